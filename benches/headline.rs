@@ -1,7 +1,7 @@
-//! The figures that glimt is judged by: whole processes, files and all, on all threads.
+//! The headline figures: whole processes, files and all, on all threads.
 //!
 //! `cargo bench --bench headline` makes its meshes and scenes in a scratch folder, renders each three times and prints the
-//! best: wall and processor time, what loading, building and rendering took of it.
+//! best: wall and processor time, with the shares of loading, building and rendering.
 
 #![allow(clippy::print_stdout)]
 
@@ -16,7 +16,7 @@ use nix::sys::time::TimeValLike;
 
 const RUNS: usize = 3;
 
-/// What a row does, its scene, the goal in words, options.
+/// A row: its title, its scene, the goal in words, options.
 struct Row {
     name: &'static str,
     goal: &'static str,
@@ -27,7 +27,7 @@ struct Row {
 fn main() -> Result<(), Box<dyn error::Error>> {
     let folder = tempfile::tempdir()?;
     let path = |name: &str| folder.path().join(name);
-    // Rings, columns and where: 871,200 and 78,804 triangles, then 1,700,168.
+    // Rings, columns and positions: 871,200 and 78,804 triangles, then 1,700,168.
     fs::write(path("large.off"), ball(660, 661, -1.1))?;
     fs::write(path("small.off"), ball(198, 200, 1.1))?;
     fs::write(path("largest.off"), ball(922, 923, 0.0))?;
@@ -82,7 +82,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     Ok(())
 }
 
-/// Render once; seconds in all and of the processor, and of the stages meshes, accel and render.
+/// Renders once; returns the seconds of the whole and of the processor, and of the stages meshes, accel and render.
 fn render(folder: &Path, options: &[&str]) -> Result<[f64; 5], Box<dyn error::Error>> {
     let processor = || -> nix::Result<f64> {
         let usage = getrusage(UsageWho::RUSAGE_CHILDREN)?;

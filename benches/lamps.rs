@@ -1,10 +1,11 @@
-//! Seconds to the same error with ever more lamps, which send the same power in all.
+//! Seconds to the same error with ever more lamps, whose total power is the same.
 //!
-//! `cargo bench --bench lamps` renders one room, lit by 10, 100, 1000 and 10,000 small lamps, by both integrators. A reference is
-//! rendered by the program itself with many samples; then four samples a pixel, three times. Errors fall with one over the
-//! samples: seconds × relMSE, by 1e-2, are the seconds to a relMSE of 1e-2, should a pixel take parts of a sample. What somebody
-//! waits for is in the last columns: the least whole number of samples whose relMSE is no more than 1e-2, and the seconds that these
-//! take, lights and render together.
+//! `cargo bench --bench lamps` renders one room, lit by 10, 100, 1000 and 10,000 small lamps, by both integrators. The program
+//! itself renders a reference with many samples; then it renders four samples a pixel, three times.
+//!
+//! Errors fall with one over the samples: (seconds × relMSE) / 1e-2 are therefore the seconds to a relMSE of 1e-2, if a pixel could
+//! take parts of a sample. The last columns give the real wait: the least whole number of samples with a relMSE of at most 1e-2,
+//! and their seconds, lights and render together.
 //! `-- whitted 10 1000` chooses rows.
 
 #![allow(clippy::print_stdout)]
@@ -17,10 +18,10 @@ use std::process::{Command, Stdio};
 
 const RUNS: usize = 3;
 
-/// What a relMSE of that takes is told.
+/// The relMSE for which the table gives seconds.
 const GOAL: f64 = 1e-2;
 
-/// No more are tried.
+/// Most samples that are tried.
 const MOST_SAMPLES: u32 = 64;
 
 fn main() -> Result<(), Box<dyn error::Error>> {
@@ -55,11 +56,11 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     Ok(())
 }
 
-/// What renders with some samples take and give.
+/// Figures of renders with some samples.
 struct Measured {
-    /// Seconds of the stage.
+    /// Seconds of the stage lights.
     lights: f64,
-    /// Of the stage render.
+    /// Seconds of the stage render.
     seconds: f64,
     /// Shadow rays.
     rays: f64,
@@ -79,7 +80,7 @@ fn measured(folder: &Path, samples: u32) -> Result<Measured, Box<dyn error::Erro
     Ok(Measured { lights, seconds, rays, relmse: error_of(folder)? })
 }
 
-/// Render once; seconds of the stages lights and render, and shadow rays.
+/// Renders once; returns the seconds of the stages lights and render, and the shadow rays.
 fn render(folder: &Path, options: &[&str]) -> Result<[f64; 3], Box<dyn error::Error>> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_glimt"));
     command.current_dir(folder).args(["scene.toml", "--once", "--report", "report.json"]).args(options);
@@ -103,7 +104,7 @@ fn error_of(folder: &Path) -> Result<f64, Box<dyn error::Error>> {
     errors["relmse"].as_f64().ok_or_else(|| "no relMSE".into())
 }
 
-/// A room with things in it, under this many balls of light, which the camera does not see.
+/// A room with objects, under this many balls of light, which the camera does not see.
 fn scene(integrator: &str, count: u32) -> String {
     let mut scene = format!(
         r#"[render]

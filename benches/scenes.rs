@@ -1,5 +1,5 @@
-//! What large scene files cost `check`: a million spheres, and files in which something stands N and 4N times, right or
-//! wrong. Processor seconds of the program; a growth well above 4 is a quadratic search.
+//! Processor time of `check` for large scene files: a million spheres, and files that repeat an element, right or
+//! wrong, N and 4N times. A growth well above 4 reveals a quadratic search.
 //!
 //! `cargo bench --bench scenes [NAME…]`
 
@@ -13,7 +13,7 @@ use nix::sys::time::TimeValLike;
 
 const HEAD: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n";
 
-/// Scene files with as many of something as asked for.
+/// Function that makes a scene file with so many elements.
 type Family = fn(usize) -> String;
 
 const FAMILIES: [(&str, Family); 14] = [

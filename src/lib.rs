@@ -1,21 +1,21 @@
 //! # glimt: a ray tracer that lives in the terminal
 //!
-//! A scene file is read, lowered to a small description, made ready to trace, rendered in passes
-//! and written as a picture; the terminal UI and `--once` drive the same pipeline by messages.
+//! glimt reads a scene file, lowers it to a small description, prepares it for tracing, renders it in passes and writes
+//! the picture. The terminal UI and `--once` drive the same pipeline by messages.
 //!
 //! ## The rooms
 //!
 //! | room | what it knows |
 //! | --- | --- |
-//! | [`system`] | the operating system's errors in plain words, which files have an end |
-//! | [`choice`](mod@choice) | values that are chosen by name |
+//! | [`system`] | the operating system: its errors in plain words, files that have an end, priorities, processor time, aborts |
+//! | [`choice`](mod@choice) | values with names: the same words in scene files, options and reports |
 //! | [`math`] | numbers, vectors, transforms, colour |
 //! | [`control`] | the cancel token and the progress sink |
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
-//! | [`accel`] | trees over boxes and ids, a closure tests the shape; over triangles, of boxes by vector instructions and of planes |
+//! | [`accel`] | trees over boxes and ids, where a closure tests the shape; trees of boxes (by vector instructions) and of planes over triangles |
 //! | [`sampling`] | sample streams, warps, distributions |
 //! | [`materials`] | phong and its lobes, mirror, glass; texture lookup, normal maps, Fresnel |
-//! | [`lights`] | point and area lights, light from beyond the scene; a tree over many; the photons that they emit |
+//! | [`lights`] | point and area lights, directional lights and environments; a tree over many lights; photon emission |
 //! | [`scene`] | the scene file: parsing, validation, diagnostics, the lowered description |
 //! | [`assets`] | bytes → meshes, textures, orbiter cameras |
 //! | [`world`] | everything ready to trace, immutable |
@@ -24,14 +24,14 @@
 //! | [`compare`] | the error of a picture against a reference |
 //! | [`output`] | encoders, atomic writes, metadata |
 //! | [`pipeline`] | stages, caches, the worker, watching files |
-//! | [`mod@bench`] | run time against error: references, estimates, tables, plots |
+//! | [`mod@bench`] | error against time: references, estimates, tables, plots |
 //! | [`tui`] | the terminal front end |
 //! | [`cli`] | arguments, the headless front end |
 //!
 //! ## The crates
 //!
-//! The rooms stand in member crates under `crates/`, so that they are compiled side by side and an edit compiles what lies above it
-//! alone; this crate hands them all on. Each crate names the rooms below it at its root: `crate::math` is the same everywhere.
+//! The rooms are in member crates under `crates/`. Crates compile side by side, and an edit only recompiles its own crate and those
+//! above it; this crate re-exports them all. Each crate names the rooms below it at its root: `crate::math` is the same everywhere.
 //!
 //! | crate | rooms |
 //! | --- | --- |
@@ -44,13 +44,13 @@
 //! | `tui` | [`tui`] |
 //! | `cli` | [`mod@bench`], [`cli`] |
 //!
-//! Nothing is optimised across crates at the end of a build: a small function that others call for each ray or sample is marked
-//! `#[inline]`.
+//! The build does no optimisation across crates: mark `#[inline]` on small functions that other crates call for each ray or
+//! sample.
 //!
 //! ## The arrows
 //!
-//! Each room uses the rooms on its right and no others; `tests/suite/house` reads the sources and holds them to
-//! this table, and the table to them. Within a room files import in one direction too, but for the pairs listed there.
+//! Each room uses the rooms on its right and no others: `tests/suite/house` compares the sources with this table.
+//! Within a room, files import in one direction too, but for the pairs listed there.
 //!
 //! ```text
 //! system      ->
@@ -77,18 +77,18 @@
 //!
 //! ## What holds everywhere
 //!
-//! - The same scene, settings and seed give the same bits, whatever the number of threads, on every machine: random
-//!   numbers are a function of pixel, sample and dimension, every sum has a fixed order, and no function of the system's
-//!   mathematical library is between a scene and its picture.
-//! - Rays travel in batches; a hit carries a bound on its error, from which the next ray starts: no distance is a
-//!   constant. Where a constant tells degenerate from usable it is relative to the size of what it judges.
-//! - A scene's coordinates are `f64`; what is traced is `f32` from an origin near what the camera looks at (`world::origin`),
-//!   meshes from one of their own.
+//! - The same scene, settings and seed give the same bits, whatever the number of threads, on every machine. Random numbers are a
+//!   function of pixel, sample and dimension, every sum has a fixed order, and no function of the system's mathematical library
+//!   affects a picture.
+//! - Rays travel in batches. A hit carries a bound on its error, from which the next ray starts: no epsilon is a constant.
+//!   A constant that separates degenerate from usable is relative to the size of what it judges.
+//! - A scene's coordinates are `f64`. Tracing uses `f32` relative to an origin near the camera's target (`world::origin`); each
+//!   mesh has an origin of its own.
 //! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
-//! - Files are touched in `assets`, `output`, `scene` (the scene, and whether what it names is there),
-//!   `pipeline::watch`, `bench::cache` and `cli::new` alone.
-//! - `unsafe` code is in `accel::wide_bvh::simd`, with a portable twin that gives the same bits, and in `system::abort`, which gives
-//!   the terminal back when an allocation fails.
+//! - Only `assets`, `output`, `scene` (the scene, and whether the files that it names exist), `pipeline::watch`, `bench::cache` and
+//!   `cli::new` access files.
+//! - `unsafe` code is in `accel::wide_bvh::simd`, with a portable twin that gives the same bits, and in `system::abort`, which
+//!   restores the terminal if an allocation fails.
 //! - `tui` does not know `world`; `world` does not know pixels or time.
 
 pub use glimt_base::{choice, control, film, math, sampling, system};

@@ -1,4 +1,4 @@
-//! Keys on the camera: the first changed cell after one, and pictures a second while one is held.
+//! Keys on the camera: the first changed cell after a press, and pictures a second while a key is held.
 
 use std::path::Path;
 use std::thread;
@@ -8,9 +8,9 @@ use super::terminal::{Cells, Terminal};
 use super::{COLUMNS, PAUSE, ROUNDS, ROWS, figures};
 use crate::Outcome;
 
-/// How long a key is held.
+/// Time for which a key is held.
 const HELD: Duration = Duration::from_secs(2);
-/// How often it repeats.
+/// Time between its repeats.
 const REPEAT: Duration = Duration::from_millis(33);
 
 /// A line of figures for a scene of this path.
@@ -30,8 +30,8 @@ pub fn row(folder: &Path, scene: &Path) -> Outcome<String> {
     Ok(format!("first {}  held {:5.1} pictures a second", figures(times), held(&mut terminal)?))
 }
 
-/// A key that repeats as keyboards do, to and fro. What is finer of the same camera comes later than the next press, so that each
-/// burst of bytes is a picture of another camera.
+/// Holds a key that repeats as keyboards do, to and fro. Refined pictures of the same camera come later than the next press, so
+/// that each burst of bytes is a picture of another camera.
 fn held(terminal: &mut Terminal) -> Outcome<f64> {
     terminal.cells();
     let begin = Instant::now();
@@ -44,7 +44,7 @@ fn held(terminal: &mut Terminal) -> Outcome<f64> {
     Ok(terminal.bursts() as f64 / begin.elapsed().as_secs_f64())
 }
 
-/// Less noise is not another picture.
+/// Whether another picture is shown; less noise does not count.
 fn is_other(before: &Cells, now: &Cells) -> bool {
     let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     let far = |(a, b): &([[u8; 3]; 2], [[u8; 3]; 2])| {

@@ -1,4 +1,4 @@
-//! How soon the worker is free for a newer request, whatever it is doing.
+//! Time until the worker is free for a newer request, whatever it is doing.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -11,8 +11,8 @@ use super::Outcome;
 
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// Stopped after 0, 1, 2, … 60 ms, at first with nothing loaded: while the scene is read, its trees are built, the
-/// first picture and the first passes are traced; then well into the render.
+/// Times of cancellations after 0, 1, 2, … 60 ms, at first with nothing loaded: while the worker reads the scene,
+/// builds its trees, traces the first picture and the first passes; then well into the render.
 pub fn times(scene: &Path) -> Outcome<Vec<Duration>> {
     let mut times = Vec::new();
     for step in 0..12 {

@@ -1,12 +1,14 @@
-//! From a save or a key to the first changed cell of the picture, and how soon a render stops.
+//! Latency: from a save or a key to the first changed cell of the picture, and until a render stops.
 //!
-//! `cargo bench --bench latency [-- [settled] [busy] [cancel] [camera] [SCENE…]]` copies scenes and assets into a scratch folder, runs
-//! glimt on each in a pseudo-terminal of 120×40 cells, edits the file, presses keys, and prints medians and maxima in
-//! milliseconds: from before the file is written, or the key pressed, until the terminal has read the first bytes
-//! that change the picture. `settled`: nothing is rendering when the file is saved; `busy`: the picture before it still is.
-//! Another build of the program may be named by `GLIMT`. `cancel`: from a newer request until the worker takes it up, whatever it was doing.
-//! `camera`: keys on the camera while the picture before is being rendered, on every bundled scene: the first changed cell, and how
-//! many pictures a second are seen while a key is held.
+//! `cargo bench --bench latency [-- [settled] [busy] [cancel] [camera] [SCENE…]]` copies scenes and assets into a scratch folder,
+//! runs glimt on each in a pseudo-terminal of 120×40 cells, edits the file, presses keys, and prints medians and maxima in
+//! milliseconds. A time runs from before the file is written, or the key pressed, until the terminal has read the first bytes that
+//! change the picture.
+//!
+//! `settled` saves the file while nothing is rendering; `busy` while the previous picture still is. `GLIMT` may name another build
+//! of the program. `cancel` measures from a newer request until the worker takes it up, whatever it was doing. `camera` presses
+//! camera keys while the previous picture is being rendered, on every bundled scene: the first changed cell, and the number of
+//! pictures a second while a key is held.
 
 #![allow(clippy::print_stdout)]
 
@@ -28,7 +30,7 @@ const COLUMNS: u16 = 120;
 const ROWS: u16 = 40;
 /// Measurements of each kind.
 const ROUNDS: usize = 7;
-/// After a save, nothing is asked of the machine for this long.
+/// Pause after a save, in which the machine does nothing else.
 const PAUSE: Duration = Duration::from_millis(300);
 
 fn main() -> Outcome<()> {
@@ -80,7 +82,7 @@ impl Mode {
         }
     }
 
-    /// Whether the picture is another one. While it is still being rendered, less noise is not a change.
+    /// Whether the picture is another one. While it is still being rendered, less noise does not count.
     fn is_other(self, before: &Cells, now: &Cells) -> bool {
         let differ = |most: u8| {
             let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
@@ -96,7 +98,7 @@ impl Mode {
     }
 }
 
-/// One scene: every edit, every key.
+/// Measures one scene: every edit, every key.
 fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
     let path = copies.scene(scene);
     let path = path.to_str().ok_or("a name that is no text")?;
@@ -104,7 +106,7 @@ fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
     let arguments = [path, "--samples", samples, "-o", "out.png"];
     let mut terminal = Terminal::open(copies.folder(), &arguments, COLUMNS, ROWS)?;
     terminal.wait("a picture", |screen| screen.contents().contains('▀'))?;
-    // Files whose times are this old need not be read to be known.
+    // Wait until the files are so old that their times alone identify them.
     std::thread::sleep(Duration::from_millis(2500));
     let mut words = Vec::new();
     for edit in scene.edits {
@@ -124,7 +126,7 @@ fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
     for key in scene.keys {
         let mut times = Vec::new();
         for _ in 0..ROUNDS {
-            // Another picture each time, so that none is found among those that are kept. The camera changes every view.
+            // Each request is for another picture, so that none is cached. The camera changes every view.
             ready(&mut terminal, mode)?;
             let (file, bytes) = copies.edit(scene, scene.camera())?;
             fs::write(&file, &bytes)?;
@@ -143,7 +145,7 @@ fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
     Ok(())
 }
 
-/// The picture before something is done.
+/// Waits for the picture before an edit or a key.
 fn ready(terminal: &mut Terminal, mode: Mode) -> Outcome<Cells> {
     if mode == Mode::Settled {
         terminal.wait("the end of the render", |screen| {

@@ -1,19 +1,19 @@
-//! What is edited in the bundled scenes.
+//! Edits of the bundled scenes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::Outcome;
 
-/// A bundled scene with edits of it: what kind, what is replaced and by what. `{}` stands for a number between 0.1
-/// and 1 that is another one each time; without it, the file of this name is a picture that gets darker by it.
+/// A bundled scene with edits of it: the kind, the replaced text and its replacement. `{}` stands for a number between
+/// 0.1 and 1 that differs each time; without `{}`, the edit darkens the picture file of this name.
 pub struct Scene {
     pub name: &'static str,
     pub edits: &'static [Edit],
     pub keys: &'static [&'static str],
 }
 
-/// The kind, what is replaced, by what.
+/// The kind of an edit, the replaced text, its replacement.
 pub type Edit = (&'static str, &'static str, &'static str);
 
 impl Scene {
@@ -115,7 +115,7 @@ pub struct Copies {
 }
 
 impl Copies {
-    /// All of them, with the large mesh that is made.
+    /// Copies all of them, with the large mesh, which is generated.
     pub fn new() -> Outcome<Self> {
         let folder = tempfile::tempdir()?;
         let project = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -153,7 +153,7 @@ impl Copies {
         self.folder.path().join("scenes").join(scene.name).with_extension("toml")
     }
 
-    /// The file that an edit changes, and what it holds then.
+    /// The file that an edit changes, and its new content.
     pub fn edit(&mut self, scene: &Scene, (_, from, to): Edit) -> Outcome<(PathBuf, Vec<u8>)> {
         self.edits += 1;
         let number = 0.1 + f64::from(self.edits) * 0.377 % 0.9;

@@ -1,5 +1,5 @@
-//! A terminal that notes when bytes came and looks at them later, so that it takes no time from the program while
-//! something is measured.
+//! A terminal that notes the times of bytes and parses them later, so that it takes no time from the program during a
+//! measurement.
 
 use std::io::{Read, Write};
 use std::num::NonZeroU16;
@@ -12,10 +12,10 @@ use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system}
 
 use super::Outcome;
 
-/// Nothing that is waited for takes this long.
+/// Longest time to wait for anything.
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// Bytes that the program wrote, and when.
+/// Bytes that the program wrote, with their time.
 type Chunk = (Instant, Vec<u8>);
 
 /// The program in a pseudo-terminal of truecolour.
@@ -32,7 +32,7 @@ pub struct Terminal {
 pub type Cells = Vec<Option<[[u8; 3]; 2]>>;
 
 impl Terminal {
-    /// Start the program in this folder.
+    /// Starts the program in this folder.
     pub fn open(folder: &Path, arguments: &[&str], columns: u16, rows: u16) -> Outcome<Self> {
         let size = PtySize { rows, cols: columns, pixel_width: 0, pixel_height: 0 };
         let pair = native_pty_system().openpty(size)?;
@@ -54,12 +54,12 @@ impl Terminal {
         Ok(Self { _master: pair.master, child, keys, chunks, screen })
     }
 
-    /// Type these characters.
+    /// Types these characters.
     pub fn press(&self, keys: &str) -> Outcome<()> {
         Ok(lock(&self.keys).write_all(keys.as_bytes())?)
     }
 
-    /// Wait until the screen is as told.
+    /// Waits until the screen satisfies `holds`.
     pub fn wait(&mut self, what: &str, holds: impl Fn(&vt100::Screen) -> bool) -> Outcome<()> {
         let deadline = Instant::now() + LIMIT;
         loop {
@@ -74,13 +74,13 @@ impl Terminal {
         }
     }
 
-    /// What the picture is now.
+    /// Current cells of the picture.
     pub fn cells(&mut self) -> Cells {
         self.catch_up();
         cells(self.screen.screen())
     }
 
-    /// When the picture first differed as told, looked for once `pause` is over and then until it is found.
+    /// Time at which the picture first satisfies `differs`, searched for once `pause` is over, then until it is found.
     pub fn when(&mut self, pause: Duration, differs: impl Fn(&Cells) -> bool) -> Outcome<Instant> {
         let deadline = Instant::now() + LIMIT;
         thread::sleep(pause);
@@ -101,7 +101,7 @@ impl Terminal {
         Err(format!("the picture does not change\n{}", self.screen.screen().contents()).into())
     }
 
-    /// How often bytes enough for a picture came after a pause.
+    /// Number of bursts, after a pause, with enough bytes for a picture.
     pub fn bursts(&mut self) -> usize {
         const LEAST: usize = 300;
         const GAP: Duration = Duration::from_millis(8);
@@ -126,7 +126,7 @@ impl Terminal {
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        // The figures are there; how it ends is of no interest.
+        // The measurement is complete; a failure to end the program does not matter.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -136,7 +136,7 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Note what comes, and answer what a terminal is asked: whether it is there, and what it is.
+/// Notes incoming bytes, and answers the program's queries: whether there is a terminal, and its kind.
 fn read(
     mut output: Box<dyn Read + Send>,
     chunks: Arc<Mutex<Vec<Chunk>>>,
@@ -156,7 +156,7 @@ fn read(
                     let _ = lock(&keys).write_all(answer);
                 }
             }
-            // A question may be cut.
+            // A query may be cut in two.
             tail.drain(..tail.len().saturating_sub(3));
         }
     });

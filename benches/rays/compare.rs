@@ -1,4 +1,4 @@
-//! Hits against those that a file says.
+//! Comparison of hits with those in a file.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use glimt::math::DVec3;
 
 use crate::meshes;
 
-/// Trace the rays of a file and count what differs from the answers in another: hits (`.hits`), or a byte for each ray whether it
-/// is occluded.
+/// Traces the rays of a file and counts the differences from the answers in another file: hits (`.hits`), or a byte for each ray
+/// that says whether it is occluded.
 pub fn compare(tree: &WideBvh, mesh: &TriangleMesh, rays: &Path, answers: &Path) -> std::io::Result<()> {
     let rays_read = meshes::ray_file(rays)?;
     let name =
@@ -43,14 +43,14 @@ fn closest(tree: &WideBvh, mesh: &TriangleMesh, rays: &[Ray], answers: &[Option<
     );
 }
 
-/// How many rays differ, and how many of those pass an edge by less than rounding can tell.
+/// Reports how many rays differ, and how many of these pass an edge within rounding.
 fn report<'a>(mesh: &TriangleMesh, differing: impl Iterator<Item = &'a Ray>) {
     let differing: Vec<_> = differing.collect();
     let on_edge = differing.iter().filter(|ray| passes_edge(mesh, ray)).count();
     println!("    hit or miss differs {}, {on_edge} of them within 4 ulp of an edge", differing.len());
 }
 
-/// Whether the ray passes an edge of some triangle at no more than 4 ulp of the coordinates that are told apart.
+/// Whether the ray passes an edge of some triangle within 4 ulp of the compared coordinates.
 fn passes_edge(mesh: &TriangleMesh, ray: &Ray) -> bool {
     let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3().normalize());
     (0..mesh.triangles.len() as u32).any(|id| {
@@ -66,9 +66,9 @@ fn passes_edge(mesh: &TriangleMesh, ray: &Ray) -> bool {
     })
 }
 
-/// How far a line and a segment are apart.
+/// Distance of a line and a segment.
 fn distance(origin: DVec3, direction: DVec3, a: DVec3, b: DVec3) -> f64 {
-    // Seen along the line, the segment is one of the plane across it.
+    // Project along the line: the segment is then one in the plane across it.
     let flat = |p: DVec3| (p - origin) - direction * (p - origin).dot(direction);
     let (a, b) = (flat(a), flat(b));
     let along = b - a;

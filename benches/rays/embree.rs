@@ -1,4 +1,4 @@
-//! Embree 4 by its C interface, loaded at run time from a path that the user gives: the peer to stand beside.
+//! Embree 4 by its C interface, loaded at run time from a path that the user gives, for comparison.
 //!
 //! Names, numbers and layouts are those of the headers `rtcore_common.h`, `rtcore_ray.h`, `rtcore_buffer.h` and
 //! `rtcore_scene.h` of Embree 4.
@@ -25,7 +25,7 @@ const FORMAT_FLOAT3: c_int = 0x9003;
 const SCENE_FLAG_ROBUST: c_int = 1 << 2;
 const RAY_QUERY_FLAG_COHERENT: c_int = 1 << 16;
 
-/// How much work goes into a tree.
+/// Effort of building a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
     /// `RTC_BUILD_QUALITY_MEDIUM`, its default.
@@ -80,7 +80,7 @@ struct Arguments {
 
 type Handle = *mut c_void;
 
-/// What is called for every ray.
+/// Functions that are called for every ray.
 #[derive(Clone, Copy)]
 struct Queries {
     intersect1: unsafe extern "C" fn(Handle, *mut RayHit, *const Arguments),
@@ -100,7 +100,7 @@ pub struct Scene<'a> {
     _mesh: &'a TriangleMesh,
     device: Handle,
     scene: Handle,
-    /// Bytes that the library holds for it, by its own account.
+    /// Bytes that the library takes for it, by its own count.
     pub memory_bytes: usize,
 }
 
@@ -112,7 +112,7 @@ extern "C" fn count_memory(_user: *mut c_void, bytes: isize, _post: bool) -> boo
 }
 
 impl Embree {
-    /// Load it.
+    /// Loads the library.
     pub fn load(path: &Path) -> Result<Self, libloading::Error> {
         // SAFETY: the user names a library to run; Embree's initialisers ask for nothing.
         let library = unsafe { Library::new(path)? };
@@ -136,7 +136,7 @@ impl Embree {
         unsafe { self.library.get(name.as_bytes()) }.unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    /// Build the tree over a mesh by `threads` threads.
+    /// Builds the tree over a mesh by `threads` threads.
     pub fn build<'a>(
         &'a self,
         mesh: &'a TriangleMesh,
@@ -215,7 +215,7 @@ impl Embree {
 }
 
 impl Scene<'_> {
-    /// Build the tree: the time of this is the build time.
+    /// Builds the tree; this call is timed as the build.
     pub fn commit(&mut self) {
         // SAFETY: the scene is alive.
         unsafe { self.embree.function::<unsafe extern "C" fn(Handle)>("rtcCommitScene")(self.scene) };
@@ -240,7 +240,7 @@ impl Scene<'_> {
         query.t_far < 0.0
     }
 
-    /// Primitives that sixteen rays at a time hit; as many as there are whole sixteens.
+    /// Number of primitives that rays hit, traced sixteen at a time; a remainder is left out.
     pub fn closest16(&self, rays: &[Ray], coherent: bool) -> usize {
         let arguments = Arguments {
             flags: if coherent { RAY_QUERY_FLAG_COHERENT } else { 0 },

@@ -1,17 +1,17 @@
-//! The ray kernel: what building takes and holds, and millions of rays a second, on one thread and on all: primary rays,
-//! one cosine-distributed bounce, any hit towards a point light.
+//! The ray kernel: time and memory of building, and millions of rays a second, on one thread and on all. Rays are
+//! primary rays, one cosine-distributed bounce, and shadow rays (any hit) towards a point light.
 //!
 //! - `cargo bench --bench rays` runs on generated meshes, `-- a.ply b.obj c.mesh` on files; `-- ball` on a generated one
 //!   of a million triangles.
-//! - `--embree LIB` stands the same beside Embree 4: `LIB` is a `libembree4.so`, its scene robust and of medium quality.
-//!   `--embree-isa avx512` lets it use those (its packets of 16 need them, its single rays are faster by AVX2).
-//! - `--instructions NAME` traverses by those alone.
-//! - `--high` cuts large triangles first, `Quality::High`, also Embree's.
+//! - `--embree LIB` compares with Embree 4: `LIB` is a `libembree4.so`; its scene is robust and of medium quality.
+//!   `--embree-isa avx512` lets it use AVX-512 (its packets of 16 need it, its single rays are faster by AVX2).
+//! - `--instructions NAME` traverses by these instructions alone.
+//! - `--high` cuts large triangles first, `Quality::High`, also in Embree.
 //! - `--build` builds and traces nothing.
-//! - `--rays FILE --hits FILE` (or `--occluded FILE`), any number of times, counts what differs from given answers.
+//! - `--rays FILE --hits FILE` (or `--occluded FILE`), any number of times, counts differences from given answers.
 //!
-//! Runs of glimt and of the peer alternate chunk by chunk, and each chunk counts by its fastest run, so that what else
-//! the machine does falls on both alike or not at all.
+//! Runs of glimt and of Embree alternate chunk by chunk, and each chunk counts by its fastest run. Other load on the
+//! machine therefore affects both alike, or neither.
 
 #![allow(clippy::print_stdout)]
 
@@ -30,7 +30,7 @@ use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use rayon::prelude::*;
 
-/// Chunks are timed this often.
+/// Number of timed runs of each chunk.
 const RUNS: usize = 7;
 
 /// Rays of a chunk.
@@ -170,7 +170,7 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
     }
 }
 
-/// The same by all threads: packets of primary and shadow rays, single diffuse ones.
+/// The rates on all threads: packets of primary and shadow rays, single diffuse ones.
 fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
     let chunks = |rays: &[Ray], way: &(dyn Fn(&[Ray]) -> usize + Sync)| {
         let mut best = f64::INFINITY;
@@ -205,7 +205,7 @@ fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
     line("shadow", "Mrays/s", chunks(&rays.shadow, &any), None);
 }
 
-/// The same of the tree of planes.
+/// The rates of the tree of planes.
 fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
     let count = mesh.triangles.len() as u32;
     let build = || KdTree::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("nobody cancels");
@@ -227,7 +227,7 @@ fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
     line("shadow", "Mrays/s", rates(&rays.shadow, [&mut any])[0], None);
 }
 
-/// A figure, the peer's, and how they stand.
+/// Prints a figure, Embree's, and their ratio.
 fn line(name: &str, unit: &str, own: f64, peer: Option<f64>) {
     match peer {
         Some(peer) => println!("  {name:<10} {unit:>9} {own:>9.3} {peer:>9.3}  ratio {:.3}", own / peer),
@@ -259,7 +259,7 @@ fn any(name: &str, tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray]) {
     }
 }
 
-/// Sixteen rays at a time; the peer's once as they are and once told that they are coherent.
+/// Rates for sixteen rays at a time; Embree's with and without the hint that they are coherent.
 fn packets(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &meshes::Rays) {
     let mut closest = |rays: &[Ray]| {
         let mut found = 0;
@@ -291,7 +291,7 @@ fn packets(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &meshes::Rays) {
 /// Traces rays and counts what is hit.
 type Way<'a> = &'a mut dyn FnMut(&[Ray]) -> usize;
 
-/// Millions of rays a second of each way to trace them; every chunk counts by the fastest of its runs.
+/// Millions of rays a second by each function; every chunk counts by the fastest of its runs.
 fn rates<const N: usize>(rays: &[Ray], mut ways: [Way<'_>; N]) -> [f64; N] {
     let mut total = [0.0; N];
     for chunk in rays.chunks(CHUNK) {

@@ -1,4 +1,4 @@
-//! What is measured: generated meshes, meshes and rays from files, rays made for a mesh.
+//! Test data: generated meshes, meshes and rays from files, rays generated for a mesh.
 
 use std::io;
 use std::path::Path;
@@ -13,10 +13,10 @@ use glimt::math::frame::Frame;
 use glimt::math::{Vec2, Vec3};
 use glimt::sampling::{CAMERA_PATH, Decision, PixelSampler, warp};
 
-/// Pixels of a side: a million rays.
+/// Pixels along a side: a million rays.
 const SIDE: u32 = 1000;
 
-/// A closed ball with bumps: `rings` rings of twice as many squares of two triangles, less the poles' halves.
+/// A closed ball with bumps: `rings` rings of twice as many squares of two triangles, less half of those at the poles.
 pub fn rippled_ball(rings: u32) -> TriangleMesh {
     let columns = rings;
     let point = |ring: u32, column: u32| {
@@ -40,7 +40,8 @@ pub fn rippled_ball(rings: u32) -> TriangleMesh {
     mesh
 }
 
-/// A mesh file that glimt reads, or one of counts, positions and indices as they lie in memory (`.mesh`).
+/// Reads a mesh file in a format that glimt knows, or one of counts, positions and indices as they lie in memory
+/// (`.mesh`).
 pub fn load(path: &Path) -> Result<TriangleMesh, String> {
     if path.extension().is_some_and(|ending| ending == "mesh") {
         return raw_mesh(&std::fs::read(path).map_err(|error| error.to_string())?)
@@ -70,11 +71,11 @@ fn raw_mesh(bytes: &[u8]) -> io::Result<TriangleMesh> {
 
 /// Rays of one kind.
 pub struct Rays {
-    /// From outside, in the order of pixels.
+    /// Rays from outside, in the order of pixels.
     pub primary: Vec<Ray>,
-    /// From their hits, cosine-distributed.
+    /// Cosine-distributed rays from their hits.
     pub diffuse: Vec<Ray>,
-    /// From their hits to a point light.
+    /// Rays from their hits to a point light.
     pub shadow: Vec<Ray>,
 }
 

@@ -1,9 +1,10 @@
-//! What scenes do not use costs nothing: renders in turns, without and with it.
+//! Unused features must cost nothing: renders in turns, without and with them.
 //!
-//! `cargo bench --bench skips` prints for each pair the least seconds without, the median of the ratios of its rounds with its standard
-//! error, the ratio of the instructions that valgrind counts in smaller pictures, where that is installed, and whether the pictures have
-//! the same bits; it ends by 1 where the instructions (else the seconds) differ by more than 1 %, or bits differ. Times of other
-//! programs' work are in the seconds; instructions are those of this one alone. `-- WORD` chooses pairs, `-- rounds=N` how many rounds.
+//! `cargo bench --bench skips` prints for each pair: the least seconds without the feature; the median of the ratios of its rounds
+//! with its standard error; the ratio of the instructions that valgrind, if installed, counts in smaller pictures; and whether the
+//! pictures have the same bits. It exits with 1 if the instructions (without valgrind, the seconds) differ by more than 1 %, or
+//! bits differ. Seconds include the load of other programs; instructions are those of this program alone. `-- WORD` chooses pairs,
+//! `-- rounds=N` the number of rounds.
 
 #![allow(clippy::print_stdout)]
 
@@ -20,7 +21,7 @@ use std::process::{Command, ExitCode};
 use pairs::Pair;
 use row::Picture;
 
-/// How far from 1 a ratio may be.
+/// Largest deviation of a ratio from 1.
 const BOUND: f64 = 0.01;
 
 /// Width, height and samples: a fifth of a second.
@@ -58,20 +59,20 @@ fn main() -> ExitCode {
     ExitCode::from(u8::from(faulty))
 }
 
-/// What the rounds of a pair came to.
+/// Results of the rounds of a pair.
 struct Paired {
-    /// The least, without.
+    /// Least seconds, without the feature.
     seconds: f64,
     /// The median of the ratios of the rounds.
     ratio: f64,
     /// Its standard error.
     error: f64,
     is_same: bool,
-    /// Why the report says that a stage was skipped.
+    /// Reason in the report for which a stage was skipped.
     said: String,
 }
 
-/// Rounds in turns; which one is first changes from round to round.
+/// Runs rounds in turns; the first of a round changes from round to round.
 fn ratios(pair: &Pair, rounds: usize) -> Result<Paired, String> {
     let (mut ratios, mut seconds, mut is_same, mut said) = (Vec::new(), f64::INFINITY, true, String::new());
     for round in 0..rounds.max(1) {
@@ -94,12 +95,12 @@ fn ratios(pair: &Pair, rounds: usize) -> Result<Paired, String> {
     Ok(Paired { seconds, ratio: at(2), error, is_same, said })
 }
 
-/// Millions of instructions of a smaller picture, by valgrind; none where it is not installed or fails.
+/// Millions of instructions of a smaller picture, by valgrind. `None` if valgrind is not installed or fails.
 fn instructions(picture: &Picture) -> Option<f64> {
     let folder = tempfile::tempdir().ok()?;
     let mut program = Command::new("valgrind");
     program.args(["--tool=callgrind", "--callgrind-out-file=/dev/null", env!("CARGO_BIN_EXE_glimt")]);
-    // It knows no AVX-512.
+    // valgrind does not know AVX-512.
     program.env("GLIMT_SIMD", "avx2");
     let mut command = run::call(folder.path(), picture, program).ok()?;
     let output =
@@ -110,7 +111,7 @@ fn instructions(picture: &Picture) -> Option<f64> {
     count.split_whitespace().next()?.parse::<f64>().ok().map(|count| count * 1e-6)
 }
 
-/// What the report says of a stage.
+/// The report's reason for the state of a stage.
 fn why(report: &serde_json::Value, stage: &str) -> String {
     let stages = report["stages"].as_array().into_iter().flatten();
     let said = stages.filter(|one| one["name"] == stage);

@@ -1,17 +1,17 @@
-//! Scenes with something that they do not use, on and off.
+//! Scenes with a feature that they do not use, on and off.
 
 use super::row::Picture;
 
-/// The same picture without and with what the scene does not use.
+/// A picture without and with a feature that the scene does not use.
 pub(crate) struct Pair {
     pub(crate) name: &'static str,
     pub(crate) off: Picture,
     pub(crate) on: Picture,
-    /// A stage that the report calls skipped with `on`, and a part of why.
+    /// A stage that the report calls skipped with `on`, and a part of the reason.
     pub(crate) skipped: Option<(&'static str, &'static str)>,
 }
 
-/// A small room; `RENDER` keys, `CAMERA` keys and what else there is can be put in.
+/// A small room; `RENDER` keys, `CAMERA` keys and other elements can be inserted.
 const ROOM: &str = r#"
 [render]
 width = WIDTH
@@ -47,7 +47,7 @@ const LAMP: &str = "[materials.lamp]\nemission = 5\n[[quad]]\ncorner = [-0.5, 3,
 
 const PICTURE: &str = "P3 2 2 255 90 120 200 20 30 40 255 250 200 70 70 80";
 
-/// All of them, in pictures of this size.
+/// All pairs, in pictures of this size.
 pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<Pair> {
     let scene = |render: &str, camera: &str, ball: &str, rest: &str| {
         let size = [("WIDTH", width), ("HEIGHT", height), ("SAMPLES", samples)];

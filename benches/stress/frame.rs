@@ -1,4 +1,4 @@
-//! A scene in a frame: where its origin is and how long its unit of length.
+//! A frame of a scene: its origin and its unit of length.
 
 /// Origin and unit of length.
 #[derive(Clone, Copy)]
@@ -11,15 +11,15 @@ pub(crate) struct Frame {
 const SIZE: f64 = 8.0;
 
 impl Frame {
-    /// Nothing moved, nothing scaled.
+    /// The frame that moves and scales nothing.
     pub(crate) const PLAIN: Self = Self { at: [0.0; 3], unit: 1.0 };
 
-    /// 2ᵏ times as large.
+    /// A frame 2ᵏ times as large.
     pub(crate) fn scaled(k: i32) -> Self {
         Self { unit: 2.0_f64.powi(k), ..Self::PLAIN }
     }
 
-    /// Moved by so many times the scene's size.
+    /// A frame moved by so many times the scene's size.
     pub(crate) fn moved(sizes: f64) -> Self {
         Self { at: [SIZE * sizes, -0.5 * SIZE * sizes, 0.25 * SIZE * sizes], ..Self::PLAIN }
     }
@@ -31,7 +31,7 @@ impl Frame {
         format!("[{:?}, {:?}, {:?}]", at_x + x, at_y + y, at_z + z)
     }
 
-    /// The way from one point to another.
+    /// The vector from one point to another.
     pub(crate) fn way(self, x: f64, y: f64, z: f64) -> String {
         Self { at: [0.0; 3], ..self }.point(x, y, z)
     }
@@ -41,7 +41,7 @@ impl Frame {
         format!("{:?}", x * self.unit)
     }
 
-    /// An intensity that gives the same light over distances of this frame.
+    /// An intensity that gives the same irradiance at distances of this frame.
     pub(crate) fn intensity(self, x: f64) -> String {
         format!("{:?}", x * self.unit * self.unit)
     }

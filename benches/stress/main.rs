@@ -1,7 +1,7 @@
-//! The program at the ends of what scenes may be: every case beside a plain twin, of which the right answer or the cost is known.
+//! The program at the limits of scenes: every case beside a plain twin, whose right answer or cost is known.
 //!
-//! `cargo bench --bench stress` renders all, prints the table and writes it to `benches/stress/table.md`; `-- WORD` only the rows
-//! that have the word, printed. It ends by 1 where a row is not within its bounds.
+//! `cargo bench --bench stress` renders all cases, prints the table and writes it to `benches/stress/table.md`; `-- WORD` only
+//! prints the rows that contain the word. It exits with 1 if a row is not within its bounds.
 
 #![allow(clippy::print_stdout)]
 
@@ -17,7 +17,7 @@ use std::process::ExitCode;
 
 use row::{Extent, Figure, Row};
 
-/// Renders of a row whose time is compared.
+/// Renders of a timed row.
 const ROUNDS: u32 = 3;
 
 fn main() -> ExitCode {

@@ -1,4 +1,4 @@
-//! What is rendered and what it is held against.
+//! Rows of the table: pictures, their twins, and bounds.
 
 /// A scene file and the files that it names.
 #[derive(Clone)]
@@ -25,12 +25,12 @@ impl Picture {
     }
 }
 
-/// What a row measures.
+/// Measure of a row.
 #[derive(Clone, Copy)]
 pub(crate) enum Figure {
     /// √(Σ(t·a − b)²/Σb²) of the picture a and its twin b, t given.
     Difference(f64),
-    /// How far the mean of the picture is from the right answer, relative to that.
+    /// Deviation of the picture's mean from the right answer, relative to it.
     Mean(f64),
 }
 
@@ -40,32 +40,32 @@ pub(crate) struct Row {
     pub(crate) pairs: Vec<(Picture, Picture)>,
     pub(crate) figure: Figure,
     pub(crate) bound: f64,
-    /// Whether the twin is as much work, so that no more than three times its time may be taken.
+    /// Whether the case is as much work as its twin, so that it may take at most three times its time.
     pub(crate) is_timed: bool,
 }
 
 impl Row {
-    /// Pictures that are to look like their twins.
+    /// A row of pictures that must look like their twins.
     pub(crate) fn alike(name: impl Into<String>, pairs: Vec<(Picture, Picture)>, bound: f64) -> Self {
         Self { name: name.into(), pairs, figure: Figure::Difference(1.0), bound, is_timed: false }
     }
 
-    /// A picture whose mean is known.
+    /// A row for a picture whose mean is known.
     pub(crate) fn mean(name: impl Into<String>, pair: (Picture, Picture), mean: f64, bound: f64) -> Self {
         Self { name: name.into(), pairs: vec![pair], figure: Figure::Mean(mean), bound, is_timed: false }
     }
 
-    /// The twin is as much work.
+    /// The row with its time compared: the twin is as much work.
     pub(crate) fn timed(self) -> Self {
         Self { is_timed: true, ..self }
     }
 }
 
-/// How many of the cases.
+/// Extent of the cases.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Extent {
-    /// For every run of the tests.
+    /// The cases for every run of the tests.
     Short,
-    /// All.
+    /// All cases.
     Long,
 }

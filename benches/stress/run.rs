@@ -1,4 +1,4 @@
-//! Render by the program and compare.
+//! Renders by the program and compares.
 
 use std::fs;
 use std::path::Path;
@@ -7,39 +7,39 @@ use std::time::{Duration, Instant};
 
 use super::row::{Figure, Picture, Row};
 
-/// A render that takes longer hangs.
+/// Longest time of a render; a longer one hangs.
 const LONGEST: Duration = Duration::from_secs(120);
 
-/// Times of its twin's seconds that a case may take.
+/// Most time of a case, in times of its twin's.
 pub(crate) const MOST_SLOWER: f64 = 3.0;
 
 /// A rendered picture.
 #[derive(Clone)]
 pub(crate) struct Rendered {
     pub(crate) pixels: Vec<f32>,
-    /// Of all stages but reading and writing.
+    /// Seconds of all stages but reading and writing.
     pub(crate) seconds: f64,
     pub(crate) non_finite: u64,
-    /// As it was written.
+    /// Report as it was written.
     pub(crate) report: serde_json::Value,
 }
 
-/// What a row came to.
+/// Results of a row.
 pub(crate) struct Measured {
     /// The worst figure.
     pub(crate) figure: f64,
     pub(crate) non_finite: u64,
-    /// In all, of the cases and of their twins.
+    /// Seconds in all, of the cases and of their twins.
     pub(crate) seconds: [f64; 2],
 }
 
 impl Measured {
-    /// Whether the pictures are within their bound; whatever the time.
+    /// Whether the pictures are within their bound; times do not count.
     pub(crate) fn is_right(&self, row: &Row) -> bool {
         self.figure <= row.bound && self.non_finite == 0
     }
 
-    /// What is wrong with it; nothing is the goal.
+    /// Faults of the row; the goal is an empty list.
     pub(crate) fn faults(&self, row: &Row) -> Vec<&'static str> {
         let slower = self.seconds[0] / self.seconds[1];
         let faults = [
@@ -51,7 +51,7 @@ impl Measured {
     }
 }
 
-/// Render all of a row, `rounds` times in turns; the shortest times count.
+/// Renders all pictures of a row, `rounds` times in turns; the shortest times count.
 ///
 /// # Errors
 /// The program failed, crashed or took too long.
@@ -70,7 +70,7 @@ pub(crate) fn measure(row: &Row, rounds: u32) -> Result<Measured, String> {
             case_of.seconds = case_of.seconds.min(render(case)?.seconds);
             twin_of.seconds = twin_of.seconds.min(render(twin)?.seconds);
         }
-        // A NaN is the worst of all.
+        // A NaN counts as the worst figure.
         let figure = figure(row.figure, &case_of.pixels, &twin_of.pixels)?;
         measured.figure = if figure <= measured.figure { measured.figure } else { figure };
         measured.non_finite += case_of.non_finite + twin_of.non_finite;
@@ -98,7 +98,7 @@ fn figure(figure: Figure, case: &[f32], twin: &[f32]) -> Result<f64, String> {
     })
 }
 
-/// Render once, on one thread.
+/// Renders once, on one thread.
 ///
 /// # Errors
 /// The program failed, crashed or took too long.
@@ -107,7 +107,7 @@ pub(crate) fn render(picture: &Picture) -> Result<Rendered, String> {
     render_in(folder.path(), picture)
 }
 
-/// The program, or another one that runs it, called to render a picture in a folder, on one thread.
+/// A command of the program, or of another one that runs it, to render a picture in a folder, on one thread.
 ///
 /// # Errors
 /// Files cannot be written.

@@ -1,7 +1,7 @@
-//! How near what a terminal shows comes to the picture.
+//! Fidelity of the terminal's output to the picture.
 //!
-//! Cells become pixels, and these are compared with the picture in Oklab: as they are, and blurred as an eye blurs
-//! them that does not look at single cells; characters as their mean. Beside it chafa, with the same characters and its best dithering.
+//! Cells become pixels, and these are compared with the picture in Oklab: as they are, and blurred as by an eye that does not look
+//! at single cells. Characters count by their mean. chafa is measured beside it, with the same characters and its best dithering.
 
 use std::error::Error;
 use std::path::Path;
@@ -20,10 +20,11 @@ const CELL: (usize, usize) = (12, 24);
 /// The blur, in pixels: a quarter of a cell's height.
 const BLUR: f32 = 6.0;
 const WINDOW: Rect = Rect { x: 0, y: 0, width: 80, height: 30 };
-/// A terminal's own colours, and how much of a cell the ink of its brightest character covers.
+/// A terminal's own colours, and the part of a cell that the ink of its brightest character covers.
 const INK: [u8; 3] = [229; 3];
 const GROUND: [u8; 3] = [0; 3];
-/// How much of its cell the ink of each character from the space to ~ covers, of 255: the means of DejaVu Sans Mono's bitmaps.
+/// Part of its cell, of 255, that the ink of each character from the space to ~ covers: the means of DejaVu Sans Mono's
+/// bitmaps.
 #[rustfmt::skip]
 const INK_OF_ASCII: [u8; 95] = [0, 21, 16, 61, 52, 45, 58, 8, 28, 28, 24, 27, 11, 7, 7, 27, 61, 38, 44, 46, 49, 48, 58, 36, 62, 58, 14, 17, 29, 28, 29, 31, 66, 54, 68, 40, 60, 53, 43, 53, 59, 43, 39, 57, 35, 68, 68, 58, 52, 63, 62, 49, 38, 55, 47, 67, 50, 39, 48, 35, 27, 35, 17, 17, 6, 48, 54, 32, 54, 48, 37, 60, 47, 34, 36, 47, 32, 54, 40, 45, 54, 54, 26, 38, 36, 40, 34, 47, 36, 42, 36, 39, 30, 38, 15];
 
@@ -100,7 +101,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The errors of a picture in the cells that `draw` makes of it, which are those of a picture without a border.
+/// The errors of a picture in the cells that `draw` makes of it, which has no border.
 fn errors(
     file: &Path,
     draw: impl Fn(&Picture, Rect) -> Result<Option<Buffer>, Box<dyn Error>>,
@@ -116,7 +117,7 @@ fn errors(
     Ok(Some([seen.error(&truth), seen.blurred().error(&truth.blurred())]))
 }
 
-/// Where the picture is.
+/// Position of the picture.
 fn place(buffer: &Buffer) -> Rect {
     let is_picture = |x: u16, y: u16| buffer[(x, y)].symbol() != " ";
     let columns: Vec<u16> =
@@ -127,7 +128,7 @@ fn place(buffer: &Buffer) -> Rect {
     Rect::new(*left, *top, columns.len() as u16, rows.len() as u16)
 }
 
-/// The picture by chafa in these cells; none where there is no chafa, or where it has no such characters.
+/// The picture by chafa in these cells. `None` without chafa, or if it lacks such characters.
 fn chafa(file: &Path, area: Rect, mode: &Mode, dither: &str) -> Result<Option<Buffer>, Box<dyn Error>> {
     if mode.symbols.is_empty() {
         return Ok(None);
@@ -178,7 +179,7 @@ fn copy(from: &vt100::Cell, to: &mut Cell) {
     to.set_symbol(if from.has_contents() { from.contents() } else { " " }).set_fg(fg).set_bg(bg);
 }
 
-/// Linear light.
+/// Linear light in rows.
 struct Plane {
     width: usize,
     height: usize,
@@ -213,7 +214,7 @@ impl Plane {
         Self { width, height, pixels }
     }
 
-    /// By a Gaussian, along the rows and then along the columns.
+    /// Blurs by a Gaussian, along the rows and then along the columns.
     fn blurred(&self) -> Self {
         let reach = (3.0 * BLUR) as isize;
         let weights: Vec<f32> = (-reach..=reach).map(|i| (-(i as f32 / BLUR).powi(2) / 2.0).exp()).collect();

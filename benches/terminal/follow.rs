@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::watched::{COLUMNS, Line, ROWS, Watched};
 
-/// Percent of the render at which the screen is looked at, and codes of 255 that it may be off.
+/// Percent of the render at which the screen is examined, and its largest allowed deviation in codes of 255.
 const LOOKS: [(u32, f64); 3] = [(10, 1.5), (25, 0.8), (50, 0.5)];
 
 const WAYS: [(&str, &[&str]); 5] = [
@@ -19,7 +19,7 @@ const WAYS: [(&str, &[&str]); 5] = [
     ("sixel", &["--preview", "sixel", "--color", "truecolor"]),
 ];
 
-/// For tmux: 24 bits of colour, on both sides.
+/// Settings for tmux: 24 bits of colour, on both sides.
 const TMUX: &str =
     "set -g default-terminal tmux-256color\nset -as terminal-features ',*:RGB'\nset -g status off\n";
 
@@ -48,7 +48,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Renders once, and says how far the screen was from the final one on the way.
+/// Renders once, and reports the distance of the screen from its final state on the way.
 fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     let terminal = Watched::open(command, folder, Line::NONE)?;
     let begin = std::time::Instant::now();
@@ -59,7 +59,7 @@ fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     }
     terminal.wait("the end", |far| far.percent() == Some(100))?;
     let (seconds, came) = (begin.elapsed().as_secs_f64(), terminal.far().came);
-    // The last picture may still be on its way.
+    // Wait, as the last picture may still be on its way.
     thread::sleep(Duration::from_secs(2));
     let last = terminal.far().seen();
     let figures: Vec<String> = screens
@@ -70,7 +70,7 @@ fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     Ok(format!("{:>7} {:>7} {:>7} {seconds:>9.1} {rate:>9.0}", figures[0], figures[1], figures[2]))
 }
 
-/// The mean absolute difference where either shows something; `None` if they have different sizes.
+/// The mean absolute difference of pixels that either shows; `None` if they have different sizes.
 fn apart(a: &[[u8; 3]], b: &[[u8; 3]]) -> Option<f64> {
     let pairs = a.iter().zip(b).filter(|(a, b)| **a != [0; 3] || **b != [0; 3]);
     let (mut sum, mut count) = (0, 0);

@@ -7,9 +7,11 @@ use std::time::{Duration, Instant};
 
 use crate::watched::{Line, Watched};
 
-/// How often the key repeats, how long it is held before the line is looked at, and how long it is looked at.
+/// Time between repeats of the key; then the time for which it is held before the line is measured, and the time of the
+/// measurement.
 const REPEAT: Duration = Duration::from_millis(33);
-/// Presses in one direction. The camera swings in front of the scene: behind the wall of a room all is black, and nothing is to be sent.
+/// Presses in one direction. The camera swings in front of the scene: behind the wall of a room all is black, and there is nothing
+/// to send.
 const SWING: u32 = 8;
 const BEFORE: Duration = Duration::from_secs(2);
 const HELD: Duration = Duration::from_secs(6);
@@ -28,7 +30,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The part of the line that was used, and the most bytes that had not been answered for.
+/// The used part of the line, and the most bytes without an answer.
 fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
     let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene).with_extension("toml");
@@ -46,12 +48,12 @@ fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
     Ok(((far.came - before) as f64 / most, far.most_unanswered))
 }
 
-/// Holds keys that orbit, one and its opposite in turns, as keyboards repeat them.
+/// Holds two opposite keys that orbit, in turns, and repeats them as keyboards do.
 fn hold(terminal: &Watched, time: Duration) -> Result<(), Box<dyn Error>> {
     let begin = Instant::now();
     let mut presses = 0;
     while begin.elapsed() < time {
-        // The first and the last swing are halves: the scene's own camera is in the middle.
+        // The first and the last swing are halves, so that the scene's own camera is in the middle.
         let is_right = ((presses + SWING / 2) / SWING).is_multiple_of(2);
         terminal.press(if is_right { "l" } else { "h" })?;
         presses += 1;

@@ -11,7 +11,7 @@ use ratatui::backend::{Backend, CrosstermBackend};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-/// Counts what is written.
+/// A writer that counts bytes.
 struct Counter(Rc<Cell<usize>>);
 
 impl Write for Counter {
@@ -25,7 +25,7 @@ impl Write for Counter {
     }
 }
 
-/// ratatui on crossterm, as it is.
+/// Plain ratatui on crossterm.
 pub(crate) struct Plain {
     backend: CrosstermBackend<Counter>,
     sent: Rc<Cell<usize>>,
@@ -40,18 +40,18 @@ impl Plain {
         Self { backend, sent, shown: Buffer::empty(area) }
     }
 
-    /// Bytes that lead from what is shown to this.
+    /// Bytes that change the screen to this picture.
     pub(crate) fn draw(&mut self, wanted: &Buffer) -> usize {
         let before = self.sent.get();
         let difference = self.shown.diff(wanted);
-        // The counter takes everything.
+        // Writing to the counter cannot fail.
         let _ = self.backend.draw(difference.into_iter());
         self.shown = wanted.clone();
         self.sent.get() - before
     }
 }
 
-/// Bytes of the picture by chafa in half blocks of 24 bits; none where there is no chafa.
+/// Bytes of the picture by chafa in half blocks of 24 bits. `None` without chafa.
 pub(crate) fn chafa(picture: &Picture) -> Result<Option<usize>, Box<dyn Error>> {
     let file = tempfile::Builder::new().suffix(".png").tempfile()?;
     let pixels = picture.pixels.as_flattened();

@@ -10,17 +10,17 @@ use glimt::pipeline::Handle;
 use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
 use glimt::pipeline::settings::Overrides;
 
-/// A picture on its way to the final one.
+/// A preview on the way to the final picture.
 pub(crate) struct Shot {
-    /// Since the request.
+    /// Seconds since the request.
     pub(crate) seconds: f64,
-    /// Of a pixel of the film, in the mean; 0: a coarse picture.
+    /// Mean samples of a pixel of the film; 0 for a coarse picture.
     pub(crate) samples: f64,
     pub(crate) picture: Picture,
     pub(crate) is_final: bool,
 }
 
-/// Renders the scene and keeps every preview that was seen; the last one is final.
+/// Renders the scene and keeps every preview that the front end saw; the last one is final.
 pub(crate) fn render(
     handle: &Handle,
     generation: u64,

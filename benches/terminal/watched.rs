@@ -1,4 +1,4 @@
-//! The program in a pseudo-terminal, at the end of a line, with what is seen at the other end.
+//! The program in a pseudo-terminal at one end of a line, and the screen at the other end.
 
 use std::error::Error;
 use std::io::{Read, Write};
@@ -17,22 +17,22 @@ pub(crate) const COLUMNS: u16 = 120;
 pub(crate) const ROWS: u16 = 40;
 /// Width and height of a cell in pixels.
 const CELL: (u16, u16) = (8, 16);
-/// Nothing that is waited for takes this long.
+/// Longest time to wait for anything.
 const LIMIT: Duration = Duration::from_secs(600);
-/// What a terminal answers to what it is asked: whether it is there, what it is, whether it synchronises its output.
+/// A terminal's answers to queries: whether it is there, its kind, whether it synchronises its output.
 const ANSWERS: [(&[u8], &[u8]); 3] =
     [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;4;22c"), (b"\x1b[?2026$p", b"\x1b[?2026;2$y")];
 
-/// A way to the terminal.
+/// A line to the terminal.
 #[derive(Clone, Copy)]
 pub(crate) struct Line {
     pub(crate) bytes_per_second: f64,
-    /// One way.
+    /// Delay in one direction.
     pub(crate) delay: Duration,
 }
 
 impl Line {
-    /// To a terminal on the same machine.
+    /// The line to a terminal on the same machine.
     pub(crate) const NONE: Self = Self { bytes_per_second: f64::INFINITY, delay: Duration::ZERO };
     /// 1 Mbit/s, 150 ms there and back.
     pub(crate) const THIN: Self = Self { bytes_per_second: 125e3, delay: Duration::from_millis(75) };
@@ -42,9 +42,9 @@ impl Line {
 pub(crate) struct Far {
     pub(crate) cells: vt100::Parser,
     pub(crate) pixels: PixelScreen,
-    /// Bytes that have come.
+    /// Bytes that have arrived.
     pub(crate) came: usize,
-    /// Bytes that were sent, and those up to the last question that was answered.
+    /// Bytes sent, and those up to the last query that was answered.
     sent: usize,
     answered: usize,
     pub(crate) most_unanswered: usize,
@@ -75,7 +75,7 @@ impl Far {
     }
 }
 
-/// The colours of the parts of a cell; black for what is not of blocks, so that all screens have as many.
+/// The colours of the parts of a cell; black for other characters than blocks, so that all screens have equally many.
 fn parts(cell: &vt100::Cell) -> [[u8; 3]; 24] {
     let color = |color| match color {
         vt100::Color::Default => None,
@@ -135,7 +135,7 @@ impl Watched {
         lock(&self.far)
     }
 
-    /// Waits until the other end is as told.
+    /// Waits until the other end satisfies `holds`.
     pub(crate) fn wait(&self, what: &str, holds: impl Fn(&Far) -> bool) -> Result<(), Box<dyn Error>> {
         let deadline = Instant::now() + LIMIT;
         while !holds(&self.far()) {
@@ -151,7 +151,7 @@ impl Watched {
 
 impl Drop for Watched {
     fn drop(&mut self) {
-        // The figures are there; how it ends is of no interest.
+        // The measurement is complete; a failure to end the program does not matter.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -161,10 +161,10 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Bytes that arrive at that time.
+/// Bytes, with the time of their arrival.
 type Due = (Instant, Vec<u8>);
 
-/// The line: what the program writes comes to the other end, and the answers come back.
+/// Runs the line: the program's output goes to the other end, and the answers come back.
 fn carry(
     mut output: Box<dyn Read + Send>,
     far: Arc<Mutex<Far>>,

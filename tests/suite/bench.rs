@@ -1,4 +1,4 @@
-//! `glimt bench`: small scenes measured as a whole.
+//! `glimt bench` on small scenes.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -31,7 +31,7 @@ v = [0, 0, 1]
 material = "lamp"
 "#;
 
-/// Small enough for a test.
+/// Options for a measurement small enough for a test.
 const SMALL: &str = "--samples 1,4 --reference-samples 64 --seeds 3 --progress none";
 
 fn desk() -> Desk {
@@ -40,7 +40,7 @@ fn desk() -> Desk {
     desk
 }
 
-/// Runs it with a cache of its own; gives stdout and stderr.
+/// Runs `glimt bench` with a cache of its own; returns stdout and stderr.
 #[track_caller]
 fn bench(desk: &Desk, line: &str, code: i32) -> (String, String) {
     let mut process = desk.glimt(&format!("bench {line}"));
@@ -187,7 +187,7 @@ fn all_scenes_are_looked_at_before_the_first_is_measured() {
     assert!(stderr.contains("none.toml") && stderr.contains("broken.toml:13"), "all that is wrong: {stderr}");
     assert!(!desk.path("a.csv").exists());
     assert!(!desk.path("cache/glimt/references").exists(), "nothing was measured");
-    // An output that the second scene reads.
+    // This output is a file that the second scene reads.
     desk.write("skin.ppm", "P6\n1 1\n255\nabc");
     let skin = "diffuse = { texture = \"skin\" }\n[textures.skin]\nfile = \"skin.ppm\"\n[materials.other]\ndiffuse = 0";
     desk.write(
@@ -263,7 +263,7 @@ fn no_output_is_an_input_or_another_output() {
         assert!(stderr.starts_with(&format!("error: {words}")), "{stderr}");
     }
     assert_eq!(desk.bytes("skin.ppm"), b"P6\n1 1\n255\nabc");
-    // The name of the file is forgotten: what stands next is taken for it.
+    // The file's name is missing: the next word is taken for it.
     for (line, words) in [
         (
             "--csv ball.toml",
@@ -292,7 +292,7 @@ fn a_file_that_cannot_be_written_does_not_cost_the_others() {
     assert!(stderr.starts_with("error: cannot write full.csv: no space left on device"), "{stderr}");
     assert!(stderr.lines().count() == 1 && errors(&json(&desk, "a.json")).len() == 1, "{stderr}");
     assert!(desk.path("a.svg").is_file());
-    // Results take the place of results, whatever they are called.
+    // Results replace results, whatever their names.
     for _ in 0..2 {
         bench(&desk, &format!("{line} --json results --csv table"), 0);
     }

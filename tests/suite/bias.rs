@@ -1,4 +1,4 @@
-//! The bias that `glimt compare` tells of EXR files, over its standard error.
+//! Bias of EXR files by `glimt compare`, over its standard error.
 
 use serde_json::Value;
 
@@ -49,7 +49,8 @@ fn compared(desk: &Desk, a: &str, b: &str) -> Value {
     serde_json::from_slice(&desk.run(&format!("compare --json {a} {b}")).stdout).expect("JSON")
 }
 
-/// The estimate is between 0.7 and 1.5 times the true error, and the spread of 24 values is within a fifth of its own.
+/// Checks that the estimate is between 0.7 and 1.5 times the true error, and that the spread of 24 values is within a
+/// fifth of its own.
 #[test]
 fn seeds_that_differ_have_a_z_of_chance() {
     const PAIRS: u32 = 24;

@@ -1,4 +1,4 @@
-//! Broken scenes as files: what each says, where, and that it says nothing else.
+//! Broken scene files: the messages and places of each, and that it gets no others.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use glimt::scene::report::{Style, line_and_column, render, summary};
 /// Line, column, and `message; label`.
 type Said = (usize, usize, &'static str);
 
-/// Every file of `tests/broken` with all that it is told, in order.
+/// Every file of `tests/broken` with all its diagnostics, in order.
 const BROKEN: &[(&str, &[Said])] = &[
     ("away", &[(15, 1, "warning: this light shines away from everything; all shapes are behind it")]),
     (
@@ -569,7 +569,7 @@ fn lists_in_other_manners_get_the_list_that_is_meant() {
     }
 }
 
-/// Everything that is said of this text.
+/// All diagnostics of this text.
 fn diagnostics_of(text: &str) -> Vec<Diagnostic> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");

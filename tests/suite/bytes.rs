@@ -1,4 +1,4 @@
-//! Bytes that real pictures take on a terminal: first pictures, edits until they stay.
+//! Bytes of real pictures on a terminal: first pictures, and edits until they settle.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
@@ -19,7 +19,7 @@ const SIZES: [(Rect, PreviewSize); 3] = [
     (Rect { x: 0, y: 0, width: 120, height: 40 }, PreviewSize { width: 90, height: 72, around: None }),
     (Rect { x: 0, y: 0, width: 200, height: 60 }, PreviewSize { width: 170, height: 112, around: None }),
 ];
-/// Pixels across and down of the film. Larger ones have less noise in their previews.
+/// Columns and rows of the film. Larger ones have less noise in their previews.
 const FILM: u32 = 320;
 
 /// Renders scenes one after the other.
@@ -36,8 +36,8 @@ impl Studio {
         Self { handle, preview, generation: 0, folder: tempfile::tempdir().expect("a scratch folder") }
     }
 
-    /// The last preview of a scene. Without a number of samples: the coarse picture that comes first, with one sample
-    /// for each of its own pixels.
+    /// The last preview of a scene. Without a number of samples, the coarse first picture, with one sample for each of
+    /// its own pixels.
     fn preview(&mut self, scene: &str, samples: Option<u32>) -> Picture {
         let path: PathBuf = self.folder.path().join("scene.toml");
         std::fs::write(&path, scene).expect("written");
@@ -144,7 +144,7 @@ impl Screen {
     }
 }
 
-/// What a colour looks like; the palette is xterm's.
+/// RGB of a colour, with xterm's palette.
 fn rgb(color: vt100::Color) -> [u8; 3] {
     match color {
         vt100::Color::Rgb(r, g, b) => [r, g, b],
@@ -170,7 +170,7 @@ fn changed(a: &Picture, b: &Picture) -> usize {
     tops.filter(|i| is_off(*i) || is_off(i + width)).count()
 }
 
-/// The screen is led through a render; the bytes of its first picture and of all.
+/// Shows a whole render on the screen; returns the bytes of its first picture and of all.
 fn through(screen: &mut Screen, pictures: &[(Picture, Fidelity)]) -> (usize, usize) {
     let sent: Vec<usize> =
         pictures.iter().map(|(picture, fidelity)| screen.show(picture, *fidelity)).collect();

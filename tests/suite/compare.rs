@@ -1,4 +1,4 @@
-//! `glimt compare` as it is called: figures, exit codes, messages, files.
+//! `glimt compare` from outside: figures, exit codes, messages, files.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -38,7 +38,7 @@ fn desk() -> Desk {
     desk
 }
 
-/// Runs it; gives the object on stdout, and stderr.
+/// Runs `glimt compare`; returns the object on stdout, and stderr.
 #[track_caller]
 fn json(desk: &Desk, line: &str, code: i32) -> (Value, String) {
     let output = desk.run(&format!("compare --json {line}"));
@@ -55,8 +55,8 @@ fn assert_near(object: &Value, key: &str, expected: f64) {
     assert!((value - expected).abs() <= 1e-6 * expected.abs().max(1.0), "{key}: {value}, not {expected}");
 }
 
-/// Computed by numpy in double precision from the bytes, decoded by the sRGB curve; SSIM by scikit-image 0.26; FLIP
-/// 0.107067652 by flip-evaluator 1.7, of single precision.
+/// Checks figures that numpy computed in double precision from the bytes, decoded by the sRGB curve; SSIM is by
+/// scikit-image 0.26, FLIP 0.107067652 by flip-evaluator 1.7, in single precision.
 #[track_caller]
 fn assert_figures_of_bytes(object: &Value) {
     for (key, expected) in [

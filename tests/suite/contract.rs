@@ -1,4 +1,4 @@
-//! The scene file as it was promised: every key, by its name, with its default, and which are required.
+//! The contract of the scene file: every key, by its name, with its default, and which keys are required.
 
 use std::fs;
 use std::path::PathBuf;
@@ -7,14 +7,14 @@ use glimt::scene::description::{Camera, Scene};
 use glimt::scene::diagnostic::{Diagnostic, Severity};
 use glimt::scene::{parse, starter};
 
-/// What is promised of a key.
+/// Promise about a key.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Promise {
-    /// May be left out: then it is what the example says.
+    /// Optional; the default is the value of the example.
     Default,
-    /// May be left out: then it is something else.
+    /// Optional; the default is another value.
     Other,
-    /// Must be there.
+    /// Required.
     Required,
 }
 
@@ -223,10 +223,10 @@ const TABLES: &[(&str, &[Key])] = &[
     ),
 ];
 
-/// What the materials refer to besides.
+/// Other elements to which the materials refer.
 const BUMPS: &str = "[textures.bumps]\nfile = \"textures/bumps.png\"\n";
 
-/// A folder with everything that the example names; gives the scene's path too.
+/// A folder with everything that the example names; returns the scene's path too.
 fn folder() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["scenes/textures", "assets"] {
@@ -263,7 +263,7 @@ pub(crate) fn errors(diagnostics: &[Diagnostic]) -> Vec<&str> {
     errors.map(|one| one.message.as_str()).collect()
 }
 
-/// Without the places of the file, which differ wherever something is left out.
+/// The scene without places in the file, which differ if something is left out.
 pub(crate) fn placeless(mut scene: Scene) -> Scene {
     scene.objects.iter_mut().for_each(|object| object.span = 0..0);
     scene.textures.iter_mut().for_each(|texture| texture.file.span = 0..0);

@@ -1,4 +1,4 @@
-//! What the tests of the program as a process share.
+//! Common helpers of the tests that run the program as a process.
 
 use std::fs;
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ position = [1, 3, 2]
 intensity = [10, 10, 10]
 "#;
 
-/// A folder with a scene, where the program is called.
+/// A folder with a scene, in which the program is called.
 pub(crate) struct Desk(pub(crate) tempfile::TempDir);
 
 impl Desk {
@@ -60,7 +60,7 @@ impl Desk {
         self.glimt(line).output().expect("it runs")
     }
 
-    /// Runs it; gives stderr after checking the exit code and that stdout is empty.
+    /// Runs it; checks the exit code and that stdout is empty, and returns stderr.
     #[track_caller]
     pub(crate) fn expect(&self, line: &str, code: i32) -> String {
         let output = self.run(line);
@@ -71,7 +71,7 @@ impl Desk {
         stderr
     }
 
-    /// As [`Self::expect`] with 0; gives the report.
+    /// Runs it as [`Self::expect`] with exit code 0; returns the report.
     #[track_caller]
     pub(crate) fn report(&self, line: &str) -> serde_json::Value {
         self.expect(&format!("{line} --once --report report.json"), 0);

@@ -1,5 +1,4 @@
-//! Scenes at the ends of what is allowed: they render, every sample is finite, in bounded time and memory; and the
-//! bundled scenes.
+//! Scenes at the limits: they render, every sample is finite, in bounded time and memory; and the bundled scenes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,7 +33,7 @@ fn lamp(position: &str, intensity: &str) -> String {
     format!("[[light]]\ntype = \"point\"\nposition = [{position}]\nintensity = [{intensity}]\n")
 }
 
-/// Render it, beauty and float file; every sample is finite.
+/// Renders it, as a picture and as a float file; checks that every sample is finite.
 #[track_caller]
 fn renders(name: &str, render: &str, camera: &str, material: &str, rest: &str) -> serde_json::Value {
     let desk = Desk::new();
@@ -204,7 +203,7 @@ fn bundled() -> Vec<PathBuf> {
     scenes
 }
 
-/// Whether a file that the scene names is made only when asked for.
+/// Whether a file that the scene names is generated only on demand.
 fn is_made_on_demand(scene: &Path) -> bool {
     scene.file_stem().is_some_and(|stem| stem == "million" || stem == "figure")
 }

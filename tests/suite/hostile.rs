@@ -1,5 +1,5 @@
-//! Files that are not what they should be: a clear error, exit code 2, nothing on stdout, the old picture left as it
-//! was, at once and in little memory.
+//! Malformed files: a clear error, exit code 2, nothing on stdout, the old picture left as it was, at once and in
+//! little memory.
 
 use std::fs::{self, File};
 use std::os::unix::ffi::OsStrExt;
@@ -10,13 +10,13 @@ use std::time::{Duration, Instant};
 
 use super::desk::{Desk, SCENE};
 
-/// What a refusal may take; it takes milliseconds, and a program that reads on takes minutes.
+/// Longest time of a refusal; it takes milliseconds, and a program that reads on takes minutes.
 const AT_ONCE: Duration = Duration::from_secs(10);
 
 const MESH: &str = "\n[[mesh]]\nfile = \"FILE\"\nmaterial = \"ball\"\n";
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-/// A scene that names `file` in one of the ways, and the line and column where it does.
+/// A scene that names `file` in one of the possible ways, and the line and column of that.
 fn scene(file: &str) -> (String, &'static str) {
     let ending = Path::new(file).extension().and_then(|ending| ending.to_str());
     let (text, place) = match ending {
@@ -33,7 +33,7 @@ fn scene(file: &str) -> (String, &'static str) {
     (text.replace("FILE", file), place)
 }
 
-/// Render a scene that must be refused with all of these words.
+/// Renders a scene, and checks that it is refused with all of these words.
 #[track_caller]
 fn refused(desk: &Desk, scene: &str, words: &[&str]) -> String {
     desk.write("ball.png", "the old one");
@@ -47,7 +47,7 @@ fn refused(desk: &Desk, scene: &str, words: &[&str]) -> String {
     stderr
 }
 
-/// Make something that is no proper file; gives what is said of it. None: it cannot be made here.
+/// Makes something that is not a proper file; returns the words of its refusal. `None` if it cannot be made here.
 fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
     Some(match what {
         "missing" => &["there is no", "file"],
@@ -64,7 +64,7 @@ fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
             &["is a pipe, a socket or a device, not a"]
         }
         "kernel" => {
-            // Where a machine has no such file, this is a link to nowhere.
+            // On a machine without such a file, this is a link to nowhere.
             if !Path::new("/proc/kmsg").exists() {
                 return None;
             }
@@ -152,7 +152,7 @@ fn an_asset_with_the_wrong_content() {
             desk.write(&file, bytes);
             refused(&desk, "scene.toml", &[wrong, &place]);
         }
-        // A gigabyte of nothing is told from its start.
+        // The start of a gigabyte of zeros is enough to refuse it.
         let huge = File::create(desk.path(&file)).and_then(|file| file.set_len(1 << 30));
         huge.expect("a sparse file");
         refused(&desk, "scene.toml", &[&file, &place]);
@@ -175,7 +175,7 @@ fn a_gigabyte_and_bytes_that_are_no_text_as_a_scene() {
     refused(&desk, "zeros.toml", &["zeros.toml", "binary file"]);
 }
 
-/// A mesh that must be refused with these words, at its place in the scene.
+/// Checks that a mesh is refused with these words, at its place in the scene.
 #[track_caller]
 fn mesh_refused(name: &str, content: &[u8], words: &[&str]) {
     let desk = Desk::new();
@@ -233,7 +233,7 @@ fn material_files() {
         let Some(_) = make(&desk.path("bad.mtl"), what) else { continue };
         desk.write("a.obj", format!("mtllib bad.mtl\n{TRIANGLE}"));
         let (text, _) = scene("a.obj");
-        // The scene has a material for it: nothing is lost, nor said.
+        // The scene has a material for it: no warning.
         desk.write("scene.toml", &text);
         let stderr = desk.expect("scene.toml --once -o a.png", 0);
         assert!(!stderr.contains("warning"), "{what}: {stderr}");
@@ -375,7 +375,7 @@ fn a_line_end_in_a_name_ends_no_line() {
     }
 }
 
-/// What a terminal would act on, or not show.
+/// Characters that a terminal would act on, or not show.
 const EVIL: &str = "\u{1b}]52;c;ZXZpbA==\u{7}\u{1b}[2J\u{9b}31m\r\u{202e}gnp\u{8}";
 
 #[track_caller]

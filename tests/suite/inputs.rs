@@ -1,4 +1,4 @@
-//! No file that a picture is made of is ever written over, whatever name leads to it.
+//! A render never overwrites an input file of its picture, whatever name leads to it.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -8,7 +8,7 @@ use super::desk::{Desk, SCENE};
 /// A picture that glimt did not write: a red texel.
 const PHOTOGRAPH: &[u8] = b"P6\n1 1\n255\n\xff\x20\x20";
 
-/// More than is ever rendered: a refusal that comes after the work is noticed.
+/// Options of an endless render, so that a refusal after the work would be noticed.
 const ENDLESS: &str = "--once --samples 4000000000 --time 2";
 
 /// A ball with a texture, a mesh with a material file and its pictures, an orbiter camera, and a texture that no
@@ -37,7 +37,7 @@ fn studio() -> Desk {
 
 const TEXTURES: &str = "[textures.skin]\nfile = \"skin.ppm\"\n[textures.unused]\nfile = \"unused.ppm\"\n";
 
-/// Every file below the desk with what it holds, links apart.
+/// Every file below the desk with its content; links are left out.
 fn everything(desk: &Desk) -> Vec<(std::path::PathBuf, Vec<u8>)> {
     let mut folders = vec![desk.0.path().to_owned()];
     let mut found = Vec::new();
@@ -56,7 +56,8 @@ fn everything(desk: &Desk) -> Vec<(std::path::PathBuf, Vec<u8>)> {
     found
 }
 
-/// Runs it; exit code 2, these words are said, nothing is rendered, and every file is as it was. Gives what is said.
+/// Runs it and checks: exit code 2, these words in the message, nothing rendered, every file unchanged. Returns the
+/// message.
 #[track_caller]
 fn refused(desk: &Desk, line: &str, words: &[&str]) -> String {
     let before = everything(desk);
@@ -76,7 +77,7 @@ fn the_default_output_is_no_input() {
     let scene =
         SCENE.replace("[materials.ball]", texture).replace("[0.8, 0.2, 0.1]", "{ texture = \"marble\" }");
     desk.write("marble.toml", scene);
-    // Made by glimt: what the default output may replace, were it no input.
+    // This picture was made by glimt: the default output could replace it, were it not an input.
     desk.expect("ball.toml --once -o marble.png", 0);
     let stderr = refused(&desk, &format!("marble.toml {ENDLESS}"), &["marble.png", "texture `marble`", "-o"]);
     assert!(stderr.contains("marble.toml:11:8") && stderr.contains("`output = "), "{stderr}");
@@ -138,7 +139,7 @@ fn every_kind_of_input_stays() {
         ("unused.ppm", "texture `unused`"),
         ("deep/wood.ppm", "one.obj"),
         ("deep/bumps.ppm", "one.obj"),
-        // Named by the material file, though nothing looks it up.
+        // The material file names these, though nothing looks them up.
         ("deep/alpha.ppm", "one.obj"),
     ] {
         let stderr = refused(&desk, &format!("scene.toml {ENDLESS} -o {output}"), &[output, role]);
@@ -152,7 +153,7 @@ fn every_kind_of_input_stays() {
         ("deep/materials.json", "is not a report that glimt wrote"),
         ("deep/one.mtl", "is not a report that glimt wrote"),
         ("deep/wood.ppm", "is not a report that glimt wrote"),
-        // Not there yet, and read as soon as it is.
+        // This file does not exist yet, and is read as soon as it does.
         ("deep/gone.mtl", "one.obj"),
     ] {
         refused(&desk, &format!("scene.toml {ENDLESS} --report {report}"), &[report, role, "--report"]);
@@ -228,7 +229,7 @@ fn by_default_only_a_picture_of_glimt_is_replaced() {
     fs::remove_file(desk.path("ball.png")).expect("removed");
     symlink("photo.png", desk.path("ball.png")).expect("a link");
     refused(&desk, &format!("ball.toml {ENDLESS}"), &ways);
-    // Whoever names it means it.
+    // An explicit output is meant.
     desk.expect("ball.toml --once -o ball.png", 0);
     assert_eq!(desk.bytes("photo.png").len(), own.len());
     desk.expect("ball.toml --once", 0);
@@ -297,7 +298,7 @@ fn new_takes_the_place_of_nothing() {
 #[test]
 fn the_map_of_an_environment_is_no_output() {
     let desk = Desk::new();
-    // One that is read, and one that is only named: a black factor needs no map.
+    // One map is read, and one is only named: a black factor needs no map.
     for (name, color) in [("lit.toml", ""), ("dark.toml", "color = 0\n")] {
         desk.write(name, format!("{SCENE}\n[environment]\nfile = \"sky.ppm\"\n{color}"));
         desk.write("sky.ppm", PHOTOGRAPH);

@@ -1,4 +1,5 @@
-//! All JSON and XML that glimt writes: valid, and without a character that a terminal would act on or not show.
+//! JSON and XML that glimt writes: all of it is valid, and without a character that a terminal would act on or not
+//! show.
 
 use serde_json::Value;
 

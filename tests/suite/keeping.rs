@@ -1,4 +1,4 @@
-//! What a write leaves as it is: files that glimt did not write, and what a file has besides its bytes.
+//! Files that a write must keep: those that glimt did not write, and the attributes of a file beside its bytes.
 
 use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
@@ -8,11 +8,11 @@ use super::desk::Desk;
 
 /// A file of somebody else whose name has the ending of a report.
 const PACKAGE: &str = "{\n  \"name\": \"somebody\",\n  \"glimt\": \"0.1.0\"\n}\n";
-/// What a person may write about a render.
+/// A file about a render that a person wrote.
 const BY_HAND: &str = "{\n  \"glimt\": \"0.1.0\",\n  \"scene\": \"a.toml\",\n  \"seconds\": 3.5\n}\n";
 /// A render that would take for ever.
 const ENDLESS: &str = "--once --samples 4000000 --width 4000";
-/// A measurement that would take for ever, but for what it says before.
+/// A measurement that would take for ever after its first messages.
 const LONG: &str = "--samples 4000000 --reference-samples 4000000 --progress none";
 /// A short one.
 const SHORT: &str =
@@ -39,8 +39,8 @@ fn a_report_replaces_nothing_that_glimt_did_not_write_whatever_its_ending() {
     refused(&desk.bytes("results.json"));
     desk.expect("ball.toml --once --report package.json --force", 0);
     let mut report: serde_json::Value = serde_json::from_slice(&desk.bytes("package.json")).expect("JSON");
-    // Its own, as it is, with the keys of the contract alone, sorted and in one line, and an empty file are replaced
-    // without asking.
+    // glimt replaces its own report without asking: as it is; with the keys of the contract alone, sorted and in one
+    // line; and an empty file.
     let as_it_is = report.to_string();
     let keys = report.as_object_mut().expect("an object");
     let fixed = ["glimt", "scene", "image", "settings", "stages", "counters", "seconds", "peak_memory_bytes"];
@@ -127,7 +127,7 @@ fn a_measurement_replaces_nothing_that_glimt_did_not_write_whatever_its_ending()
     bench(&format!("{SHORT} {all}"), 0);
 }
 
-/// Only root can try: the program runs as another user.
+/// Only root can test this: the program runs as another user.
 #[test]
 fn an_owner_that_cannot_be_kept_is_said() {
     use std::os::unix::process::CommandExt;
@@ -160,8 +160,8 @@ fn an_owner_that_cannot_be_kept_is_said() {
     assert_eq!(done["diagnostics"][0]["message"], "b.png: its owner and its group could not be kept");
 }
 
-/// A list as the kernel keeps it (posix_acl_xattr.h): rights of the owner, of user 4321, of the group, of all whom
-/// the mask limits, of others.
+/// A list as the kernel keeps it (posix_acl_xattr.h): rights of the owner, of user 4321, of the group, of all whom the
+/// mask limits, of others.
 fn access_list(named: u8, group: u8, mask: u8) -> Vec<u8> {
     const NOBODY: u32 = u32::MAX;
     let entries =

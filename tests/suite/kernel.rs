@@ -1,4 +1,4 @@
-//! The ray kernel: no leak between triangles, no speck on flat faces, the same bits by all instructions.
+//! The ray kernel: no leak between triangles, no speck on flat faces, the same bits by all instruction sets.
 
 use glimt::accel::wide_bvh::Instructions;
 use glimt::accel::{KdTree, PACKET, WideBvh, ends};
@@ -56,7 +56,7 @@ fn ball(rings: u32, bumps: f32) -> TriangleMesh {
     mesh
 }
 
-/// The same with every other ring almost on the one before: half of the triangles are needles.
+/// The ball with every other ring almost on the one before: half of the triangles are needles.
 fn needles(rings: u32) -> TriangleMesh {
     let mut mesh = ball(rings, 0.0);
     for ring in (2..rings).step_by(2) {
@@ -68,7 +68,7 @@ fn needles(rings: u32) -> TriangleMesh {
     mesh
 }
 
-/// The same, scaled and then moved.
+/// The mesh, scaled and then moved.
 fn placed(mesh: &TriangleMesh, scale: f32, offset: Vec3) -> TriangleMesh {
     let positions = mesh.positions.iter().map(|&p| p * scale + offset).collect();
     TriangleMesh { positions, ..mesh.clone() }
@@ -79,7 +79,7 @@ fn tree(mesh: &TriangleMesh) -> WideBvh {
     tree.expect("nobody cancels")
 }
 
-/// How many of the rays from the inside of a closed mesh get out: each is aimed at a vertex, or at an edge.
+/// Number of the rays from inside a closed mesh that escape; each is aimed at a vertex, or at an edge.
 fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instructions: Instructions) -> usize {
     let tree = tree(mesh).with(instructions);
     let mut random = Random(rays as u64);
@@ -107,7 +107,7 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
     leaks
 }
 
-/// The same of the other tree.
+/// [`leaks`] of the other tree.
 fn leaks_of_planes(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize) -> usize {
     let count = mesh.triangles.len() as u32;
     let tree = KdTree::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("nobody cancels");
@@ -123,7 +123,7 @@ fn leaks_of_planes(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize) -
     leaks
 }
 
-/// Leaks of `rays` rays in each place, by each tree and each kind of instructions.
+/// Counts the leaks of `rays` rays in each place, by each tree and each instruction set.
 fn assert_watertight(rays: usize) {
     let far = Vec3::new(148_376.0, 1234.0, -223_423.0);
     let places =
@@ -145,7 +145,7 @@ fn no_ray_leaks_at_edges_and_vertices() {
     assert_watertight(22_000);
 }
 
-/// 10⁸ rays.
+/// Traces 10⁸ rays.
 #[test]
 #[ignore = "90 s on two cores: cargo test --release --test suite leaks_of_many -- --ignored"]
 fn leaks_of_many_rays() {
@@ -170,7 +170,7 @@ fn boxes(side: u32) -> TriangleMesh {
     mesh
 }
 
-/// Where a ray first enters a box of the grid, by slabs in double precision.
+/// Distance at which a ray first enters a box of the grid, by slabs in double precision.
 fn first_box(ray: &Ray, side: u32) -> f64 {
     let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let enter = |cell: u32| {
@@ -227,7 +227,8 @@ fn boxes_show_no_speck_from_any_side() {
     }
 }
 
-/// A ray that enters a box, by more than rounding, hits it there; one that passes all boxes hits none.
+/// Checks that a ray which enters a box, by more than rounding, hits it there, and that one which passes all boxes hits
+/// none.
 fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
     let shifted = |by: f32| {
         let across = ray.direction.any_orthogonal_vector().normalize() * by;
@@ -246,7 +247,8 @@ fn assert_no_speck(tree: &WideBvh, ray: &Ray, side: u32) {
     }
 }
 
-/// Where a ray goes through a triangle in double precision, with the least of its weights; none where it is parallel.
+/// Distance at which a ray goes through a triangle, in double precision, with the least of its weights. `None` if it is
+/// parallel.
 fn crossing(ray: &Ray, corners: &[Vec3; 3]) -> Option<(f64, f64)> {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - ray.origin.as_dvec3());
     let (direction, normal) = (ray.direction.as_dvec3(), (b - a).cross(c - a));
@@ -256,8 +258,8 @@ fn crossing(ray: &Ray, corners: &[Vec3; 3]) -> Option<(f64, f64)> {
     (sum != 0.0).then(|| (normal.dot(a) / normal.dot(direction), least))
 }
 
-/// Slivers of all widths, and rays that start right before or behind one, well inside its edges: what single precision cannot
-/// tell from the start is decided by more digits.
+/// Slivers of all widths, and rays that start right before or behind one, well inside its edges: hits that single precision
+/// cannot separate from the start are decided in double precision.
 #[test]
 fn hits_right_at_the_start_of_a_ray_are_found() {
     let mut random = Random(91);

@@ -1,4 +1,4 @@
-//! How far render threads give way to other programs, as the system tells it (proc(5)).
+//! Nice values of render threads, as the system reports them (proc(5)).
 
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::desk::{Desk, SCENE};
 
-/// Nothing takes this long, on however busy a machine.
+/// Longest time to wait for anything, on however busy a machine.
 const LIMIT: Duration = Duration::from_secs(60);
 
 /// Name and nice value of a thread, by its line in /proc.
@@ -23,7 +23,7 @@ fn own() -> i32 {
     of_thread(&stat).expect("a nice value").1
 }
 
-/// `own` raised by this much, as far as it goes.
+/// `own` raised by this much, up to the system's limit.
 pub(crate) fn raised(steps: i32) -> i32 {
     (own() + steps).min(19)
 }
@@ -40,7 +40,8 @@ pub(crate) fn of_render_threads(id: u32) -> Vec<i32> {
         .collect()
 }
 
-/// The different nice values of two or more render threads at work: of a program that says `sign` on stderr once it renders.
+/// The different nice values of two or more working render threads, in a program that prints `sign` to stderr once it
+/// renders.
 fn of_program(mut process: Process, sign: &str) -> Vec<i32> {
     let mut child = process.stderr(Stdio::piped()).stdout(Stdio::null()).spawn().expect("it runs");
     let mut said = BufReader::new(child.stderr.take().expect("stderr"));

@@ -1,4 +1,4 @@
-//! Noise: whether the error that is reported, written and asked for is the true one, by the spread of many seeds.
+//! Noise: whether the error that is reported, written and requested is the true one, by the spread of many seeds.
 
 use std::fs;
 
@@ -81,7 +81,7 @@ fn desk(scene: &str) -> Desk {
     desk
 }
 
-/// The luminances of a picture and the error that its report tells.
+/// The luminances of a picture and the error in its report.
 fn render(desk: &Desk, options: &str) -> (Vec<f64>, f64) {
     let output = desk.run(&format!("scene.toml --once --progress none -o a.exr --report a.json {options}"));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -96,7 +96,7 @@ fn render(desk: &Desk, options: &str) -> (Vec<f64>, f64) {
     )
 }
 
-/// Pictures of some seeds: the mean and the variance of each pixel, and the root mean square of what the reports tell.
+/// Pictures of some seeds: the mean and the variance of each pixel, and the root mean square of the reported errors.
 struct Seeds {
     means: Vec<f64>,
     variances: Vec<f64>,

@@ -1,4 +1,4 @@
-//! The program as scripts use it: exit codes, streams, files.
+//! The program in scripts: exit codes, streams, files.
 
 use std::fs;
 use std::process::{Command as Process, Stdio};
@@ -400,7 +400,7 @@ fn an_end_by_a_signal_is_said() {
                 .spawn()
                 .expect("it runs");
             let said = || fs::read_to_string(desk.path("stderr")).expect("there");
-            // Silent progress shows no sign of when the handlers are set up.
+            // Silent progress gives no sign that the handlers are installed.
             let sign = if progress == "plain" { "photons" } else { "" };
             let start = Instant::now();
             while !said().contains(sign) || start.elapsed() < Duration::from_millis(500) {
@@ -429,7 +429,7 @@ fn new_writes_to_stdout_where_the_file_is_a_dash() {
     assert_eq!(desk.bytes("-"), glimt::scene::starter().as_bytes());
 }
 
-/// Until the process says this on stderr; what comes after is read and dropped.
+/// Waits until the process prints this to stderr; later output is read and dropped.
 fn wait_for(child: &mut std::process::Child, word: &str) {
     use std::io::{BufRead, BufReader};
     let stderr = BufReader::new(child.stderr.take().expect("piped"));

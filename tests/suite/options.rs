@@ -1,4 +1,4 @@
-//! Each option changes what it says, and nothing else; the report tells.
+//! Each option changes its own part and nothing else, and the report says so.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -279,7 +279,7 @@ fn targets_are_told_before_the_work() {
     assert_eq!(names(&desk), ["ball.toml", "full.png"]);
 }
 
-/// What lies in the folder, sorted.
+/// Names in the folder, sorted.
 fn names(desk: &Desk) -> Vec<String> {
     let entries = fs::read_dir(desk.0.path()).expect("a folder");
     let mut names: Vec<String> =
@@ -338,7 +338,7 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
         let stderr = desk.expect(call, 2);
         assert!(stderr.contains(words) && stderr.lines().count() == 1, "{call}: {stderr}");
     }
-    // What may be a file is one that is not there.
+    // A word that may be a file is one that does not exist.
     for call in ["room.toml --once", "./schema --once", "scenes/schema --once"] {
         assert!(desk.expect(call, 2).contains("there is no such scene file"), "{call}");
     }
@@ -361,7 +361,7 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
     desk.expect("schema --once -o a.png", 0);
 }
 
-/// The stacks of so many threads take more than the limit.
+/// Checks the way out in the message: the stacks of so many threads take more than the limit.
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_do_not_start_are_said_with_the_way_out() {

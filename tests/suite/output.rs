@@ -9,14 +9,14 @@ use std::time::Duration;
 
 use glimt::output::{OutputError, check_target, write::atomic};
 
-/// Tells a test that it runs in a child process, and on what.
+/// Environment variable that makes a test run in a child process, with its path.
 const CHILD: &str = "GLIMT_TEST_CHILD";
 
 fn child_path() -> Option<PathBuf> {
     std::env::var_os(CHILD).map(PathBuf::from)
 }
 
-/// This test binary again, for one test, in a child process.
+/// A command that runs one test of this test binary in a child process.
 fn child(program: &Path, test: &str, path: &Path) -> Command {
     let mut command = Command::new(program);
     command.args(["--exact", test, "--nocapture"]).env(CHILD, path);
@@ -76,7 +76,7 @@ fn a_link_stays_and_its_target_is_replaced() {
     let directory = scratch();
     let elsewhere = scratch();
     let target = elsewhere.path().join("real.png");
-    // Relative within the directory, then absolute to another one, where no file is yet.
+    // The first link is relative within the directory, the second absolute to another one, without a file there yet.
     symlink("middle.png", directory.path().join("out.png")).expect("a link");
     symlink(&target, directory.path().join("middle.png")).expect("a link");
     let path = directory.path().join("out.png");
@@ -131,7 +131,7 @@ fn a_pipe_without_a_reader_is_an_error_and_one_with_a_reader_gets_everything() {
     nix::unistd::mkfifo(&path, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
     let message = atomic(&path, b"picture").expect_err("nobody reads").to_string();
     assert!(message.contains("nobody reads this pipe"), "{message}");
-    // Larger than what a pipe holds; `cat` is there once the pipe can be opened for writing.
+    // More bytes than a pipe holds; `cat` is there once the pipe can be opened for writing.
     let bytes: Vec<u8> = (0..1_000_000_u32).map(|i| (i * 7 % 251) as u8).collect();
     let reader = Command::new("cat").arg(&path).stdout(Stdio::piped()).spawn().expect("cat");
     let holder = fs::OpenOptions::new().write(true).open(&path).expect("a pipe with a reader");

@@ -1,5 +1,5 @@
-//! The cases of `cargo bench --bench stress`, the short ones, and the pairs of `cargo bench --bench skips`: pictures within their
-//! bounds of their twins, every sample finite, the same bits and the same rays. Times are for the benchmarks.
+//! The short cases of `cargo bench --bench stress`, and the pairs of `cargo bench --bench skips`: pictures within their bounds of
+//! their twins, every sample finite, the same bits and the same rays. Only the benchmarks measure times.
 
 #[path = "../../benches/stress/cases/mod.rs"]
 mod cases;

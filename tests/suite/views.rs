@@ -1,4 +1,4 @@
-//! What the views of a picture hold.
+//! Contents of the views.
 
 use super::desk::Desk;
 
@@ -58,7 +58,8 @@ fn depth_is_a_distance_in_float_files_and_stretched_in_others() {
     let desk = Desk::new();
     desk.expect("ball.toml --once --samples 16 --view depth -o depth.exr -o depth.png", 0);
     let depths: Vec<f32> = floats(&desk, "depth.exr").iter().map(|pixel| pixel[0]).collect();
-    // The ball's front is 3.5 before the eye, its rim a little nearer than its middle at 4; behind it there is nothing.
+    // The ball's front is 3.5 before the camera, its rim a little nearer than its middle at 4; behind it there is
+    // nothing.
     let middle = depths[12 * 32 + 16];
     assert!((middle - 3.505).abs() < 0.006, "{middle}");
     assert_eq!(depths[0], 0.0);
@@ -70,7 +71,7 @@ fn depth_is_a_distance_in_float_files_and_stretched_in_others() {
     assert!(at(16, 12) > 200, "{}", at(16, 12));
 }
 
-/// What a PNG says of itself.
+/// Text chunks of a PNG.
 fn notes(desk: &Desk, name: &str) -> Vec<(String, String)> {
     let file = std::io::BufReader::new(std::fs::File::open(desk.path(name)).expect("a file"));
     let reader = png::Decoder::new(file).read_info().expect("a PNG");
@@ -93,7 +94,7 @@ fn a_floor_that_goes_on_for_ever_leaves_what_is_near_its_shades() {
     let (near, far) = (range[0].as_f64().expect("near"), range[1].as_f64().expect("far"));
     let depths: Vec<f32> = floats(&desk, "depth.exr").iter().map(|pixel| pixel[0]).collect();
     assert!(near < 2.0 && far > 10.0, "{near} {far}");
-    // Pixels at the border of nothing do not count: there are farther ones.
+    // Pixels at the border of empty space do not count, as there are farther ones.
     let end = far as f32;
     assert!(depths.iter().any(|&depth| depth > end) && depths.contains(&end));
     assert!(notes(&desk, "depth.png").contains(&("glimt:range".to_owned(), format!("{near} to {far}"))));

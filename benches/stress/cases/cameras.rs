@@ -1,8 +1,8 @@
-//! Lenses, angles of view, cameras in and on things, pictures of extreme shape.
+//! Lenses, angles of view, cameras inside and on objects, pictures of extreme shape.
 
 use super::{CAMERA, Extent, Picture, Row, furnace, head, signs};
 
-/// White: under light 1 from all around it has the radiance 1.
+/// A white surface: under light 1 from all around it has the radiance 1.
 const WHITE: &str =
     "[materials.w]\ndiffuse = 1\n[[sphere]]\ncenter = [0, 0, -5]\nradius = 1\nmaterial = \"w\"\n";
 
@@ -66,7 +66,8 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
             vec![(picture(0.0), plain.clone())],
             0.0,
         ));
-        // What a thing costs that nobody sees is no matter of cameras: as far as single precision goes in front of it.
+        // The cost of an invisible object is no matter of cameras: compare with one as far in front as single precision
+        // allows.
         let beside = vec![(picture(0.0), picture(-2_f64.powi(-20)))];
         rows.push(Row::alike(format!("a camera on a {name}, as in front of it"), beside, 1e-3).timed());
     }
@@ -84,7 +85,7 @@ fn around_the_camera(ior: &str) -> String {
     )
 }
 
-/// A wall seen from a distance d has the height 2 d tan(fov / 2) in the picture: as from another one by 40°.
+/// A wall at a distance d has the height 2 d tan(fov / 2) in the picture: the twin is one at 40°.
 fn angle_of_view(fov: f64) -> Row {
     let distance = |fov: f64| 1.0 / (0.5 * fov.to_radians()).tan();
     let picture = |fov: f64| {

@@ -1,4 +1,4 @@
-//! The whole scene scaled and moved: the same picture.
+//! The whole scene scaled and moved: the picture must stay the same.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -6,10 +6,10 @@ use std::fmt::Write as _;
 use super::super::frame::Frame;
 use super::{Extent, Picture, Row};
 
-/// What all moved pictures keep to.
+/// Bound on the difference of all moved pictures.
 const MOVED: f64 = 1e-3;
 
-/// Of each pixel.
+/// Samples of each pixel.
 const SAMPLES: u32 = 4;
 
 pub(super) fn rows(extent: Extent) -> Vec<Row> {
@@ -27,8 +27,8 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
         ("lens", "LENS"),
         ("64 lamps", "LAMPS"),
     ];
-    // Rounding at another place picks another lamp of a tree, or photon of a kernel, here and there, which is one sample of many: lamps
-    // in the long run alone, with more samples.
+    // Rounding at another place picks another lamp of a tree, or photon of a kernel, here and there; that is one sample of many.
+    // Lamps therefore come in the long run alone, with more samples.
     let settings = settings.iter().filter(|(_, setting)| extent == Extent::Long || *setting != "LAMPS");
     for &(name, setting) in settings {
         let is_picking = setting == PHOTONS || setting == "LAMPS";
@@ -50,14 +50,14 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
     rows
 }
 
-/// Asks for photons.
+/// Setting that stands for photons.
 const PHOTONS: &str = "PHOTONS";
 
-/// Every shape by every material and by both trees, far away; scaled as well, in the long run.
+/// Every shape with every material and both trees, far away; scaled as well, in the long run.
 fn of_shapes(extent: Extent) -> Vec<Row> {
     let trees: &[&str] = if extent == Extent::Short { &["bvh"] } else { &["bvh", "kdtree"] };
     let one = |shape: &str| {
-        // A plane is no lamp, and has a tile to the unit of length, whatever the scale.
+        // A plane cannot be a lamp, and has one texture tile per unit of length, whatever the scale.
         let materials = MATERIALS.iter().filter(|name| shape != "plane" || !["lamp", "tiles"].contains(name));
         let both = materials.flat_map(|name| trees.iter().map(move |tree| (*name, *tree)));
         both.collect::<Vec<_>>()
@@ -267,7 +267,7 @@ fn everything(frame: Frame, setting: &str, samples: u32) -> Picture {
     with_files(&scene)
 }
 
-/// With the files that scenes of this kind name.
+/// A picture with the files that such scenes name.
 fn with_files(scene: &str) -> Picture {
     let tiles = "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3";
     let ball = ball("obj", Frame::PLAIN, [0.0; 3], 1.0);

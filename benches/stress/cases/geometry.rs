@@ -18,8 +18,8 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
     rows
 }
 
-/// A ray meets the boxes of all spheres around one middle that it passes: the time grows with their number, and so does the
-/// twin's.
+/// Most nested spheres. A ray visits the boxes of all spheres around one middle that it passes: the time grows with their
+/// number, and so does the twin's.
 const MOST_NESTED: u32 = 1_000_000;
 
 const LAMP: &str = "[[light]]\nposition = [1, 2, 0]\nintensity = 9\n";
@@ -54,7 +54,7 @@ fn slivers() -> Row {
     Row::alike("a wall of 32,768 slivers, each 1 : 12,000", pairs, 1e-3).timed()
 }
 
-/// Sixteen surfaces in one plane, of one material: as one of them.
+/// Sixteen surfaces in one plane, of one material; the twin has a single one.
 fn coplanar(kind: &str) -> Row {
     let layers = |count: usize| match kind {
         "mesh" => {
@@ -72,7 +72,8 @@ fn coplanar(kind: &str) -> Row {
     Row::alike(format!("16 layers {what} in one plane, as one"), vec![(layers(16), layers(1))], 0.0)
 }
 
-/// Fifty thousand needles across space, as long as the scene and a thousandth as thick, by a tree; the other tree is the twin.
+/// Fifty thousand needles across space, as long as the scene and a thousandth as thick, in one kind of tree; the other kind is
+/// the twin.
 fn needles(accel: &str) -> Row {
     let mut random = Random(5);
     let (mut points, mut faces) = (Vec::new(), Vec::new());
@@ -88,7 +89,7 @@ fn needles(accel: &str) -> Row {
     Row::alike(format!("20,000 needles 1 : 1000, {accel} as {other}"), vec![(by(accel), by(other))], 0.0)
 }
 
-/// Spheres at places that look random; the twin's are so small that hardly any two overlap.
+/// Spheres at pseudo-random places; the twin's are so small that hardly any two overlap.
 fn overlapping(count: u32, accel: &str) -> Row {
     let spheres = |radius: f64, accel: &str| {
         let mut random = Random(9);
@@ -117,7 +118,7 @@ fn overlapping(count: u32, accel: &str) -> Row {
     .timed()
 }
 
-/// Spheres around one middle: as the outermost.
+/// Spheres around one middle; the twin has the outermost alone.
 fn nested(count: u32, accel: &str) -> Row {
     let spheres = |count: u32| {
         let (width, height) = if count > 10_000 { (4, 3) } else { (64, 48) };
@@ -143,11 +144,11 @@ fn nested(count: u32, accel: &str) -> Row {
     Row::alike(format!("{count} spheres in each other, {accel}, as the outermost"), pairs, 0.0)
 }
 
-/// A small generator.
+/// A small generator of numbers.
 struct Random(u64);
 
 impl Random {
-    /// In [−1, 1).
+    /// A number in [−1, 1).
     fn signed(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 11) as f64) / (1_u64 << 52) as f64 - 1.0

@@ -59,8 +59,8 @@ fn powered(light: &str, power: f64) -> Picture {
     Picture::new(head(64, "") + CAMERA + THINGS + &light.replace("POWER", &format!("{power:?}")))
 }
 
-/// A lamp of size 1e-9 above: a point light of its intensity, radiance × area seen. What is lit lies straight below, so that the
-/// cosine of a flat lamp is nearly one.
+/// A lamp of size 1e-9 above the scene; the twin is a point light of its intensity, radiance × projected area. The lit part lies
+/// straight below, so that the cosine of a flat lamp is nearly one.
 fn tiny(kind: &str) -> Row {
     let size = 1e-9;
     // The radiance stays below the largest number.
@@ -82,7 +82,7 @@ fn tiny(kind: &str) -> Row {
     Row::alike(format!("a {kind} lamp of size 1e-9, as a point light"), vec![(case, twin)], 1e-3).timed()
 }
 
-/// Under a quad of 2e9 everything above shines: E = πL, and a floor of reflectance 0.6 has 0.6 L.
+/// Under a quad of 2e9, the sky emits everywhere: E = πL, and a floor of reflectance 0.6 has 0.6 L.
 fn vast() -> Row {
     let picture = |size: f64| {
         let lamp = format!(

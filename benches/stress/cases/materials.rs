@@ -1,4 +1,4 @@
-//! Glass that bends nothing or much, highlights that are wide or narrow.
+//! Glass with little or much refraction, highlights wide or narrow.
 
 use super::{CAMERA, Extent, Picture, Row, furnace, head, signs};
 
@@ -22,7 +22,8 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
     ]
 }
 
-/// The exponent 0 is 2/2π everywhere on the side of the reflected ray: as a diffuse surface, under a light at the eye.
+/// The exponent 0 gives 2/2π everywhere on the side of the reflected ray; the twin is a diffuse surface, under a light
+/// at the camera.
 fn wide_highlight() -> Row {
     let picture = |material: &str| {
         let floor = format!(
@@ -34,7 +35,8 @@ fn wide_highlight() -> Row {
     Row::alike("a highlight of exponent 0, as diffuse", vec![pair], 1e-5).timed()
 }
 
-/// The exponent 1e5 throws light back within 0.3°: as a mirror, under light from all around, times the cosine, here nearly 1.
+/// The exponent 1e5 reflects light within 0.3°; the twin is a mirror, under light from all around. The factor is the cosine,
+/// here nearly 1.
 fn narrow_highlight(integrator: &str) -> Row {
     let picture = |material: &str| {
         let wall = format!(

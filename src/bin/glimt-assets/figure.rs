@@ -1,4 +1,4 @@
-//! A bear of balls and round cones that flow into each other, for `scenes/figure.toml`: 0.33 high, its seat at the origin.
+//! A bear of balls and round cones with smooth joints, for `scenes/figure.toml`: 0.33 high, its seat at the origin.
 
 use super::surface::Surface;
 use super::vector::{Vector, add, dot, mix, scale, subtract, unit};
@@ -8,10 +8,10 @@ const CORNER: Vector = [-0.13, -0.025, -0.1];
 const CELL: f64 = 0.0029;
 const CELLS: [usize; 3] = [91, 124, 91];
 
-/// Where two parts are nearer than this, they flow into each other.
+/// Distance between two parts below which they blend.
 const BLEND: f64 = 0.022;
 
-/// Both ends of a part with their radii; those apart from the middle are there on both sides.
+/// Both ends of each part, with their radii; parts off the middle exist on both sides.
 const PARTS: [[(Vector, f64); 2]; 8] = [
     // Trunk, head, snout.
     [([0.0, 0.068, 0.0], 0.076), ([0.0, 0.165, -0.004], 0.058)],
@@ -25,8 +25,8 @@ const PARTS: [[(Vector, f64); 2]; 8] = [
     [([0.0, 0.04, -0.07], 0.022), ([0.0, 0.042, -0.076], 0.022)],
 ];
 
-/// The isosurface of the distance at 0, by dual cells (Gibson, *Constrained Elastic Surface Nets*, MICCAI 1998): a vertex in each
-/// cell that it passes, moved onto it; a quad around each edge that it passes.
+/// The isosurface of the distance at 0, by dual cells (Gibson, *Constrained Elastic Surface Nets*, MICCAI 1998): a vertex, moved
+/// onto the surface, in each cell that it crosses; a quad around each edge that it crosses.
 pub(crate) fn bear() -> Surface {
     let inside = lattice();
     let [nx, ny, nz] = CELLS;
@@ -111,7 +111,7 @@ fn distance([x, y, z]: Vector) -> f64 {
     })
 }
 
-/// The distance to a ball that moves from one end to the other and changes its radius on its way.
+/// The distance to a ball that moves from one end to the other and changes its radius on the way.
 fn round_cone(point: Vector, [(from, first), (to, second)]: &[(Vector, f64); 2]) -> f64 {
     let along = subtract(*to, *from);
     let t = (dot(subtract(point, *from), along) / dot(along, along)).clamp(0.0, 1.0);

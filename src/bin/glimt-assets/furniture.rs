@@ -34,7 +34,7 @@ pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
     ]
 }
 
-/// Filled cloth of 1 by 0.2 by 1, thinner at its edges.
+/// A cushion of 1 by 0.2 by 1, thinner at its edges.
 fn cushion() -> Surface {
     let (rings, sides) = (9, 32);
     let outline = |ring: u32| {
@@ -112,7 +112,7 @@ fn cover() -> Surface {
     ])
 }
 
-/// What is in that cover.
+/// The pages in that cover.
 fn pages() -> Surface {
     block([-0.425, 0.01, -0.48], [0.425, 0.985, 0.445], 0.005)
 }

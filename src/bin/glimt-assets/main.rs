@@ -1,6 +1,6 @@
-//! Makes what the bundled scenes show: `glimt-assets` writes the stored files of `assets/`, bit for bit the same
-//! on every machine; `glimt-assets million` writes `assets/million.ply`, `glimt-assets figure` writes `assets/figure.ply`: they are
-//! too large to store.
+//! Generates the objects of the bundled scenes. `glimt-assets` writes the stored files of `assets/`, bit for bit the same on every
+//! machine. `glimt-assets million` writes `assets/million.ply`, `glimt-assets figure` writes `assets/figure.ply`: both are too
+//! large to store.
 
 mod figure;
 mod furniture;
@@ -164,7 +164,7 @@ mod tests {
         }
     }
 
-    /// Where a vertex is.
+    /// The bits of a vertex's position.
     fn place(surface: &surface::Surface, vertex: u32) -> [u64; 3] {
         surface.positions[vertex as usize].map(|coordinate| (coordinate + 0.0).to_bits())
     }
@@ -192,7 +192,7 @@ mod tests {
         }
     }
 
-    /// What scenes name and the repository does not keep.
+    /// Files that scenes name and the repository does not keep.
     const MADE_ON_DEMAND: [&str; 2] = ["../assets/million.ply", "../assets/figure.ply"];
 
     #[test]

@@ -13,7 +13,7 @@ pub(crate) fn random(point: [i64; 3], seed: u64) -> f64 {
     (mixed >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// Smooth noise in [0, 1]; repeats after `period` lattice points in x and y where that is above 0.
+/// Smooth noise in [0, 1]; if `period` is above 0, it repeats after so many lattice points in x and y.
 pub(crate) fn value(at: Vector, period: i64, seed: u64) -> f64 {
     let base = at.map(f64::floor);
     let fade = |axis: usize| {

@@ -1,4 +1,4 @@
-//! Parts that furniture is made of: blocks, turned bodies, tubes, balls. All of them are closed, their front outside.
+//! Parts of furniture: blocks, turned bodies, tubes, balls. All of them are closed, their front outside.
 
 use super::shapes::displaced_sphere;
 use super::surface::Surface;
@@ -15,7 +15,7 @@ pub(crate) fn join(parts: impl IntoIterator<Item = Surface>) -> Surface {
     whole
 }
 
-/// The surface at another place.
+/// The surface, moved.
 pub(crate) fn moved(surface: Surface, by: Vector) -> Surface {
     mapped(surface, |position| add(position, by))
 }
@@ -115,7 +115,7 @@ pub(crate) fn bar(path: &[Vector], radius: f64, sides: u32) -> Surface {
     let aside = if first[1].abs() < 0.9 { [0.0, 1.0, 0.0] } else { [1.0, 0.0, 0.0] };
     let mut normal = unit(cross(first, aside));
     for (at, &point) in path.iter().enumerate() {
-        // Turned as little as the path allows.
+        // Turn the frame as little as the path allows.
         let along = tangent(at);
         normal = unit(subtract(normal, scale(along, dot(normal, along))));
         let binormal = cross(along, normal);

@@ -30,13 +30,13 @@ fn png(side: u32, pixels: &[u8]) -> Vec<u8> {
     file
 }
 
-/// Noise in few steps: what cannot be seen costs bytes.
+/// Noise in few steps, as invisible detail costs bytes.
 fn grain(u: f64, v: f64, seed: u64) -> f64 {
     let fine = fractal([u * 32.0, v * 32.0, 0.5], 3, 32, seed);
     (fine * 24.0).round() / 24.0
 }
 
-/// The brick at (u, v): which one, and how far inside its mortar (0 in the joint, 1 on the brick).
+/// The brick at (u, v): its number, and the distance from its mortar (0 in the joint, 1 on the brick).
 fn brick(u: f64, v: f64) -> ([i64; 2], f64) {
     let course = (v * COURSES).floor();
     let shift = if course % 2.0 == 0.0 { 0.0 } else { 0.5 };

@@ -14,7 +14,7 @@ struct Writer {
 }
 
 impl Writer {
-    /// A quad with its front along u × v; its texture fits as often as `repeat` says.
+    /// Adds a quad with its front along u × v; `repeat` counts its textures along both edges.
     fn quad(&mut self, corner: Vector, u: Vector, v: Vector, repeat: [f64; 2]) {
         let points = [corner, add(corner, u), add(add(corner, u), v), add(corner, v)];
         for [x, y, z] in points {
@@ -38,7 +38,7 @@ impl Writer {
         let _ = writeln!(self.text, "o {object}\nusemtl {material}");
     }
 
-    /// A box on the floor, turned about y.
+    /// Adds a box on the floor, turned about y.
     fn block(&mut self, center: [f64; 2], half: Vector, turns: f64) {
         let (sin, cos) = turn(turns);
         let right = [cos, 0.0, -sin];
@@ -121,7 +121,7 @@ Ke 9.0 8.4 7.4
     text.as_bytes().to_vec()
 }
 
-/// Into the open front, from a little above and to the left.
+/// A camera that looks into the open front, from a little above and to the left.
 pub(crate) fn orbiter() -> Vec<u8> {
     "c 0.0 0.95 0.0\np 0.05 0.02\nr 5.0 11.0\ns 4.6 2.0\nf 38.0 640.0 480.0\n".as_bytes().to_vec()
 }

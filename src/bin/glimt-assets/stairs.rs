@@ -1,5 +1,5 @@
-//! What the stair hall of `scenes/stairs.toml` is made of. Metres; treads and balusters stand at the origin and are placed by the
-//! scene, flights and rails lie where they belong.
+//! Parts of the stair hall of `scenes/stairs.toml`. Metres; treads and balusters stand at the origin and the scene places them,
+//! flights and rails lie in their places.
 
 use super::parts::{ball, bar, block, hexahedron, join, moved, turned_body};
 use super::surface::Surface;
@@ -13,7 +13,7 @@ const WIDTH: f64 = 1.1;
 /// The open corner where the first flight begins, and its corner at the landing.
 const FOOT: Vector = [-1.9, 0.0, 1.14];
 const LANDING: Vector = [-1.9, 1.53, -1.1];
-/// Where the second flight ends.
+/// End of the second flight.
 const GALLERY: Vector = [0.62, 3.23, -1.1];
 const LEFT_WALL: f64 = -3.0;
 const RIGHT_WALL: f64 = 3.0;

@@ -1,10 +1,10 @@
-//! Polygons with what their vertices carry, and the files that they are written to.
+//! Polygons with the attributes of their vertices, and writers of mesh files.
 
 use std::fmt::Write;
 
 use super::vector::{Vector, cross, scale, subtract, unit};
 
-/// `normals` and `uvs` are empty or one for each position.
+/// A surface. `normals` and `uvs` are empty or have one entry for each position.
 #[derive(Default)]
 pub(crate) struct Surface {
     pub(crate) positions: Vec<Vector>,
@@ -30,7 +30,7 @@ impl Surface {
             for row in 0..=rows {
                 let (s, t) = (f64::from(column) / f64::from(columns), f64::from(row) / f64::from(rows));
                 surface.positions.push(point(s, t));
-                // Away from the ends, where the surface may close into a point.
+                // Stay away from the ends, at which the surface may close into a point.
                 let inner = t.clamp(10.0 * STEP, 1.0 - 10.0 * STEP);
                 let across = subtract(point(s + STEP, inner), point(s - STEP, inner));
                 let along = subtract(point(s, inner + STEP), point(s, inner - STEP));
@@ -57,7 +57,7 @@ impl Surface {
         self.faces.iter().map(|face| face.len() - 2).sum()
     }
 
-    /// Binary, least significant byte first; positions and triangles only.
+    /// Writes binary PLY, least significant byte first; positions and triangles only.
     pub(crate) fn to_ply(&self) -> Vec<u8> {
         let mut file = format!(
             "ply\nformat binary_little_endian 1.0\ncomment made by glimt-assets\nelement vertex {}\nproperty float \
@@ -79,7 +79,7 @@ impl Surface {
         file
     }
 
-    /// Text, polygons kept.
+    /// Writes OBJ as text, polygons kept.
     pub(crate) fn to_obj(&self, title: &str) -> Vec<u8> {
         let mut file = format!("# {title}. Made by glimt-assets.\n");
         for position in &self.positions {
@@ -102,7 +102,7 @@ impl Surface {
         file.into_bytes()
     }
 
-    /// Text, polygons kept.
+    /// Writes OFF as text, polygons kept.
     pub(crate) fn to_off(&self, title: &str) -> Vec<u8> {
         let mut file = format!("OFF\n# {title}. Made by glimt-assets.\n");
         let _ = writeln!(file, "{} {} 0", self.positions.len(), self.faces.len());

@@ -1,4 +1,5 @@
-//! Glass in several open parts: closed together they are one body; what stays open is named, and is the same by paths and photons.
+//! Glass in several open parts. Closed together they are one body; what stays open is named, and looks the same by paths and
+//! photons.
 
 use glimt::assets::LoadedMesh;
 use glimt::control::CancelToken;
@@ -97,7 +98,7 @@ fn turned(mesh: &TriangleMesh) -> TriangleMesh {
     TriangleMesh { triangles: mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(), ..mesh.clone() }
 }
 
-/// A floor and a large lamp above it, and what is between them.
+/// A floor and a large lamp above it, and the parts between them.
 fn room(parts: &[TriangleMesh], material: &Material) -> Build {
     let build = scene().quad(v(-6.0, -6.0, -0.1), v(12.0, 0.0, 0.0), v(0.0, 12.0, 0.0), matte(0.7)).quad(
         v(-3.0, 3.0, 4.0),
@@ -131,7 +132,7 @@ fn a_body_in_parts_is_the_body() {
         }
         let [one_path, several_path] = [&one, &several].map(|build| by_path(build.clone()).picture(8, 5));
         assert!(one_path == several_path, "round {round}: {} parts by path", parts.len());
-        // Photons are aimed at each object: they are others.
+        // Photons are aimed at each object, so that other objects mean other photons.
         if round < 4 {
             let [one, several] = [one, several].map(|build| build.photons(4000, 0.1));
             assert_same(&format!("photons, round {round}"), &one, &several, 4, 3.5, 0.0);
@@ -265,7 +266,8 @@ fn quads_of_glass_are_a_box() {
     assert_same("quads", &whole, &parts, 64, 3.5, 0.0);
 }
 
-/// The same picture by its mean and that of its quarters: within so many standard errors and a part of the value.
+/// Checks that two scenes have the same picture by its mean and that of its quarters, within so many standard errors
+/// and a fraction of the value.
 #[track_caller]
 fn assert_same(what: &str, one: &Build, other: &Build, samples: u32, errors: f64, part: f64) {
     let means = |build: &Build, first: u32| -> Vec<[f64; 5]> {

@@ -9,7 +9,7 @@ use glimt::scene::description::Render;
 use super::scenes::{emitter, scene, tile};
 use super::{Random, assert_close, assert_mean, v};
 
-/// An aperture of .2 across, in focus at 5, 40° over 480 pixels, along −z.
+/// A lens with an aperture of 0.2, in focus at 5, 40° over 480 pixels, along −z.
 fn lens() -> Camera {
     Camera::LookAt {
         position: DVec3::ZERO,
@@ -64,7 +64,8 @@ fn the_extent_of_the_circle_of_confusion() {
     for (d, exact) in [(10.0, 13.187_9), (2.5, 26.375_8)] {
         let formula = 0.2 * f64::abs(d - 5.0) / d * pixels_per_length(5.0);
         assert!((formula - exact).abs() < 1e-4);
-        // Where the ray through the middle pixel and a point of the lens meets the plane at d, in that plane's pixels.
+        // Intersect the ray through the middle pixel and a point of the lens with the plane at d, in that plane's
+        // pixels.
         let mut extent = DVec3::ZERO;
         for step in 0..3600 {
             let (sin, cos) = (f64::from(step) / 1800.0 * std::f64::consts::PI).sin_cos();

@@ -1,5 +1,5 @@
-//! Light by photons beside the same by paths: means of blocks of pixels and of the whole picture, by the spread over seeds; and even light
-//! up to edges and walls, where kernels are cut.
+//! Light by photons beside the same light by paths: means of blocks of pixels and of the whole picture, with their spread over
+//! seeds; and even light up to edges and walls, which cut kernels.
 
 use std::f64::consts::PI;
 
@@ -24,13 +24,13 @@ const SEEDS: u32 = 16;
 /// Pixels along a side of a picture, and blocks of them.
 const SIDE: usize = 16;
 const BLOCKS: usize = 4;
-/// The standard error that both methods have together is at most this part of the light: 3 % too much or too little is
-/// far outside of what chance allows.
+/// Largest joint standard error of both methods, as a fraction of the light: a deviation of 3 % is then far beyond
+/// chance.
 const MOST_ERROR: f64 = 4.5e-3;
 /// Bias that kernels may have in smooth light, far from edges.
 const SLACK: f64 = 1.5e-3;
 
-/// How long both methods work, and how wide the kernels are.
+/// Effort of both methods, and the width of the kernels.
 struct Effort {
     path_samples: u32,
     passes: u32,
@@ -67,7 +67,8 @@ fn spread(build: &Build, views: &[View], samples: u32) -> Vec<Vec<(f64, f64)>> {
     (0..views.len()).map(|view| (0..=BLOCKS * BLOCKS).map(|i| of(view, i)).collect()).collect()
 }
 
-/// Both methods see the same light: each block within 5 standard errors and 1.5 %, the whole within 4 and SLACK.
+/// Checks that both methods see the same light: each block within 5 standard errors and 1.5 %, the whole within 4 and
+/// SLACK.
 #[track_caller]
 fn assert_same_light(what: &str, build: &Build, views: &[View], effort: &Effort) {
     let &Effort { path_samples, passes, photons, radius } = effort;
@@ -89,7 +90,7 @@ fn assert_same_light(what: &str, build: &Build, views: &[View], effort: &Effort)
     }
 }
 
-/// The same of the caustic alone.
+/// [`assert_same_light`] for the caustic alone.
 #[track_caller]
 fn assert_same_caustic(what: &str, build: &Build, effort: &Effort) {
     assert_same_light(what, build, &[View::Caustic], effort);
@@ -100,14 +101,14 @@ fn floor() -> Build {
     scene().quad(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0), matte(0.7))
 }
 
-/// A square around a point, this wide, seen from this far above.
+/// A square around a point, this wide, viewed from this far above.
 fn looked_at(build: Build, at: DVec3, width: f64, above: f64) -> Build {
     let from = v(at.x, at.y + above, at.z + 1e-4 * above);
     let angle = 2.0 * (0.5 * width / above).atan();
     build.pictured(from, at, angle.to_degrees(), SIDE as u32, SIDE as u32)
 }
 
-/// A room that glows, with a mirror ball and a glass ball, seen by nobody yet.
+/// A room that glows, with a mirror ball and a glass ball, without a camera yet.
 fn room(floor: Material, wall: impl Fn(f32) -> Material) -> Build {
     let (low, side) = (-1.0, 2.0);
     let (x, y, z) = (v(side, 0.0, 0.0), v(0.0, side, 0.0), v(0.0, 0.0, side));
@@ -198,11 +199,11 @@ fn a_lamp_inside_glass_throws_the_light_that_paths_find() {
 
 /// Passes after which light at an edge is right within [`AT_EDGES`].
 const PASSES: u32 = 64;
-/// What may be left of what kernels lose at edges, as a part of the light: without a correction a kernel of radius r loses 8r/15πW of it in
-/// a strip of width W along an edge, F(x) the part of 2/πr²·(1 − ρ²/r²) beyond the distance x and 8r/15π = ∫F.
+/// Largest remaining loss of kernels at edges, as a fraction of the light. Without a correction, a kernel of radius r loses 8r/15πW
+/// of it in a strip of width W along an edge, with F(x) the part of 2/πr²·(1 − ρ²/r²) beyond the distance x and 8r/15π = ∫F.
 const AT_EDGES: f64 = 2e-3;
 
-/// A rectangle on the ground seen from above, by its middle and its sides along x and z, in pixels of about one size.
+/// A rectangle on the ground viewed from above, by its middle and its sides along x and z, in pixels of about one size.
 fn strip(build: Build, middle: DVec3, (x, z): (f64, f64)) -> Build {
     const PIXELS: f64 = 256.0;
     let side = (x * z / PIXELS).sqrt();
@@ -215,20 +216,20 @@ fn strip(build: Build, middle: DVec3, (x, z): (f64, f64)) -> Build {
     build.pictured(from, middle, fov, across as u32, up as u32).depth(3)
 }
 
-/// A sun at 45° that a lossless mirror at x = 0 throws back to the ground from x = `far` to x = `near` < 0, as wide along z: by the image of
-/// the sun its irradiance is cos 45° there, and as much on walls across x that face the mirror; light that comes straight is not shown.
+/// A sun at 45° that a lossless mirror at x = 0 reflects to the ground from x = `far` to x = `near` < 0, as wide along z. By the
+/// image of the sun its irradiance is cos 45° there, and as much on walls across x that face the mirror. Direct light is not shown.
 fn mirrored(build: Build, (far, near): (f64, f64), (z, width): (f64, f64)) -> Build {
     let corner = v(0.0, -near, z + 0.5 * width);
     let lit = build.quad(corner, v(0.0, near - far, 0.0), v(0.0, 0.0, -width), mirror(1.0));
     sun(lit, v(1.0, -1.0, 0.0).normalize(), 1.0, 0.0).viewed(View::Caustic)
 }
 
-/// What a surface of reflectance .7 shows of that.
+/// Radiance of a surface of reflectance 0.7 in that light.
 fn even() -> f64 {
     0.5_f64.sqrt() * 0.7 / PI
 }
 
-/// The mean of the picture after [`PASSES`] is what is right, within [`AT_EDGES`] and what chance allows.
+/// Checks that the mean of the picture after [`PASSES`] is exact, within [`AT_EDGES`] and chance.
 #[track_caller]
 fn assert_even(what: &str, build: &Build, (photons, radius): (u64, f64), exact: f64) {
     let build = build.clone().photons(photons, radius);
@@ -252,7 +253,7 @@ fn small_floor() -> Build {
     scene().quad(v(-2.0, 0.0, 0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, -1.0), matte(0.7))
 }
 
-/// One that goes on beyond it to all sides.
+/// A floor that goes on beyond that to all sides.
 fn long_floor() -> Build {
     scene().quad(v(-3.0, 0.0, 0.9), v(2.0, 0.0, 0.0), v(0.0, 0.0, -1.8), matte(0.7))
 }
@@ -332,7 +333,7 @@ fn light_is_even_around_a_box_that_stands_on_a_floor() {
     let beside = mirrored(standing, (-1.9, -1.5), (0.35, 0.35));
     let beside = strip(beside, v(-1.7, 0.0, 0.35), (0.18, 0.099));
     assert_even("beside a box", &beside, (4500, 0.08), even());
-    // On top of one so low that kernels reach the floor beside it, in whose plane nothing is reached.
+    // On top of a box so low that kernels reach the floor beside it, whose plane receives nothing.
     let low = long_floor().cuboid(v(-1.7, 0.01, 0.0), v(0.2, 0.02, 0.6), DVec3::ZERO, matte(0.7));
     let top = strip(mirrored(low, (-1.95, -1.45), (0.0, 0.85)), v(-1.7, 0.02, 0.0), (0.199, 0.599));
     assert_even("on a low box", &top, (4500, 0.08), even());
@@ -340,10 +341,10 @@ fn light_is_even_around_a_box_that_stands_on_a_floor() {
 
 #[test]
 fn no_photons_come_round_the_foot_of_a_wall() {
-    // A mirror without thickness on the ground, the sun before it: what it throws lights the ground before it, where a kernel hangs
-    // over its foot; no light comes behind it.
+    // A mirror without thickness stands on the ground, with the sun before it. It reflects light to the ground before it, where a
+    // kernel hangs over its foot; no light comes behind it.
     let (width, radius, passes) = (0.2, 0.1, 32);
-    // On the ground, and a little above it: so little light comes under it that it is none here.
+    // Put it on the ground, and a little above, where the light under it is negligible.
     let ground = |gap| floor().quad(v(0.0, gap, 2.0), v(0.0, 1.0, 0.0), v(0.0, 0.0, -4.0), mirror(0.9));
     let seen = |side: f64, gap: f64| {
         let strip = looked_at(ground(gap), v(side * 0.5 * width, 0.0, 0.0), width, 0.5).depth(3);

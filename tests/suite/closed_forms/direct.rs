@@ -10,7 +10,7 @@ use glimt::scene::description::{Falloff, Shadows};
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, receiver};
 use super::{assert_close, assert_mean, lambert, v};
 
-/// With one and with several shadow rays at equal cost; `irradiance` is E for radiance 1.
+/// Checks the irradiance E for radiance 1, with one and with several shadow rays at equal cost.
 #[track_caller]
 pub fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
     for (samples, shadow_samples) in [(256, 1), (16, 16)] {
@@ -19,7 +19,8 @@ pub fn assert_irradiance(what: &str, lit: &Build, irradiance: f64) {
     }
 }
 
-/// The value where one ray to the middle decides; all of the light is in sight from there or none of it.
+/// Checks the value for hard shadows, where one ray to the middle decides: from the receiver, all of the light is
+/// visible or none of it.
 #[track_caller]
 pub fn assert_hard(what: &str, lit: &Build, irradiance: f64) {
     let values = lit.clone().shadows(Shadows::Hard, 4).values(64, 64);
@@ -131,7 +132,7 @@ fn a_parallelogram_and_a_triangle() {
     assert_eq!(turned.value(), 0.0);
 }
 
-/// E at the origin from the faces of a convex polyhedron that look at it.
+/// Irradiance E at the origin from the faces of a convex polyhedron that face it.
 fn convex(faces: impl IntoIterator<Item = Vec<DVec3>>) -> f64 {
     let visible = faces.into_iter().filter(|face| {
         let normal = (face[1] - face[0]).cross(face[2] - face[0]);

@@ -11,7 +11,7 @@ use super::direct::at_origin;
 use super::scenes::{Build, matte, plain, receiver, scene};
 use super::{assert_close, assert_mean, v};
 
-/// The same with light from far away; `angle` is its apparent diameter in degrees.
+/// Adds light from far away; `angle` is its apparent diameter in degrees.
 pub fn sun(build: Build, direction: DVec3, irradiance: f32, angle: f64) -> Build {
     let light = DirectionalLight { direction, irradiance: Vec3::splat(irradiance), angle };
     build.with(|scene| scene.lights.push(Light::Directional(light)))

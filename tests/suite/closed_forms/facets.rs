@@ -10,7 +10,7 @@ use glimt::scene::description::{Falloff, NormalMap, Shadows, TextureFilter, Wrap
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, scene};
 use super::{Random, v};
 
-/// How many pixels of a picture are lit, and by how much at most.
+/// Number of lit pixels of a picture, and the largest value.
 fn lit(build: &Build) -> (usize, f64) {
     let picture = build.picture(1, 0);
     let most = picture.iter().map(|color| color.max_element()).fold(0.0, f64::max);
@@ -101,7 +101,7 @@ fn blob(random: &mut Random, rough: f64) -> TriangleMesh {
     mesh
 }
 
-/// The same at another size, seen from the inside or the outside.
+/// The mesh at another size, seen from the inside or the outside.
 fn layer(mesh: &TriangleMesh, size: f64, turned: bool) -> TriangleMesh {
     let mut layer = mesh.clone();
     layer.positions.iter_mut().for_each(|p| *p *= size as f32);
@@ -118,14 +118,14 @@ fn joined(mut mesh: TriangleMesh, other: &TriangleMesh) -> TriangleMesh {
     mesh
 }
 
-/// Distance from the middle to what is nearest that way.
+/// Distance from the middle to the nearest surface in a direction.
 fn radius_of(mesh: &TriangleMesh, direction: DVec3) -> f64 {
     let world = scene().mesh(mesh.clone(), AS_IT_IS, matte(0.5)).world();
     let hit = world.geometry.closest(&Ray::new(Vec3::ZERO, direction.as_vec3()));
     f64::from(hit.expect("the middle is inside").shape.t)
 }
 
-/// Something closed and opaque with an eye inside and lights outside, of kind `number`.
+/// A closed opaque mesh of kind `number`, with a camera inside and lights outside.
 fn closed(number: u32, random: &mut Random) -> Build {
     let rough = [0.0, 0.2, 0.6][number as usize % 3];
     let mesh = blob(random, rough);
@@ -185,8 +185,8 @@ fn closed(number: u32, random: &mut Random) -> Build {
     build.shadows(Shadows::Soft, 2).depth(1).pictured(at, at + random.direction(), 110.0, 12, 12)
 }
 
-/// A thousand closed opaque meshes, smooth and flat, with bent normals, single walls and shells, round and rough, lit from
-/// outside by points and lamps: no pixel is lit inside.
+/// Checks a thousand closed opaque meshes, smooth and flat, with bent normals, single walls and shells, round and rough,
+/// lit from outside by points and lamps: no pixel is lit inside.
 #[test]
 fn no_light_reaches_the_inside_of_a_closed_opaque_mesh() {
     let mut random = Random(77);

@@ -20,8 +20,8 @@ fn difference(a: &[DVec3], b: &[DVec3]) -> f64 {
     (off / b.iter().map(|b| b.length_squared()).sum::<f64>()).sqrt()
 }
 
-/// Every shape, some of them lamps, a mesh and a point light, of size 8, with its origin moved; all numbers are multiples of 1/1024,
-/// so that the sums are exact.
+/// Every shape, some of them lamps, a mesh and a point light, of size 8, with the origin moved. All numbers are multiples of
+/// 1/1024, so that the sums are exact.
 fn everything_at(at: DVec3, accel: Accel) -> Build {
     let p = |x: f64, y: f64, z: f64| at + (v(x, y, z) * 1024.0).round() / 1024.0;
     let d = |x: f64, y: f64, z: f64| (v(x, y, z) * 1024.0).round() / 1024.0;

@@ -10,7 +10,7 @@ use glimt::world::World;
 use super::scenes::{Build, emitter, matte, scene};
 use super::v;
 
-/// Add samples from `from` up to `to` to a film.
+/// Adds samples from `from` up to `to` to a film.
 fn go_on(film: &Film, world: &World, build: &Build, seed: u32, from: u32, to: u32) {
     for tile in 0..film.tile_count() {
         let rect = film.tile_rect(tile).expect("a tile");
@@ -99,7 +99,7 @@ fn the_estimate_of_the_error_is_right_over_many_seeds() {
                 films.iter().map(|film| film.relative_error().expect("an estimate") / truth).collect();
             eprintln!("{name}, {samples} samples, {truth:.1e}: {ratios:.2?}");
             let rms = (ratios.iter().map(|ratio| ratio * ratio).sum::<f64>() / count).sqrt();
-            // In so small a room the last doubling may gain more than those before foretell.
+            // In so small a room the last doubling may gain more than the forecast from those before.
             let most = if samples > 256 { 1.5 } else { 1.35 };
             assert!((0.9..=most).contains(&rms), "{name}, {samples} samples: {rms:.2}");
             let outside = |least, most| ratios.iter().filter(move |ratio| !(least..=most).contains(*ratio));

@@ -1,4 +1,4 @@
-//! Levels of textures: what a pixel sees of them.
+//! Mip levels of textures: the footprint of a pixel.
 
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec2, Vec3};
@@ -7,7 +7,7 @@ use glimt::scene::description::{ColorSource, Integrator, Material, MaterialKind,
 use super::scenes::{Build, lat_long_sphere, matte, mirror, phong, scene};
 use super::{mean_and_error, v};
 
-/// A checker board of squares of 16 texels, black and white, tiled; seen by ambient light alone.
+/// A checker board of squares of 16 texels, black and white, tiled, under ambient light alone.
 fn board(filter: TextureFilter, repeat: f32) -> (Build, Material) {
     let rows: Vec<Vec<Vec3>> = (0..32)
         .map(|y| (0..32).map(|x| Vec3::splat(if (x / 16 + y / 16) % 2 == 0 { 0.0 } else { 1.0 })).collect())
@@ -113,7 +113,7 @@ fn in_a_flat_mirror_it_is_as_in_the_unfolded_view() {
 
 #[test]
 fn a_ball_spreads_what_it_mirrors_as_its_facets_with_normals_do() {
-    // A board around the camera, which the ball shows small: seen in it all is grey, seen in a flat mirror it is not.
+    // Surround the camera with a board. In the ball, which shows it small, all is grey; in a flat mirror it is not.
     let (build, kind) = board(TextureFilter::Mipmap, 12.0);
     let room =
         |build: Build| build.quad(v(-30.0, -30.0, 9.0), v(60.0, 0.0, 0.0), v(0.0, 60.0, 0.0), kind.clone());

@@ -88,7 +88,7 @@ fn the_lateral_shift_of_a_slab() {
     }
 }
 
-/// A ray refracted at every surface of glass of n = 1.5 until it leaves; none where all is reflected.
+/// A ray refracted at every surface of glass of n = 1.5 until it leaves. `None` for total internal reflection.
 fn through(geometry: &Geometry, mut ray: Ray) -> Option<Ray> {
     while let Some(hit) = geometry.closest(&ray) {
         let surface = geometry.surface(&ray, &hit);
@@ -218,7 +218,8 @@ fn absorption_along_a_slab_and_a_ball() {
 
 #[test]
 fn a_glass_of_its_surroundings_index_is_invisible() {
-    // No reflection and no bending where n does not change: the pictures with and without it are the same, up to its rim.
+    // Without a change of n there is no reflection and no refraction: the pictures with and without the ball are the
+    // same, up to its rim.
     let behind = |build: Build| {
         (0..10).fold(build.background(0.1), |build, i| {
             let x = f64::from(i) * 0.4 - 2.0;

@@ -1,4 +1,4 @@
-//! Light that bounces, by paths, against closed forms.
+//! Global illumination by path tracing, against closed forms.
 
 use std::f64::consts::PI;
 
@@ -15,7 +15,8 @@ pub fn by_paths(build: Build, max_depth: u32) -> Build {
     build.with(|scene| scene.render.integrator = Integrator::Path).depth(max_depth)
 }
 
-/// |mean − exact| ≤ 4 standard errors over seeds, which are at most this part of what is right: noise alone does not pass.
+/// Checks |mean − exact| ≤ 4 standard errors over seeds. These are at most this fraction of the exact value, so that noise
+/// alone does not pass.
 #[track_caller]
 pub fn assert_near(what: &str, values: &[f64], exact: f64, most_error: f64) {
     assert!(values.len() >= 16, "too few seeds");
@@ -25,8 +26,7 @@ pub fn assert_near(what: &str, values: &[f64], exact: f64, most_error: f64) {
     assert!((mean - exact).abs() <= allowed, "{what}: {mean} ± {error} is not {exact}");
 }
 
-/// The room in which walls of a material are all that a ray can meet: a sphere seen from inside is its back, a box of quads its
-/// front.
+/// A closed room whose walls are all of one material. A sphere seen from inside shows its back, a box of quads its front.
 fn room(emission: f32, reflectance: f32, specular: f32) -> Build {
     let wall = || phong(reflectance, specular, 20.0, emission);
     let (low, side) = (-1.0, 2.0);
@@ -83,8 +83,8 @@ fn concentric_spheres_exchange_their_light() {
 
 #[test]
 fn a_glowing_ball_in_a_mirror_sees_itself() {
-    // A ball of E = 1, ρ = .8 inside of a sphere that reflects .6: all that leaves the ball comes back to it, after two
-    // scatterings. L = Σ .48ᵏ, 2k ≤ depth. Roulette is asked after each of both kinds of scatterings.
+    // A ball of E = 1, ρ = .8 is inside of a sphere that reflects .6: all light that leaves the ball comes back to it,
+    // after two scatterings. L = Σ .48ᵏ, 2k ≤ depth. Russian roulette follows both kinds of scatterings.
     let ball = scene().sphere(DVec3::ZERO, 1.0, phong(0.8, 0.0, 1.0, 1.0));
     let inside = ball.sphere(DVec3::ZERO, 2.0, mirror(0.6)).seen(v(1.5, 0.2, 0.0), DVec3::ZERO);
     for (depth, turns) in [(2, 1), (5, 2), (9, 4), (40, 20)] {
@@ -119,7 +119,7 @@ fn two_plates_exchange_their_light() {
 
 #[test]
 fn nothing_is_lost_or_won_at_lossless_mirrors_and_glass() {
-    // A white background is behind everything: 1, whatever the path. Roulette never ends a path that loses nothing.
+    // A white background is behind everything: 1, whatever the path. Roulette never ends a path without loss.
     for (what, material) in [("mirror", mirror(1.0)), ("glass", glass(1.5)), ("diamond", glass(2.4))] {
         let ball =
             scene().sphere(DVec3::ZERO, 1.0, material).pictured(v(0.0, 0.0, 4.0), DVec3::ZERO, 30.0, 16, 16);
@@ -256,7 +256,8 @@ fn direct_light_by_paths_is_that_of_whitted() {
 
 #[test]
 fn a_sharp_highlight_of_a_lamp_has_little_noise() {
-    // All of the lobe is on the lamp: ∫(α + 2)/2π·cos^α·cos θ = cos θ of the mirrored direction, here 45°; and the diffuse part.
+    // The lamp covers all of the lobe: ∫(α + 2)/2π·cos^α·cos θ = cos θ of the mirrored direction, here 45°; and the diffuse
+    // part.
     let corners = [v(0.2, 1.8, -0.9), v(1.8, 0.2, -0.9), v(1.8, 0.2, 0.9), v(0.2, 1.8, 0.9)];
     let (u, w) = (corners[1] - corners[0], corners[3] - corners[0]);
     for shininess in [1e3_f32, 1e5] {
@@ -356,9 +357,9 @@ fn mirrors_and_glass_are_followed_as_by_whitted() {
 
 #[test]
 fn light_behind_glass_is_found_by_paths_alone_and_counted_once() {
-    // A lamp that lies on a pane and one in the open: the pane's lamp reaches the floor through its glass, which light samples
-    // take for opaque. A slab passes (1 − R)/(1 + R); over all angles the floor gets what a numeric integral says. Here the
-    // check is by equality: glass of index 1 is no glass.
+    // One lamp lies on a pane and one in the open. The pane's lamp reaches the floor through its glass, which is opaque to
+    // light samples. A slab passes (1 − R)/(1 + R), and over all angles a numeric integral gives the floor's light. Here the
+    // check is by equality: glass of index 1 changes nothing.
     let lit = |ior: Option<f32>| {
         let floor =
             scene().quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), phong(0.4, 0.4, 8.0, 0.0));

@@ -1,4 +1,4 @@
-//! Hard shadows: one ray to the middle decides; what arrives is what arrives without shadows and with soft ones.
+//! Hard shadows: one ray to the middle decides; unoccluded light is as without shadows and with soft ones.
 
 use glimt::integrators::render_tile;
 use glimt::math::DVec3;

@@ -1,4 +1,4 @@
-//! Many lights: what vertices pick of them adds up to what all of them send.
+//! Many lights: the samples of the picked ones add up to the light of all.
 
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
@@ -11,12 +11,13 @@ use super::global::by_paths;
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tile};
 use super::{Random, mean_and_error, v};
 
-/// Lights that send next to nothing, so many that vertices pick from all; black ones would be left out.
+/// Adds nearly dark lights, so many that vertices pick from all; black ones would be left out.
 fn with_dark_lights(build: Build) -> Build {
     (0..33).fold(build, |build, i| build.point_light(v(f64::from(i), 3.0, 0.0), 1e-20, Falloff::Square))
 }
 
-/// The means of all pixels agree within 5 standard errors over seeds, which are at most this part of them.
+/// Checks that the means of all pixels agree within 5 standard errors over seeds, which are at most this fraction of
+/// them.
 #[track_caller]
 fn assert_same(what: &str, a: &Build, b: &Build, (samples, seeds): (u32, u32), most_error: f64) {
     let means = |build: &Build| -> Vec<f64> {
@@ -35,7 +36,7 @@ fn assert_same(what: &str, a: &Build, b: &Build, (samples, seeds): (u32, u32), m
     assert!((a - b).abs() < 5.0 * error + 1e-5 * b, "{what}: {a} ± {of_a} is not {b} ± {of_b}");
 }
 
-/// A floor with things on it, seen by a few pixels from below the lamps: their edges would be most of the noise.
+/// A floor with objects on it, seen by a few pixels from below the lamps, whose edges would be most of the noise.
 fn room(floor: glimt::scene::description::Material) -> Build {
     scene()
         .quad(v(-4.0, 0.0, 4.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, -8.0), floor)
@@ -115,7 +116,7 @@ fn picks_inside_glass_and_behind_mirrors_bring_what_all_lights_do() {
     assert_same("path", &by_paths(picked, 4), &by_paths(build, 4), (32, 24), 1.5e-2);
 }
 
-/// A lamp of two by two over the floor, as so many by so many quads.
+/// A lamp of two by two over the floor, cut into so many by so many quads.
 fn cut_lamp(build: Build, parts: u32) -> Build {
     let side = 2.0 / f64::from(parts);
     (0..parts * parts).fold(build, |build, i| {
@@ -133,7 +134,7 @@ fn a_lamp_that_is_cut_into_a_thousand_lights_as_before() {
     }
 }
 
-/// The lobes find most of the light; each of the thousand is picked once in thirty vertices.
+/// The lobes find most of the light; each of the thousand lamps is picked once in thirty vertices.
 #[test]
 fn a_sharp_highlight_of_a_lamp_that_is_cut_is_as_before() {
     let floor = phong(0.0, 0.8, 300.0, 0.0);
@@ -192,7 +193,7 @@ fn a_hundred_points_over_a_floor_light_it_as_their_sum() {
         let (mean, error) = mean_and_error(&values);
         assert!(error < 2e-3 * exact, "{what}: {error} of {exact}");
         assert!((mean - exact).abs() < 4.5 * error + 1e-5 * exact, "{what}: {mean} ± {error} is not {exact}");
-        // Points that are few enough to look at each are picked in proportion to what arrives: hardly anything is random.
+        // Points for which the tree examines every light pick in proportion to what arrives: hardly anything is random.
         assert!(error * 8.0 < 1e-3 * exact, "{what}: {}", error * 8.0 / exact);
     }
 }

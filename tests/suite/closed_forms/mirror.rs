@@ -1,4 +1,4 @@
-//! Mirrors, and what depth means.
+//! Mirrors, and the meaning of depth.
 
 use std::f64::consts::PI;
 

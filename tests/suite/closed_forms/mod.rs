@@ -43,7 +43,7 @@ pub fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// |mean − exact| ≤ max(3·SE, 1e-5·exact), the mean over seeds.
+/// Checks |mean − exact| ≤ max(3·SE, 1e-5·exact), with the mean over seeds.
 #[track_caller]
 pub fn assert_mean(what: &str, values: &[f64], exact: f64) {
     assert!(values.len() >= 16, "too few seeds");
@@ -52,14 +52,15 @@ pub fn assert_mean(what: &str, values: &[f64], exact: f64) {
     assert!((mean - exact).abs() <= allowed, "{what}: {mean} ± {error} is not {exact}");
 }
 
-/// Equal within 1e-5 of the right value.
+/// Checks that a value is exact within 1e-5.
 #[track_caller]
 pub fn assert_close(what: &str, value: f64, exact: f64) {
     assert!((value - exact).abs() <= 1e-5 * exact.abs(), "{what}: {value} is not {exact}");
 }
 
-/// Irradiance per radiance of a polygon in clear sight above the horizon, whatever its orientation: ½·|Σ Θᵢ(Γᵢ·n)|, Θᵢ
-/// the angle that an edge fills and Γᵢ the unit normal of its plane through the point (Lambert, *Photometria*, 1760).
+/// Irradiance per radiance of an unoccluded polygon above the horizon, whatever its orientation: ½·|Σ Θᵢ(Γᵢ·n)|, with
+/// Θᵢ the angle that an edge subtends and Γᵢ the unit normal of its plane through the point (Lambert, *Photometria*,
+/// 1760).
 pub fn lambert(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     let corners: Vec<DVec3> = polygon.iter().map(|&corner| (corner - point).normalize()).collect();
     let edges = corners.iter().zip(corners.iter().cycle().skip(1));
@@ -74,18 +75,18 @@ pub fn lambert(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
 pub struct Random(pub u64);
 
 impl Random {
-    /// In [0, 1).
+    /// A number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 11) as f64) / (1_u64 << 53) as f64
     }
 
-    /// In [−1, 1).
+    /// A number in [−1, 1).
     pub fn signed(&mut self) -> f64 {
         2.0 * self.unit() - 1.0
     }
 
-    /// Uniform over directions.
+    /// A uniform direction.
     pub fn direction(&mut self) -> DVec3 {
         let (z, phi) = (self.signed(), std::f64::consts::TAU * self.unit());
         let r = (1.0 - z * z).sqrt();

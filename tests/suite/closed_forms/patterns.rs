@@ -1,4 +1,4 @@
-//! Lamps with a texture on them.
+//! Lamps with an emission texture.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,7 +13,7 @@ use super::direct::{assert_hard, assert_irradiance, at_origin};
 use super::scenes::{AS_IT_IS, Build, emitter, phong};
 use super::{assert_close, lambert, mean_and_error, v};
 
-/// Grey of these values, rows from the top.
+/// Adds a grey texture of these values, rows from the top.
 fn greys(build: &mut Build, rows: &[&[f32]], filter: TextureFilter, repeat: Vec2) -> usize {
     let rows: Vec<Vec<Vec3>> = rows.iter().map(|row| row.iter().map(|x| Vec3::splat(*x)).collect()).collect();
     let rows: Vec<&[Vec3]> = rows.iter().map(Vec::as_slice).collect();
@@ -31,12 +31,12 @@ fn by_paths(build: &Build) -> Build {
 
 const CHECKER: [&[f32]; 2] = [&[5.0, 0.0], &[1.0, 3.0]];
 
-/// Above the origin, u × v downwards.
+/// Corner of the lamp above the origin, with u × v downwards.
 const CORNER: DVec3 = v(-0.7, 1.0, -0.4);
 const U: DVec3 = v(1.5, 0.2, 0.0);
 const V: DVec3 = v(0.0, 0.1, 1.2);
 
-/// E of the checker over a lamp, each square of it by Lambert's formula.
+/// Irradiance E of the checker over a lamp, each square of it by Lambert's formula.
 fn by_squares(scale: f64) -> f64 {
     let mut irradiance = 0.0;
     for (row, values) in CHECKER.iter().enumerate() {
@@ -86,7 +86,7 @@ fn the_same_on_a_mesh_whose_corners_have_coordinates() {
     }
 }
 
-/// E at the origin, facing up, over a cosine-weighted hemisphere.
+/// Irradiance E at the origin, facing up, over a cosine-weighted hemisphere.
 fn by_directions(build: &Build) -> f64 {
     const RINGS: u32 = 1500;
     let world = build.world();
@@ -149,7 +149,7 @@ fn a_texture_of_one_colour_is_that_colour() {
             for (value, exact) in lit.values(16, 8).into_iter().zip(plain.values(16, 8)) {
                 assert_close("as the colour", value, exact);
             }
-            // And it is seen as bright.
+            // The camera sees the same radiance.
             let seen = |build: Build| build.seen(v(0.1, 0.0, 0.1), CORNER + U * 0.5 + V * 0.5).value();
             assert_eq!((seen(lit), seen(plain)), (3.0, 3.0));
         }
@@ -177,7 +177,7 @@ fn a_lamp_is_as_strong_as_the_mean_of_its_texture() {
     assert_close("power", strength(&patterned), strength(&plain));
 }
 
-/// So many that vertices pick some of them.
+/// Adds so many lamps that vertices pick some of them.
 #[test]
 fn picked_lamps_have_their_textures() {
     let mut build = at_origin();

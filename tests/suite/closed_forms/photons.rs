@@ -1,4 +1,4 @@
-//! Light that photons bring, against closed forms and against paths.
+//! Light by photons, against closed forms and against paths.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -31,8 +31,8 @@ fn room(material: impl Fn() -> glimt::scene::description::Material) -> Build {
         .seen(v(0.1, 0.2, -0.3), v(0.3, -1.0, 0.2))
 }
 
-/// A light without size in the middle of a small ball of glass, through whose surface all of its light goes straight on: where it
-/// lands it has come by glass alone. Radiance in glass is told over n²; outside the intensity is 1.
+/// A light without size in the middle of a small ball of glass. All of its light goes straight through the surface, so that it
+/// arrives by glass alone. Radiance in glass is over n²; outside the intensity is 1.
 fn in_glass(build: Build, at: DVec3) -> Build {
     build.point_light(at, 1.0 / (1.5 * 1.5), Falloff::Square).sphere(at, 0.05, glass(1.5))
 }
@@ -158,7 +158,8 @@ fn both(build: &Build, depth: u32, samples: [u32; 2], (count, radius): (u64, f64
     [means(&by_paths(build.clone(), depth), samples[0]), means(&by_photons, samples[1])]
 }
 
-/// Both see as much light: within 4 standard errors, of at most this part of it, and some more for kernels at edges.
+/// Checks that both see the same light: within 4 standard errors, which are at most this fraction of it, and some slack
+/// for kernels at edges.
 #[track_caller]
 fn assert_same_light(what: &str, [(a, da), (b, db)]: [(f64, f64); 2], most_error: f64, slack: f64) {
     let error = da.hypot(db);
@@ -184,7 +185,7 @@ fn photons_and_paths_see_the_same_light_where_all_of_it_comes_by_glass() {
 
 #[test]
 fn smooth_meshes_throw_back_what_photons_bring_as_paths_see_it() {
-    // A wall whose normals are bent to the floor, where about half of the light arrives that the facets would throw there.
+    // A wall whose normals are bent to the floor; about half of the light that the facets would reflect arrives there.
     let wall = TriangleMesh {
         positions: vec![
             Vec3::new(-1.0, 0.0, -0.5),
@@ -221,7 +222,7 @@ fn a_sun_lights_what_is_under_water_without_end() {
         .depth(3)
         .photons(20_000, 0.3);
     let (mean, error) = mean_and_error(&sun(ground, -to_sun, 1.0, 0.0).values(8, 16));
-    // The eye is under water as well: radiance over n² is what is seen.
+    // The camera is under water as well: it sees radiance over n².
     let inside = (angle.sin() / 1.33).asin();
     let (i, t) = (angle.cos(), inside.cos());
     let (s, p) = ((i - 1.33 * t) / (i + 1.33 * t), (1.33 * i - t) / (1.33 * i + t));

@@ -1,4 +1,4 @@
-//! Rays that leave surfaces, aim at edges, are huge, tiny or not a number.
+//! Rays that leave surfaces, aim at edges, are huge, tiny or NaN.
 
 use glimt::choice::Choice;
 use glimt::control::CancelToken;
@@ -15,7 +15,7 @@ use glimt::world::{Geometry, Hit};
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::{Random, v};
 
-/// Where a ray from outside towards a point meets the geometry.
+/// Surface that a ray from outside towards a point hits.
 fn aimed(geometry: &Geometry, random: &mut Random, at: DVec3, far: f64) -> Option<SurfacePoint> {
     let origin = (at + random.direction() * far).as_vec3();
     let ray = Ray::new(origin, (at - origin.as_dvec3()).as_vec3().normalize());
@@ -31,7 +31,7 @@ pub fn leaving(random: &mut Random, surface: &SurfacePoint, side: Vec3) -> Ray {
     Ray::new(offset_origin(surface.point, surface.error, surface.normal, direction), direction)
 }
 
-/// Rays that leave a convex shape outwards and hit it again, of all that were tried.
+/// Number of rays, of all tries, that leave a convex shape outwards and hit it again.
 pub fn self_hits(build: &Build, random: &mut Random, center: DVec3, size: f64, tries: u32) -> (u32, u32) {
     let world = build.world();
     let (mut hits, mut tried) = (0, 0);

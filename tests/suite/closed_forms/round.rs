@@ -21,7 +21,8 @@ fn axial(p: DVec3, origin: DVec3, axis: DVec3) -> DVec2 {
     DVec2::new(p.dot(n), p.cross(n).length())
 }
 
-/// Nowhere steeper than the distance, negative inside the closed shape, 0 on its surface.
+/// Signed distance bound of a shape: nowhere steeper than the distance, negative inside the closed shape, 0 on its
+/// surface.
 fn distance(shape: &Shape, p: DVec3) -> f64 {
     match *shape {
         Shape::Cylinder { a, b, radius, .. } => {
@@ -41,7 +42,7 @@ fn distance(shape: &Shape, p: DVec3) -> f64 {
     }
 }
 
-/// Greatest length in it.
+/// Greatest length of a shape.
 fn reach(shape: &Shape) -> f64 {
     match *shape {
         Shape::Disk { center, radius, .. } => center.length() + radius,
@@ -52,7 +53,7 @@ fn reach(shape: &Shape) -> f64 {
     }
 }
 
-/// Of the smallest of its parts.
+/// Size of the smallest of its parts.
 fn size(shape: &Shape) -> f64 {
     match *shape {
         Shape::Cylinder { a, b, radius, .. } => radius.min((b - a).length()),
@@ -62,9 +63,9 @@ fn size(shape: &Shape) -> f64 {
     }
 }
 
-/// Whether the line crosses the surface by more than `allowed` between two distances, by halves: around the middle of a
-/// stretch nothing is nearer than its distance tells. Stretches of 10⁻⁵ of the shape's size are looked at in
-/// the middle only, as otherwise a line in the surface would take for ever.
+/// Whether the line crosses the surface by more than `allowed` between two distances, by halving: around the middle of
+/// an interval, the surface is no nearer than its distance bound. Intervals of 10⁻⁵ of the shape's size are examined in
+/// the middle only, as a line in the surface would otherwise take for ever.
 fn crosses(shape: &Shape, ray: &Ray, from: f64, to: f64, sign: f64, allowed: f64) -> bool {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     let length = ray.direction.as_dvec3().length();
@@ -78,7 +79,8 @@ fn crosses(shape: &Shape, ray: &Ray, from: f64, to: f64, sign: f64, allowed: f64
     crosses(shape, ray, from, middle, sign, allowed) || crosses(shape, ray, middle, to, sign, allowed)
 }
 
-/// The hit is on the surface, and nothing was crossed before it, or at all where there is none. Gives whether there is.
+/// Checks that the hit is on the surface and no surface was crossed before it, or at all without a hit. Returns whether
+/// there is a hit.
 #[track_caller]
 fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let far = reach(shape) + ray.origin.as_dvec3().length();
@@ -101,7 +103,7 @@ fn check(shape: &Shape, geometry: &Geometry, ray: &Ray, sign: f64) -> bool {
     let error = f64::from(surface.error.length());
     assert!(off.abs() <= error, "{off} over {error} {shape:?} {ray:?}");
     assert!((surface.normal.length() - 1.0).abs() < 1e-6);
-    // The front is outwards, where there is room to tell.
+    // The front is outwards, if there is room to decide.
     let out = surface.point.as_dvec3() + surface.normal.as_dvec3() * (4.0 * error);
     let tells = error < 0.05 * size(shape);
     assert!(!tells || distance(shape, out) > 0.0, "{shape:?} {ray:?} {surface:?}");

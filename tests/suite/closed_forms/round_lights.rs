@@ -10,7 +10,8 @@ use super::direct::{assert_hard, assert_irradiance, at_origin};
 use super::scenes::{Build, emitter, matte, scene};
 use super::{assert_close, v};
 
-/// E at the origin, facing up, of what emits L = 1: π times the part of a cosine-weighted hemisphere that meets a front.
+/// Irradiance E at the origin, facing up, of a shape that emits L = 1: π times the part of a cosine-weighted hemisphere
+/// that hits a front.
 fn by_directions(shape: &Shape) -> f64 {
     const RINGS: u32 = 1500;
     let geometry = scene().shape(shape.clone(), matte(0.5)).world().geometry;
@@ -66,7 +67,7 @@ fn a_parallel_disk_beside() {
     assert_close("the reference", (by_directions(&shape) / exact - 1.0).abs().max(1e-3), 1e-3);
 }
 
-/// The same irradiance by area and by directions.
+/// Checks the irradiance by area against that by directions.
 #[track_caller]
 fn assert_same(shape: &Shape) {
     let exact = by_directions(shape);

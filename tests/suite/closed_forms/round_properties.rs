@@ -1,4 +1,4 @@
-//! What disks, cylinders, cones and tori have in common with every shape: scales, zeros, bounds, tangents.
+//! Properties of disks, cylinders, cones and tori that every shape has: scales, zeros, bounds, tangents.
 
 use glimt::geometry::Ray;
 use glimt::math::{DVec3, Vec3};

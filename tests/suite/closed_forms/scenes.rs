@@ -1,4 +1,4 @@
-//! Scenes put together in code, and what their pixels are.
+//! Scenes built in code, and their pixels.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -30,7 +30,7 @@ pub struct Build {
     sky: Option<Arc<Texels>>,
 }
 
-/// Nothing, seen from (0, 0, 0) along −z through a single narrow pixel.
+/// An empty scene, seen from (0, 0, 0) along −z through a single narrow pixel.
 pub fn scene() -> Build {
     let render = Render {
         error: 0.0,
@@ -108,7 +108,7 @@ impl Build {
         self.with(|scene| scene.render.max_depth = max_depth)
     }
 
-    /// With photons, so many in a pass, gathered within this radius by the first.
+    /// Turns photons on: so many in a pass, gathered within this radius in the first pass.
     pub fn photons(self, count: u64, radius: f64) -> Self {
         self.with(|scene| scene.photons = Photons { enabled: true, count, radius, bounces: 10_000 })
     }
@@ -150,7 +150,7 @@ impl Build {
         self.loaded(LoadedMesh { mesh, ..LoadedMesh::default() }, placed, material)
     }
 
-    /// The same of what was read from a file.
+    /// Adds an instance of a mesh that was read from a file.
     pub fn loaded(mut self, loaded: LoadedMesh, placed: [DVec3; 3], material: Material) -> Self {
         let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
             .expect("nobody cancels");
@@ -161,7 +161,7 @@ impl Build {
         self.shape(Shape::Mesh(Mesh { file, scale, rotate, translate, smooth: false }), material)
     }
 
-    /// The last mesh, smooth.
+    /// Makes the last mesh smooth.
     pub fn smooth(self) -> Self {
         self.with(|scene| {
             if let Some(Shape::Mesh(mesh)) = scene.objects.last_mut().map(|object| &mut object.shape) {
@@ -181,7 +181,7 @@ impl Build {
         build.with(|scene| scene.objects.last_mut().expect("the mesh").material = None)
     }
 
-    /// A texture by rows from the top; its number.
+    /// Adds a texture by rows from the top; returns its number.
     pub fn texture(&mut self, rows: &[&[Vec3]], filter: TextureFilter, wrap: Wrap, repeat: Vec2) -> usize {
         let number = self.texels.len();
         self.texels.push(Arc::new(Texels {
@@ -201,13 +201,13 @@ impl Build {
         number
     }
 
-    /// The same light from everywhere.
+    /// Adds an environment of one radiance.
     pub fn environment(self, radiance: f32) -> Self {
         let color = Vec3::splat(radiance);
         self.with(|scene| scene.environment = Some(Environment { color, file: None, rotate: 0.0 }))
     }
 
-    /// Light by an equirectangular map of so many columns, rows from the top.
+    /// Adds an equirectangular environment map of so many columns, rows from the top.
     pub fn sky(mut self, width: u32, texels: Vec<Vec3>, rotate: f64) -> Self {
         let height = texels.len() as u32 / width;
         self.sky = Some(Arc::new(Texels { width, height, data: TexelData::Float(texels), unusable: 0 }));
@@ -253,7 +253,7 @@ impl Build {
         self.picture(1, 0)[0]
     }
 
-    /// The only pixel where all is grey, by one sample.
+    /// The only pixel of a grey picture, by one sample.
     pub fn value(&self) -> f64 {
         self.color().x
     }
@@ -271,7 +271,7 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
     tile_by(maps(world, settings, samples).as_ref(), world, settings, rect, samples)
 }
 
-/// The maps of so many samples; none where no photons are gathered.
+/// The photon maps of so many samples. `None` if no photons are gathered.
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
     let token = CancelToken::new();
     settings.heeded().photons.filter(|_| settings.gathers()).map(|of_photons| {
@@ -281,7 +281,7 @@ pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<Ph
     })
 }
 
-/// [`tile`] by maps that are there.
+/// [`tile`] with existing photon maps.
 pub fn tile_by(
     maps: Option<&PhotonMaps>,
     world: &World,
@@ -389,5 +389,5 @@ pub fn lat_long_sphere(rings: u32, steps: u32, radius: f64, center: DVec3) -> Tr
     mesh
 }
 
-/// Leaves a mesh where it is.
+/// Placement that leaves a mesh as it is.
 pub const AS_IT_IS: [DVec3; 3] = [DVec3::ONE, DVec3::ZERO, DVec3::ZERO];

@@ -178,9 +178,9 @@ fn a_sphere_s_coordinates() {
     assert_close("v", known.y, 0.695_913_3);
 }
 
-/// A coarse smooth ball is lit like the ball that it stands for, up to 4° before the edge of the light, where facets
-/// look away by up to half of their 11.25°: none is black, none steps out of the cosine by more than a third, the room
-/// left for vertex normals, which are means of the facets around.
+/// Checks that a coarse smooth ball is lit like the ball that it approximates, up to 4° before the edge of the light,
+/// where facets are turned away by up to half of their 11.25°. No facet is black, none deviates from the cosine by more
+/// than a third, the margin for vertex normals, which are means of the facets around.
 #[test]
 fn facets_do_not_show_at_the_edge_of_the_light() {
     for shadows in [Shadows::Hard, Shadows::Off] {

@@ -1,4 +1,4 @@
-//! Light from all around.
+//! Environment light.
 
 use std::f64::consts::{PI, TAU};
 

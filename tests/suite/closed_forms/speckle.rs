@@ -8,7 +8,7 @@ use glimt::scene::description::Accel;
 use super::scenes::{AS_IT_IS, Build, matte, scene};
 use super::{Random, v};
 
-/// Where a ray enters the cube [−h, h]³; none where it does not.
+/// Distance at which a ray enters the cube [−h, h]³. `None` if it misses.
 fn entry(ray: &Ray, h: f64) -> Option<f64> {
     let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let (a, b) = ((DVec3::splat(-h) - o) / d, (DVec3::splat(h) - o) / d);

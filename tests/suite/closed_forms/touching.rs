@@ -19,11 +19,11 @@ fn fresnel(n: f64, m: f64, sine: f64) -> f64 {
     0.5 * (across * across + along * along)
 }
 
-/// What is reflected and what passes of a stack of layers in air, by adding one surface after another: between what is there and
-/// the next, light goes to and fro in a geometric series.
+/// Reflectance and transmittance of a stack of layers in air, by adding one surface after another: between the stack so far and
+/// the next surface, light goes to and fro in a geometric series.
 fn layers(indices: &[f64], sine: f64) -> (f64, f64) {
     let media: Vec<f64> = [1.0].iter().chain(indices).chain(&[1.0]).copied().collect();
-    // Of what is there: reflected from above, reflected from below, passed.
+    // For the stack so far: reflected from above, reflected from below, passed.
     let (mut above, mut below, mut passed) = (0.0, 0.0, 1.0);
     for pair in media.windows(2) {
         let r = fresnel(pair[0], pair[1], sine);
@@ -78,7 +78,7 @@ impl Turned {
     }
 }
 
-/// Within a part of the right value, by the mean over seeds.
+/// Checks that the mean over seeds is within a fraction of the exact value.
 #[track_caller]
 fn assert_within(what: &str, build: &Build, samples: u32, exact: f64, part: f64) {
     let (mean, error) = mean_and_error(&build.values(samples, 16));
@@ -286,7 +286,7 @@ fn glass_that_stands_on_something_opaque() {
         };
         for first in [false, true] {
             let what = |of: &str| format!("{of}, round {round}, floor first: {first}");
-            // What the floor sends passes the upper face alone; what that turns back the floor takes.
+            // Only the upper face passes the floor's emission; the floor absorbs what it reflects.
             assert_within(&what("lamp"), &stood(emitter(1.0), first), 16, 1.0 - r, 1e-4);
             // r + (1 − r)²·m·Σ(m·r)ᵏ.
             let mirrored = stood(mirror(0.5), first).background(1.0);
@@ -442,7 +442,7 @@ fn block(low: DVec3, high: DVec3) -> TriangleMesh {
     mesh
 }
 
-/// All of a white furnace is 1.
+/// Checks that a white furnace is 1 everywhere.
 #[track_caller]
 fn assert_white(what: &str, build: Build) {
     let seen = build.background(1.0).depth(1000).pictured(v(2.2, 1.7, 4.5), DVec3::ZERO, 40.0, 32, 24);

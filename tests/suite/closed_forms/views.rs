@@ -1,4 +1,4 @@
-//! Views of the trees and of the work.
+//! Views of the trees and of their cost.
 
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
@@ -8,7 +8,7 @@ use glimt::scene::description::{Accel, Falloff, Integrator, Shadows};
 use super::scenes::{AS_IT_IS, Build, matte, scene};
 use super::v;
 
-/// A picture of 64 × 64 pixels of which one is 1/64 wide at a distance of 1, along −z.
+/// A picture of 64 × 64 pixels, each 1/64 wide at a distance of 1, along −z.
 fn framed(build: Build, view: View) -> Vec<DVec3> {
     let fov = 2.0 * 0.5_f64.atan().to_degrees();
     build.pictured(DVec3::ZERO, DVec3::NEG_Z, fov, 64, 64).viewed(view).picture(64, 2)
@@ -18,7 +18,7 @@ fn at(picture: &[DVec3], x: usize, y: usize) -> DVec3 {
     picture[y * 64 + x]
 }
 
-/// In a box from (−1, −1, −6) to (1, 1, −4).
+/// A ball in a box from (−1, −1, −6) to (1, 1, −4).
 fn ball() -> Build {
     scene().sphere(v(0.0, 0.0, -5.0), 1.0, matte(0.5)).with(|scene| scene.render.ambient = Vec3::ONE)
 }
@@ -102,8 +102,8 @@ fn cost_counts_what_goes_on_by_paths_too() {
             ball().depth(depth).environment(1.0).with(|scene| scene.render.integrator = Integrator::Path);
         at(&framed(build, View::Cost), 32, 32).x
     };
-    // The ray that goes on, which is all that looks for a sky that is the same everywhere, leaves the ball: it meets the root and
-    // the leaf again.
+    // The ray that goes on is the only one that looks for a constant sky. It leaves the ball: it visits the root and the leaf
+    // again.
     assert_eq!(bounce(0), 3.0);
     assert!(bounce(1) > 3.0 && bounce(1) <= 6.0, "{}", bounce(1));
 }

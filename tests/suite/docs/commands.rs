@@ -35,8 +35,8 @@ fn the_commands_of_every_page_run() {
     }
 }
 
-/// Makes the folder that commands are called in: the bundled scenes, the program, and the files that the page shows, which
-/// say their names in their first lines.
+/// Makes the folder in which commands are called: the bundled scenes, the program, and the files that the page shows,
+/// which name themselves in their first lines.
 fn furnish(folder: &Path, page: &Page) {
     for name in ["scenes", "assets"] {
         symlink(root().join(name), folder.join(name)).expect("linked");
@@ -86,7 +86,7 @@ fn script(text: &str) -> (String, usize) {
     (script, count)
 }
 
-/// A call of glimt as this test makes it: what opens the terminal is checked, what renders is small.
+/// A call of glimt as this test makes it: calls that open the terminal are checked, renders are small.
 fn call(line: &str) -> String {
     let cut = ["2>", "|"].iter().filter_map(|mark| line.find(mark)).min().unwrap_or(line.len());
     let (call, rest) = line.split_at(cut);

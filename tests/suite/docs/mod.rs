@@ -1,4 +1,5 @@
-//! The pages for users, held to the program: their commands run, their scenes are right, their tables have what there is.
+//! The pages for users, checked against the program: their commands run, their scenes are right, their tables are
+//! complete.
 
 mod commands;
 mod links;

@@ -1,4 +1,4 @@
-//! Circles of imports between the files of a room: where there are none, a room has an order to be read in.
+//! Circles of imports between the files of a room: a room without circles has an order in which to read it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -33,7 +33,7 @@ const PAIRS: [(&str, &str, &str); 8] = [
 /// Rooms that have larger circles for now. To be removed with the last of these.
 const UNTANGLED_LATER: [&str; 3] = ["film", "integrators", "lights"];
 
-/// Groups of files of which each reaches each other one by imports within its room.
+/// Groups of files that reach each other by imports within their room.
 fn circles() -> Vec<Vec<String>> {
     let sources = all_sources().into_iter().map(|(file, inside)| {
         let path = inside.to_str().expect("UTF-8").to_owned();

@@ -1,6 +1,6 @@
-//! The files of a room and the files that each of them imports from, as their sources say.
+//! Imports of each file of a room, according to the sources.
 //!
-//! An import leads to the file that defines what is imported: `pub use` is followed. Tests are left out.
+//! An import leads to the file that defines the imported item: `pub use` is followed. Tests are left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -42,7 +42,7 @@ impl Modules {
         self.texts.keys()
     }
 
-    /// Modules that one imports from, or names in its code. Those around it are left out: a child may use what its parents define.
+    /// Modules that a module imports from, or names in its code. Its parents are left out: a child may use what they define.
     pub(super) fn used_by(&self, module: &Module) -> BTreeSet<Module> {
         let mut paths: Vec<Vec<String>> = self.imports[module].iter().map(|one| one.path.clone()).collect();
         paths.extend(paths_in(&self.texts[module]).into_iter().map(|path| self.unabbreviated(module, path)));
@@ -50,7 +50,7 @@ impl Modules {
         files.filter(|file| !module.starts_with(file)).collect()
     }
 
-    /// A path in code, with what its first name was imported as.
+    /// A path in code, with its first name replaced by its import.
     fn unabbreviated(&self, module: &Module, path: Vec<String>) -> Vec<String> {
         match self.imports[module].iter().find(|one| one.name == path[0]) {
             Some(import) => [import.path.clone(), path[1..].to_vec()].concat(),
@@ -58,7 +58,7 @@ impl Modules {
         }
     }
 
-    /// The module that defines what a path in `module` leads to. `None` if the path leads out of the crate.
+    /// The module that defines the item of a path in `module`. `None` if the path leads out of the crate.
     fn defining(&self, module: &Module, path: &[String], depth: u32) -> Option<Module> {
         assert!(depth < 20, "{module:?} re-exports {path:?} in a ring");
         let whole = self.absolute(module, path)?;

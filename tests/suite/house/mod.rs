@@ -1,4 +1,4 @@
-//! The arrows between the rooms, as the map in `src/lib.rs` draws them: no other ones, and none for nothing.
+//! The arrows between the rooms, as the map in `src/lib.rs` draws them: no others are used, and each is used.
 
 mod circles;
 mod imports;
@@ -100,8 +100,8 @@ fn the_map_has_no_cycle() {
     }
 }
 
-/// Functions that the system's library computes, each machine's with bits of its own. (`sqrt` is right to the last bit
-/// everywhere; a fused product is, but slow where the processor has none.)
+/// Functions of the system's library, whose bits differ between machines. (`sqrt` is right to the last bit everywhere;
+/// a fused product is too, but slow if the processor has none.)
 const OF_THE_SYSTEM: [&str; 34] = [
     "sin",
     "cos",
@@ -139,7 +139,7 @@ const OF_THE_SYSTEM: [&str; 34] = [
     "angle_to",
 ];
 
-/// Whose results are in no picture: what a terminal shows, progress, the assets' generator (which has `libm`).
+/// Rooms whose results are in no picture: the screen, progress, the assets' generator (which has `libm`).
 const ELSEWHERE: [&str; 3] = ["tui", "bin", "pipeline/render/forecast/pace.rs"];
 
 #[test]

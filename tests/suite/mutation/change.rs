@@ -7,7 +7,7 @@ use super::random::Random;
 /// Longest result: longer ones only take longer.
 const MOST_BYTES: usize = 1 << 20;
 
-/// Words that programs stumble over.
+/// Words that make programs stumble.
 const WORDS: &[&str] = &[
     "0",
     "-1",
@@ -96,7 +96,7 @@ const WORDS: &[&str] = &[
     "BINARY",
 ];
 
-/// Numbers that stand at the edges of their types.
+/// Numbers at the limits of their types.
 const EDGES: &[u64] = &[
     0,
     1,
@@ -157,7 +157,7 @@ fn change(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
     }
 }
 
-/// A place, more often near the start, where headers are.
+/// A position, more often near the start, which holds headers.
 fn place(bytes: &[u8], random: &mut Random) -> usize {
     let within = if random.below(2) == 0 { bytes.len().min(256) } else { bytes.len() };
     random.below(within)
@@ -179,7 +179,7 @@ fn set_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     }
 }
 
-/// A number of 1, 2, 4 or 8 bytes in either order.
+/// Sets a number of 1, 2, 4 or 8 bytes in either order.
 #[expect(clippy::ptr_arg, reason = "one signature for all changes")]
 fn set_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     let (at, length) = (place(bytes, random), 1 << random.below(4));
@@ -254,7 +254,7 @@ fn replace_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     bytes.splice(word, random.pick(WORDS).bytes());
 }
 
-/// More digits, or another sign, for a word that begins like a number.
+/// Gives a word that begins like a number more digits, or another sign.
 fn grow_number(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     let mut numbers = words(bytes);
     numbers.retain(|word| bytes.get(word.start).is_some_and(|byte| byte.is_ascii_digit() || *byte == b'-'));
@@ -276,7 +276,7 @@ fn insert_word(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     bytes.splice(word.end..word.end, text.into_bytes());
 }
 
-/// Bytes that are no UTF-8, or no text at all.
+/// Inserts bytes that are not UTF-8, or not text at all.
 fn insert_bytes(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     let at = place(bytes, random);
     let new: Vec<u8> = (0..=random.below(16)).map(|_| random.next() as u8 | 0x80).collect();
@@ -311,7 +311,7 @@ fn delete_part(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     bytes.drain(part);
 }
 
-/// The start of one, the end of another.
+/// Joins the start of one file and the end of another.
 fn splice(bytes: &mut Vec<u8>, other: &[u8], random: &mut Random) {
     bytes.truncate(random.below(bytes.len()) + 1);
     if !other.is_empty() {

@@ -1,15 +1,15 @@
-//! Scenes and assets that were changed at random, through `check`: no crash, no hang, exit codes 0 and 2 only, little
-//! memory, nothing on the screen that a terminal would act on.
+//! Fuzzing: `check` on randomly changed scenes and assets. No crash, no hang, exit codes 0 and 2 only, little memory, nothing on
+//! the screen that a terminal would act on.
 //!
-//! The short version runs with the suite. The long one, about ten minutes on two cores:
+//! The short version runs with the suite. The long one takes about ten minutes on two cores:
 //!
 //! ```text
 //! GLIMT_MUTATIONS=20000,5000,500 cargo test --profile quick --test suite mutation -- --nocapture
 //! ```
 //!
-//! The numbers: scenes and assets checked in worker processes by the library, and how many of each kind by the program
-//! itself. `GLIMT_MUTATION_SEED` (a whole number, 1 by default) chooses other ones. The same seed gives the same files; those that
-//! fail are kept in the folder that the message names.
+//! The numbers are those of scenes and of assets that the library checks in worker processes, and of each kind that the program
+//! itself checks. `GLIMT_MUTATION_SEED` (a whole number, 1 by default) chooses other files. The same seed gives the same files;
+//! those that fail are kept in the folder that the message names.
 
 mod change;
 mod program;
@@ -24,7 +24,7 @@ use std::path::PathBuf;
 use random::Random;
 use seeds::{Seed, assets, scenes};
 
-/// What is changed.
+/// Kind of the changed file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Scene,
@@ -57,7 +57,7 @@ impl Material {
         Self { scenes: scenes(), assets: assets() }
     }
 
-    /// The changed file of a case, under the name of what it was made from.
+    /// The changed file of a case, under the name of its original.
     fn make(&self, case: Case) -> Seed {
         let seeds = match case.kind {
             Kind::Scene => &self.scenes,
@@ -70,7 +70,7 @@ impl Material {
     }
 }
 
-/// How many scenes, assets, and of each kind by the program.
+/// Numbers of scenes, of assets, and of each kind for the program itself.
 fn counts() -> [u64; 3] {
     let asked = std::env::var("GLIMT_MUTATIONS").unwrap_or_else(|_| "250,250,15".to_owned());
     let numbers: Vec<u64> =
@@ -82,7 +82,7 @@ fn seed() -> u64 {
     std::env::var("GLIMT_MUTATION_SEED").map_or(1, |seed| seed.parse().expect("a whole number"))
 }
 
-/// Keep the files of cases that failed, and say where.
+/// Keeps the files of failed cases, and reports their folder.
 fn settle(failures: &[(Case, String)]) {
     if failures.is_empty() {
         return;

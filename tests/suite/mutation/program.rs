@@ -1,4 +1,4 @@
-//! `glimt check` as it is called.
+//! `glimt check` from outside.
 
 use std::process::{Command, Output, Stdio};
 use std::sync::mpsc::channel;
@@ -24,7 +24,7 @@ pub(super) fn check_all(kind: Kind, seed: u64, count: u64) -> Vec<(Case, String)
     cases.filter_map(check).collect()
 }
 
-/// None where it takes too long.
+/// Runs a command. `None` if it takes too long.
 fn run(command: &mut Command) -> Option<Output> {
     let child =
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it runs");
@@ -33,7 +33,7 @@ fn run(command: &mut Command) -> Option<Output> {
     let waiting = std::thread::spawn(move || send.send(child.wait_with_output()));
     let output = output.recv_timeout(AT_MOST).ok().map(|output| output.expect("its output"));
     if output.is_none() {
-        // It has not been waited for: the number is its own.
+        // Nobody has waited for it yet, so the number is still its own.
         let _ = nix::sys::signal::kill(process, nix::sys::signal::Signal::SIGKILL);
     }
     let _ = waiting.join();

@@ -1,4 +1,4 @@
-//! What is changed: the scenes and assets that there are, and a small file of every format that is read.
+//! Originals of the changed files: existing scenes and assets, and a small file of every format.
 
 use std::fs;
 use std::io::Cursor;
@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use image::{DynamicImage, ExtendedColorType, ImageFormat, save_buffer};
 
-/// Assets beyond that take long and show nothing new.
+/// Largest asset in bytes: larger ones take long and show nothing new.
 const MOST_BYTES: u64 = 150_000;
 
-/// A file that a scene is, or that one names.
+/// A scene file, or a file that a scene names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Seed {
     /// Its name in the folder of the case.
@@ -50,7 +50,7 @@ pub(super) fn assets() -> Vec<Seed> {
         let ending = path.extension().expect("an ending").to_string_lossy();
         Seed { file: format!("case.{ending}"), bytes: fs::read(path).expect("an asset") }
     };
-    // The small ones of every format more often.
+    // Take the small files of every format more often.
     [made.clone(), made, found.iter().map(seed).collect()].concat()
 }
 

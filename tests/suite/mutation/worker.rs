@@ -1,4 +1,4 @@
-//! `check` by the library in processes of their own, so that a stack overflow, a hang and too much memory are seen.
+//! `check` by the library in worker processes, so that a stack overflow, a hang and too much memory are noticed.
 
 use std::io::{BufRead, BufReader, Write};
 use std::panic::{self, AssertUnwindSafe};
@@ -19,23 +19,23 @@ use super::{Case, Kind, Material};
 /// Longest time of a case.
 pub(super) const AT_MOST: Duration = Duration::from_secs(2);
 
-/// Longest wait for a case to be made; only a machine that stands still takes so long.
+/// Longest wait until a case is made; only a stalled machine takes so long.
 const TO_BEGIN: Duration = Duration::from_secs(120);
 
-/// How often a case that takes longer is tried again, alone: the machine may be busy with other things.
+/// Number of times that a slow case is tried again, alone, as the machine may be busy.
 pub(super) const TRIES: usize = 3;
 
-/// Most memory that is really used, a worker's own included. The largest that a small file may claim and get is an
-/// image, whose pixels are allocated before the file turns out to be too short.
+/// Most memory in use, a worker's own included. The largest that a small file may claim and get is an image, whose
+/// pixels are allocated before the file turns out to be too short.
 const MEMORY_BYTES: u64 = 1 << 30;
 
-/// Most memory that may be asked for.
+/// Most memory that may be requested.
 const ADDRESS_BYTES: u64 = 16 << 30;
 
 /// Processes at work.
 const LANES: u64 = 2;
 
-/// Says to a process of this test that it is a worker, and which cases are its own.
+/// Environment variable that makes a process of this test a worker, and names its cases.
 const ORDER: &str = "GLIMT_MUTATION_WORKER";
 
 /// The cases of a kind that failed, with the reason.
@@ -66,10 +66,10 @@ pub(super) fn check_all(kind: Kind, seed: u64, count: u64) -> Vec<(Case, String)
     failures.into_inner().expect("no panic")
 }
 
-/// What is said of a case that takes too long.
+/// Message for a case that takes too long.
 const SLOW: &str = "it takes more than 2 s";
 
-/// Let a worker do the cases from this one up to a number; the error is the first that fails.
+/// Lets a worker do the cases from this one up to a number; the error is the first failure.
 fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
     let Case { kind, seed, number } = first;
     let mut worker = Command::new(std::env::current_exe().expect("this program"))
@@ -97,7 +97,7 @@ fn follow(first: Case, end: u64) -> Result<(), (Case, String)> {
     )
 }
 
-/// What is said of a worker that ended within a case.
+/// Message for a worker that ended within a case.
 const GONE: &str = "the process ended";
 
 fn lines_of(worker: &mut Child) -> Receiver<String> {
@@ -105,7 +105,7 @@ fn lines_of(worker: &mut Child) -> Receiver<String> {
     let output = BufReader::new(worker.stdout.take().expect("its stdout"));
     std::thread::spawn(move || {
         for line in output.lines().map_while(Result::ok) {
-            // What the test harness says itself has no mark.
+            // Lines of the test harness have no mark.
             if let Some(line) = line.strip_prefix("@ ")
                 && send.send(line.to_owned()).is_err()
             {
@@ -116,7 +116,7 @@ fn lines_of(worker: &mut Child) -> Receiver<String> {
     lines
 }
 
-/// The worker makes a case in its own time; from then on the time counts.
+/// Waits for a result. The worker makes a case in its own time; from then on the time counts.
 fn next_result(lines: &Receiver<String>) -> Result<(), String> {
     let next = |at_most: Duration| match lines.recv_timeout(at_most) {
         Ok(line) => Ok(line),
@@ -128,7 +128,7 @@ fn next_result(lines: &Receiver<String>) -> Result<(), String> {
     if said == "right" { Ok(()) } else { Err(said) }
 }
 
-/// Does nothing where nobody ordered it.
+/// Runs the ordered cases; does nothing without an order.
 #[test]
 fn worker() {
     let Ok(order) = std::env::var(ORDER) else { return };
@@ -148,7 +148,7 @@ fn worker() {
     }
 }
 
-/// A line to who started this worker.
+/// Sends a line to the process that started this worker.
 fn say(text: &str) {
     writeln!(std::io::stdout(), "\n@ {text}").expect("somebody listens");
 }
@@ -156,7 +156,7 @@ fn say(text: &str) {
 /// The last panic, wherever it was caught.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// The library silences panics that it contains, from its first work on; this hook hears them all.
+/// Installs a hook that hears all panics: the library silences panics that it contains, from its first work on.
 fn listen_to_panics(desk: &Desk) {
     let _ = check(
         &desk.lay(
@@ -174,7 +174,7 @@ fn listen_to_panics(desk: &Desk) {
 fn one(scene: &Path) -> Result<(), String> {
     let checked = panic::catch_unwind(AssertUnwindSafe(|| check(scene, &[])));
     if let Some(panic) = PANIC.lock().expect("no panic").take() {
-        // Decoders of others may panic: it is contained, and an error of the file.
+        // Decoders of other crates may panic: the library contains it as an error of the file.
         let is_foreign = panic.contains("/.cargo/registry/") || panic.contains("/registry/src/");
         if checked.is_err() || !is_foreign {
             return Err(format!("a panic: {panic}"));
@@ -197,7 +197,7 @@ fn one(scene: &Path) -> Result<(), String> {
     if used > MEMORY_BYTES { Err(format!("it takes {} MiB of memory", used >> 20)) } else { Ok(()) }
 }
 
-/// Of this program; getrusage(2) would add what the process took when it was still its parent's copy.
+/// Peak memory of this program; getrusage(2) would add that of the process while it was still its parent's copy.
 fn peak_memory_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix("kB"));
@@ -228,7 +228,7 @@ impl Desk {
         Self(folder)
     }
 
-    /// Put the file of a case in its place; gives the scene to check.
+    /// Puts the file of a case in its place; returns the scene to check.
     pub(super) fn lay(&self, case: Case, made: &Seed) -> PathBuf {
         let folder = self.0.path().join("scenes");
         let scene = folder.join("case.toml");

@@ -1,4 +1,4 @@
-//! What is asked of a place of the picture: by a click, and at the crosshair by keys alone.
+//! Inspecting a place of the picture: by a click, and at the crosshair by keys alone.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -42,7 +42,7 @@ fn the_crosshair_says_all_that_is_there() {
     for words in ["sphere \"apple\"", &place, "phong ball", "3 away", "at (", "radiance (", "normal ("] {
         terminal.wait_for(words);
     }
-    // The next key takes it away; a click says what is elsewhere, which is the crosshair then.
+    // The next key closes it; a click inspects another place, which is then the crosshair.
     terminal.press("e");
     terminal.wait("no facts", |screen| !screen.contents().contains("apple"));
     terminal.press(&click(30, 10));
@@ -118,7 +118,7 @@ fn pixels_are_shown_around_what_was_clicked() {
     terminal
         .wait("no board", |screen| screen.contents().contains("1:1") && Colors::of(screen).red < before / 2);
     terminal.press("x");
-    // But for a few cells on its edges, which keep what is as near.
+    // A few cells on its edges may keep their value if it is as near.
     terminal.wait("the picture as before", |screen| Colors::of(screen).red.abs_diff(before) <= before / 8);
 }
 

@@ -1,4 +1,4 @@
-//! What the picture is made of, as the terminal says what it is.
+//! Characters of the picture, by the terminal's name for itself.
 
 use super::pty::{Folder, SCENE};
 

@@ -1,4 +1,4 @@
-//! Each kind of edit, and what is made again for it: by the lines of stages on the screen, and in the report.
+//! Each kind of edit, and the stages that run again for it: by the lines of stages on the screen, and in the report.
 
 use super::pty::{Folder, SCENE, Terminal};
 
@@ -9,7 +9,7 @@ fn paint(color: &str) -> String {
     format!("P3\n1 1\n255\n{color}\n")
 }
 
-/// Two textures and a mesh beside what is there.
+/// A scene with two more textures and a mesh.
 fn scene() -> String {
     let balls = "[[sphere]]\ncenter = [-0.5, 0.5, 0.5]\nradius = 0.2\nmaterial = \"skin\"\n\n\
                  [[sphere]]\ncenter = [-0.5, -0.5, 0.5]\nradius = 0.2\nmaterial = \"bark\"\n";
@@ -39,7 +39,7 @@ fn terminal(folder: &Folder) -> Terminal {
     terminal
 }
 
-/// `d`one, `r`eused or `s`kipped for each stage in order, and what is said of the stage of this name.
+/// `d`one, `r`eused or `s`kipped for each stage in order, and the message of the stage of this name.
 fn stages(folder: &Folder, name: &str) -> (String, String) {
     let report: serde_json::Value = serde_json::from_slice(&folder.bytes("report.json")).expect("JSON");
     let stages = report["stages"].as_array().expect("stages");
@@ -87,7 +87,7 @@ fn each_edit_makes_again_what_depends_on_it_and_nothing_else() {
             renders += 1;
             terminal.wait_for_render(renders);
             let (statuses, said) = stages(&folder, stage);
-            // Whoever goes back finds the trees and the picture of before.
+            // Going back finds the trees and the picture of before.
             let is_of_light = expected.is_none() && from == "[20, 20, 20]";
             let back = if is_of_light { "drrrdsrd" } else { "drrrrsrd" };
             assert_eq!(statuses, expected.unwrap_or(back), "{to}");

@@ -1,4 +1,4 @@
-//! How the program ends, and what it leaves.
+//! Ends of the program, and the state that it leaves.
 
 use nix::sys::signal::Signal;
 
@@ -72,7 +72,7 @@ fn a_picture_that_was_asked_for_is_written_at_the_end_or_the_person_is_told() {
     assert_eq!(terminal.end_saying("wrote scene.png"), 0);
     assert!(folder.path("scene.png").is_file());
 
-    // Nothing to write: most pixels have no sample yet.
+    // There is nothing to write: most pixels have no sample yet.
     std::fs::remove_file(folder.path("scene.png")).expect("removed");
     folder.write(
         "scene.toml",
@@ -85,7 +85,7 @@ fn a_picture_that_was_asked_for_is_written_at_the_end_or_the_person_is_told() {
     assert!(!folder.path("scene.png").exists());
 }
 
-/// Whether it is being written already hangs on the machine; it is lost in no case.
+/// Whether the write has begun depends on the machine; the picture is never lost.
 #[test]
 fn a_whole_picture_reaches_the_disk_whatever_key_comes_while_it_is_written() {
     let folder = Folder::new();
@@ -110,7 +110,7 @@ fn a_whole_picture_reaches_the_disk_whatever_key_comes_while_it_is_written() {
         assert_eq!(terminal.end(), 0, "{key:?}");
         std::fs::remove_file(folder.path("scene.png")).expect(key);
     }
-    // Asked for, and left at once.
+    // A write was requested, then quit at once.
     folder.write("scene.toml", &large.replace("samples = 1", "samples = 100000"));
     let mut terminal = folder.terminal();
     terminal.wait_for("ETA");
@@ -139,7 +139,7 @@ fn ctrl_z_goes_to_the_shell_and_fg_comes_back() {
     terminal.wait("the picture", |screen| screen.alternate_screen());
     terminal.wait_for_color("red");
     terminal.press("q");
-    // What is typed before the program is gone is its own.
+    // The program still gets what is typed before its end.
     terminal.wait("the shell", is_shell);
     terminal.press("exit\n");
     assert_eq!(terminal.end(), 0);

@@ -1,4 +1,4 @@
-//! Where each key and each way of the mouse brings the eye, by the numbers that `c` writes into the scene file.
+//! Camera position after each key and each use of the mouse, by the numbers that `c` writes into the scene file.
 
 use std::fs;
 
@@ -16,7 +16,7 @@ fn numbers(folder: &Folder, key: &str) -> Vec<f64> {
     line.trim_matches(['[', ']']).split(',').map(|it| it.trim().parse().expect("a number")).collect()
 }
 
-/// What a key of the file is after these keys and `c`. The file is as before then, and its picture on disk.
+/// Value of a key of the file after these keys and `c`. The file is then restored, and its picture is on disk.
 fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &str) -> Vec<f64> {
     terminal.press(keys);
     terminal.wait_for("camera moved: shown, not written");
@@ -39,7 +39,7 @@ fn assert_near(numbers: &[f64], expected: &[f64], what: &str) {
     assert!(numbers.len() == expected.len() && is_near, "{what:?}: {numbers:?} is not {expected:?}");
 }
 
-/// The eye's distance along one axis and along z after a step of 3° from 4 away.
+/// The camera's distance along one axis and along z after a step of 3° from a distance of 4.
 const ASIDE: f64 = 0.2093;
 const AHEAD: f64 = 3.9945;
 
@@ -67,7 +67,7 @@ fn each_key_brings_the_eye_where_its_table_says() {
     }
 }
 
-/// What a terminal sends for a button or the wheel over a cell from 1.
+/// A terminal's sequence for a button or the wheel over a cell, counted from 1.
 fn mouse(button: u8, column: u16, row: u16) -> String {
     format!("\x1b[<{button};{column};{row}M")
 }

@@ -1,4 +1,4 @@
-//! The mouse, the camera in the scene file, the editor and pictures of before, as a person meets them.
+//! The mouse, the camera in the scene file, the editor and earlier pictures, as a person meets them.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -9,7 +9,7 @@ use nix::unistd::Pid;
 
 use super::pty::{Colors, Folder, GREEN, RED, SCENE, Terminal};
 
-/// What a terminal sends for the left button: down, moved or up, over a cell from 1.
+/// A terminal's sequence for the left button: down, moved or up, over a cell, counted from 1.
 fn press(column: u16, row: u16) -> String {
     format!("\x1b[<0;{column};{row}M")
 }
@@ -85,8 +85,8 @@ fn the_camera_goes_into_the_file_and_is_the_scene_s_own_then() {
     assert_eq!(kept, text.replace("focus = 4.0\n", "focus = 4.0\nfov = 42\n"));
     terminal.wait("not moved any more", |screen| !screen.contents().contains("camera moved"));
     terminal.wait("the picture on disk", |_| folder.bytes("scene.png") == folder.once(&[]));
-    // What it wrote itself is no edit: the table of stages has what was kept.
-    // A key that does nothing more takes the message away, which stands in the place of the stages.
+    // Its own write is not an edit: the table of stages still shows those that were reused. A key without further
+    // effect closes the message, which covers the stages.
     terminal.press("??");
     terminal.wait("nothing rendered anew", |screen| screen.contents().contains("reused"));
     folder.write("scene.toml", &kept.replace(RED, GREEN));
@@ -107,7 +107,7 @@ fn the_focus_goes_where_was_clicked() {
     terminal.wait_for("focus 4 away: shown, not written");
 }
 
-/// An editor that says what it was called with, reads a line of keys, and changes the scene.
+/// An editor that prints its arguments, reads a line of keys, and changes the scene.
 pub(super) const EDITOR: &str =
     "#!/bin/sh\nprintf 'editing %s at %s\\r\\n' \"$2\" \"$1\"\nread -r line\necho \"# $line\" >> \"$2\"\n";
 
@@ -167,7 +167,7 @@ fn process(folder: &Folder, file: &str) -> Pid {
     Pid::from_raw(number.trim().parse().expect("a number"))
 }
 
-/// The end of glimt is not the end of the terminal, which would set its modes by itself.
+/// A shell that runs glimt: if the terminal ended with glimt, it would reset its modes by itself.
 const FROM_SHELL: &str = "modes=$(stty -g); \"$0\" scene.toml; code=$?; test \"$modes\" = \"$(stty -g)\" && echo as before; exit $code";
 
 #[test]

@@ -1,10 +1,10 @@
-//! Bursts, pasted text and the terminal's own answers: no key is lost, and nothing else counts as one.
+//! Bursts, pasted text and the terminal's own answers: glimt loses no key, and takes nothing else for one.
 
 use std::time::Duration;
 
 use super::pty::{Folder, SCENE};
 
-/// Does nothing.
+/// A key without a binding.
 const UNBOUND: &str = "Y";
 
 fn pause(milliseconds: u64) {
@@ -16,7 +16,7 @@ fn a_key_after_a_burst_is_seen() {
     let folder = Folder::new();
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
-    // Nothing more comes after it: what is at its end must not wait for that.
+    // Nothing more comes after it: its last key must not wait for more.
     terminal.burst(UNBOUND.repeat(60_000) + "?");
     terminal.wait_for("show or hide this help");
     terminal.burst(UNBOUND.repeat(60_000) + "q");
@@ -73,7 +73,7 @@ fn answers_of_the_terminal_are_no_keys_however_they_are_split() {
         ["\x1b[0n", "\x1b[?62;1;22;0c", "\x1b[24;80R", "\x1b[?2026;0$y", "\x1b]11;rgb:0000/0000/0000\x1b\\"]
     {
         terminal.press(answer);
-        // A string that comes in pieces cannot be told from keys, and none is asked for.
+        // A string in pieces looks like keys, and glimt never requests one.
         for byte in answer.chars().filter(|_| !answer.starts_with("\x1b]")) {
             terminal.press(&byte.to_string());
             pause(90);

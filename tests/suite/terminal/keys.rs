@@ -1,4 +1,4 @@
-//! What each key does, as seen on the screen and on disk.
+//! Effects of each key, as seen on the screen and on disk.
 
 use std::fs;
 
@@ -57,7 +57,7 @@ fn views_are_shown_as_they_are_and_written_when_asked() {
     terminal.press("v");
     terminal.wait_for("view normal: shown, not written");
     terminal.wait_for_render(2);
-    // The board faces the eye: (0, 0, 1) is shown as (n + 1)/2, without a curve.
+    // The board faces the camera: (0, 0, 1) is shown as (n + 1)/2, without a curve.
     let board = vt100::Color::Rgb(128, 128, 255);
     terminal.wait("normals", |screen| cells(screen).filter(|cell| upper(cell) == Some(board)).count() > 100);
     assert_eq!(folder.bytes("scene.png"), beauty);

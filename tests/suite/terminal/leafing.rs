@@ -1,4 +1,4 @@
-//! Warnings, the help under the wheel, pictures of before, and a screen that something else wrote on.
+//! Warnings, the help under the wheel, earlier pictures, and a screen on which another program wrote.
 
 use super::pty::{BLUE, Folder, GREEN, RED, SCENE};
 

@@ -58,7 +58,7 @@ fn every_way_of_saving_gives_one_render_and_its_picture() {
     terminal.wait_for_render(4);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
 
-    // A save of what is there already, and a file beside it, are no reason to render.
+    // Saving the same content, or a file beside the scene, is no reason to render.
     folder.write("scene.toml", SCENE);
     folder.write("notes.txt", "nothing");
     folder.write("scene.toml", &SCENE.replace(RED, GREEN));

@@ -1,4 +1,4 @@
-//! In the live program no input is written over either: it says so, and renders on.
+//! The live program does not overwrite inputs either: it reports this, and renders on.
 
 use std::fs;
 use std::os::unix::fs::symlink;

@@ -1,4 +1,4 @@
-//! The render gives way to the front end and to other programs, as far as the call says.
+//! The render yields to the front end and to other programs, as far as the options say.
 
 use super::super::niceness::{of_render_threads, raised};
 use super::pty::Folder;

@@ -1,4 +1,4 @@
-//! A person's terminal: the program inside, what is on its screen, keys.
+//! A person's terminal: the program inside, its screen, keys.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -15,7 +15,7 @@ use nix::sys::termios::LocalFlags;
 use nix::unistd::Pid;
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_pty_system};
 
-/// Nothing takes this long, on however busy a machine.
+/// Longest time to wait for anything, on however busy a machine.
 const LIMIT: Duration = Duration::from_secs(60);
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_glimt");
@@ -172,7 +172,7 @@ impl Terminal {
         Self { master: pair.master, _slave: pair.slave, child, keys, screen, relay, is_reading }
     }
 
-    /// What is seen once it stays so: words come before the picture.
+    /// The value of `look` once it stays the same: words come before the picture.
     pub fn settled<T: PartialEq>(&self, look: impl Fn(&vt100::Screen) -> T) -> T {
         let mut before = self.look(&look);
         loop {
@@ -194,11 +194,11 @@ impl Terminal {
         writer.write_all(keys.as_bytes()).expect("keys are taken");
     }
 
-    /// The same for more than the terminal holds, which waits until the program has read it.
+    /// Types more than the terminal holds, and waits until the program has read it.
     pub fn burst(&mut self, keys: String) {
         let writer = self.keys.clone();
         std::thread::spawn(move || {
-            // A program that ends takes no more.
+            // A program that ends reads no more.
             let _ = writer.lock().expect("a writer does not panic").write_all(keys.as_bytes());
         });
     }
@@ -209,7 +209,7 @@ impl Terminal {
         self.master.resize(size(columns, rows)).expect("resized");
     }
 
-    /// Something else writes on the terminal.
+    /// Writes on the terminal as another program would.
     pub fn scribble(&self, bytes: &str) {
         self.screen.lock().expect("a parser does not panic").process(bytes.as_bytes());
     }
@@ -223,7 +223,7 @@ impl Terminal {
         self.child.process_id().expect("an id")
     }
 
-    /// Whether the terminal takes what the program writes.
+    /// Makes the terminal read the program's output, or stop reading.
     pub fn set_reading(&self, reading: bool) {
         self.is_reading.store(reading, Ordering::Release);
     }
@@ -241,13 +241,13 @@ impl Terminal {
         }
     }
 
-    /// What went over the thin line.
+    /// Traffic of the thin line.
     pub fn line<T>(&self, what: impl FnOnce(&Seen) -> T) -> T {
         let relay = self.relay.as_ref().expect("a thin line");
         what(&relay.seen.lock().expect("no panic"))
     }
 
-    /// What is on the screen.
+    /// Text of the screen.
     pub fn text(&self) -> String {
         self.look(|screen| screen.contents())
     }
@@ -256,7 +256,7 @@ impl Terminal {
         what(self.screen.lock().expect("a parser does not panic").screen())
     }
 
-    /// Waits until the screen is as told.
+    /// Waits until the screen satisfies `holds`.
     #[track_caller]
     pub fn wait(&self, what: &str, holds: impl Fn(&vt100::Screen) -> bool) {
         let deadline = Instant::now() + LIMIT;
@@ -294,13 +294,13 @@ impl Terminal {
         });
     }
 
-    /// Waits for the end; gives the exit code after checking that the terminal is as it was before.
+    /// Waits for the end; checks that the terminal is as it was before and returns the exit code.
     #[track_caller]
     pub fn end(self) -> u32 {
         self.end_saying("")
     }
 
-    /// The same, with one of these words, `|` between them, on the screen then.
+    /// [`Terminal::end`], with one of these words, separated by `|`, on the final screen.
     #[track_caller]
     pub fn end_saying(mut self, words: &str) -> u32 {
         let code = self.code();
@@ -343,12 +343,12 @@ pub struct Colors {
 }
 
 impl Colors {
-    /// Those of the upper halves of cells.
+    /// Colours of the upper halves of cells.
     pub fn of(screen: &vt100::Screen) -> Self {
         let mut colors = Self::default();
         for color in cells(screen).filter_map(upper) {
             let vt100::Color::Rgb(r, g, b) = color else { continue };
-            // Far from what the edges of things have: the last bits of a colour hang on what was there before.
+            // Compare far from the colours of edges: the last bits of a colour depend on the cell's history.
             let above = |a: u8, b: u8, c: u8| a > 50 && a / 2 > b.max(c);
             colors.red += usize::from(above(r, g, b));
             colors.green += usize::from(above(g, r, b));

@@ -12,12 +12,12 @@ use std::time::{Duration, Instant};
 
 /// Bytes a second: 1 Mbit/s.
 const RATE: f64 = 125_000.0;
-/// One way.
+/// Delay in one direction.
 const DELAY: Duration = Duration::from_millis(75);
 const QUESTIONS: [(&[u8], &[u8]); 3] =
     [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;22c"), (b"\x1b[?2026$p", b"\x1b[?2026;2$y")];
 
-/// What answers the program's questions.
+/// Source of the answers to the program's queries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answers {
     /// The terminal, at the far end.
@@ -27,22 +27,22 @@ pub enum Answers {
     Nothing,
 }
 
-/// What was seen on the way.
+/// Traffic on the line.
 #[derive(Debug, Default)]
 pub struct Seen {
     /// Bytes that came out of the program.
     pub sent: usize,
     /// Bytes that are on the person's screen.
     pub shown: usize,
-    /// Bytes up to the last question whose answer the program has got.
+    /// Bytes up to the last query whose answer has arrived at the program.
     answered: usize,
-    /// Most bytes that had not been answered for.
+    /// Most bytes without an answer.
     pub most_unanswered: usize,
     /// Most bytes that were in the line.
     pub most_waiting: usize,
 }
 
-/// Bytes on their way: when they arrive, and, of an answer, how much had been sent when it was asked for.
+/// Bytes on their way, with the time of their arrival; for an answer, with the number of bytes before its query.
 struct Due {
     when: Instant,
     bytes: Vec<u8>,
@@ -62,7 +62,7 @@ pub struct Relay {
 }
 
 impl Relay {
-    /// Between what the program writes (`output`), what it reads (`input`), and the person's screen.
+    /// Starts a relay between the program's output, its input, and the person's screen.
     pub fn start(
         mut output: Box<dyn Read + Send>,
         input: Arc<Mutex<Box<dyn Write + Send>>>,
@@ -86,7 +86,7 @@ impl Relay {
                         let _ = to_answer.send(Due::answer(answer, now));
                     }
                 }
-                // The line is a clock: what comes later waits for what came before.
+                // The line is a clock: later bytes wait for earlier ones.
                 for part in bytes.chunks(250) {
                     free = free.max(now) + Duration::from_secs_f64(part.len() as f64 / RATE);
                     let _ = down.send(Due { when: free + DELAY, bytes: part.to_vec(), asked: None });
@@ -100,7 +100,7 @@ impl Relay {
         Self { seen, up }
     }
 
-    /// The person presses keys.
+    /// Presses keys as the person.
     pub fn press(&self, keys: &str) {
         let when = Instant::now() + DELAY;
         let _ = self.up.send(Due { when, bytes: keys.as_bytes().to_vec(), asked: None });
@@ -134,7 +134,7 @@ fn show(
     }
 }
 
-/// Keys and answers, each when it is due.
+/// Delivers keys and answers, each when it is due.
 fn raise(rising: &Receiver<Due>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mutex<Seen>) {
     let mut waiting: VecDeque<Due> = VecDeque::new();
     loop {
@@ -162,7 +162,7 @@ fn raise(rising: &Receiver<Due>, input: &Mutex<Box<dyn Write + Send>>, seen: &Mu
     }
 }
 
-/// Finds questions in a stream that is cut anywhere.
+/// Finds queries in a stream that may be cut anywhere.
 #[derive(Default)]
 struct Scanner {
     last: Vec<u8>,
@@ -171,7 +171,7 @@ struct Scanner {
 }
 
 impl Scanner {
-    /// The answers, each with the number of bytes up to its question.
+    /// The answers, each with the number of bytes up to its query.
     fn answers(&mut self, bytes: &[u8]) -> Vec<(&'static [u8], usize)> {
         let mut found = Vec::new();
         for byte in bytes {

@@ -1,4 +1,4 @@
-//! However a file is saved: one render, and no error on the way.
+//! Ways of saving a file: each gives one render, and no error on the way.
 
 use std::fs;
 use std::io::Write;
@@ -68,7 +68,7 @@ fn every_way_of_saving_a_scene_renders_once() {
             save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
             terminal.wait_for_color(color);
             terminal.wait_for_render(render);
-            // The same once more is no reason to render: the count of the next round shows it.
+            // Saving the same once more is no reason to render: the count of the next round shows it.
             save(&folder.path("scene.toml"), &SCENE.replace(RED, value));
             println!("{way} {options:?}");
         }
@@ -107,12 +107,12 @@ fn no_error_until(terminal: &Terminal, color: &'static str, render: usize) {
     terminal.wait_for_render(render);
 }
 
-/// Cut in the middle of a line.
+/// Two halves of a text, cut in the middle of a line.
 fn halves(text: &str) -> (&str, &str) {
     text.split_at(text.find("diffuse").expect("a material") + 4)
 }
 
-/// How long the writer pauses. A machine that makes more of it than the requirement is, tells nothing.
+/// Pause of the writer. If the machine makes it longer than required, the test proves nothing.
 const PAUSE: Duration = Duration::from_millis(200);
 
 #[test]
@@ -186,7 +186,7 @@ fn a_file_that_breaks_does_not_stop_the_render_of_the_last_good_scene() {
     assert_eq!(written, folder.once(&[]));
 }
 
-/// The folder of the scene is removed and made again, as by a checkout: seen from inside it and from outside.
+/// Removes the scene's folder and makes it again, as a checkout does: seen from inside it and from outside.
 #[test]
 fn a_folder_that_goes_and_comes_back_is_found_again() {
     for (line, picture) in [

@@ -12,7 +12,7 @@ fn last_line(screen: &vt100::Screen) -> String {
     screen.contents().lines().nth(rows - 1).unwrap_or_default().trim_end().to_owned()
 }
 
-/// Waits until the words for this size are there, and gives the red cells once they stay.
+/// Waits until the words for this size are there, and returns the red cells once they stay.
 fn resized(terminal: &mut Terminal, columns: u16, rows: u16) -> usize {
     terminal.resize(columns, rows);
     terminal.wait("the line of keys", |screen| last_line(screen).ends_with("? help"));

@@ -60,7 +60,7 @@ fn what_path_does_not_know_is_said() {
     terminal.wait_for_render(2);
 }
 
-/// The state of the view in the line of keys.
+/// Waits for a view in the line of keys.
 fn wait_for_view(terminal: &Terminal, name: &str) {
     terminal.wait(name, |screen| {
         let text = screen.contents();

@@ -1,13 +1,13 @@
-//! Over a thin line a key is answered at once, whatever is on the way, and the shell is back at once.
+//! Over a thin line, glimt answers a key at once, whatever is on the way, and the shell returns at once.
 
 use std::time::{Duration, Instant};
 
 use super::pty::{Folder, GREEN, RED, SCENE, Terminal};
 use super::relay::Answers;
 
-/// Most bytes on their way that the terminal has not answered for.
+/// Most bytes on their way without an answer from the terminal.
 const MOST: usize = 24_000;
-/// From a key to its first changed cells, and from `q` to the shell.
+/// Longest time from a key to its first changed cells, and from `q` to the shell.
 const SEEN: Duration = Duration::from_millis(400);
 
 const ALL: [Answers; 3] = [Answers::Terminal, Answers::Multiplexer, Answers::Nothing];
@@ -22,7 +22,7 @@ fn endless(answers: Answers) -> (Folder, Terminal) {
     (folder, terminal)
 }
 
-/// How long a key takes to show.
+/// Time until a key shows its effect.
 fn time(terminal: &mut Terminal, key: &str, what: &str, holds: impl Fn(&vt100::Screen) -> bool) -> Duration {
     let begin = Instant::now();
     terminal.press(key);
@@ -30,8 +30,8 @@ fn time(terminal: &mut Terminal, key: &str, what: &str, holds: impl Fn(&vt100::S
     begin.elapsed()
 }
 
-/// Whether something took no longer than [`SEEN`] at least once: other tests may have the processors meanwhile, so that the least of
-/// several times is what the program takes.
+/// Checks that something took no longer than [`SEEN`] at least once. Other tests may occupy the processors, so that the least of
+/// several times is the program's own.
 #[track_caller]
 fn assert_at_once(what: &str, mut once: impl FnMut() -> Duration) {
     const TRIES: u32 = 12;
@@ -47,7 +47,7 @@ fn assert_at_once(what: &str, mut once: impl FnMut() -> Duration) {
 
 #[test]
 fn keys_are_seen_at_once_and_little_is_on_the_way() {
-    /// The line itself stands still while other tests have the processors.
+    /// Number of tries, as the line itself stalls while other tests occupy the processors.
     const TRIES: u32 = 4;
     for answers in ALL {
         let mut least = usize::MAX;
@@ -61,7 +61,7 @@ fn keys_are_seen_at_once_and_little_is_on_the_way() {
     }
 }
 
-/// Bytes in the line, or of those that the terminal has not answered for, while keys are pressed and the scene is saved.
+/// Bytes in the line, or bytes without an answer from the terminal, while keys are pressed and the scene is saved.
 fn most_on_the_way(answers: Answers) -> usize {
     let (folder, mut terminal) = endless(answers);
     let mut words = ["shadows hard", "shadows off", "shadows soft"].into_iter().cycle();
@@ -148,7 +148,7 @@ fn a_terminal_that_takes_nothing_does_not_hold_up_the_end() {
     });
 }
 
-/// A terminal cuts what does not fit; the program may see the last size only.
+/// Checks the redraw: a terminal cuts what does not fit, and the program may see only the last size.
 #[test]
 fn a_window_that_shrinks_and_grows_at_once_is_drawn_anew() {
     let folder = Folder::new();

@@ -11,7 +11,7 @@ pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
     /// Its name.
     fn name(self) -> &'static str;
 
-    /// What it means, in a few words.
+    /// Its meaning, in a few words.
     fn meaning(self) -> &'static str;
 
     /// The value of this name.
@@ -23,7 +23,7 @@ pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
 /// A choice in a report: its name.
 ///
 /// # Errors
-/// Those of the serializer.
+/// The serializer's errors.
 pub fn serialize<C: Choice, S: serde::Serializer>(choice: &C, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(choice.name())
 }

@@ -1,15 +1,15 @@
-//! How long work is stopped, paused and watched: a token that is polled and a sink for progress.
+//! A token to stop and pause long work, which polls it, and a sink for its progress.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The work was told to stop; nothing that it made may be used.
+/// Says that the work was stopped; nobody may use what it made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cancelled")]
 pub struct Cancelled;
 
-/// Where long work reports: work units done, work units in all.
+/// A sink to which long work reports: work units done, work units in all.
 pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
 
 /// A sink for work that nobody watches.
@@ -28,7 +28,7 @@ struct Shared {
     changed: Condvar,
 }
 
-/// For how long work was held, and since when it is.
+/// Time for which work was held before, and the start of the current hold.
 #[derive(Debug, Default)]
 struct Held {
     before: Duration,
@@ -59,7 +59,7 @@ impl CancelToken {
         self.0.changed.notify_all();
     }
 
-    /// For how long the work was held until now, in all.
+    /// Total time for which the work has been held.
     pub fn held(&self) -> Duration {
         let held = self.lock();
         held.before + held.since.map_or(Duration::ZERO, |since| since.elapsed())

@@ -32,7 +32,7 @@ pub(super) fn agx(color: Vec3) -> Vec3 {
     Vec3::from_array(outset.to_array().map(|x| pow(x, 2.2)))
 }
 
-/// Columns.
+/// Columns of AgX's inset matrix.
 const AGX_INSET: [Vec3; 3] = [
     Vec3::new(0.842_479_05, 0.042_328_242, 0.042_375_654),
     Vec3::new(0.078_433_6, 0.878_468_6, 0.078_433_6),

@@ -1,10 +1,10 @@
 //! Sums of samples, tone mapping, pictures.
 //!
-//! Integrators make [`TileSamples`]; a [`Film`] sums them in f64; [`Film::radiance`] is what is written,
-//! [`Previewer`] shrinks it for the screen while it grows, and [`tone::develop`] turns either into a [`Picture`].
+//! Integrators make [`TileSamples`]; a [`Film`] sums them in f64. [`Film::radiance`] is what files hold. [`Previewer`]
+//! shrinks it for the screen while it grows. [`tone::develop`] turns either into a [`Picture`].
 //!
-//! Large pictures are worked at by all threads of the pool that the caller is in, and by the caller alone outside of
-//! one: the number of threads is the caller's to choose.
+//! All threads of the caller's pool work on large pictures; outside of a pool the caller works alone. The caller
+//! chooses the number of threads.
 
 mod curves;
 mod noise;
@@ -27,7 +27,7 @@ pub use sums::{CELL_SIZE, CELLS, Film, FilmError, SampleStats, TILE_SIZE};
 
 use crate::math::Vec3;
 
-/// Whether this thread belongs to a pool that work can be shared in.
+/// Whether this thread belongs to a pool, whose threads can share work.
 fn is_in_pool() -> bool {
     rayon::current_thread_index().is_some()
 }
@@ -59,7 +59,7 @@ impl Rect {
     }
 }
 
-/// What two spans (start, length) have in common; u64, as a start and a length may add up to more than u32 holds.
+/// Intersection of two spans (start, length). In u64, as a start and a length may add up to more than u32 holds.
 fn overlap(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
     let end = |(start, length): (u32, u32)| u64::from(start) + u64::from(length);
     let start = a.0.max(b.0);
@@ -67,26 +67,26 @@ fn overlap(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
     Some((start, u32::try_from(length).ok()?))
 }
 
-/// What an integrator made of a tile: `samples` radiances for each pixel, one after the other in rows.
+/// Samples that an integrator took in a tile: `samples` radiances for each pixel, one after the other in rows.
 #[derive(Clone, Debug)]
 pub struct TileSamples {
     /// The pixels.
     pub pixels: Pixels,
     /// Samples for each.
     pub samples: u32,
-    /// `pixels.count() · samples` radiances, placed as the reconstruction filter weighs.
+    /// `pixels.count() · samples` radiances, at places drawn in proportion to the reconstruction filter.
     pub radiance: Vec<Vec3>,
-    /// Which of them lie where the filter is negative; none where it is so nowhere.
+    /// Samples that lie where the filter is negative. `None` if the filter is negative nowhere.
     pub negative: Option<NegativeLobes>,
 }
 
-/// Samples where the reconstruction filter is negative. A pixel is 1 + `weight` of the mean of the others, less `weight` of
-/// the mean of these, so that what is the same everywhere stays as it is, however the samples fall.
+/// Samples where the reconstruction filter is negative. A pixel's value is (1 + `weight`) · mean of the other
+/// samples − `weight` · mean of these. A constant image therefore stays constant, wherever the samples fall.
 #[derive(Clone, Debug)]
 pub struct NegativeLobes {
     /// −∫min(f, 0)/∫f.
     pub weight: f64,
-    /// For each radiance.
+    /// Whether each radiance lies where the filter is negative.
     pub is_negative: Vec<bool>,
 }
 
@@ -107,7 +107,7 @@ impl RadianceImage {
         Self { width, height, pixels: vec![Vec3::ZERO; width as usize * height as usize] }
     }
 
-    /// Takes over the pixels of a rectangle, in rows. What is not finite is black, as in a [`Film`].
+    /// Takes over the pixels of a rectangle, in rows. Pixels that are not finite become black, as in a [`Film`].
     pub fn put(&mut self, rect: Rect, pixels: &[Vec3]) {
         let width = self.width as usize;
         let rows = self.pixels.chunks_exact_mut(width).skip(rect.y as usize);

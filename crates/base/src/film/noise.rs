@@ -1,4 +1,4 @@
-//! How far a film is from the picture of endless samples, judged by its own samples.
+//! Noise of a film: its distance from the converged image, estimated by its own samples.
 
 use rayon::prelude::*;
 
@@ -11,16 +11,16 @@ pub(super) fn luminance(radiance: DVec3) -> f64 {
     radiance.dot(LUMINANCE_WEIGHTS.as_dvec3())
 }
 
-/// How the pixels of a tile moved while their samples doubled.
+/// Squared steps of a tile's pixel means: the changes of each mean when its samples doubled.
 ///
-/// The samples of a pixel are not independent: each twice as many fill the gaps between those before, so that the variance of
-/// single samples tells too much, and two halves scrambled apart would cost what the gaps are worth. But for the mean M of 2n
-/// samples, of which the first n have the mean A and the others B, (A − M)² = (A − B)²/4 has the expectation V(n) − V(2n)
-/// for any dependence between A and B, as V(2n) = (V(A) + V(B))/4 + Cov/2 and V(A) = V(B) = V(n).
+/// The samples of a pixel are not independent: each doubling fills the gaps between the samples before. Therefore the variance
+/// of single samples overestimates the noise, and two halves with separate scrambles would lose what the gaps are worth. But
+/// let M be the mean of 2n samples, A the mean of the first n and B that of the others. (A − M)² = (A − B)²/4 has the
+/// expectation V(n) − V(2n) for any dependence between A and B, as V(2n) = (V(A) + V(B))/4 + Cov/2 and V(A) = V(B) = V(n).
 ///
-/// The rate at which V falls is measured by the same pixels: within the first n samples, and within the others, lie two such
-/// steps more, which have the expectation V(n/2) − V(n). Their mean over the first step is the rate. A bright sample that comes
-/// once is in all three: it says twice, as rare light does, however few pixels meet it.
+/// The same pixels measure the rate at which V falls: the first n samples and the others each contain one more such step, with
+/// the expectation V(n/2) − V(n). The mean of these two over the first step is the rate. A bright sample that comes once is in
+/// all three steps: it says a rate of two, as rare light does, however few pixels meet it.
 #[derive(Debug, Default)]
 pub(super) struct Steps {
     /// Luminance of each pixel at the last power of two of its samples.
@@ -33,18 +33,18 @@ pub(super) struct Steps {
     recent: Vec<f32>,
 }
 
-/// Sums over pixels of squared steps to one power of two of samples.
+/// Sums over pixels of their squared steps to one power of two of samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct LevelSums {
     /// Steps of the mean of all samples.
     outer: f64,
     /// Steps within the second half of the samples.
     inner: f64,
-    /// Squares of these: how few pixels the sum hangs on.
+    /// Squares of the `outer` steps, which tell how few pixels the sum hangs on.
     outer_squares: f64,
-    /// `outer`, each over luminance² + [`RELMSE_LEAST`].
+    /// Sum of the `outer` steps, each divided by luminance² + [`RELMSE_LEAST`].
     relative: f64,
-    /// `inner`, each over luminance² + [`RELMSE_LEAST`].
+    /// Sum of the `inner` steps, each divided by luminance² + [`RELMSE_LEAST`].
     relative_inner: f64,
 }
 
@@ -57,7 +57,7 @@ struct StepPair {
 }
 
 impl Steps {
-    /// With memory for so many pixels, if it can be had.
+    /// Empty steps with memory reserved for so many pixels. `None` if the memory cannot be had.
     pub(super) fn reserved(area: usize) -> Option<Self> {
         let reserved = || {
             let mut values = Vec::new();
@@ -67,14 +67,14 @@ impl Steps {
         Some(Self { last: reserved()?, half_way: reserved()?, recent: reserved()?, levels: Vec::new() })
     }
 
-    /// For so many pixels; cannot fail where the memory was reserved.
+    /// Makes room for so many pixels; cannot fail if the memory was reserved.
     pub(super) fn fill(&mut self, area: usize) {
         for values in [&mut self.last, &mut self.half_way, &mut self.recent] {
             values.resize(area, 0.0);
         }
     }
 
-    /// The last step of a pixel, squared.
+    /// Square of a pixel's last step.
     pub(super) fn square(&self, pixel: usize) -> f64 {
         self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))
     }
@@ -88,7 +88,7 @@ impl Steps {
         (next - count) as usize
     }
 
-    /// Notes the luminance of a pixel of a half of a cell at a count that [`Steps::samples_to_next`] leads to.
+    /// Notes the luminance of a pixel (with its cell and half) at a count that [`Steps::samples_to_next`] leads to.
     pub(super) fn note(&mut self, (pixel, cell, half): (usize, usize, usize), count: u32, luminance: f64) {
         let rounded = luminance as f32;
         if !count.is_power_of_two() {
@@ -116,7 +116,7 @@ impl Steps {
         self.last[pixel] = rounded;
     }
 
-    /// Steps of a half of a cell to 2 to the power of `level` samples.
+    /// Steps of a half of a cell to 2^`level` samples.
     fn pair(&self, level: usize, (cell, half): (usize, usize), is_relative: bool) -> Option<StepPair> {
         let of = |level: usize| self.levels.get(level.checked_sub(1)?).map(|cells| cells[cell][half]);
         let parts = |sums: LevelSums| match is_relative {
@@ -128,15 +128,15 @@ impl Steps {
         Some(StepPair { last, before })
     }
 
-    /// Steps of a half of a cell to 2 to the power of `level` samples and one, two and three doublings earlier.
+    /// Steps of a half of a cell to 2^`level` samples, and those one, two and three doublings earlier.
     fn last_four(&self, level: usize, at: (usize, usize), is_relative: bool) -> Option<[f64; 4]> {
         let StepPair { last, before } = self.pair(level, at, is_relative)?;
         let earlier = |back: usize| self.pair(level.checked_sub(back)?, at, is_relative)?.before;
         Some([last, before?, earlier(1)?, earlier(2)?])
     }
 
-    /// How many times smaller four times as many samples made the variance, at 2 to the power of `level` of them, over this half of all
-    /// cells; `None` as in [`Steps::fall`], which tells of twice as many.
+    /// Factor by which four times as many samples reduced the variance, at 2^`level` samples, over this half of all cells. `None`
+    /// as in [`Steps::fall`], which gives the factor for twice as many.
     fn fourfold_fall(&self, level: usize, half: usize) -> Option<f64> {
         let mut sums = [0.0; 4];
         for cell in 0..CELLS {
@@ -146,13 +146,13 @@ impl Steps {
             }
         }
         let [last, before, third, fourth] = sums;
-        // Of the same step at four times fewer samples, and of two steps together, which is careful.
+        // Compare with the same step at four times fewer samples, and carefully with two steps together.
         let fall = (third / last).max(CAREFUL * (third + fourth) / (last + before));
         Some(fall).filter(|fall| fall.is_finite() && *fall > 0.0)
     }
 
-    /// The relative spread to expect of the sum of the steps to 2 to the power of `level` samples over these halves of all cells: 1 where
-    /// a single pixel decides it, less the more pixels share it. Cells that have fewer samples do not count.
+    /// Relative spread to expect of the sum of the steps to 2^`level` samples, over these halves of all cells: 1 if a single pixel
+    /// decides it, less the more pixels share it. Cells that have fewer samples do not count.
     fn spread(&self, level: usize, halves: &[usize]) -> f64 {
         let Some(cells) = level.checked_sub(1).and_then(|index| self.levels.get(index)) else { return 1.0 };
         let sums = cells.iter().flat_map(|cell| halves.iter().map(|half| cell[*half]));
@@ -161,14 +161,14 @@ impl Steps {
         if sum > 0.0 { squares.sqrt() / sum } else { 0.0 }
     }
 
-    /// How far a fall is trusted, from 0 to 1.
+    /// Trust in a fall, from 0 to 1.
     fn trust(&self, level: usize, halves: &[usize]) -> f64 {
         let spread = self.spread(level, halves);
         1.0 / (1.0 + DOUBT * spread * spread)
     }
 
-    /// How many times smaller the variance got by the doubling to 2 to the power of `level` samples, over these halves of all cells;
-    /// `None` if that is not known. Cells that have fewer samples do not count.
+    /// Factor by which the doubling to 2^`level` samples reduced the variance, over these halves of all cells. `None` if it is not
+    /// known. Cells that have fewer samples do not count.
     fn fall(&self, level: usize, halves: &[usize]) -> Option<f64> {
         let (mut last, mut before) = (0.0, 0.0);
         for (cell, half) in (0..CELLS).flat_map(|cell| halves.iter().map(move |half| (cell, *half))) {
@@ -182,46 +182,46 @@ impl Steps {
     }
 }
 
-/// How the variance of a pixel's mean falls with its samples.
+/// Convergence: the law by which the variance of a pixel's mean falls with its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Convergence {
-    /// The samples of a pixel fill each other's gaps. Twice as many make the variance 2 times smaller where light is rare, 2.8 times at
-    /// edges and in penumbras, 4 times and more where all is smooth: the steps between pairs of them tell.
+    /// The samples of a pixel fill each other's gaps. Twice as many divide the variance by 2 in places of rare light, by 2.8 at
+    /// edges and in penumbras, by 4 and more in smooth places. The steps between pairs of doublings measure it.
     #[default]
     Stratified,
-    /// Each sample has photons of its own, which the pixels share: what they leave falls as that of independent samples in the end,
-    /// while what the eye's part leaves falls faster at first.
+    /// Each sample has photons of its own, which the pixels share. In the end the photons' variance falls as that of independent
+    /// samples, while that of the camera paths falls faster at first.
     Photons,
 }
 
-/// How many times smaller twice as many independent samples make the variance.
+/// Factor by which twice as many independent samples reduce the variance.
 const INDEPENDENT_RATE: f64 = 2.0;
 
-/// The largest fall by a doubling that is believed.
+/// Largest fall by a doubling that is believed.
 const MOST_FALL: f64 = 12.0;
 
-/// Falls up to this are taken for that of independent samples: by chance, few bright pixels seem to fall as fast.
+/// Largest fall that is taken for that of independent samples: by chance, few bright pixels seem to fall as fast.
 const CHANCE_FALL: f64 = 2.3;
 
-/// The part of a fall beyond [`CHANCE_FALL`] that the next doubling is expected to have: what is smooth in a tile vanishes first, and
-/// what is left falls slower.
+/// Part of a fall beyond [`CHANCE_FALL`] that is expected of the next doubling: the smooth parts of a tile converge first, and the
+/// rest falls slower.
 const LASTING: f64 = 0.65;
 
-/// How much less is believed of a fall that few pixels decide, by the square of its [`Steps::spread`].
+/// Distrust in a fall that few pixels decide, per square of its [`Steps::spread`].
 const DOUBT: f64 = 2.0;
 
-/// The part of the fall by two steps together that is believed.
+/// Part of the fall by two steps together that is believed.
 const CAREFUL: f64 = 0.8;
 
-/// How many times smaller four times as many independent samples make the variance, up to which fall chance is taken for the cause, and
-/// how a fall beyond that goes on.
+/// Factor by which four times as many independent samples reduce the variance; then the fall up to which chance is taken for the
+/// cause, the part of a fall beyond it that goes on, and the largest rate.
 const FOURFOLD_RATE: f64 = 4.0;
 const FOURFOLD_CHANCE: f64 = 5.2;
 const FOURFOLD_LASTING: f64 = 1.2;
 const FOURFOLD_MOST: f64 = 40.0;
 
 impl Convergence {
-    /// The power of the samples with which the variance of most pictures falls in the long run, whatever the last steps tell.
+    /// Power of the samples with which the variance of most pictures falls in the long run, whatever the last steps say.
     pub fn usual_power(self) -> f64 {
         match self {
             Self::Stratified => 1.432_959_407_276_106_2,
@@ -229,21 +229,21 @@ impl Convergence {
         }
     }
 
-    /// How many times smaller the variance got by the doubling to 2 to the power of `level` samples, in these halves of a tile.
+    /// Factor by which the doubling to 2^`level` samples reduced the variance, in these halves of a tile.
     fn fall(steps: &Steps, level: usize, halves: &[usize]) -> f64 {
         steps.fall(level, halves).map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
     }
 
-    /// How many times smaller twice as many samples as 2 to the power of `level` make the variance, in these halves of a tile.
+    /// Factor by which twice as many samples as 2^`level` are expected to reduce the variance, in these halves of a tile.
     pub(super) fn rate(steps: &Steps, level: usize, halves: &[usize]) -> f64 {
         rate_after(Self::fall(steps, level, halves), steps.trust(level, halves))
     }
 
-    /// The variance of means of `count` samples of one half of a cell, summed over its pixels, and the rate at which it falls.
+    /// Variance of the means of `count` samples of one half of a cell, summed over its pixels, and the rate at which it falls.
     ///
-    /// Two foretellings have a share in it, as their geometric mean. One goes by twice as many samples: by the last step and by what the
-    /// two before it foretell, as each has a spread. But points in base 2 fill squares at powers of 4, so that every other doubling
-    /// gains more. The other goes by four times as many.
+    /// The variance is the geometric mean of two forecasts. One goes by doublings: by the last step, and by the forecast from the
+    /// two steps before it, as each has a spread. But points in base 2 fill squares at powers of 4, so that every other doubling
+    /// gains more. The other forecast therefore goes by four times as many samples.
     fn variance(
         steps: &Steps,
         (cell, half): (usize, usize),
@@ -263,8 +263,8 @@ impl Convergence {
         Some((variance, rate))
     }
 
-    /// The variance of means of 2 to the power of `level` samples of one half of a cell by how it fell with four times as many, summed
-    /// over its pixels; none where there are fewer than 16.
+    /// Variance of the means of 2^`level` samples of one half of a cell, summed over its pixels, by its fall with four times as
+    /// many samples. `None` for fewer than 16 samples.
     fn by_four(steps: &Steps, level: usize, at: (usize, usize), is_relative: bool) -> Option<f64> {
         let [last, before, ..] = steps.last_four(level, at, is_relative)?;
         let fall = steps.fourfold_fall(level, at.1).unwrap_or(FOURFOLD_RATE);
@@ -274,25 +274,26 @@ impl Convergence {
     }
 }
 
-/// The rate that is expected after a fall that is trusted so far.
+/// Rate to expect after a fall with this trust.
 fn rate_after(fall: f64, trust: f64) -> f64 {
     INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
 }
 
-/// The variance of a mean of `count` ≥ 2 samples by the squared step to the last power of two of them, and the rate at which it falls.
+/// Variance of a mean of `count` ≥ 2 samples, from the squared step to the last power of two of them and the rate at which it
+/// falls.
 pub(super) fn pixel_variance(step: f64, count: u32, rate: f64) -> f64 {
-    // Between powers of two as for independent samples.
+    // Between powers of two it falls as for independent samples.
     let part = f64::from(1_u32 << count.ilog2()) / f64::from(count);
     step / (rate - 1.0) * part
 }
 
-/// Samples that bring the standard error of means of `count` samples to a part of itself, where its square falls with this power of
-/// them.
+/// Number of samples that reduces the standard error of means of `count` samples to this part of itself, if its square falls with
+/// this power of the samples.
 pub fn samples_by(power: f64, part: f64, count: u32) -> u32 {
     (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
 }
 
-/// How much noise there is in a half of a cell.
+/// Noise in a half of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfNoise {
     /// Mean variance of the pixels' luminance.
@@ -301,30 +302,30 @@ pub struct HalfNoise {
     pub mean: f64,
     /// Samples of each pixel.
     pub samples: u32,
-    /// The variance is expected to fall with this power of the samples.
+    /// Power of the samples with which the variance is expected to fall.
     pub power: f64,
 }
 
-/// How much noise there is in a picture.
+/// Noise in a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureNoise {
-    /// [`Film::relative_error`].
+    /// Relative standard error: [`Film::relative_error`].
     pub relative_error: f64,
-    /// Its square is expected to fall with this power of the samples.
+    /// Power of the samples with which the square of that error is expected to fall.
     pub power: f64,
 }
 
-/// Sums over pixels.
+/// Sums over pixels for the noise of a picture.
 #[derive(Clone, Copy, Debug, Default)]
 struct NoiseSums {
     variance: f64,
-    /// What twice as many samples are expected to leave of the variance.
+    /// Variance that twice as many samples are expected to leave.
     left: f64,
     mean: f64,
 }
 
 impl NoiseSums {
-    /// The power of the samples with which the variance falls by the next doubling; without noise that of independent ones.
+    /// Power of the samples with which the variance falls by the next doubling; without noise, that of independent samples.
     fn power(self) -> f64 {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
@@ -337,29 +338,28 @@ impl NoiseSums {
 }
 
 impl Film {
-    /// The error to expect of the picture so far, relative to its brightness: the root mean square over the pixels of
-    /// the standard error of their luminance, divided by the picture's mean luminance; by what the last samples changed
-    /// in it.
+    /// Expected error of the picture so far, relative to its brightness: the root mean square over the pixels of the
+    /// standard error of their luminance, divided by the picture's mean luminance. The changes by the last samples give
+    /// the estimate.
     ///
-    /// Next to 0 where all samples of each pixel are alike; none where a pixel has fewer than two samples,
-    /// of which nothing can be told.
+    /// Next to 0 if all samples of each pixel are alike. `None` if a pixel has fewer than two samples.
     pub fn relative_error(&self) -> Option<f64> {
         self.noise().map(|noise| noise.relative_error)
     }
 
-    /// The same, and how it falls.
+    /// [`Film::relative_error`], and the power of the samples with which it falls.
     pub fn noise(&self) -> Option<PictureNoise> {
         let sums @ NoiseSums { variance, mean, .. } = self.noise_sums()?;
         let pixels = self.crop().area() as f64;
         let error = (variance / pixels).sqrt();
-        // Of a black picture too.
+        // A black picture without error has a relative error of 0 too.
         let relative_error = if error == 0.0 { 0.0 } else { error / (mean / pixels) };
         Some(PictureNoise { relative_error, power: sums.power() })
             .filter(|noise| noise.relative_error.is_finite())
     }
 
-    /// The standard error of the mean luminance of a whole picture, whose pixels err apart from each other; none of a part, where
-    /// photons make the pixels err together, and where a pixel has fewer than two samples.
+    /// Standard error of the mean luminance of a whole picture, whose pixels' errors are independent. `None` for a crop, for
+    /// photons, which make the pixels' errors dependent, and if a pixel has fewer than two samples.
     pub fn mean_luminance_error(&self) -> Option<f64> {
         let is_whole = (self.crop().width, self.crop().height) == (self.width(), self.height());
         let is_apart = self.convergence == Convergence::Stratified;
@@ -393,13 +393,13 @@ impl Film {
         self.of_tiles(of_tile).into_iter().try_fold(NoiseSums::default(), add)
     }
 
-    /// What is told of each tile, in their order. In a pool its threads share the work.
+    /// Calls `tell` for each tile and returns the answers in the tiles' order. In a pool its threads share the work.
     pub fn of_tiles<T: Send>(&self, tell: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
         let tiles = 0..self.tile_count();
         if is_in_pool() { tiles.into_par_iter().map(tell).collect() } else { tiles.map(tell).collect() }
     }
 
-    /// The noise in a half of a cell; none where a pixel has fewer than two samples, and where there are no pixels in it.
+    /// Noise in a half of a cell. `None` if the half has no pixels, or one with fewer than two samples.
     pub fn half_noise(&self, number: usize, half: usize) -> Option<HalfNoise> {
         let tile = self.tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
@@ -413,21 +413,21 @@ impl Film {
         Some(HalfNoise { variance: variance / pixels, mean: sum / pixels, samples, power: libm::log2(rate) })
     }
 
-    /// How many times smaller the variance of the pixels of a tile got by their last doubling, over the halves of its cells that had it;
-    /// none where there are not steps enough to tell.
+    /// Factor by which the last doubling reduced the variance of a tile's pixels, over the halves of its cells that had it. `None`
+    /// if there are not enough steps.
     pub fn tile_fall(&self, tile: usize) -> Option<f64> {
         let tile = self.tile(tile);
         tile.steps.fall(tile.steps.levels.len(), &[0, 1])
     }
 
-    /// The relative spread to expect of the variance that one half of all cells of a tile tells: 1 where a single pixel decides it, less
-    /// the more pixels share it. Cells that have fewer samples than others do not count.
+    /// Relative spread to expect of the variance that one half of all cells of a tile measures: 1 if a single pixel decides it,
+    /// less the more pixels share it. Cells that have fewer samples than others do not count.
     pub fn tile_spread(&self, tile: usize, half: usize) -> f64 {
         let tile = self.tile(tile);
         tile.steps.spread(tile.steps.levels.len(), &[half])
     }
 
-    /// The noise in one half of all cells of a tile; none as in [`Film::half_noise`].
+    /// Noise in one half of all cells of a tile. `None` as in [`Film::half_noise`].
     pub fn tile_noise(&self, tile: usize, half: usize) -> Option<HalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
@@ -443,9 +443,9 @@ impl Film {
         (pixels > 0.0).then_some(HalfNoise { variance, mean, samples, power })
     }
 
-    /// The error of a half of a cell as it was after the first `count` samples of each of its pixels, a power of two: the mean over the
-    /// pixels of the variance of their luminance over luminance² + [`RELMSE_LEAST`], and the power of the samples with which it falls.
-    /// None for fewer than two samples, for more than there are, and where there are no pixels.
+    /// Error of a half of a cell after the first `count` samples of each of its pixels, a power of two: the mean over the pixels of
+    /// the variance of their luminance over luminance² + [`RELMSE_LEAST`], and the power of the samples with which it falls. `None`
+    /// for fewer than two samples, for more than the pixels have, and if the half has no pixels.
     pub fn half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.tile(number / CELLS);
         let pixels = self.half_pixel_count(number, half);
@@ -453,17 +453,17 @@ impl Film {
         (pixels > 0).then(|| (sum / pixels as f64, libm::log2(rate)))
     }
 
-    /// How its noise is taken to fall.
+    /// Convergence of this film's noise.
     pub fn convergence(&self) -> Convergence {
         self.convergence
     }
 
-    /// How many pixels a half of a cell has.
+    /// Number of pixels in a half of a cell.
     pub fn half_pixel_count(&self, cell: usize, half: usize) -> usize {
         self.cell_rect(cell).map_or(0, |rect| Part::Half(half).count(rect.area()))
     }
 
-    /// Places, in its tile, of the pixels of a half of a cell.
+    /// Indices, in its tile, of the pixels of a half of a cell.
     fn half_pixels(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
         let (tile, rect) = (self.tile_rect(cell / CELLS), self.cell_rect(cell));
         let part = Part::Half(half);
@@ -474,7 +474,7 @@ impl Film {
         })
     }
 
-    /// Mean luminance of the picture; none where a pixel has no sample.
+    /// Mean luminance of the picture. `None` if a pixel has no sample.
     pub fn mean_luminance(&self) -> Option<f64> {
         let of_tile = |tile: usize| {
             let tile = self.tile(tile);
@@ -523,7 +523,7 @@ mod tests {
 
     #[test]
     fn a_half_that_has_stopped_does_not_tell_how_noise_fell() {
-        // Of two pixels, which are a half each, the first has steps of 1 and 0.5, the other one of 3 alone.
+        // Of two pixels, each a half of its own, the first has steps of 1 and 0.5, the other a single one of 3.
         let film = film(&[&[1.0, 3.0, 2.0, 4.0], &[1.0, 7.0]]);
         assert_eq!(film.tile_fall(0), Some(4.0));
         assert_eq!(self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).tile_fall(0), None, "one step");
@@ -554,7 +554,7 @@ mod tests {
 
     #[test]
     fn independent_samples_have_the_error_that_their_variance_says_whatever_they_are_taken_for() {
-        // Falls by chance are believed a little.
+        // Falls that may be chance are believed a little.
         let mut next = unit(5);
         for count in [16, 64, 100, 1024] {
             let pixels: Vec<Vec<f32>> = (0..4000).map(|_| (0..count).map(|_| next()).collect()).collect();
@@ -567,8 +567,8 @@ mod tests {
         }
     }
 
-    /// A film of 64 × 64 pixels and the true root mean square error of their means; `sample` makes the sample of a number for a pixel
-    /// that has some random bits, and `truth` is the mean of all that there are.
+    /// A film of 64 × 64 pixels and the true root mean square error of their means. `sample` makes the sample of a number for a
+    /// pixel with random bits of its own; `truth` is the mean of all samples.
     fn square(count: u32, truth: f64, mut sample: impl FnMut(u32, u32) -> f32) -> (Film, f64) {
         const SIDE: u32 = 64;
         let film = Film::new(SIDE, SIDE, None).expect("a film");
@@ -595,7 +595,7 @@ mod tests {
         film.relative_error().expect("an estimate") / exact
     }
 
-    /// Points of a van der Corput sequence, moved for each pixel: each twice as many fill the gaps.
+    /// Points of a van der Corput sequence, shifted for each pixel: each doubling fills the gaps.
     fn filling(number: u32, bits: u32) -> f32 {
         ((number.reverse_bits() >> 8) ^ bits) as f32 / 16_777_216.0
     }

@@ -1,13 +1,13 @@
-//! Halves of a cell that look alike: what one tells of its noise is true of the other too.
+//! Halves of a cell that look alike, so that the noise of one holds for the other too.
 
 use super::Rect;
 
 /// Some pixels of a rectangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pixels {
-    /// Where they are.
+    /// Rectangle that the pixels are in.
     pub rect: Rect,
-    /// Which of those there.
+    /// Part of the rectangle: all its pixels, or a half.
     pub part: Part,
 }
 
@@ -18,12 +18,12 @@ impl From<Rect> for Pixels {
 }
 
 impl Pixels {
-    /// How many there are.
+    /// Number of the pixels.
     pub fn count(&self) -> usize {
         self.part.count(self.rect.area())
     }
 
-    /// Column and row in the picture of the pixel of a number.
+    /// Column and row, in the picture, of the pixel of a number.
     #[inline]
     pub fn place(&self, number: u32) -> (u32, u32) {
         let index = self.part.index(number, self.rect);
@@ -31,18 +31,18 @@ impl Pixels {
     }
 }
 
-/// All pixels of a rectangle, or half of them: one of every two neighbours in its rows, in turns the left and the right one, so
-/// that no edge, level, upright or aslant, lies in one half alone.
+/// All pixels of a rectangle, or half of them: one of every two neighbours in its rows, the left and the right one in turns.
+/// Therefore no edge (level, upright or aslant) lies in one half alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Every pixel.
     All,
-    /// The first half, 0, or the other one, 1.
+    /// One half: the first, 0, or the other one, 1.
     Half(usize),
 }
 
 impl Part {
-    /// How many of `area` pixels.
+    /// Number of pixels in this part of `area` pixels.
     pub fn count(self, area: usize) -> usize {
         match self {
             Self::All => area,
@@ -50,19 +50,19 @@ impl Part {
         }
     }
 
-    /// The place in the rectangle, row after row, of the pixel of a number.
+    /// Index in the rectangle, row after row, of the pixel of a number.
     #[inline(always)]
     pub fn index(self, number: u32, rect: Rect) -> u32 {
         match self {
             Self::All => number,
-            // Of an odd number of pixels the last one is in the first half.
+            // If their number is odd, the last pixel is in the first half.
             Self::Half(half) => {
                 (2 * number + (swaps(number, rect.width) ^ half as u32)).min(rect.area() as u32 - 1)
             }
         }
     }
 
-    /// The half that a place in a rectangle is in.
+    /// The half that contains the pixel of an index in a rectangle.
     pub fn half_of(index: u32, rect: Rect) -> usize {
         let area = rect.area() as u32;
         let is_alone = index + 1 == area && area % 2 == 1;
@@ -70,7 +70,7 @@ impl Part {
     }
 }
 
-/// Whether the right one of a pair of neighbours is in the first half: every two rows it is the other one.
+/// Whether the right one of a pair of neighbours is in the first half; it changes every two rows.
 #[inline(always)]
 fn swaps(pair: u32, width: u32) -> u32 {
     (pair / width) & 1

@@ -1,4 +1,4 @@
-//! The picture so far, at the size of a screen, many times a second.
+//! Preview of the picture so far, at the size of a screen, many times a second.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -10,9 +10,9 @@ use super::resample::Axis;
 use super::{Film, Quantity, RadianceImage, is_in_pool};
 use crate::math::{DVec3, Vec3};
 
-/// Shrinks (or enlarges) a film by area, exactly for any ratio, and remembers what each tile gave, so that a picture
-/// costs what changed since the one before. Pixels without samples have no weight; where a new pixel covers none
-/// that has, the base shows.
+/// Shrinks (or enlarges) a film by area, exactly for any ratio. It remembers each tile's share, so that a picture costs
+/// only what changed since the one before. Pixels without samples have no weight; the base shows in new pixels that
+/// cover no others.
 #[derive(Debug)]
 pub struct Previewer {
     quantity: Quantity,
@@ -26,7 +26,7 @@ pub struct Previewer {
     is_whole: bool,
 }
 
-/// What one tile gives to the pixels of the preview that it covers.
+/// Share of one tile in the pixels of the preview that it covers.
 #[derive(Clone, Debug, Default)]
 struct Share {
     revision: u64,
@@ -39,31 +39,31 @@ struct Share {
     cells: Vec<Weighted>,
 }
 
-/// A weighted sum and the sum of its weights. There is one for each pixel of a preview: 16 bytes.
+/// A weighted sum and the sum of its weights: 16 bytes for each pixel of a preview.
 type Weighted = (Vec3, f32);
 
-/// The same while it is summed up.
+/// The same in double precision, while it is summed up.
 type Sum = (DVec3, f64);
 
 /// Rows that are summed up at a time, so that there is no second copy of all shares.
 const BAND_ROWS: u32 = 32;
 
-/// Tiles that one thread looks at between two looks at the clock: less than a millisecond of work.
+/// Tiles that one thread takes up between two looks at the clock: less than a millisecond of work.
 const TILES_AT_ONCE: usize = 32;
 
 impl Previewer {
-    /// For pictures of this size; at least one pixel.
+    /// A previewer for pictures of this size, of at least one pixel.
     pub fn new(width: u32, height: u32) -> Self {
         Self::of(Quantity::Radiance, width, height)
     }
 
-    /// The same of another number of the samples.
+    /// A previewer that shows this quantity.
     pub fn of(quantity: Quantity, width: u32, height: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self { quantity, width, height, film_id: None, shares: Vec::new(), next: 0, is_whole: false }
     }
 
-    /// What its pictures are of.
+    /// Quantity that its pictures show.
     pub fn quantity(&self) -> Quantity {
         self.quantity
     }
@@ -85,8 +85,8 @@ impl Previewer {
         self.is_whole
     }
 
-    /// Take up what changed in the film, until `deadline` at the latest; none: all of it. Whether that was all; what
-    /// is left is first next time. Any film may be given at any call.
+    /// Takes up the film's changes, until `deadline` at the latest, and returns whether that was all of them. The rest
+    /// comes first next time. Without a deadline it takes up everything. Each call may have another film.
     pub fn update(&mut self, film: &Film, deadline: Option<Instant>) -> bool {
         if self.film_id != Some(film.id()) {
             self.film_id = Some(film.id());
@@ -109,8 +109,8 @@ impl Previewer {
         true
     }
 
-    /// What was taken up. `base` shows where there are no samples yet (the coarse first picture; of any size);
-    /// none: black.
+    /// Picture of everything taken up. `base`, the coarse first picture of any size, shows in pixels without samples;
+    /// black without a base.
     pub fn picture(&self, base: Option<&RadianceImage>) -> RadianceImage {
         let width = self.width as usize;
         let mut pixels = Vec::with_capacity(width * self.height as usize);
@@ -121,7 +121,7 @@ impl Previewer {
             for share in &self.shares {
                 share.add_to(&mut band, rows.clone(), self.width);
             }
-            // The base is made as large as the picture only where it shows.
+            // The base is enlarged only if some of it shows.
             if band.iter().any(|(_, weight)| *weight <= 0.0) {
                 base = base.map(|base| match (base.width, base.height) == (self.width, self.height) {
                     true => base,
@@ -139,7 +139,7 @@ impl Previewer {
     }
 }
 
-/// Take up these tiles, the first of which is `first`.
+/// Takes up these tiles, the first of which is `first`.
 fn refresh(shares: &mut [Share], first: usize, (film, quantity): (&Film, Quantity), axes: [Axis; 2]) {
     let refresh = |(i, share): (usize, &mut Share)| {
         if film.tile(first + i).revision != share.revision {
@@ -186,7 +186,7 @@ impl Share {
         self.cells.extend(sums.into_iter().map(|(sum, weight)| (sum.as_vec3(), weight as f32)));
     }
 
-    /// Adds what lies in these rows of the picture.
+    /// Adds this share in these rows of the picture.
     fn add_to(&self, band: &mut [Sum], rows: Range<u32>, picture_width: u32) {
         let width = self.width.max(1) as usize;
         let first = rows.start.saturating_sub(self.y) as usize;
@@ -206,7 +206,7 @@ mod tests {
     use super::*;
     use crate::film::{Rect, TileSamples};
 
-    /// A film whose pixel (x, y) has one sample of `value`, where `value` gives one.
+    /// A film whose pixel (x, y) has one sample of `value`; none if `value` is `None`.
     fn film(width: u32, height: u32, crop: Option<Rect>, value: impl Fn(u32, u32) -> Option<f32>) -> Film {
         let film = Film::new(width, height, crop).expect("a small film");
         for tile in 0..film.tile_count() {
@@ -348,7 +348,7 @@ mod tests {
         }
         assert!(previewer.is_whole());
         assert_eq!(previewer.picture(None), preview(&film, 23, 23, None));
-        // What changes behind the place reached is taken up in the next round.
+        // Changes behind the place reached come in the next round.
         previewer.update(&film, Some(past));
         let rect = film.tile_rect(0).expect("a tile");
         film.add(

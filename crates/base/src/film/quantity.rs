@@ -1,18 +1,18 @@
-//! What a picture is made of: the samples' mean, or numbers about the samples.
+//! Quantities that a picture can show: the samples' mean, or numbers about the samples.
 
 use super::noise::{Convergence, pixel_variance};
 use super::sums::Tile;
 use crate::math::DVec3;
 
-/// What of its samples a film shows.
+/// A quantity that a film shows of its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quantity {
-    /// What they make of the picture.
+    /// The picture: the samples' mean.
     #[default]
     Radiance,
-    /// How many each pixel has.
+    /// Number of samples of each pixel.
     Samples,
-    /// The standard error to expect of each pixel's luminance.
+    /// Expected standard error of each pixel's luminance.
     Error,
 }
 
@@ -20,7 +20,7 @@ pub enum Quantity {
 const REACH: usize = 2;
 
 impl Tile {
-    /// A number of the pixel of an index in a tile of so many columns; none where it has no sample.
+    /// Value of a quantity for the pixel of an index, in a tile of so many columns. `None` if the pixel has no sample.
     pub(super) fn value(&self, quantity: Quantity, (index, columns): (usize, usize)) -> Option<DVec3> {
         match quantity {
             Quantity::Radiance => self.mean(index),
@@ -29,7 +29,7 @@ impl Tile {
         }
     }
 
-    /// Standard error of a pixel; 0 for a single sample, of which nothing is known.
+    /// Standard error of a pixel; 0 for a single sample, which says nothing about it.
     fn error(&self, index: usize, columns: usize) -> Option<f64> {
         let count = self.count(index);
         let rows = self.counts.len() / columns.max(1);

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{RadianceImage, is_in_pool};
 use crate::math::DVec3;
 
-/// How the pixels of one axis fall into those of another length.
+/// Map from the pixels of one axis to those of another length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Axis {
     from: u64,
@@ -13,12 +13,12 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// From a length to another one, both ≥ 1 pixels.
+    /// The map from a length to another one, both ≥ 1 pixels.
     pub(super) fn new(from: u32, to: u32) -> Self {
         Self { from: u64::from(from.max(1)), to: u64::from(to.max(1)) }
     }
 
-    /// The new pixels that the old pixel `index` covers, and how much of each. Both axes are measured in units of
+    /// New pixels that the old pixel `index` covers, each with the covered amount. Both axes are measured in units of
     /// 1/(from·to) of the whole, so that every overlap is a whole number and nothing is rounded.
     pub(super) fn covered(self, index: u32) -> impl Iterator<Item = (u32, f64)> + Clone {
         let (start, end) = (u64::from(index) * self.to, (u64::from(index) + 1) * self.to);
@@ -38,7 +38,7 @@ pub(super) fn resized(image: &RadianceImage, width: u32, height: u32) -> Radianc
         return image.clone();
     }
     let (width, height) = (width.max(1), height.max(1));
-    // Each new pixel gathers the old ones that it covers: the same overlaps, seen from the other side.
+    // Each new pixel gathers the old ones that it covers: the same overlaps, by the inverse map.
     let columns = Axis::new(image.width, width).inverse();
     let rows = Axis::new(image.height, height).inverse();
     let pixel = |i: usize| {

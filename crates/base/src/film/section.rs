@@ -4,7 +4,8 @@ use super::{Film, Quantity, RadianceImage, Rect};
 use crate::math::Vec3;
 
 impl Film {
-    /// These pixels as they are. `base`, a picture of the whole at any size, shows where there are no samples yet; none: black.
+    /// Copies these pixels as they are. `base`, a picture of the whole at any size, shows in pixels without samples; black
+    /// without a base.
     pub fn section(&self, quantity: Quantity, rect: Rect, base: Option<&RadianceImage>) -> RadianceImage {
         let mut image = RadianceImage::black(rect.width, rect.height);
         if let Some(base) = base {

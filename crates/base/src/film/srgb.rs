@@ -1,4 +1,4 @@
-//! The sRGB curve to bytes by table: the same bytes as the formula, without a power per channel.
+//! The sRGB curve as a table to bytes: the same bytes as the formula, without a power per channel.
 
 use std::sync::LazyLock;
 
@@ -30,7 +30,7 @@ static TABLE: LazyLock<ByteTable> = LazyLock::new(|| {
     table
 });
 
-/// Bisection over the bits of the floats in [0, 1], which are in the order of the floats.
+/// Finds the bits by bisection over the floats in [0, 1], whose bits are in the order of the floats.
 fn first_bits_of(byte: usize) -> u32 {
     let (mut low, mut high) = (0, ONE_BITS);
     while low < high {

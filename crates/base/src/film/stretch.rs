@@ -1,21 +1,21 @@
-//! Numbers that have no brightness of their own, shown by what is seen of them.
+//! Stretch of numbers without a brightness of their own (distances, amounts) to the range in view.
 
 use super::RadianceImage;
 use crate::math::Vec3;
 
-/// How numbers become brightnesses.
+/// Map from numbers to brightnesses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Stretch {
-    /// As they are.
+    /// No stretch: the numbers as they are.
     #[default]
     None,
-    /// To be stretched; black until [`Stretch::of_picture`] says to what.
+    /// A stretch whose range is not yet known; black until [`Stretch::of_picture`] sets it.
     Unknown(Kind),
-    /// Stretched to these.
+    /// A stretch to this range.
     To(Kind, Range),
 }
 
-/// What numbers are.
+/// Kind of the numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Distances: the nearest is white, the farthest dark, 0 stands for nothing and is black.
@@ -24,28 +24,28 @@ pub enum Kind {
     Amounts,
 }
 
-/// What is seen of numbers.
+/// Range of the numbers in view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// The least; 0 of amounts.
+    /// Least number; 0 for amounts.
     pub least: f32,
-    /// The greatest.
+    /// Greatest number.
     pub greatest: f32,
-    /// Of the curve between them, see [`Range::part`].
+    /// Bias b of the curve between them, see [`Range::part`].
     bias: f32,
 }
 
-/// How dark the farthest distance is.
+/// Brightness of the farthest distance.
 const DARKEST: f32 = 0.1;
 
-/// The median number is shown at this brightness at least.
+/// Least brightness of the median number.
 const QUARTER: f32 = 0.25;
 
-/// No curve is steeper than this one.
+/// Least bias: no curve is steeper.
 const LEAST_BIAS: f32 = 1e-3;
 
 impl Stretch {
-    /// To what is seen in a picture.
+    /// The stretch to the numbers in this picture.
     pub fn of_picture(self, image: &RadianceImage) -> Self {
         match self {
             Self::None | Self::To(..) => self,
@@ -53,7 +53,7 @@ impl Stretch {
         }
     }
 
-    /// What it stretches to, if it is known.
+    /// Range that it stretches to. `None` if it is not known, or nothing is stretched.
     pub fn range(&self) -> Option<Range> {
         match self {
             Self::None | Self::Unknown(_) => None,
@@ -95,21 +95,21 @@ impl Range {
         Self { bias: bias.clamp(LEAST_BIAS, 1.0), ..linear }
     }
 
-    /// The least and the greatest.
+    /// Least and greatest number.
     pub fn ends(&self) -> [f32; 2] {
         [self.least, self.greatest]
     }
 
-    /// The place of a number in the range, from 0 to 1: straight where at least half of what is seen is beyond the first quarter;
-    /// else by the curve x/(x + b(1 − x)) (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV, 1994)
-    /// that brings half of it there. A plane that goes on to the horizon leaves what stands before it a range of its own.
+    /// Place of a number in the range, from 0 to 1: linear if at least half of the numbers in view lie beyond the first quarter;
+    /// else by the curve x/(x + b(1 − x)) that brings half of them there (Schlick, *Fast Alternatives to Perlin's Bias and Gain
+    /// Functions*, Graphics Gems IV, 1994). Thereby objects keep a range of their own before a plane that goes on to the horizon.
     fn part(&self, number: f32) -> f32 {
         let range = self.greatest - self.least;
         let x = if range > 0.0 { ((number - self.least) / range).clamp(0.0, 1.0) } else { 0.0 };
         if self.bias < 1.0 { x / (x + self.bias * (1.0 - x)) } else { x }
     }
 
-    /// Brightness of a distance. What is nearer than all that is seen is a pixel that is filled in part.
+    /// Brightness of a distance. A distance below the range belongs to a pixel that is partly empty.
     fn nearness(&self, distance: f32) -> f32 {
         if distance < self.least {
             return if self.least.is_finite() { distance / self.least } else { distance.min(1.0) };
@@ -118,8 +118,8 @@ impl Range {
     }
 }
 
-/// The distances that are seen. Pixels at the border of nothing are averages of distances and nothing: they do not count where
-/// there are others.
+/// Distances in view. Pixels at the border of empty space are averages of distances and nothing: they count only if there are
+/// no others.
 fn distances(image: &RadianceImage) -> Vec<f32> {
     let (width, height) = (image.width as usize, image.height as usize);
     let at = |x: usize, y: usize| image.pixels[y * width + x].x;
@@ -171,11 +171,11 @@ mod tests {
 
     #[test]
     fn a_horizon_leaves_what_is_before_it_its_shades() {
-        // A floor as it is seen from 1 above: rows of 1/row, the last ones far away.
+        // A floor seen from a height of 1: rows of 1/row, the last ones far away.
         let numbers: Vec<f32> = (1..=200).map(|row| 200.0 / row as f32).collect();
         let shown = shown(Kind::Distances, &numbers);
         assert!(shown[199] == 1.0 && (shown[0] - 0.1).abs() < 1e-6, "both ends are there");
-        // Half of the rows are at 1 … 2: in a straight stretch over 1 … 200 all of them were white.
+        // Half of the rows are at 1 … 2: a linear stretch over 1 … 200 would make all of them white.
         assert!((shown[99] - (1.0 - 0.9 * 0.25)).abs() < 0.01, "{}", shown[99]);
         assert!(shown.windows(2).all(|pair| pair[0] < pair[1]), "none is like another");
     }
@@ -185,7 +185,7 @@ mod tests {
         assert_near(&shown(Kind::Amounts, &[0.0, 1.0, 2.0, 4.0]), &[0.0, 0.25, 0.5, 1.0]);
         assert_near(&shown(Kind::Amounts, &[16.0; 3]), &[1.0; 3]);
         assert_near(&shown(Kind::Amounts, &[0.0; 3]), &[0.0; 3]);
-        // One pixel that is worth a thousand others does not make them black.
+        // One pixel that is worth a thousand others does not make the others black.
         let shown = shown(Kind::Amounts, &[1.0, 1.0, 1.0, 1000.0]);
         assert!((shown[0] - 0.25).abs() < 0.01 && shown[3] == 1.0, "{shown:?}");
     }

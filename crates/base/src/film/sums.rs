@@ -11,7 +11,7 @@ use crate::math::{DVec3, Vec3};
 /// Pixels along a tile's side: 1024 pixels of 40 bytes stay in a core's second-level cache.
 pub const TILE_SIZE: u32 = 32;
 
-/// Pixels along the side of a cell of a tile. Cells have as many samples as their own noise asks for: the smaller they are, the fewer
+/// Pixels along the side of a cell of a tile. Each cell gets the samples that its own noise needs. The smaller the cells, the fewer
 /// pixels share the samples of an edge.
 pub const CELL_SIZE: u32 = 16;
 
@@ -20,10 +20,10 @@ const CELLS_ACROSS: usize = (TILE_SIZE / CELL_SIZE) as usize;
 /// Cells of a tile, in rows.
 pub const CELLS: usize = CELLS_ACROSS * CELLS_ACROSS;
 
-/// Why there is no film.
+/// Reasons for which a film cannot be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FilmError {
-    /// Its memory cannot be had.
+    /// There is not enough memory.
     #[error(
         "a picture of {width}×{height} pixels needs {:.1} GB of memory, which this machine does not give; \
          make it smaller{}", *.bytes as f64 / 1e9,
@@ -34,12 +34,13 @@ pub enum FilmError {
         width: u32,
         /// Rows.
         height: u32,
-        /// For the sums and the finished picture.
+        /// Bytes for the sums and the finished picture.
         bytes: u64,
-        /// Whether there is room for the finished picture, which a crop does not make smaller, and no crop as yet.
+        /// Whether a crop would help: there is room for the finished picture, which a crop does not make smaller, and
+        /// there is no crop yet.
         crop_helps: bool,
     },
-    /// It would have no pixels.
+    /// The picture would have no pixels.
     #[error("there are no pixels to render: the picture is {width}×{height} and the crop lies outside of it")]
     Empty {
         /// Columns.
@@ -60,17 +61,17 @@ fn way_out(crop_helps: bool) -> &'static str {
 /// Samples per pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleStats {
-    /// Of the pixel with the fewest.
+    /// Samples of the pixel with the fewest.
     pub min: u32,
-    /// Over all pixels.
+    /// Mean over all pixels.
     pub mean: f64,
-    /// Of the pixel with the most.
+    /// Samples of the pixel with the most.
     pub max: u32,
 }
 
-/// Sums of samples for the pixels of a picture, or of a crop of it. Tiles are numbered in rows from the top left
-/// of the crop. Any thread may add to any tile and take a snapshot at any time; the sums of a tile have the same
-/// bits whenever its samples come in the same order, however they are grouped.
+/// Sums of samples for the pixels of a picture, or of a crop of it. Tiles are numbered in rows from the top left of the
+/// crop. Any thread may add to any tile and take a snapshot at any time. The sums of a tile have the same bits if its
+/// samples come in the same order, however they are grouped.
 #[derive(Debug)]
 pub struct Film {
     width: u32,
@@ -83,16 +84,16 @@ pub struct Film {
     pub(super) convergence: Convergence,
 }
 
-/// Sums of one tile, in rows; empty until its first samples come, so that the memory is first touched by the thread
-/// that renders the tile.
+/// Sums of one tile, in rows; empty until its first samples come, so that the thread that renders the tile is the first
+/// to touch its memory.
 #[derive(Debug, Default)]
 pub(super) struct Tile {
     pub(super) sums: Vec<DVec3>,
     pub(super) counts: Vec<u32>,
-    /// What the filter's negative lobes have of them; none before a sample comes that is in one.
+    /// Sums of the samples in the filter's negative lobes. `None` before the first of them.
     negative: Option<Negative>,
     pub(super) steps: Steps,
-    /// Grows whenever the tile changes.
+    /// Counter that grows whenever the tile changes.
     pub(super) revision: u64,
 }
 
@@ -105,8 +106,7 @@ struct Negative {
 }
 
 impl Tile {
-    /// What a pixel's samples make of it, if it has any: their mean, for a filter with negative lobes those of both signs by
-    /// their weights.
+    /// Mean of a pixel's samples, weighted by sign if the filter has negative lobes. `None` if the pixel has no sample.
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
         let count = self.count(index);
         let negative = self.negative.as_ref().filter(|negative| negative.counts[index] > 0);
@@ -126,15 +126,15 @@ impl Tile {
         self.counts.get(index).copied().unwrap_or(0)
     }
 
-    /// Cannot fail: the memory was reserved when the film was made.
+    /// Makes room for the tile's pixels. Cannot fail: the memory was reserved when the film was made.
     fn fill(&mut self, area: usize) {
         self.sums.resize(area, DVec3::ZERO);
         self.counts.resize(area, 0);
         self.steps.fill(area);
     }
 
-    /// Add samples of one pixel of a half of a cell in their order; how many of them are not finite. `is_negative` tells them apart where the
-    /// filter has negative lobes of this weight.
+    /// Adds samples of one pixel of a half of a cell in their order and returns how many are not finite. `is_negative` marks the
+    /// samples in negative lobes, if the filter has such of this weight.
     fn add(
         &mut self,
         (index, cell, half): (usize, usize, usize),
@@ -144,7 +144,7 @@ impl Tile {
         let mut non_finite = 0;
         let mut rest = 0..radiances.len();
         while !rest.is_empty() {
-            // Up to the next count at which the mean is noted.
+            // Add up to the next count at which the mean is noted.
             let left = Steps::samples_to_next(self.counts[index]);
             let part = rest.start..rest.end.min(rest.start + left);
             non_finite += match lobes {
@@ -181,7 +181,7 @@ impl Tile {
     }
 }
 
-/// Add what is finite; how many are not.
+/// Adds the finite radiances and returns how many are not finite.
 fn add_up(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
     let all = radiances.iter().fold(*sum, |sum, radiance| sum + radiance.as_dvec3());
     if all.is_finite() {
@@ -203,16 +203,16 @@ impl Film {
     /// A film without samples for a picture of this size, or for the part of it that `crop` covers.
     ///
     /// # Errors
-    /// [`FilmError`] where the crop lies outside of the picture or memory does not suffice for the sums and the
+    /// [`FilmError`] if the crop lies outside of the picture, or if there is not enough memory for the sums and the
     /// finished picture.
     pub fn new(width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
         Self::within(u64::MAX, width, height, crop)
     }
 
-    /// The same where no more than `most_bytes` may be taken.
+    /// [`Film::new`], if no more than `most_bytes` may be taken.
     ///
     /// # Errors
-    /// As [`Film::new`].
+    /// [`FilmError`] as in [`Film::new`].
     pub fn within(most_bytes: u64, width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
         let whole = Rect { x: 0, y: 0, width, height };
         let crop = crop.unwrap_or(whole).intersection(&whole).ok_or(FilmError::Empty { width, height })?;
@@ -236,7 +236,7 @@ impl Film {
         })
     }
 
-    /// The same film, whose noise falls so.
+    /// The same film with this convergence of its noise.
     pub fn converging(self, convergence: Convergence) -> Self {
         Self { convergence, ..self }
     }
@@ -251,7 +251,7 @@ impl Film {
         self.height
     }
 
-    /// The pixels that are rendered.
+    /// Pixels that are rendered.
     pub fn crop(&self) -> Rect {
         self.crop
     }
@@ -261,22 +261,22 @@ impl Film {
         self.tiles.len()
     }
 
-    /// The pixels of a tile, in the whole picture; none beyond the last tile.
+    /// Pixels of a tile, in the whole picture. `None` beyond the last tile.
     pub fn tile_rect(&self, tile: usize) -> Option<Rect> {
         (tile < self.tiles.len()).then(|| tile_rect(self.crop, tile))
     }
 
-    /// Cells of the crop, of which each tile has [`CELLS`]; those of its last tiles may be without pixels.
+    /// Number of cells of the crop: [`CELLS`] for each tile. Cells of its last tiles may have no pixels.
     pub fn cell_count(&self) -> usize {
         CELLS * self.tiles.len()
     }
 
-    /// The pixels of a cell, in the whole picture; none where it has none.
+    /// Pixels of a cell, in the whole picture. `None` if it has no pixels.
     pub fn cell_rect(&self, cell: usize) -> Option<Rect> {
         cell_rect(self.tile_rect(cell / CELLS)?, cell % CELLS)
     }
 
-    /// Every tile once, from the middle of the crop outwards in rings; sorted when it is first asked for.
+    /// Indices of all tiles, from the middle of the crop outwards in rings; sorted at the first call.
     pub fn tile_order(&self) -> &[usize] {
         self.order.get_or_init(|| rings(self.crop))
     }
@@ -287,8 +287,8 @@ impl Film {
         (self.crop.area() * SUM_BYTES + self.tiles.len() * tile) as u64
     }
 
-    /// Add samples to a tile, each for itself and in their order. A sample with a NaN or an infinity counts as
-    /// black and in [`Film::non_finite_samples`]. Pixels outside of the tile are left out.
+    /// Adds samples to a tile, each by itself and in their order. A sample with a NaN or an infinity counts as black
+    /// and in [`Film::non_finite_samples`]. Pixels outside of the tile are left out.
     pub fn add(&self, tile: usize, samples: &TileSamples) {
         let Some(rect) = self.tile_rect(tile) else { return };
         if samples.samples == 0 || samples.pixels.rect.width == 0 {
@@ -313,12 +313,12 @@ impl Film {
         self.non_finite_samples.fetch_add(non_finite, Ordering::Relaxed);
     }
 
-    /// The picture so far: the mean of every pixel's samples; black where there are none, and outside the crop.
+    /// The picture so far: the mean of every pixel's samples; black outside the crop and in pixels without samples.
     pub fn radiance(&self) -> RadianceImage {
         self.image(Quantity::Radiance)
     }
 
-    /// The same of another number of the samples.
+    /// The picture of this quantity.
     pub fn image(&self, quantity: Quantity) -> RadianceImage {
         let mut image = RadianceImage::black(self.width, self.height);
         for (i, tile) in self.tiles.iter().enumerate() {
@@ -337,7 +337,7 @@ impl Film {
         image
     }
 
-    /// One pixel of that; none where it has no sample, or lies outside the crop.
+    /// One pixel of [`Film::image`]. `None` if it has no sample or lies outside the crop.
     pub fn pixel(&self, quantity: Quantity, x: u32, y: u32) -> Option<Vec3> {
         let Rect { x: left, y: top, .. } = self.crop;
         let (right, down) = (x.checked_sub(left)?, y.checked_sub(top)?);
@@ -352,7 +352,7 @@ impl Film {
         value.map(DVec3::as_vec3)
     }
 
-    /// Samples of the crop's pixels.
+    /// Statistics of the samples of the crop's pixels.
     pub fn samples(&self) -> SampleStats {
         let (mut min, mut max, mut total) = (u32::MAX, 0, 0_u64);
         for tile in &self.tiles {
@@ -369,17 +369,17 @@ impl Film {
         SampleStats { min, mean: total as f64 / self.crop.area() as f64, max }
     }
 
-    /// Samples with a NaN or an infinity, which counted as black.
+    /// Number of samples with a NaN or an infinity, which counted as black.
     pub fn non_finite_samples(&self) -> u64 {
         self.non_finite_samples.load(Ordering::Relaxed)
     }
 
-    /// Tells films apart.
+    /// A number that tells films apart.
     pub(super) fn id(&self) -> u64 {
         self.id
     }
 
-    /// One tile; nobody else adds to it meanwhile. A thread that panicked leaves sums that are whole.
+    /// Locks a tile, so that nobody else adds to it. A thread that panicked leaves sums that are whole.
     pub(super) fn tile(&self, tile: usize) -> MutexGuard<'_, Tile> {
         lock(&self.tiles[tile])
     }
@@ -394,7 +394,7 @@ fn index_in(rect: Rect, x: u32, y: u32) -> Option<usize> {
     (x < rect.width && y < rect.height).then(|| y as usize * rect.width as usize + x as usize)
 }
 
-/// The cell of a tile that a pixel of it is in, and its pixels.
+/// The cell of a tile that contains a pixel, and the cell's pixels.
 fn cell_at(tile: Rect, x: u32, y: u32) -> (usize, Rect) {
     let (column, row) = ((x - tile.x) / CELL_SIZE, (y - tile.y) / CELL_SIZE);
     let cell = row as usize * CELLS_ACROSS + column as usize;
@@ -431,22 +431,23 @@ fn rings(crop: Rect) -> Vec<usize> {
     places.into_iter().map(|(_, _, tile)| tile).collect()
 }
 
-/// Of one pixel's sum, count, last two noted means and last step.
+/// Bytes for one pixel: its sum, count, last two noted means and last step.
 const SUM_BYTES: usize = size_of::<DVec3>() + 3 * size_of::<f32>() + size_of::<u32>();
 
-/// For the sums of the crop, and for the whole picture as radiance and as sRGB.
+/// Bytes for the sums of the crop, and for the whole picture as radiance and as sRGB.
 fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
     let pixel = size_of::<Vec3>() + size_of::<[u8; 3]>();
     let whole = u64::from(width) * u64::from(height);
     (crop.area() as u64).saturating_mul(SUM_BYTES as u64).saturating_add(whole.saturating_mul(pixel as u64))
 }
 
-/// Whether so much can be had at once.
+/// Whether so many bytes can be had at once.
 fn is_available(bytes: u64) -> bool {
     usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
 }
 
-/// Asks for all the memory at once first, as a system that promises more than it has refuses only that.
+/// Allocates the tiles. Asks for all the memory at once first, as a system that promises more than it has refuses only
+/// that.
 fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
     if !is_available(bytes_needed(width, height, crop)) {
         return None;

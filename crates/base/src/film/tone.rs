@@ -1,4 +1,4 @@
-//! From radiance to what a display is sent: exposure, tone curve, clamp, sRGB.
+//! From radiance to display values: exposure, tone curve, clamp, sRGB.
 
 use rayon::prelude::*;
 
@@ -30,36 +30,36 @@ impl Default for Tonemap {
     }
 }
 
-/// How display light in [0, 1] is encoded.
+/// Encoding of display light in [0, 1].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Transfer {
-    /// By the sRGB curve (IEC 61966-2-1).
+    /// The sRGB curve (IEC 61966-2-1).
     #[default]
     Srgb,
-    /// As it is: the values are what a display is sent.
+    /// Identity: the display gets the values as they are.
     Identity,
 }
 
-/// How radiance becomes what a display is sent.
+/// Map from radiance to display values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
-    /// Radiance is multiplied by 2 to this power.
+    /// Exposure: radiance is multiplied by 2 to this power.
     pub exposure_stops: f32,
-    /// What then brings it into [0, 1].
+    /// Tone curve that then brings it into [0, 1].
     pub curve: Tonemap,
-    /// How that is encoded.
+    /// Encoding of the result.
     pub transfer: Transfer,
-    /// What numbers are stretched by that have no brightness of their own.
+    /// Stretch of numbers that have no brightness of their own.
     pub stretch: Stretch,
 }
 
-/// Far above everything that any curve tells apart, far below what overflows inside one.
+/// Largest radiance: far above everything that any curve tells apart, far below what overflows inside one.
 const BRIGHTEST: f32 = 1e10;
-/// Below this many pixels other threads are not worth waking.
+/// Fewest pixels for which it pays to wake other threads.
 const PARALLEL_PIXELS: usize = 1 << 18;
 
 impl ToneMapping {
-    /// For pictures of numbers, whose values are what a display is sent: they are clamped and nothing else.
+    /// Tone mapping of pictures of numbers, whose values are display values: it only clamps them.
     pub const DATA: Self = Self {
         exposure_stops: 0.0,
         curve: Tonemap::None,
@@ -67,12 +67,12 @@ impl ToneMapping {
         stretch: Stretch::None,
     };
 
-    /// For this picture, all of it: numbers are stretched to what is seen in it.
+    /// The tone mapping of this whole picture: numbers are stretched to their range in it.
     pub fn of_picture(self, image: &RadianceImage) -> Self {
         Self { stretch: self.stretch.of_picture(image), ..self }
     }
 
-    /// One colour: linear display light in [0, 1], whatever is fed; NaN and negative components count as 0.
+    /// Linear display light in [0, 1] of one colour, whatever comes in; NaN and negative components count as 0.
     pub fn apply(&self, radiance: Vec3) -> Vec3 {
         self.exposed(radiance, exp2(self.exposure_stops))
     }
@@ -90,7 +90,7 @@ impl ToneMapping {
     }
 }
 
-/// A picture of 8 bits a channel.
+/// Develops a picture of 8 bits a channel.
 pub fn develop(image: &RadianceImage, tone: &ToneMapping) -> Picture {
     let pixels = match tone.transfer {
         Transfer::Srgb => map_pixels(image, tone, |color| color.to_array().map(linear_to_srgb8)),
@@ -101,7 +101,7 @@ pub fn develop(image: &RadianceImage, tone: &ToneMapping) -> Picture {
     Picture { width: image.width, height: image.height, pixels }
 }
 
-/// A picture of 16 bits a channel.
+/// Develops a picture of 16 bits a channel.
 pub fn develop16(image: &RadianceImage, tone: &ToneMapping) -> Picture16 {
     let quantise = |x: f32| (x * 65535.0 + 0.5) as u16;
     let pixels = match tone.transfer {

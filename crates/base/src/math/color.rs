@@ -4,8 +4,8 @@ use glam::Vec3;
 
 use super::elementary::pow;
 
-/// What is added to the square of a reference in relMSE, so that errors of black pixels stay finite: errors below a radiance of 0.1
-/// count as they are, above it relative to what is right.
+/// Term added to the square of a reference in relMSE, so that errors of black pixels stay finite: errors below a radiance of 0.1
+/// count as they are, above it relative to the reference.
 pub const RELMSE_LEAST: f64 = 0.01;
 
 /// Weights of linear Rec. 709 primaries in relative luminance (IEC 61966-2-1).

@@ -1,13 +1,14 @@
 //! Numbers of few decimals, as a person would write them.
 
-/// To a multiple of a power of ten: the number nearest to its few decimals.
+/// Rounds to a multiple of a power of ten: to the number nearest to its few decimals.
 pub fn rounded(number: f64, step: f64) -> f64 {
     let digits = libm::round(-libm::log10(step)).max(0.0) as usize;
     let whole = libm::round(number / step) * step;
     format!("{whole:.digits$}").parse().unwrap_or(whole) + 0.0
 }
 
-/// The last decimal of places that are so far from what is looked at: a power of ten, from 1e-5 to 1e-4 of the distance.
+/// Last decimal of coordinates at this distance from the point of view: a power of ten, from 1e-5 to 1e-4 of the
+/// distance.
 pub fn step_at(distance: f64) -> f64 {
     libm::pow(10.0, libm::floor(libm::log10(distance)) - 4.0)
 }

@@ -1,10 +1,10 @@
 //! Elementary functions without branches and without the system's library: the same bits on every machine, and vector
-//! instructions in loops. `f64` inside where that makes an `f32` result right but for its rounding.
+//! instructions in loops. They work in `f64` inside if that makes the `f32` result right but for its rounding.
 
 use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 use std::f64::consts::LN_2;
 
-/// xʸ for x ≥ 0, within one ulp; 1 where y is 0, 0 for x = 0 < y.
+/// xʸ for x ≥ 0, within one ulp; 1 for y = 0, 0 for x = 0 < y.
 #[inline(always)]
 pub fn pow(x: f32, y: f32) -> f32 {
     let power = exp2_f64(f64::from(y) * log2_f64(f64::from(x))) as f32;
@@ -13,7 +13,7 @@ pub fn pow(x: f32, y: f32) -> f32 {
     if (y == 0.0) | (x == 1.0) { 1.0 } else { power }
 }
 
-/// xʸ for normal x > 0, within 1e-11 times y of itself; 0 or ∞ where `f32` is.
+/// xʸ for normal x > 0, with a relative error of at most 1e-11 · y; 0 or ∞ if it is so in `f32`.
 #[inline(always)]
 pub fn power_f64(x: f64, y: f64) -> f64 {
     exp2_f64(y * log2_f64(x))
@@ -31,13 +31,13 @@ pub fn log2(x: f32) -> f32 {
     log2_f64(f64::from(x)) as f32
 }
 
-/// Binary logarithm of a normal x > 0 within 1e-11: by the exponent, and for the rest m in [√½, √2) by the series of
-/// 2·artanh((m − 1)/(m + 1)).
+/// Binary logarithm of a normal x > 0 within 1e-11: from the exponent, and for the rest m in [√½, √2) from the series
+/// of 2·artanh((m − 1)/(m + 1)).
 #[inline(always)]
 fn log2_f64(x: f64) -> f64 {
     const SQRT_HALF: u64 = 0x3fe6_a09e_667f_3bcd;
     const MANTISSA: u64 = (1 << 52) - 1;
-    // A whole number below 2⁵² in the last bits of 2⁵² is that number beside 2⁵².
+    // The sum of 2⁵² and a whole number below 2⁵² has that number in its last bits.
     const WHOLE: u64 = 0x4330_0000_0000_0000;
     let shifted = x.to_bits().wrapping_add(0x3ff0_0000_0000_0000 - SQRT_HALF);
     let exponent = f64::from_bits((shifted >> 52) | WHOLE) - (f64::from_bits(WHOLE) + 1023.0);
@@ -50,11 +50,11 @@ fn log2_f64(x: f64) -> f64 {
     exponent + series * (2.0 / LN_2)
 }
 
-/// 2ˣ within 1e-11 of itself, taken to where `f32` is 0 or ∞ outside of [−200, 200]: by the whole part, and the rest in
-/// [−½, ½] by Taylor's series.
+/// 2ˣ with a relative error of 1e-11. x is clamped to [−200, 200], beyond which `f32` is 0 or ∞. By the whole part, and
+/// for the rest in [−½, ½] by Taylor's series.
 #[inline(always)]
 fn exp2_f64(x: f64) -> f64 {
-    // 1.5·2⁵²: sums with it are rounded to whole numbers, which stand in their last bits.
+    // 1.5·2⁵²: a sum with it is rounded to a whole number, in its last bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     let x = if x < 200.0 { x } else { 200.0 };
     let x = if x > -200.0 { x } else { -200.0 };
@@ -66,8 +66,8 @@ fn exp2_f64(x: f64) -> f64 {
     f64::from_bits(series.to_bits().wrapping_add(sum.to_bits() << 52))
 }
 
-/// Arc cosine of x in [−1, 1] within 2 ulp: near 0 by the arc sine, beyond ½ by that of the half angle (the polynomial is that
-/// of Moshier's Cephes library).
+/// Arc cosine of x in [−1, 1] within 2 ulp: near 0 by the arc sine, beyond ½ by the arc sine of the half angle (with the
+/// polynomial of Moshier's Cephes library).
 #[inline(always)]
 pub fn acos(x: f32) -> f32 {
     let size = x.abs();
@@ -79,14 +79,14 @@ pub fn acos(x: f32) -> f32 {
     let p = 7.495_300_3e-2 + z * (4.547_002_6e-2 + z * p);
     let arcsine = s + s * z * (1.666_675_2e-1 + z * p);
     let of_size = if is_large { 2.0 * arcsine } else { FRAC_PI_2 - arcsine };
-    // What π/2 and π lack of themselves as `f32`.
+    // The rounding errors of π/2 and π as `f32`.
     let rest = if is_large { 0.0 } else { -4.371_139e-8 };
     let negative = if is_large { PI - (of_size + 8.742_278e-8) } else { FRAC_PI_2 + (arcsine + rest) };
     if x < 0.0 { negative } else { of_size + rest }
 }
 
-/// Angle of (x, y) from the x axis in [−π, π], within 3 ulp; 0 at (0, 0). By the arc tangent of a number in [0, 1], taken to
-/// within ±tan(π/8) (the polynomial is that of Moshier's Cephes library).
+/// Angle of (x, y) from the x axis in [−π, π], within 3 ulp; 0 at (0, 0). By the arc tangent of a number in [0, 1], reduced
+/// to ±tan(π/8) (with the polynomial of Moshier's Cephes library).
 #[inline(always)]
 pub fn atan2(y: f32, x: f32) -> f32 {
     const TAN_EIGHTH: f32 = 0.414_213_57;
@@ -101,14 +101,14 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     let p = 1.997_771_1e-1 + z * (-1.387_768_6e-1 + z * 8.053_744_5e-2);
     let rest = t + t * z * (-3.333_295e-1 + z * p);
     let first = if is_far { FRAC_PI_2 * 0.5 + rest } else { rest };
-    // What π/2 and π lack of themselves as `f32`.
+    // The rounding errors of π/2 and π as `f32`.
     let quarter = if is_steep { FRAC_PI_2 - (first + 4.371_139e-8) } else { first };
     let half = if x < 0.0 { PI - (quarter + 8.742_278e-8) } else { quarter };
     half.copysign(y)
 }
 
-/// Sine and cosine of an angle of at most 1000, within 1.2e-7: the angle is taken to [−π/4, π/4] around a multiple of π/2, which
-/// is subtracted in three parts (Cody and Waite, *Software Manual for the Elementary Functions*, 1980), and there the
+/// Sine and cosine of an angle of at most 1000, within 1.2e-7. The angle is reduced to [−π/4, π/4] around a multiple of π/2,
+/// which is subtracted in three parts (Cody and Waite, *Software Manual for the Elementary Functions*, 1980). There the
 /// polynomials are those of Moshier's Cephes library.
 #[inline(always)]
 pub fn sin_cos(angle: f32) -> (f32, f32) {
@@ -130,7 +130,7 @@ pub fn sin_cos(angle: f32) -> (f32, f32) {
 mod tests {
     use super::*;
 
-    /// How far a result is off, in units of the last place of the right one.
+    /// Error of a result, in units of the last place of the exact one.
     fn ulps(value: f32, exact: f64) -> f64 {
         let near = exact as f32;
         let ulp = f64::from((near.abs().next_up() - near.abs()).max(f32::MIN_POSITIVE * f32::EPSILON));

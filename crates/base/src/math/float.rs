@@ -10,7 +10,7 @@ pub const fn gamma(n: u32) -> f32 {
     (n * UNIT_ROUNDOFF) / (1.0 - n * UNIT_ROUNDOFF)
 }
 
-/// The largest power of two that is not above a number > 0; 0 where there is none.
+/// The largest power of two that is not above a number > 0; 0 if there is none.
 pub fn power_of_two_below(number: f64) -> f64 {
     f64::from_bits(number.to_bits() & f64::INFINITY.to_bits())
 }

@@ -28,7 +28,7 @@ impl Frame {
         }
     }
 
-    /// A direction in this frame's coordinates to the coordinates the frame is given in.
+    /// Transforms a direction from this frame's coordinates to those in which the frame is given.
     #[inline(always)]
     pub fn to_world(&self, local: Vec3) -> Vec3 {
         self.s * local.x + self.t * local.y + self.n * local.z

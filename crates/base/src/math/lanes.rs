@@ -3,13 +3,13 @@
 
 use super::Vec3;
 
-/// Numbers at a time.
+/// Number of lanes.
 pub const LANES: usize = 16;
 
 /// One number for each of several samples.
 pub type Lanes = [f32; LANES];
 
-/// Vectors, by coordinate.
+/// Vectors, one array for each coordinate.
 pub type Lanes3 = [Lanes; 3];
 
 /// The vector of a lane.
@@ -18,32 +18,32 @@ pub fn lane(vectors: &Lanes3, i: usize) -> Vec3 {
     Vec3::new(vectors[0][i], vectors[1][i], vectors[2][i])
 }
 
-/// Set the vector of a lane.
+/// Sets the vector of a lane.
 #[inline(always)]
 pub fn set_lane(vectors: &mut Lanes3, i: usize, v: Vec3) {
     (vectors[0][i], vectors[1][i], vectors[2][i]) = (v.x, v.y, v.z);
 }
 
-/// Whether something holds, for each lane: [`TRUE`] or 0.
+/// A mask: [`TRUE`] or 0 for each lane.
 pub type Truths = [u32; LANES];
 
-/// What holds, in [`Truths`].
+/// Value of a lane of [`Truths`] in which the condition holds.
 pub const TRUE: u32 = u32::MAX;
 
-/// What instructions fold rows with. A value is the right to use them: of those that a processor may lack, values are made where
-/// it is known to have them.
+/// Instructions that fold rows. A value is the right to use them: for instructions that a processor may lack, values exist only
+/// if the processor has them.
 pub trait Folds: Copy {
-    /// A bit for each lane where something holds.
+    /// One bit for each lane in which the condition holds.
     fn bits(self, holds: &Truths) -> u32;
 }
 
-/// By instructions that every processor has.
+/// Folds by instructions that every processor has.
 #[derive(Clone, Copy)]
 pub struct PlainFolds;
 
 impl Folds for PlainFolds {
-    /// Compilers take sums of single bits apart into a test of one lane after the other: the hint has them finish the vector first,
-    /// and then it is folded by halves.
+    /// Folds by halves. Compilers take sums of single bits apart into a test of one lane after the other; the hint has them finish
+    /// the vector first.
     #[inline(always)]
     fn bits(self, holds: &Truths) -> u32 {
         let mut row = std::hint::black_box(*holds);
@@ -63,7 +63,7 @@ impl Folds for PlainFolds {
     }
 }
 
-/// The lanes whose bits are set.
+/// Mask of the lanes whose bits are set.
 #[inline(always)]
 pub fn truths(bits: u32) -> Truths {
     let mut holds = [0; LANES];
@@ -73,8 +73,8 @@ pub fn truths(bits: u32) -> Truths {
     holds
 }
 
-/// Take other numbers in the lanes where something holds. By bits: of `if` and `else` compilers may choose between places in
-/// memory, one lane after the other.
+/// Takes the new numbers in the lanes of the mask. Works by bits: for `if` and `else`, compilers may choose between places
+/// in memory, one lane after the other.
 #[inline(always)]
 pub fn take(holds: &Truths, new: &Lanes, own: &mut Lanes) {
     for i in 0..LANES {
@@ -82,7 +82,7 @@ pub fn take(holds: &Truths, new: &Lanes, own: &mut Lanes) {
     }
 }
 
-/// [`take`] of whole numbers.
+/// [`take`] for whole numbers.
 #[inline(always)]
 pub fn take_u32(holds: &Truths, new: &[u32; LANES], own: &mut [u32; LANES]) {
     for i in 0..LANES {

@@ -1,20 +1,20 @@
-//! How large and how small the numbers of a scene may be, whichever file they come from.
+//! Limits for the numbers of a scene, whichever file they come from.
 
 use super::DVec3;
 
-/// Largest magnitude of any number: products of two larger ones do not fit into 32-bit floats.
+/// Largest magnitude of any number: products of two larger ones overflow 32-bit floats.
 pub const LARGEST: f64 = 1e18;
 
-/// Shortest length that is not 0: products of two shorter ones are lost there.
+/// Shortest length that is not 0: products of two shorter ones underflow.
 pub const SHORTEST: f64 = 1e-18;
 
-/// The length of a vector, also where its square is lost or does not fit.
+/// Length of a vector, even if its square underflows or overflows.
 pub fn length(vector: DVec3) -> f64 {
     let largest = vector.abs().max_element();
     if largest > 0.0 { (vector / largest).length() * largest } else { 0.0 }
 }
 
-/// Whether a length is more than nothing, and yet too short to work with.
+/// Whether a length is above 0, yet too short to work with.
 pub fn is_too_short(length: f64) -> bool {
     length != 0.0 && length.abs() < SHORTEST
 }

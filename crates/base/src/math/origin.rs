@@ -1,19 +1,20 @@
-//! Where coordinates start that single precision is to hold.
+//! Origin of coordinates for single precision.
 
 use super::DVec3;
 use super::float::power_of_two_below;
 
-/// Steps of origins in sizes of what is around them: so far off, single precision errs by a millionth of that size.
+/// Step of the grid of origins, in sizes of the scene around: at that distance, single precision errs by a millionth of
+/// the size.
 const STEP: f64 = 64.0;
 
-/// Sizes like 1, 2 and 5 are not near the next power of two, where the step changes.
+/// Factor that keeps sizes like 1, 2 and 5 away from the powers of two, at which the step changes.
 const OFF_POWERS: f64 = 1.37;
 
-/// An origin for what is of a size around a place: 0 near 0, and far from it on a grid whose step is a power of two, so that
-/// nothing is rounded where numbers are moved there and small changes of the place change nothing.
+/// Origin for a scene of this size around a place: 0 near 0, and far from it on a grid whose step is a power of two.
+/// Therefore moving numbers there rounds nothing, and small changes of the place change nothing.
 pub fn origin_near(place: DVec3, size: f64) -> DVec3 {
     let step = STEP * power_of_two_below(size * OFF_POWERS);
-    // Adding 0 makes −0 and 0 one.
+    // Adding 0 turns −0 into 0.
     let origin = (place / step).round() * step + DVec3::ZERO;
     if step > 0.0 && origin.is_finite() { origin } else { DVec3::ZERO }
 }

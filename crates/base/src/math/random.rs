@@ -1,4 +1,4 @@
-//! Numbers as good as random, for tests.
+//! Pseudo-random numbers for tests.
 
 /// A linear congruential generator (Knuth's MMIX), by its upper 24 bits: numbers in [0, 1).
 pub fn unit(seed: u64) -> impl FnMut() -> f32 {
@@ -9,7 +9,7 @@ pub fn unit(seed: u64) -> impl FnMut() -> f32 {
     }
 }
 
-/// The same in [−1, 1).
+/// Numbers of [`unit()`], spread over [−1, 1).
 pub fn signed(seed: u64) -> impl FnMut() -> f32 {
     let mut unit = unit(seed);
     move || unit() * 2.0 - 1.0

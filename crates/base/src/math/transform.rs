@@ -28,43 +28,43 @@ impl Transform {
         }
     }
 
-    /// The same map from coordinates that start at `inside` to those that start at `outside`.
+    /// The map, given from coordinates that start at `inside` to coordinates that start at `outside`.
     #[inline]
     pub fn between(self, inside: DVec3, outside: DVec3) -> Self {
         Self { translation: self.translation + self.linear * inside - outside, ..self }
     }
 
-    /// A point to the outside.
+    /// Transforms a point to the outside.
     #[inline]
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.linear * p + self.translation
     }
 
-    /// A direction to the outside.
+    /// Transforms a direction to the outside.
     #[inline]
     pub fn vector(&self, v: DVec3) -> DVec3 {
         self.linear * v
     }
 
-    /// Bounds on the components of directions to the outside, from those inside.
+    /// Transforms bounds on the components of directions to the outside.
     pub fn reach(&self, reach: DVec3) -> DVec3 {
         let DMat3 { x_axis, y_axis, z_axis } = self.linear;
         x_axis.abs() * reach.x + y_axis.abs() * reach.y + z_axis.abs() * reach.z
     }
 
-    /// A normal to the outside, by the inverse transpose; not normalised.
+    /// Transforms a normal to the outside, by the inverse transpose; not normalised.
     #[inline]
     pub fn normal(&self, n: DVec3) -> DVec3 {
         self.inverse_linear.transpose() * n
     }
 
-    /// A point from the outside.
+    /// Transforms a point from the outside.
     #[inline]
     pub fn inverse_point(&self, p: DVec3) -> DVec3 {
         self.inverse_linear * (p - self.translation)
     }
 
-    /// A direction from the outside.
+    /// Transforms a direction from the outside.
     #[inline]
     pub fn inverse_vector(&self, v: DVec3) -> DVec3 {
         self.inverse_linear * v

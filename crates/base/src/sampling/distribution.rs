@@ -3,12 +3,12 @@
 /// Chooses an index in proportion to weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Discrete {
-    /// Sums of the weights up to and with each index.
+    /// Cumulative sums: of the weights up to and with each index.
     sums: Vec<f64>,
 }
 
 impl Discrete {
-    /// From weights ≥ 0; none where they sum to nothing.
+    /// A distribution from weights ≥ 0. `None` if their sum is 0.
     pub fn new(weights: impl IntoIterator<Item = f64>) -> Option<Self> {
         let sums: Vec<f64> = weights
             .into_iter()
@@ -31,7 +31,7 @@ impl Discrete {
         (self.sums[index] - before) / self.total()
     }
 
-    /// The index that `u` in [0, 1) falls on, and where in its share `u` is, in [0, 1).
+    /// The index that `u` in [0, 1) falls on, and the place of `u` in its share, in [0, 1).
     pub fn sample(&self, u: f32) -> (usize, f32) {
         let target = f64::from(u) * self.total();
         let index = self.sums.partition_point(|&sum| sum <= target).min(self.sums.len() - 1);

@@ -1,5 +1,5 @@
-//! Pixel filters by importance: samples are placed as the filter weighs, and those of one sign all count alike (Ernst,
-//! Stamminger, Greiner, *Filter Importance Sampling*, 2006).
+//! Pixel filters by importance sampling: samples are placed in proportion to the filter, and those of one sign all
+//! count alike (Ernst, Stamminger, Greiner, *Filter Importance Sampling*, 2006).
 
 use std::sync::LazyLock;
 
@@ -20,18 +20,18 @@ choice! {
     }
 }
 
-/// A place relative to the pixel's centre, in pixels, drawn in proportion to |f|, and f's sign there.
+/// A place relative to the pixel's centre, in pixels, drawn in proportion to |f|, with f's sign there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
     /// Offset from the centre.
     pub offset: Vec2,
-    /// Whether the filter is negative there. A pixel is 1 + w of the mean where it is not, less w of the mean where it is, with
-    /// w from [`PixelFilter::negative_weight`].
+    /// Whether the filter is negative there. A pixel is (1 + w) · mean of the positive samples − w · mean of the negative ones,
+    /// with w from [`PixelFilter::negative_weight`].
     pub is_negative: bool,
 }
 
 impl PixelFilter {
-    /// Warp a point of the unit square.
+    /// Warps a point of the unit square to a sample of the filter.
     #[inline]
     pub fn sample(self, u: Vec2) -> FilterSample {
         match self {
@@ -42,7 +42,7 @@ impl PixelFilter {
         }
     }
 
-    /// Warp points of the unit square, in their place; each is also told to `each`, by its number.
+    /// Warps points of the unit square in place and passes each sample, with its number, to `each`.
     #[inline(always)]
     pub fn sample_row<const N: usize>(
         self,
@@ -62,17 +62,17 @@ impl PixelFilter {
         }
     }
 
-    /// −∫min(f, 0)/∫f over the plane; none where f is nowhere negative.
+    /// −∫min(f, 0)/∫f over the plane. `None` if f is nowhere negative.
     pub fn negative_weight(self) -> Option<f64> {
         match self {
             Self::Box | Self::Tent | Self::Gaussian => None,
-            // Of |f| in two dimensions 1 + 2w is left in units of ∫f.
+            // In two dimensions, ∫|f| is 1 + 2w in units of ∫f.
             Self::Mitchell => Some((MITCHELL.excess * MITCHELL.excess - 1.0) * 0.5),
         }
     }
 }
 
-/// Density 1 − |x| on [−1, 1].
+/// A point of density 1 − |x| on [−1, 1].
 #[inline(always)]
 fn tent(u: f32) -> f32 {
     let (is_left, twice) = (u < 0.5, 2.0 * u);

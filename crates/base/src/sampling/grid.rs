@@ -1,15 +1,15 @@
 //! A distribution over the cells of a grid.
 
-/// Chooses a cell in proportion to weights: first its row, then its column. No cell that weighs anything gets less than a small
-/// share of what is usual around it, so that `f32` numbers can reach it.
+/// Chooses a cell in proportion to weights: first its row, then its column. Every cell with a weight gets at least a small
+/// share of the mean around it, so that `f32` numbers can reach it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     columns: usize,
-    /// Probabilities of all rows before each, and 1.
+    /// Cumulative probabilities: of all rows before each, and 1.
     rows: Vec<f32>,
-    /// Of the columns in each row, `columns + 1` a row.
+    /// Cumulative probabilities of the columns in each row, `columns + 1` a row.
     in_row: Vec<f32>,
-    /// Where to start to look for a row, and for a column in each row: [`guide`].
+    /// Starts of the search for a row, and for a column in each row: see [`guide`].
     row_guide: Vec<u32>,
     column_guide: Vec<u32>,
 }
@@ -21,15 +21,15 @@ pub struct InGrid {
     pub column: usize,
     /// The cell's row.
     pub row: usize,
-    /// Where in the cell, along the row and across it, in [0, 1).
+    /// Place in the cell, along the row and across it, in [0, 1).
     pub rest: [f32; 2],
 }
 
-/// The least share of the mean that something with a weight gets.
+/// Least share, in means, of a cell or row with a weight.
 const LEAST: f64 = 1.0 / 64.0;
 
 impl Grid {
-    /// From rows of as many weights ≥ 0 each; none where there are none, or they sum to nothing.
+    /// A distribution from rows of weights ≥ 0, all of the same length. `None` if there are no rows or their sum is 0.
     pub fn new(columns: usize, rows: impl Iterator<Item = Vec<f64>>) -> Option<Self> {
         let (mut in_row, mut totals) = (Vec::new(), Vec::new());
         for weights in rows {
@@ -54,13 +54,13 @@ impl Grid {
         InGrid { column, row, rest: [along, across] }
     }
 
-    /// Probability of a row.
+    /// Probability of choosing a row.
     #[inline(always)]
     pub fn row_probability(&self, row: usize) -> f32 {
         self.rows[row + 1] - self.rows[row]
     }
 
-    /// Probability of a column in a row.
+    /// Probability of choosing a column, once its row is chosen.
     #[inline(always)]
     pub fn column_probability(&self, row: usize, column: usize) -> f32 {
         let sums = self.columns_of(row);
@@ -74,7 +74,7 @@ impl Grid {
     }
 }
 
-/// Add shares of the whole before each weight, and all of it, to a list; gives the sum of the weights.
+/// Appends cumulative shares to a list (of all weights before each, then 1) and returns the sum of the weights.
 fn add_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
     let total: f64 = weights.iter().sum();
     let least = total / weights.len().max(1) as f64 * LEAST;
@@ -89,8 +89,8 @@ fn add_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
     total
 }
 
-/// For each of as many equal parts of [0, 1) as there are shares, the one that its start falls on (Chen and Asau, *On Generating
-/// Random Variates from an Empirical Distribution*, 1974).
+/// Guide table: [0, 1) is cut into as many equal parts as there are shares; gives the share that the start of each part falls on
+/// (Chen and Asau, *On Generating Random Variates from an Empirical Distribution*, 1974).
 fn guide(sums: &[f32]) -> impl Iterator<Item = u32> {
     let (count, mut place) = (sums.len() - 1, 0);
     (0..count).map(move |part| {
@@ -99,8 +99,8 @@ fn guide(sums: &[f32]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// The last share that does not start beyond `u`, of those from one on. It is mostly that one or the next: these steps are made
-/// without a branch, which nobody could foresee.
+/// The last share, from `place` on, that does not start beyond `u`. It is mostly `place` or the next: these two steps are made
+/// without a branch, which no processor could predict.
 #[inline(always)]
 fn last_from(sums: &[f32], mut place: usize, u: f32) -> usize {
     for _ in 0..2 {
@@ -113,10 +113,10 @@ fn last_from(sums: &[f32], mut place: usize, u: f32) -> usize {
     place
 }
 
-/// The share that `u` in [0, 1) falls on, and where in it, in [0, 1).
+/// The share that `u` in [0, 1) falls on, and the place of `u` in it, in [0, 1).
 #[inline(always)]
 fn find(sums: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
-    // Rounding may lead to the part after that of `u`.
+    // Rounding may lead to the part after that of `u`, so start one earlier.
     let part = ((u * guide.len() as f32) as usize).saturating_sub(1);
     let first = last_from(sums, guide[part] as usize, u);
     let rest = (u - sums[first]) / (sums[first + 1] - sums[first]);

@@ -3,48 +3,48 @@
 
 use crate::math::Vec2;
 
-/// A random decision at a vertex of a path. Numbers of different decisions are independent, those of one decision well
-/// distributed over the samples of a pixel. There is no other way to a dimension.
+/// A random decision at a vertex of a path. Numbers of different decisions are independent; those of one decision are
+/// well distributed over the samples of a pixel. Every random number belongs to a decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
-    /// Where in the pixel.
+    /// Position in the pixel.
     Pixel,
-    /// Where on the lens.
+    /// Position on the lens.
     Lens,
-    /// Where on the light of this number.
+    /// Position on the light of this number.
     Light(u32),
-    /// Which light, where not all are sampled.
+    /// Choice of a light, if not all are sampled.
     Pick,
-    /// Where on that.
+    /// Position on the chosen light.
     Picked,
-    /// To which of the picked lights rays are sent.
+    /// Choice of the picked lights that get shadow rays.
     Trace,
-    /// Which of two ways to go on.
+    /// Choice between reflection and refraction.
     Choice,
-    /// Which lobe to go on in.
+    /// Choice of the lobe to go on in.
     Lobe,
-    /// Where to in a lobe.
+    /// Direction within a lobe.
     Direction,
-    /// Whether to go on at all from where a path is scattered by a lobe.
+    /// Russian roulette after scattering by a lobe.
     Roulette,
-    /// Whether to go on at all from a mirror or glass: another decision than that of the vertex after it, which has the same path.
+    /// Russian roulette after a mirror or glass: a decision apart from that at the next vertex, which has the same path number.
     Spared,
-    /// Whether photons are looked up where many look-ups are on the way.
+    /// Choice of the vertices that look up photons, if there are many on the way.
     Gather,
-    /// Where in a kernel the trial of this number looks for surface.
+    /// Position, in a kernel, of the trial of this number that looks for surface.
     Trial(u32),
-    /// Which light a photon starts at, and which piece of it.
+    /// Choice of a photon's light, and of a piece of it.
     Lamp,
-    /// Whether a photon is aimed, and at what.
+    /// Choice of whether to aim a photon, and of its target.
     Aim,
-    /// Where on its light a photon starts.
+    /// Starting position of a photon on its light.
     Start,
-    /// Where to a photon is sent.
+    /// Direction of an emitted photon.
     Sent,
 }
 
 impl Decision {
-    /// Its dimension at a vertex; `path` tells the paths of one sample apart.
+    /// Dimension of the decision at a vertex; `path` tells the paths of one sample apart.
     #[inline(always)]
     fn dimension(self, path: u32) -> u32 {
         let number = match self {
@@ -70,7 +70,7 @@ impl Decision {
     }
 }
 
-/// The path that a sample's numbers in the camera belong to.
+/// Path number of a sample's decisions in the camera.
 pub const CAMERA_PATH: u32 = 0;
 
 /// The random numbers of one sample of a pixel.
@@ -87,7 +87,7 @@ fn pixel_seed(seed: u32, x: u32, y: u32) -> u32 {
 }
 
 impl PixelSampler {
-    /// For sample number `sample` of pixel (x, y) of the whole picture.
+    /// The numbers of sample `sample` of pixel (x, y) of the whole picture.
     #[inline]
     pub fn new(seed: u32, x: u32, y: u32, sample: u32) -> Self {
         Self { seed: pixel_seed(seed, x, y), sample }
@@ -109,7 +109,7 @@ pub struct SamplerRow<const N: usize> {
 }
 
 impl<const N: usize> SamplerRow<N> {
-    /// For samples of pixels (x, y) of the whole picture.
+    /// The numbers of samples of pixels (x, y) of the whole picture.
     #[inline(always)]
     pub fn new(seed: u32, x: &[u32; N], y: &[u32; N], samples: &[u32; N]) -> Self {
         let mut seeds = [0; N];
@@ -119,8 +119,8 @@ impl<const N: usize> SamplerRow<N> {
         Self { seeds, samples: *samples }
     }
 
-    /// For each sample two numbers in [0, 1) for one of the repetitions of a decision, of which there are `of`: well distributed
-    /// over repetitions and samples together. Every 2³² points are scrambled anew.
+    /// Two numbers in [0, 1) for each sample, for one of the `of` repetitions of a decision: well distributed over repetitions
+    /// and samples together. Every 2³² points are scrambled anew.
     #[inline(always)]
     pub fn pairs(&self, paths: &[u32; N], decision: Decision, repetition: u32, of: u32) -> [[f32; N]; 2] {
         let (mut indices, mut seeds) = ([0; N], [0; N]);
@@ -133,10 +133,10 @@ impl<const N: usize> SamplerRow<N> {
     }
 }
 
-/// Points of the first two dimensions of Sobol's sequence, their order and both coordinates scrambled.
+/// Points of the first two dimensions of Sobol's sequence, with their order and both coordinates scrambled.
 #[inline(always)]
 fn scrambled<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> [[f32; N]; 2] {
-    // One step for all lanes after the other: so they become vector instructions.
+    // Each step runs over all lanes before the next one, so that compilers make vector instructions of it.
     let mut places = indices;
     for (place, &seed) in places.iter_mut().zip(&seeds) {
         *place = owen(place.reverse_bits(), seed).reverse_bits();
@@ -151,14 +151,14 @@ fn scrambled<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> [[f32; N]; 2
     points
 }
 
-/// The upper 24 of reversed bits as a part of 1; so few that vectors convert them as signed numbers.
+/// The upper 24 of reversed bits as a fraction in [0, 1); few enough that vectors convert them as signed numbers.
 #[inline(always)]
 fn unit(bits: u32) -> f32 {
     (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32)
 }
 
-/// The second coordinate with its bits reversed: bit j is the sum of those bits k of the index for which C(k, j) is odd,
-/// which are the k that have every bit of j. That of the first coordinate is the index itself.
+/// The second coordinate with its bits reversed. Bit j is the sum of those bits k of the index for which C(k, j) is odd,
+/// that is of the k that have every bit of j. The first coordinate, reversed, is the index itself.
 #[inline(always)]
 fn pascal(mut bits: u32) -> u32 {
     for (shift, lacking) in
@@ -169,8 +169,8 @@ fn pascal(mut bits: u32) -> u32 {
     bits
 }
 
-/// Owen scrambling of reversed bits by a hash in which each depends on lower ones only (Laine and Karras, *Stratified
-/// Sampling for Stochastic Transparency*, 2011; constants of Vegdahl, *Building a Better LK Hash*, 2021).
+/// Owen scrambling of reversed bits by a hash in which each bit depends on lower ones only (Laine and Karras,
+/// *Stratified Sampling for Stochastic Transparency*, 2011; constants of Vegdahl, *Building a Better LK Hash*, 2021).
 #[inline(always)]
 fn owen(mut bits: u32, seed: u32) -> u32 {
     bits ^= bits.wrapping_mul(0x3d20_adea);
@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn each_group_of_repetitions_has_one_in_each_part() {
-        // Any 32 of a decision's repetitions from a multiple of 32 on, however many groups a sample has.
+        // Take any 32 of a decision's repetitions, from a multiple of 32 on, for any number of groups a sample has.
         for (sample, of) in [(0, 32), (5, 96), (77, 160), (1 << 27, 64)] {
             let row = SamplerRow::new(3, &[7; 16], &[9; 16], &[sample; 16]);
             let paths = std::array::from_fn(|i| i as u32);

@@ -5,7 +5,7 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 use crate::math::elementary::sin_cos;
 use crate::math::{Vec2, Vec3};
 
-/// Uniform on the unit disk (Shirley and Chiu, *A Low Distortion Map Between Disk and Square*, 1997).
+/// A uniform point of the unit disk (Shirley and Chiu, *A Low Distortion Map Between Disk and Square*, 1997).
 #[inline(always)]
 pub fn disk(u: Vec2) -> Vec2 {
     let offset = u * 2.0 - Vec2::ONE;
@@ -30,8 +30,7 @@ pub fn triangle(u: Vec2) -> Vec3 {
     Vec3::new(b0, b1, 1.0 - b0 - b1)
 }
 
-/// Uniform over the solid angle of a cone about z, given 1 − cos of its half angle, which keeps its digits for
-/// narrow cones.
+/// A uniform direction in a cone about z, given 1 − cos of its half angle, which keeps its digits for narrow cones.
 #[inline(always)]
 pub fn cone(u: [f32; 2], one_minus_cos_max: f32) -> Vec3 {
     let one_minus_cos = u[0] * one_minus_cos_max;
@@ -40,15 +39,15 @@ pub fn cone(u: [f32; 2], one_minus_cos_max: f32) -> Vec3 {
     Vec3::new(sin * cos_phi, sin * sin_phi, 1.0 - one_minus_cos)
 }
 
-/// Unit vectors before z with a density of cos θ/π (Malley's method: *Physically Based Rendering*, 4th ed., section 13.6.3).
+/// A unit vector with z > 0 and density cos θ/π (Malley's method: *Physically Based Rendering*, 4th ed., section 13.6.3).
 #[inline(always)]
 pub fn cosine(u: [f32; 2]) -> Vec3 {
     let at = disk(Vec2::from_array(u));
     at.extend((1.0 - at.length_squared()).max(0.0).sqrt())
 }
 
-/// In the unit square by a density that is bilinear between values ≥ 0 at its corners (0, 0), (1, 0), (0, 1), (1, 1), not all 0
-/// (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th edition, A.5.1).
+/// A point of the unit square with a density that is bilinear between values ≥ 0 at its corners (0, 0), (1, 0), (0, 1), (1, 1),
+/// not all 0 (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th edition, A.5.1).
 #[inline(always)]
 pub fn bilinear(u: [f32; 2], corners: &[f32; 4]) -> [f32; 2] {
     let [a, b, c, d] = *corners;
@@ -56,13 +55,13 @@ pub fn bilinear(u: [f32; 2], corners: &[f32; 4]) -> [f32; 2] {
     [linear(u[0], a + (c - a) * y, b + (d - b) * y), y]
 }
 
-/// In [0, 1] by a density that is linear between values ≥ 0 at both ends.
+/// A number in [0, 1] with a density that is linear between values ≥ 0 at both ends.
 #[inline(always)]
 fn linear(u: f32, first: f32, last: f32) -> f32 {
     let sum = first + last;
     let first = if sum > 0.0 { first / sum } else { 0.5 };
     let square = first * first + u * (1.0 - 2.0 * first);
-    // Where the first is 0 and u too, that is 0.
+    // If both the first and u are 0, the result is 0.
     (u / (first + square.max(f32::MIN_POSITIVE).sqrt())).min(1.0)
 }
 

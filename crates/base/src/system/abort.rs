@@ -1,7 +1,7 @@
-//! The end of a process by abort(3), which is how a failed allocation ends one: the terminal is given back, a sentence is
-//! written, the exit code is 1.
+//! The end of a process by abort(3), as after a failed allocation: glimt restores the terminal, writes a sentence, and
+//! exits with code 1.
 //!
-//! Beside the kernels the one place with `unsafe` code. Everything that runs in the handler is async-signal-safe
+//! `unsafe` code is here and in the SIMD kernels alone. Everything that runs in the handler is async-signal-safe
 //! (signal-safety(7)): no lock, no allocation.
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -18,7 +18,7 @@ use signal_hook::low_level;
 /// Size in bytes of the last allocation that was refused; 0 if none was.
 static REFUSED_BYTES: AtomicUsize = AtomicUsize::new(0);
 
-/// Gives the terminal back, by async-signal-safe calls alone.
+/// Restores the terminal, by async-signal-safe calls alone.
 static GIVE_BACK: OnceLock<fn()> = OnceLock::new();
 
 /// Exit code of work that failed.
@@ -72,17 +72,17 @@ pub fn catch() -> io::Result<()> {
     unsafe { low_level::register(SIGABRT, last_words) }.map(drop)
 }
 
-/// Sets what gives the terminal back before the sentence is written. It may only make async-signal-safe calls; the first
-/// one that is set stays.
+/// Sets the function that restores the terminal before the sentence is written. It may only make async-signal-safe
+/// calls. The first one that is set stays.
 pub fn give_back_by(give_back: fn()) {
     let _ = GIVE_BACK.set(give_back);
 }
 
-/// Whether a thread is at its last words.
+/// Whether a thread is already at its last words.
 static IS_ENDING: AtomicBool = AtomicBool::new(false);
 
-/// Gives the terminal back, says why the process ends, ends it. Where memory is out, several threads abort at once: the first one
-/// speaks, the others are held until the process is gone.
+/// Restores the terminal, says why the process ends, and ends it. If memory is out, several threads abort at once: the first one
+/// speaks, the others wait until the process is gone.
 fn last_words() {
     while IS_ENDING.swap(true, Ordering::AcqRel) {
         pause();

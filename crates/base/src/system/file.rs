@@ -1,11 +1,11 @@
-//! Files that have an end: what may be opened and read to it without waiting for anybody.
+//! Files that have an end, and can be opened and read to it without blocking.
 
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-/// What a name leads to.
+/// Kind of file that a name leads to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A file that can be read to its end.
@@ -14,12 +14,12 @@ pub enum Kind {
     Folder,
     /// A pipe, a socket or a device.
     Special,
-    /// Looks like a regular file; what it holds is made up while it is read, and may never end.
+    /// A file that looks regular, but whose content the kernel makes up during the read, perhaps without end.
     Kernel,
 }
 
 impl Kind {
-    /// After `it is`.
+    /// The words for it, to follow `it is`.
     pub fn words(self) -> &'static str {
         match self {
             Self::Regular => "a regular file",
@@ -39,17 +39,17 @@ impl Kind {
     }
 }
 
-/// What a name leads to, links followed, and its metadata.
+/// Kind of file that a name leads to, links followed, and its metadata.
 ///
 /// # Errors
-/// There is nothing of this name, or it may not be looked at.
+/// No file has this name, or it may not be looked at.
 pub fn kind(path: &Path) -> io::Result<(Kind, Metadata)> {
     let metadata = fs::metadata(path)?;
     Ok((Kind::of(path, &metadata), metadata))
 }
 
-/// Why a person would not want another file to take the place of this one, if anything speaks against it. Permissions count
-/// also for root, whom they do not stop.
+/// Reason for which a person would not want another file to replace this one. `None` if there is no such reason.
+/// Permissions count also for root, whom they do not stop.
 pub fn why_keep(metadata: &Metadata) -> Option<&'static str> {
     match () {
         () if metadata.nlink() > 1 => Some("has other names (hard links), which would keep the old text"),
@@ -58,11 +58,11 @@ pub fn why_keep(metadata: &Metadata) -> Option<&'static str> {
     }
 }
 
-/// Opens a file for reading if it is a regular one; else says what it is. Nothing that would block is opened, and a
-/// name that leads elsewhere by then does not block either.
+/// Opens a file for reading if it is a regular one; else returns its kind. Nothing that would block is opened, even if
+/// the name leads elsewhere by then.
 ///
 /// # Errors
-/// The file is not there, or may not be read.
+/// The file does not exist, or may not be read.
 pub fn open(path: &Path) -> io::Result<Result<(File, Metadata), Kind>> {
     let (kind, _) = kind(path)?;
     if kind != Kind::Regular {
@@ -80,7 +80,7 @@ pub fn open(path: &Path) -> io::Result<Result<(File, Metadata), Kind>> {
     })
 }
 
-/// Whether a file lies in one of the file systems by which the kernel shows itself.
+/// Whether a file lies in one of the kernel's own file systems.
 #[cfg(target_os = "linux")]
 fn is_of_kernel(path: &Path) -> bool {
     use nix::sys::statfs::{
@@ -131,7 +131,7 @@ mod tests {
         for path in [Path::new("/proc/kmsg"), Path::new("/proc/self/status"), &link] {
             assert_eq!(open(path).expect("it is there").err(), Some(Kind::Kernel), "{}", path.display());
         }
-        // An open file by its number is the file itself.
+        // A path to an open file by its number leads to the file itself.
         let file = File::create(folder.path().join("file")).expect("a file");
         let number = std::os::fd::AsRawFd::as_raw_fd(&file);
         let same = format!("/proc/self/fd/{number}");

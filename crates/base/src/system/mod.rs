@@ -1,4 +1,5 @@
-//! What the operating system says, in plain words, what a terminal shows as it is, which files have an end, which threads go first, what they took, and why they are not started.
+//! The operating system: its errors in plain words, characters that a terminal shows, files that have an end, priorities and
+//! processor time of threads, the end by abort.
 
 #[allow(unsafe_code)]
 pub mod abort;
@@ -10,7 +11,7 @@ pub mod threads;
 
 use std::io::{Error, ErrorKind};
 
-/// An error of the file system as it stands within a sentence: in small letters, without its number.
+/// An error of the file system as part of a sentence: in small letters, without its number.
 pub fn in_words(error: &Error) -> String {
     #[cfg(unix)]
     if error.raw_os_error() == Some(nix::libc::ELOOP) {
@@ -18,7 +19,7 @@ pub fn in_words(error: &Error) -> String {
     }
     match error.kind() {
         ErrorKind::NotADirectory => "a part of its path is a file, not a folder".to_owned(),
-        // Not what the system refused but what was never shown to it: a name with a zero in it.
+        // The system did not refuse this: it never saw the name, which has a zero in it.
         ErrorKind::InvalidInput if error.raw_os_error().is_none() => "that is no name of a file".to_owned(),
         _ => {
             let text = error.to_string();

@@ -1,6 +1,7 @@
-//! Which threads go first.
+//! Priorities of threads.
 //!
-//! A nice value says how much a thread gives way to others: 10 more are a tenth of the share of a processor that both want.
+//! A nice value says how much a thread yields to others: with 10 more, it gets a tenth of the share when both want a
+//! processor.
 
 /// Raises the nice value of this thread and of those that it starts from now on; outside Linux that of the whole process
 /// (nice(2), sched(7)). With 0, or if the system refuses, nothing changes.

@@ -1,9 +1,9 @@
-//! What work takes of a processor.
+//! Processor time.
 
 use nix::time::{ClockId, clock_gettime};
 
-/// Seconds that this thread has had of a processor: those of others, and those in which it was held, do not count. 0 where the system
-/// does not tell.
+/// Processor seconds that this thread has used. Time of other threads, and time in which it waited, do not count. 0 if the system
+/// does not measure it.
 pub fn seconds_of_thread() -> f64 {
     let Ok(time) = clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID) else { return 0.0 };
     time.tv_sec() as f64 + 1e-9 * time.tv_nsec() as f64
@@ -20,7 +20,7 @@ mod tests {
         let (begin, before) = (Instant::now(), seconds_of_thread());
         std::thread::sleep(Duration::from_millis(30));
         let slept = seconds_of_thread() - before;
-        // Bounded, as the clock may not be there.
+        // The loop is bounded, as the system may have no such clock.
         let worked = (0..10_000_000).any(|_| seconds_of_thread() - before > slept + 0.01);
         assert!(worked || before == 0.0, "{slept}");
         assert!(begin.elapsed().as_secs_f64() >= slept + 0.03, "{slept}");

@@ -5,7 +5,7 @@ use std::io::Error;
 
 use super::in_words;
 
-/// Why `what` could not be started, with the way out: what refuses threads is a limit on memory, for their stacks, or on their number.
+/// Says why `what` could not be started, and the way out: a limit on memory (for stacks) or on the number of threads refuses it.
 pub fn not_started(what: &str, is_number_chosen: bool, error: &impl Display) -> String {
     let why = in_words(&Error::other(error.to_string()));
     let fewer = if is_number_chosen { "use fewer (--threads 1), or " } else { "" };

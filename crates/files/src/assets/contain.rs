@@ -9,10 +9,10 @@ thread_local! {
     static CONTAINED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Run `work`; a panic inside is returned as its message.
+/// Runs `work` and returns a panic inside as its message.
 ///
-/// The panic hook that is set at the first call stays in charge of every other panic. A front end that sets a
-/// hook of its own (to restore the terminal) does so before it loads anything.
+/// The panic hook set at the first call stays in charge of every other panic. A front end that sets a hook of its own
+/// (to restore the terminal) does so before it loads anything.
 ///
 /// # Errors
 /// The message of a panic.

@@ -1,4 +1,4 @@
-//! Bytes → meshes, textures and cameras. Every error names the file and, where it has lines, the line.
+//! Assets: from bytes to meshes, textures and cameras. Every error names the file and, if the file has lines, the line.
 
 pub mod contain;
 pub mod image;
@@ -11,36 +11,36 @@ use std::path::{Path, PathBuf};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 
-/// Why a file could not be used.
+/// Reasons for which a file could not be used.
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
-    /// The file could not be read, or is no file.
+    /// The file could not be read, or is not a regular file.
     #[error("cannot read {}: {reason}", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// In words.
+        /// The reason, in words.
         reason: String,
     },
-    /// The file was read and is not what it should be.
+    /// The content of the file is wrong.
     #[error("{}{}: {reason}", path.display(), line.map_or(String::new(), |line| format!(":{line}")))]
     Malformed {
         /// The file.
         path: PathBuf,
-        /// Line, from 1, in files that have lines.
+        /// Line, from 1. `None` for files without lines.
         line: Option<usize>,
-        /// In words.
+        /// The reason, in words.
         reason: String,
     },
-    /// There is no memory for its content.
+    /// There is not enough memory for its content.
     #[error("out of memory: {} MB for {} were refused", bytes.div_ceil(1_000_000), path.display())]
     OutOfMemory {
         /// The file.
         path: PathBuf,
-        /// Size of what was refused.
+        /// Size of the refused allocation.
         bytes: usize,
     },
-    /// The work was told to stop.
+    /// The work was cancelled.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
 }
@@ -62,14 +62,14 @@ pub struct LoadedMesh {
     pub mesh: TriangleMesh,
     /// The file's own materials, which [`TriangleMesh::materials`] refers to.
     pub materials: Vec<FileMaterial>,
-    /// What was left out.
+    /// Faces that were left out.
     pub dropped: Dropped,
-    /// Anything else worth saying, a line each.
+    /// Other warnings, a line each.
     pub warnings: Vec<String>,
-    /// What its own materials lack, a line each: of no account where the scene gives it another one.
+    /// Warnings about its own materials, a line each; they do not matter if the scene gives the mesh another material.
     pub material_warnings: Vec<String>,
-    /// Files that were read besides the mesh file, or should have been: material libraries. When one of them
-    /// changes, so does this value.
+    /// Files that belong to the mesh file, read or missing: material libraries. If one of them changes, so does this
+    /// value.
     pub companions: Vec<PathBuf>,
     /// Pictures that the material libraries name, looked up or not.
     pub pictures: Vec<PathBuf>,
@@ -85,43 +85,43 @@ impl LoadedMesh {
 /// Faces that could not be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
-    /// With a NaN or an infinite coordinate.
+    /// Faces with a NaN or an infinite coordinate.
     pub non_finite: u64,
-    /// With two corners at one place, or all on a line.
+    /// Faces with two corners at one place, or all corners on a line.
     pub degenerate: u64,
 }
 
-/// A material as a mesh file (MTL) has it.
+/// A material of a mesh file (MTL).
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileMaterial {
-    /// Its name there.
+    /// Its name in the file.
     pub name: String,
-    /// Kd.
+    /// Diffuse reflectance, `Kd`.
     pub diffuse: Vec3,
-    /// Ks, the strength of the classic highlight without normalisation.
+    /// Specular reflectance, `Ks`: the strength of the classic highlight without normalisation.
     pub specular: Vec3,
-    /// Ns.
+    /// Exponent, `Ns`.
     pub shininess: f32,
-    /// Ke, radiance; with a texture, what that is multiplied by.
+    /// Emission, `Ke`: radiance; with a texture, the factor on it.
     pub emission: Vec3,
-    /// Ni.
+    /// Index of refraction, `Ni`.
     pub ior: f32,
-    /// illum.
+    /// Illumination model, `illum`.
     pub illumination_model: Option<u8>,
-    /// map_Kd, resolved against the MTL's folder.
+    /// Diffuse texture, `map_Kd`, relative to the MTL's folder.
     pub diffuse_texture: Option<PathBuf>,
-    /// map_Ks.
+    /// Specular texture, `map_Ks`.
     pub specular_texture: Option<PathBuf>,
-    /// map_Ke.
+    /// Emission texture, `map_Ke`.
     pub emission_texture: Option<PathBuf>,
-    /// norm or map_Bump, read as a normal map.
+    /// Normal map, `norm` or `map_Bump`.
     pub normal_texture: Option<PathBuf>,
 }
 
 /// A gKit orbiter camera: the scene's centre seen from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OrbiterCamera {
-    /// `c`: the centre that is looked at.
+    /// `c`: centre of the view.
     pub center: [f64; 3],
     /// `p`: offset in the picture's plane.
     pub position: [f64; 2],
@@ -133,7 +133,7 @@ pub struct OrbiterCamera {
     pub radius: f64,
     /// `f`: vertical angle in degrees.
     pub fov: f64,
-    /// Second and third number of `f`: pixels.
+    /// Second and third number of `f`: size in pixels.
     pub width: f64,
     /// Pixels down.
     pub height: f64,

@@ -8,8 +8,8 @@
 //! f 45 1024 640    vertical angle in degrees, width and height in pixels
 //! ```
 //!
-//! What they mean is defined by gKit's `Orbiter` class. A point of the world goes to camera space (x right,
-//! y up, looking along −z) by
+//! gKit's `Orbiter` class defines their meaning. A point of the world goes to camera space (x right, y up, looking
+//! along −z) by
 //!
 //! `view = T(−p.x, −p.y, −size) · Rx(r.x) · Ry(r.y) · T(−c)`
 //!
@@ -22,18 +22,18 @@ use super::{AssetError, OrbiterCamera, read};
 use crate::control::{CancelToken, unwatched};
 use crate::math::limits::{LARGEST, SHORTEST, is_too_short};
 
-/// An orbiter file is five lines; more than this is something else.
+/// Most bytes of an orbiter file, which has five lines: a larger file is something else.
 const LIMIT: u64 = 1 << 20;
 
 /// The angle of gKit's viewer, for files from before the `f` line.
 const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 
-/// Read an orbiter file. `c` and `s` must be there; `p` and `r` are 0 and `f` is 45 degrees at 1024 × 640 where
-/// they are not.
+/// Reads an orbiter file. `c` and `s` are required; without them, `p` and `r` are 0 and `f` is 45 degrees at
+/// 1024 × 640.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line: an unknown letter, a wrong count of
-/// numbers, a number that is not finite or out of range.
+/// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line: an unknown letter, a wrong count of numbers,
+/// a number that is not finite or out of range.
 pub fn load(path: &Path) -> Result<OrbiterCamera, AssetError> {
     let token = CancelToken::new();
     let bytes = read::text(path, LIMIT, read::Watch { progress: &unwatched, token: &token })?;

@@ -1,4 +1,4 @@
-//! Reading files without surprises: only regular files, never more than a limit, watched and stoppable.
+//! Reading files safely: only regular files, never more than a limit, with progress and cancellation.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -12,7 +12,7 @@ pub(crate) use crate::system::in_words;
 /// Bytes between two polls of the token.
 const CHUNK: usize = 1 << 20;
 
-/// Who watches the work, and who may stop it.
+/// Progress sink and cancel token of the work.
 #[derive(Clone, Copy)]
 pub(crate) struct Watch<'a> {
     pub(crate) progress: Progress<'a>,
@@ -20,14 +20,14 @@ pub(crate) struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    /// Report, then go on or stop.
+    /// Reports progress, then polls the token.
     pub(crate) fn tick(&self, done: usize, total: usize) -> Result<(), Cancelled> {
         (self.progress)(done as u64, total as u64);
         self.token.check()
     }
 }
 
-/// Open a regular file of at most `limit` bytes; gives its length too. Pipes, devices and folders are refused
+/// Opens a regular file of at most `limit` bytes and returns its length too. Pipes, devices and folders are refused
 /// before they are opened, so that nothing blocks.
 pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
@@ -41,26 +41,26 @@ pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     Ok((file, found.len()))
 }
 
-/// Bytes at the start of a file that tell text from other things.
+/// Bytes at the start of a file by which text is recognised.
 const START: usize = 1 << 12;
 
-/// All bytes of a text file; one that is binary by its start is refused before the rest is read.
+/// Reads a text file; a file whose start is binary is refused before the rest is read.
 pub(crate) fn text(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
     bytes_if(path, limit, watch, |start| !start.contains(&0))
 }
 
-/// All bytes of a file whose first three are no zeros: letters, in every format that this is asked of.
+/// Reads a file whose first three bytes are not zeros: they are letters in every format that uses this function.
 pub(crate) fn lettered(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
     bytes_if(path, limit, watch, |start| !start[..start.len().min(3)].contains(&0))
 }
 
-/// All bytes of a regular file.
+/// Reads a regular file.
 pub(crate) fn bytes(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
     bytes_if(path, limit, watch, |_| true)
 }
 
-/// All bytes of a regular file, if its first [`START`] are accepted. Progress counts bytes out of `2·length`: the
-/// second half is the parser's.
+/// Reads a regular file if its first [`START`] bytes are accepted. Progress counts bytes out of `2·length`: the second
+/// half is the parser's.
 fn bytes_if(
     path: &Path,
     limit: u64,

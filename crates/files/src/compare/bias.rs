@@ -1,21 +1,21 @@
-//! Whether a picture is brighter than its reference by more than their noise.
+//! Bias: whether a picture is brighter than its reference by more than their noise.
 
 use super::Errors;
 
-/// How much brighter a picture is than its reference, as a part of the reference's mean luminance.
+/// Excess brightness of a picture, relative to the reference's mean luminance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bias {
-    /// mean (a − b) / mean b; none where the reference is black.
+    /// mean (a − b) / mean b. `None` if the reference is black.
     pub value: Option<f64>,
-    /// Its standard error by the noise of both; none where one of them is not known.
+    /// Standard error of the bias by the noise of both. `None` if one of the two is not known.
     pub standard_error: Option<f64>,
-    /// The one over the other; none without noise.
+    /// Bias divided by its standard error. `None` without noise.
     pub z: Option<f64>,
 }
 
 impl Bias {
-    /// With the standard errors of both mean luminances, where they are known. The noise of one picture must not depend on that of
-    /// the other.
+    /// The bias, with the standard errors of both mean luminances if they are known. The noise of one picture must not depend on
+    /// that of the other.
     pub fn new(errors: &Errors, standard_errors: [Option<f64>; 2]) -> Self {
         let [a, b] = errors.luminances;
         let error = match standard_errors {

@@ -1,4 +1,4 @@
-//! Colours for errors: black, purple, red, orange, pale yellow, as much lighter for each step as the one before.
+//! Colours for errors: black, purple, red, orange, pale yellow, in equal steps of lightness.
 
 use std::f64::consts::TAU;
 

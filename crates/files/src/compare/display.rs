@@ -1,4 +1,4 @@
-//! Errors of what a display shows, clamped sRGB of any fineness: PSNR of its channels, SSIM of its luma.
+//! Errors of displayed values, clamped sRGB without quantisation: PSNR of the channels, SSIM of the luma.
 //!
 //! SSIM: Z. Wang et al., "Image Quality Assessment: From Error Visibility to Structural Similarity" (2004): a Gaussian
 //! window of 11 × 11 pixels with σ = 1.5, K₁ = 0.01, K₂ = 0.03, L = 1; the mean over the windows that lie inside.
@@ -102,7 +102,7 @@ fn lumas(pair: &Pair, tile: Rect) -> (f64, [Plane; 2]) {
     (square, lumas)
 }
 
-/// The place in the picture of one in the tile with its margin, if it is inside.
+/// Converts a position in the tile with its margin to one in the picture. `None` if it is outside.
 fn inside(start: u32, offset: usize, length: usize) -> Option<usize> {
     (start as usize + offset).checked_sub(RADIUS).filter(|&place| place < length)
 }
@@ -111,8 +111,8 @@ fn is_inner(offset: usize, length: u32) -> bool {
     (RADIUS..RADIUS + length as usize).contains(&offset)
 }
 
-/// For each place of the tile along one side, the weights of its window that are inside of the picture; none where the
-/// window does not count.
+/// For each position of the tile along one side, the weights of its window inside of the picture. `None` if the window
+/// does not count.
 fn weights_inside(start: u32, count: u32, length: usize, window: &[f64]) -> Vec<Option<f64>> {
     let weight = |place: usize| {
         let is_whole = place >= RADIUS && place + RADIUS < length;

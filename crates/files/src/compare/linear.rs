@@ -1,4 +1,4 @@
-//! Errors of linear values as they are.
+//! Errors of linear values.
 
 use rayon::prelude::*;
 
@@ -6,7 +6,7 @@ use super::Pair;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_LEAST};
 use crate::math::{DVec2, Vec3};
 
-/// Of the pixels, one in so many is left out of the trimmed mean.
+/// The trimmed mean leaves out one in so many pixels.
 const DROPPED_ONE_IN: usize = 1000;
 
 pub(super) struct Linear {
@@ -25,9 +25,9 @@ struct Sums {
     square: f64,
     relative: f64,
     max: f64,
-    /// Column and row of the first that has it.
+    /// Column and row of the first pixel with the largest difference.
     max_at: [u32; 2],
-    /// Of both pictures.
+    /// Sums of the luminances of both pictures.
     luminances: DVec2,
 }
 
@@ -58,7 +58,7 @@ pub(super) fn measure(pair: &Pair) -> Linear {
     }
 }
 
-/// What `of` gives for each row, in their order.
+/// Results of `of` for each row, in their order.
 fn map_rows<T: Send>(pair: &Pair, of: impl Fn(&[Vec3], &[Vec3]) -> T + Sync) -> Vec<T> {
     let a = pair.a().pixels.par_chunks(pair.width());
     a.zip(pair.b().pixels.par_chunks(pair.width())).map(|(a, b)| of(a, b)).collect()
@@ -101,6 +101,6 @@ fn trimmed(pair: &Pair, dropped: usize) -> f64 {
     });
     let (sum, count) =
         rows.into_iter().fold((0.0, 0_usize), |all, row: (f64, usize)| (all.0 + row.0, all.1 + row.1));
-    // Of those that are equal to the least that is dropped, some may stay.
+    // Several values may equal the least dropped one: some of these stay.
     (sum + (kept - count) as f64 * least_dropped) / kept as f64
 }

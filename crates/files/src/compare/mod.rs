@@ -1,8 +1,8 @@
 //! The error of a picture against a reference.
 //!
-//! On linear values as they are: RMSE, relMSE, the largest difference. On what a display shows, clamped sRGB: PSNR,
-//! SSIM, FLIP. All sums are in double precision and in an order that no number of threads changes; work is shared in
-//! the pool that the caller is in.
+//! Linear values give RMSE, relMSE and the largest difference; displayed values, clamped sRGB, give PSNR, SSIM and
+//! FLIP. All sums are in double precision, in an order that does not depend on the number of threads. The threads of
+//! the caller's pool share the work.
 
 mod bias;
 mod colormap;
@@ -21,20 +21,20 @@ pub use flip::PIXELS_PER_DEGREE;
 pub use pair::{CompareError, Pair};
 pub use two::TwoReferences;
 
-/// How far the first picture of a pair is from the second, its reference. Means are over pixels and channels.
+/// Errors of the first picture of a pair against the second, its reference. Means are over pixels and channels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Errors {
     /// √mean (a − b)², linear.
     pub rmse: f64,
     /// mean (a − b)²/(b² + 0.01), linear.
     pub relmse: f64,
-    /// The same without the thousandth of the pixels (rounded down) that have the largest values.
+    /// relMSE without the thousandth of the pixels (rounded down) that have the largest values.
     pub relmse_trimmed: f64,
-    /// How many pixels that leaves out.
+    /// Number of pixels that it leaves out.
     pub dropped_pixels: u64,
     /// max |a − b|, linear.
     pub max: f64,
-    /// Column and row, from 0 at the top left, of the first pixel that has it.
+    /// Column and row, from 0 at the top left, of the first pixel with the largest difference.
     pub max_at: [u32; 2],
     /// Mean luminance of both, linear.
     pub luminances: [f64; 2],
@@ -46,7 +46,7 @@ pub struct Errors {
     pub flip: f64,
 }
 
-/// What is measured of a pair.
+/// Measurements of a pair.
 #[derive(Clone, Debug)]
 pub struct Measured {
     /// The figures.

@@ -8,13 +8,13 @@ use crate::control::{CancelToken, unwatched};
 use crate::film::RadianceImage;
 use crate::math::Vec3;
 
-/// Why two files cannot be compared.
+/// Reasons for which two files cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
-    /// A file that could not be read, or is no picture.
+    /// A file could not be read, or is not a picture.
     #[error(transparent)]
     File(#[from] AssetError),
-    /// Values that are no numbers.
+    /// Some values are not finite.
     #[error(
         "{}: {nan} of its values are NaN and {infinite} infinite, the first at pixel ({}, {}), counted from (0, 0) \
          at the top left, in {channel}: no error can be measured; find what made them, or render it again",
@@ -23,16 +23,16 @@ pub enum CompareError {
     NotFinite {
         /// The file.
         path: PathBuf,
-        /// How many values are NaN.
+        /// Number of NaN values.
         nan: u64,
-        /// How many are infinite, of either sign.
+        /// Number of infinite values, of either sign.
         infinite: u64,
-        /// Column and row of the first.
+        /// Column and row of the first such value.
         at: [u32; 2],
-        /// The channel of the first, in words.
+        /// Channel of the first such value, in words.
         channel: &'static str,
     },
-    /// Pictures of two sizes.
+    /// The pictures have two sizes.
     #[error(
         "{} has {}×{} pixels and {} {}×{}: only pictures of one size can be compared; render one of them at the size \
          of the other (--width, --height)",
@@ -57,18 +57,18 @@ impl Pair {
     /// Checks the picture and its reference; messages call them by these names.
     ///
     /// # Errors
-    /// Everything that is wrong with them.
+    /// All faults of both.
     pub fn new(names: [&Path; 2], a: RadianceImage, b: RadianceImage) -> Result<Self, Vec<CompareError>> {
         let errors = [check_finite(names[0], &a), check_finite(names[1], &b), check_sizes(names, &a, &b)];
         let errors: Vec<_> = errors.into_iter().flatten().collect();
         if errors.is_empty() { Ok(Self { a, b }) } else { Err(errors) }
     }
 
-    /// Reads two files of any kind that a texture may be: whole numbers are taken for sRGB, floats for linear; alpha is
-    /// left out.
+    /// Reads two image files of any format that a texture may have: whole numbers are read as sRGB, floats as linear;
+    /// alpha is left out.
     ///
     /// # Errors
-    /// Everything that is wrong with them.
+    /// All faults of both.
     pub fn load(a: &Path, b: &Path) -> Result<Self, Vec<CompareError>> {
         match (read(a), read(b)) {
             (Ok(first), Ok(second)) => Self::new([a, b], first, second),
@@ -78,7 +78,7 @@ impl Pair {
         }
     }
 
-    /// The picture that is judged.
+    /// The picture under test.
     pub fn a(&self) -> &RadianceImage {
         &self.a
     }
@@ -98,7 +98,7 @@ impl Pair {
         self.a.height as usize
     }
 
-    /// Both pixels of a place.
+    /// Both pixels at a position.
     pub(super) fn at(&self, x: usize, y: usize) -> [Vec3; 2] {
         let index = y * self.width() + x;
         [self.a.pixels[index], self.b.pixels[index]]

@@ -19,7 +19,8 @@ impl Plane {
         Self { values, ..*self }
     }
 
-    /// Weighted sums along rows and columns, where all taps lie inside: the plane shrinks by `taps − 1` on both sides.
+    /// Weighted sums along rows and columns at pixels for which all taps lie inside: the plane shrinks by `taps − 1` on
+    /// both sides.
     pub(super) fn filtered(&self, along_rows: &[f64], along_columns: &[f64]) -> Self {
         self.along_rows(along_rows).along_columns(along_columns)
     }

@@ -19,7 +19,7 @@ fn errors(a: &RadianceImage, b: &RadianceImage) -> Errors {
     measure(&pair(a.clone(), b.clone())).errors
 }
 
-/// Hashed values in [0, 1] with noise of ±1/8 on them, of which some is outside of what a display shows.
+/// Hashed values in [0, 1] with noise of ±1/8, some of it outside of the range of a display.
 fn noisy(width: u32, height: u32) -> [RadianceImage; 2] {
     let clean = |x, y, c| ((x * 7 + y * 13 + c * 29) * (x + 2 * y + 3) % 257) as f32 / 256.0;
     let noise = |x, y, c| (((x * 5 + y * 11 + c * 17) % 33) as f32 - 16.0) / 128.0;
@@ -50,7 +50,7 @@ struct Expected {
     psnr: f64,
     ssim: f64,
     flip: f64,
-    /// By the published program, in single precision.
+    /// FLIP by the published program, in single precision.
     published_flip: f64,
 }
 

@@ -5,12 +5,12 @@ use crate::film::Rect;
 /// Columns and rows of a tile.
 pub(super) const SIDE: usize = 128;
 
-/// How many rows of tiles there are.
+/// Number of bands: rows of tiles.
 pub(super) fn bands(height: usize) -> usize {
     height.div_ceil(SIDE)
 }
 
-/// The tiles of one of them, from left to right.
+/// The tiles of one band, from left to right.
 pub(super) fn of_band(band: usize, width: usize, height: usize) -> impl Iterator<Item = Rect> {
     let y = band * SIDE;
     (0..width.div_ceil(SIDE)).map(move |column| {

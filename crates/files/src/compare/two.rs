@@ -1,5 +1,5 @@
-//! The error against two references that have noise of their own. With independent noise a and b, a reference is the truth plus
-//! noise, and the mean of (x − r₁)(x − r₂) is that of (x − truth)²: the noise is in no square.
+//! The error against two noisy references. With independent noise a and b, a reference is the truth plus noise, and the mean of
+//! (x − r₁)(x − r₂) is that of (x − truth)²: no square contains the noise.
 
 use super::Pair;
 use crate::film::RadianceImage;
@@ -35,13 +35,13 @@ impl TwoReferences {
         &self.pair
     }
 
-    /// relMSE of a picture of the same size: its mean is right whatever the noise of the references. It can be below 0.
+    /// relMSE of a picture of the same size, unbiased whatever the noise of the references. It can be below 0.
     pub fn error(&self, x: &RadianceImage) -> f64 {
         self.cross(x, x)
     }
 
-    /// The mean of (x − r)(y − r) relative to r²: of two pictures by one method with independent noise it is the square of what
-    /// they have in common, the bias.
+    /// The mean of (x − r)(y − r) relative to r². For two pictures by one method with independent noise, it is the square of
+    /// their common error, the bias.
     pub fn cross(&self, x: &RadianceImage, y: &RadianceImage) -> f64 {
         let places = self.places().zip(x.pixels.iter().zip(&y.pixels));
         let sum = places.fold(DVec3::ZERO, |sum, ((weight, a, b), (x, y))| {
@@ -51,19 +51,19 @@ impl TwoReferences {
         sum.element_sum()
     }
 
-    /// relMSE of one reference: what its noise would add to the error if it were alone.
+    /// relMSE of one reference: the error that its noise would add if it were the only reference.
     pub fn noise(&self) -> f64 {
         let sum = self.places().fold(DVec3::ZERO, |sum, (weight, a, b)| sum + weight * (a - b) * (a - b));
         sum.element_sum() / 2.0
     }
 
-    /// The standard error that the noise of the references gives [`Self::error`]: pixels are taken as independent, channels as
-    /// one.
+    /// Standard error of [`Self::error`] by the noise of the references: pixels are taken as independent, channels as one.
     pub fn uncertainty(&self, x: &RadianceImage) -> f64 {
         let variances = self.places().zip(&x.pixels).map(|((weight, a, b), x)| {
             let (between, from) = ((a - b) * (a - b), x.as_dvec3() - (a + b) / 2.0);
             let of = |channel: usize| {
-                // Of a·b and of (x − truth)(a + b), where the variance of one reference is half of `between`.
+                // Add the variances of a·b and of (x − truth)(a + b); the variance of one reference is half of
+                // `between`.
                 let variance = between[channel] * (between[channel] / 12.0 + from[channel] * from[channel]);
                 weight[channel] * variance.sqrt()
             };
@@ -73,7 +73,7 @@ impl TwoReferences {
         variances.sum::<f64>().sqrt()
     }
 
-    /// How much brighter a picture is than the references, as a part of their mean luminance.
+    /// Excess brightness of a picture, relative to the references' mean luminance.
     pub fn brightness(&self, x: &RadianceImage) -> f64 {
         let sum: f64 = x.pixels.iter().map(|pixel| luminance(pixel.as_dvec3())).sum();
         sum / x.pixels.len() as f64 / self.mean_luminance() - 1.0
@@ -85,7 +85,7 @@ impl TwoReferences {
         sum / self.weights.len() as f64
     }
 
-    /// The standard error that the noise of the references gives [`Self::brightness`]: pixels are taken as independent.
+    /// Standard error of [`Self::brightness`] by the noise of the references: pixels are taken as independent.
     pub fn brightness_uncertainty(&self) -> f64 {
         let square = |x: f64| x * x;
         let squares = self.places().map(|(_, a, b)| square(luminance((a - b) / 2.0)));

@@ -1,4 +1,4 @@
-//! What a file has besides its bytes, carried over to the file that takes its place: owner, group, access list,
+//! Attributes of a file beside its bytes, carried over to the file that replaces it: owner, group, access list,
 //! extended attributes, permissions.
 
 use std::ffi::{OsStr, OsString};
@@ -23,16 +23,16 @@ const OWNER: u32 = 0o700;
 /// Rights of the owner and of all others, but for the group's.
 const NOT_GROUP: u32 = 0o707;
 
-/// Whether a file may be replaced if something that it has besides its bytes cannot be kept.
+/// Policy for a file that would lose some of its attributes when it is replaced.
 #[derive(Clone, Copy)]
 pub enum Losses<'a> {
-    /// It may, and a sentence says what was lost; the new file never gives anybody more rights.
+    /// It is replaced, and a sentence reports the losses; the new file never gives anybody more rights.
     Told(&'a dyn Fn(String)),
-    /// It may not.
+    /// It is not replaced.
     Refused,
 }
 
-/// What the replaced file has.
+/// Attributes of the replaced file.
 #[derive(Debug)]
 pub(super) struct Attributes {
     uid: u32,
@@ -44,16 +44,16 @@ pub(super) struct Attributes {
     named: Vec<(OsString, io::Result<Vec<u8>>)>,
 }
 
-/// What the new file lacks, and the permissions that are safe without it.
+/// Attributes that the new file lacks, and the permissions that are safe without them.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Carried {
-    /// In words, such as `its owner`.
+    /// The lost attributes in words, such as `its owner`.
     pub(super) lost: Vec<String>,
     mode: u32,
 }
 
 impl Attributes {
-    /// Reads those of the file.
+    /// Reads the attributes of the file.
     pub(super) fn of(path: &Path, metadata: &fs::Metadata) -> Self {
         let mut named = named(path);
         named.sort_by_key(|(name, _)| name == ACCESS_LIST);
@@ -67,10 +67,10 @@ impl Attributes {
         }
     }
 
-    /// Gives them to a new file that only its owner can read so far, all but the permissions.
+    /// Gives all attributes but the permissions to a new file that only its owner can read so far.
     pub(super) fn carry_over(&self, new: &File) -> Carried {
         let mut carried = Carried { lost: Vec::new(), mode: self.mode };
-        // While the new file is this user's own.
+        // Start while the new file is this user's own.
         #[cfg(target_os = "linux")]
         if !self.flags.carry_over(new) {
             carried.lost.push("its flags (chattr)".to_owned());
@@ -86,17 +86,17 @@ impl Attributes {
         if is_same(ids()) || fchown(new, Some(self.uid), Some(self.gid)).is_ok() {
             return;
         }
-        // The group alone can be kept by every member of it.
+        // Every member of the group can at least keep the group.
         let _ = fchown(new, None, Some(self.gid));
         let (uid, gid) = ids().unwrap_or((u32::MAX, u32::MAX));
-        // Set-user-ID and set-group-ID would be of somebody else.
+        // Set-user-ID and set-group-ID would belong to another user.
         carried.mode &= 0o777;
         if uid != self.uid {
             carried.lost.push("its owner".to_owned());
         }
         if gid != self.gid {
             carried.lost.push("its group".to_owned());
-            // Members of the new group had the rights of all others.
+            // Members of the new group had the rights of all others before.
             let of_others = (carried.mode & 0o007) << 3;
             carried.mode &= NOT_GROUP | of_others;
         }
@@ -109,7 +109,7 @@ impl Attributes {
                 carried.lose(name);
             }
         }
-        // A folder gives new files a list of its own.
+        // A folder gives new files a list of its own: replace or remove it.
         let has_list = self.named.iter().any(|(name, _)| name == ACCESS_LIST);
         let is_inherited = || matches!(new.get_xattr(ACCESS_LIST), Ok(Some(_)));
         if !has_list && is_inherited() && new.remove_xattr(ACCESS_LIST).is_err() {
@@ -126,7 +126,7 @@ impl Carried {
 
     fn lose(&mut self, name: &OsStr) {
         if name == ACCESS_LIST {
-            // Rights of the group were the mask of the list.
+            // The file's group rights were the mask of its list.
             self.mode &= OWNER;
             self.lost.push("its access list".to_owned());
         } else {
@@ -135,7 +135,7 @@ impl Carried {
     }
 }
 
-/// Extended attributes of a file; none on file systems without them.
+/// Extended attributes of a file; empty on file systems without them.
 fn named(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
     let is_carried = |name: &OsString| !NOT_CARRIED.iter().any(|known| name == known);
     let value = |name: OsString| match xattr::get_deref(path, &name) {
@@ -150,7 +150,7 @@ fn named(path: &Path) -> Vec<(OsString, io::Result<Vec<u8>>)> {
     }
 }
 
-/// What is there already needs no right to be set.
+/// Sets an attribute. One that is already there needs no right to be set.
 fn set(new: &File, name: &OsStr, value: &[u8]) -> io::Result<()> {
     if new.get_xattr(name).is_ok_and(|now| now.as_deref() == Some(value)) {
         return Ok(());
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn an_access_list_that_is_lost_leaves_rights_to_the_owner_alone() {
-        // These bytes are no list.
+        // These bytes are not a valid list.
         let (attributes, new) = attributes(0o664, ACCESS_LIST);
         let carried = attributes.carry_over(&new);
         assert_eq!(carried, Carried { lost: vec!["its access list".to_owned()], mode: 0o600 });

@@ -1,4 +1,4 @@
-//! Why a picture could not be written, and the way out.
+//! Errors of writing a picture, with the way out.
 
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::Format;
 use crate::system::in_words;
 
-/// Why a picture could not be written.
+/// Reasons for which a picture could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     /// The path has no ending.
@@ -15,7 +15,7 @@ pub enum OutputError {
         /// The path.
         path: PathBuf,
     },
-    /// The ending names no format.
+    /// No format has this ending.
     #[error("cannot write {}: .{ending} is not a format that glimt writes; use one of {}", path.display(), Format::known_endings())]
     UnknownEnding {
         /// The path.
@@ -23,16 +23,16 @@ pub enum OutputError {
         /// Its ending, in small letters.
         ending: String,
     },
-    /// The format is planned.
+    /// The format is planned, but not yet available.
     #[error("cannot write {}: WebP is not available in this version; use one of {}", path.display(), Format::known_endings())]
     NotAvailable {
         /// The path.
         path: PathBuf,
     },
-    /// Neither 8 nor 16.
+    /// The bit depth is neither 8 nor 16.
     #[error("{bits} bits a channel are not possible; use 8 or 16")]
     BitDepth {
-        /// What was asked for.
+        /// Requested bits.
         bits: u8,
     },
     /// The format cannot hold the picture.
@@ -40,7 +40,7 @@ pub enum OutputError {
     Unsuitable {
         /// The format.
         format: Format,
-        /// What it cannot.
+        /// Property that the format lacks.
         why: String,
     },
     /// The encoder failed.
@@ -48,34 +48,34 @@ pub enum OutputError {
     Encoder {
         /// The format.
         format: Format,
-        /// What it said.
+        /// Message of the encoder.
         why: String,
     },
-    /// The target is nothing that a picture can be written to.
+    /// A picture cannot be written to the target.
     #[error("cannot write {}: {why}; {way_out}", path.display())]
     Target {
         /// The path as given.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Fault of the target.
         why: String,
-        /// What to do.
+        /// Advice for a way out.
         way_out: &'static str,
     },
-    /// What is there must stay.
+    /// The existing file must stay.
     #[error("{reason}")]
     Refused {
-        /// Which file, why, and the way out.
+        /// The file, the reason, and the way out.
         reason: String,
     },
-    /// The work was told to stop.
+    /// The work was cancelled.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
-    /// The system refused.
+    /// The system refused the operation.
     #[error("cannot write {}: {}; {}", path.display(), in_words(source), way_out(source))]
     File {
         /// The path as given.
         path: PathBuf,
-        /// What it said.
+        /// Error of the system.
         source: io::Error,
     },
 }

@@ -1,4 +1,4 @@
-//! OpenEXR: 32 bit float, linear, Rec. 709 primaries, lossless ZIP. Negative values stay, which a filter with negative lobes makes:
+//! OpenEXR: 32 bit float, linear, Rec. 709 primaries, lossless ZIP. Negative values, from filters with negative lobes, stay:
 //! without them dark noise would be too bright on average.
 
 use std::fs::File;
@@ -22,7 +22,8 @@ use crate::film::RadianceImage;
 /// The attribute with the standard error of the picture's mean luminance, a double.
 const MEAN_LUMINANCE_ERROR: &str = "glimtMeanLuminanceError";
 
-/// What an EXR file says of the standard error of its mean luminance. Only of a regular file: a pipe is read once.
+/// Standard error of the mean luminance according to an EXR file. Only for a regular file: a pipe can be read only
+/// once.
 pub fn mean_luminance_error(path: &Path) -> Option<f64> {
     let is_regular = path.metadata().is_ok_and(|found| found.is_file());
     let file = if is_regular { File::open(path).ok()? } else { return None };
@@ -58,8 +59,8 @@ pub(super) fn encode(
     Ok(bytes.into_bytes())
 }
 
-/// The encoder's own way is a pool with a thread for every core. This one stays in the pool that the caller is in, or
-/// on the caller's thread outside of one.
+/// Compresses in the caller's pool, or on the caller's thread outside of one. The encoder itself would make a pool with
+/// a thread for every core.
 fn compress(
     meta: &MetaData,
     mut blocks: impl Iterator<Item = (usize, UncompressedBlock)>,
@@ -93,8 +94,9 @@ const REC_709: Chromaticities = Chromaticities {
     white: Vec2(0.3127, 0.3290),
 };
 
-/// All metadata go into the standard `comments`, a line each: attributes of their own would come in the random order of
-/// the encoder's hash map, and the same picture would give different files. There is one, which programs read.
+/// Attributes of the file. All metadata go into the standard `comments`, a line each: attributes of their own would
+/// come in the random order of the encoder's hash map, and the same picture would give different files. One attribute,
+/// which programs read, stands by itself.
 fn attributes(options: &EncodeOptions) -> LayerAttributes {
     let line = |(name, value): &(String, String)| format!("{}: {}", one_line(name), one_line(value));
     let lines: Vec<_> = options.metadata.iter().map(line).collect();
@@ -104,7 +106,7 @@ fn attributes(options: &EncodeOptions) -> LayerAttributes {
     LayerAttributes { software_name: Some(text(SOFTWARE)), comments, other, ..Default::default() }
 }
 
-/// The bytes of UTF-8, as other programs write and read them.
+/// The text as UTF-8, as other programs write and read it.
 fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use rustix::fs::{IFlags, ioctl_getflags, ioctl_setflags};
 
-/// What a person sets and files keep. A file that is append-only or immutable is not replaced; the other flags are the
+/// Flags that a person sets and files keep. Append-only and immutable files are not replaced; the other flags are the
 /// system's own.
 const CARRIED: IFlags = IFlags::NODUMP
     .union(IFlags::NOATIME)
@@ -21,18 +21,18 @@ const CARRIED: IFlags = IFlags::NODUMP
 pub(super) struct Flags(Option<IFlags>);
 
 impl Flags {
-    /// Reads those of the file.
+    /// Reads the flags of the file.
     pub(super) fn of(path: &Path) -> Self {
         Self(File::open(path).ok().and_then(|file| ioctl_getflags(file).ok()))
     }
 
-    /// Gives them to a new, empty file; whether it has them then.
+    /// Gives the flags to a new, empty file; returns whether it has them.
     pub(super) fn carry_over(&self, new: &File) -> bool {
         let Some(wanted) = self.0 else { return true };
         let set = || {
             let now = ioctl_getflags(new)?;
             let then = (now - CARRIED) | (wanted & CARRIED);
-            // What it has already needs no right to be set.
+            // Flags that are already set need no right to be set.
             if now == then { Ok(()) } else { ioctl_setflags(new, then) }
         };
         set().is_ok()

@@ -23,10 +23,10 @@ pub enum Format {
 /// Bits per channel of integer formats.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum BitDepth {
-    /// 8.
+    /// 8 bits.
     #[default]
     Eight,
-    /// 16.
+    /// 16 bits.
     Sixteen,
 }
 
@@ -43,7 +43,7 @@ impl TryFrom<u8> for BitDepth {
 }
 
 impl Format {
-    /// Endings, without the dot, and what they name.
+    /// Endings, without the dot, and their formats.
     const ENDINGS: [(&'static str, Self); 6] = [
         ("png", Self::Png),
         ("exr", Self::Exr),
@@ -53,7 +53,7 @@ impl Format {
         ("ppm", Self::Ppm),
     ];
 
-    /// Every ending that names a format, without the dot.
+    /// All known endings, without the dot.
     pub fn endings() -> impl Iterator<Item = &'static str> {
         Self::ENDINGS.iter().map(|(ending, _)| *ending)
     }
@@ -63,10 +63,10 @@ impl Format {
         Self::ENDINGS.map(|(ending, _)| format!(".{ending}")).join(", ")
     }
 
-    /// The format that a path's ending names, in small letters or capitals.
+    /// The format of a path's ending, in small letters or capitals.
     ///
     /// # Errors
-    /// No ending, or one that names no format.
+    /// There is no ending, or no format has it.
     pub fn of(path: &Path) -> Result<Self, OutputError> {
         let Some(ending) = path.extension() else {
             return Err(OutputError::NoEnding { path: path.to_owned() });
@@ -79,10 +79,10 @@ impl Format {
         })
     }
 
-    /// Whether a file of this format can hold such a picture.
+    /// Checks that a file of this format can hold such a picture.
     ///
     /// # Errors
-    /// [`OutputError::Unsuitable`], saying why not.
+    /// [`OutputError::Unsuitable`] with the reason.
     pub fn check_picture(self, width: u32, height: u32, bit_depth: BitDepth) -> Result<(), OutputError> {
         let unsuitable = |why: String| Err(OutputError::Unsuitable { format: self, why });
         if width == 0 || height == 0 {

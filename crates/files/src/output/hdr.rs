@@ -1,5 +1,5 @@
 //! Radiance HDR: G. Ward, "Real Pixels" (Graphics Gems II, 1991): three mantissas and a shared exponent, lines
-//! compressed by runs. There are no negative values in it.
+//! compressed by runs. The format has no negative values.
 
 use super::{EncodeOptions, OutputError, SOFTWARE, as_finite, one_line};
 use crate::control::CancelToken;
@@ -44,11 +44,11 @@ fn write_line(line: &[Vec3], bytes: &mut Vec<u8>) {
     }
 }
 
-/// Mantissas rounded to the nearest, so that what is read is as often brighter as darker.
+/// Rounds the mantissas to the nearest, so that values read back are as often brighter as darker.
 fn rgbe(color: Vec3) -> [u8; 4] {
     let color = color.to_array().map(|component| f64::from(as_finite(component).max(0.0)));
     let brightest = color[0].max(color[1]).max(color[2]);
-    // 2^(exponent − 1) ≤ brightest < 2^exponent, one more where the mantissa would be rounded up to 256.
+    // 2^(exponent − 1) ≤ brightest < 2^exponent, one more if the mantissa would be rounded up to 256.
     let mut exponent = libm::log2(brightest).floor() + 1.0;
     if (brightest / libm::exp2(exponent) * 256.0).round() >= 256.0 {
         exponent += 1.0;

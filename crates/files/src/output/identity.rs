@@ -1,4 +1,4 @@
-//! Which file a path leads to, whatever its name.
+//! Identity of the file that a path leads to, whatever its name.
 
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -8,22 +8,22 @@ use std::path::Path;
 
 use super::place::{directory_of, follow};
 
-/// A regular file, there or not yet: two paths with the same one lead to the same file. Links of both kinds, `..` and
-/// file systems that do not tell small letters from capitals are seen through.
+/// Identity of a regular file, existing or not: two paths with the same identity lead to the same file. It resolves
+/// links of both kinds, `..`, and file systems that do not distinguish small letters from capitals.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum FileIdentity {
-    /// A file that is there.
+    /// A file that exists.
     Existing {
-        /// Of its file system.
+        /// Device of its file system.
         device: u64,
-        /// Its number there.
+        /// Its inode there.
         inode: u64,
     },
-    /// A file that is not there yet, in a folder that is.
+    /// A file that does not exist yet, in a folder that does.
     New {
-        /// Of the folder's file system.
+        /// Device of the folder's file system.
         device: u64,
-        /// The folder's number there.
+        /// The folder's inode there.
         inode: u64,
         /// Its name in that folder.
         name: OsString,
@@ -31,7 +31,8 @@ pub enum FileIdentity {
 }
 
 impl FileIdentity {
-    /// None where a write would replace nothing: folders, devices, pipes, and paths that cannot be followed.
+    /// The identity of the path's file. `None` if a write would replace nothing: folders, devices, pipes, and paths
+    /// that cannot be followed.
     pub fn of(path: &Path) -> Option<Self> {
         match fs::metadata(path) {
             Ok(found) if found.is_file() => Some(Self::Existing { device: found.dev(), inode: found.ino() }),
@@ -40,7 +41,7 @@ impl FileIdentity {
         }
     }
 
-    /// Whether it is that of an open file.
+    /// Whether it is the identity of an open file.
     pub fn is_of(&self, file: &File) -> bool {
         let found = |found: fs::Metadata| Self::Existing { device: found.dev(), inode: found.ino() };
         file.metadata().is_ok_and(|metadata| found(metadata) == *self)

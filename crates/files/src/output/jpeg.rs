@@ -8,7 +8,7 @@ use super::{EncodeOptions, Format, OutputError};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// Of 100: no loss that is seen at arm's length, at a quarter of the size of 100.
+/// Quality, of 100: no visible loss at arm's length, at a quarter of the size of 100.
 const QUALITY: u8 = 92;
 
 pub(super) fn encode(

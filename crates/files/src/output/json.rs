@@ -1,4 +1,4 @@
-//! JSON that a terminal can show: what it would act on, or not show, is escaped as `\u200d`.
+//! JSON that is safe on a terminal: characters that it would act on, or not show, are escaped as `\u200d`.
 
 use std::fmt::Write;
 
@@ -9,7 +9,7 @@ use crate::system::text::is_plain;
 /// A value in one line, without a line end.
 ///
 /// # Errors
-/// Those of the value's own serialisation.
+/// The errors of the value's own serialisation.
 pub fn in_a_line(value: &impl Serialize) -> serde_json::Result<String> {
     serde_json::to_string(value).map(harmless)
 }
@@ -17,12 +17,13 @@ pub fn in_a_line(value: &impl Serialize) -> serde_json::Result<String> {
 /// A value as the text of a file: indented, with a line end.
 ///
 /// # Errors
-/// Those of the value's own serialisation.
+/// The errors of the value's own serialisation.
 pub fn file(value: &impl Serialize) -> serde_json::Result<String> {
     serde_json::to_string_pretty(value).map(|text| harmless(text) + "\n")
 }
 
-/// Line ends come from the layout: within strings they are escaped already. Every other such character is within one.
+/// Escapes such characters. Line ends come from the layout, as they are escaped within strings; every other such
+/// character is within a string.
 fn harmless(text: String) -> String {
     let is_harmless = |c: char| c == '\n' || is_plain(c);
     if text.chars().all(is_harmless) {
@@ -34,7 +35,7 @@ fn harmless(text: String) -> String {
             escaped.push(c);
         } else {
             for unit in c.encode_utf16(&mut [0; 2]) {
-                // A string takes everything.
+                // Writing to a string cannot fail.
                 let _ = write!(escaped, "\\u{unit:04x}");
             }
         }

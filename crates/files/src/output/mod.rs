@@ -1,7 +1,7 @@
 //! Pictures to bytes, bytes to files.
 //!
 //! [`check_target`] before hours of work, [`encode`] into memory, [`write::atomic`] to disk: a file is whole, or it is
-//! the one that was there before. [`FileIdentity`] tells whether two paths lead to one file.
+//! the old one. [`FileIdentity`] decides whether two paths lead to one file.
 
 mod attributes;
 mod error;
@@ -35,22 +35,22 @@ use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::tone::ToneMapping;
 
-/// What a file says of the program that wrote it.
+/// Name and version of the program, as written into files.
 const SOFTWARE: &str = concat!("glimt ", env!("CARGO_PKG_VERSION"));
-/// The first word of that.
+/// Name of the program, the first word of that.
 const PROGRAM: &str = "glimt";
 
-/// How a picture becomes a file.
+/// Settings for encoding a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EncodeOptions {
-    /// For files of 8 and 16 bits; float files get linear radiance, unexposed.
+    /// Tone mapping for files of 8 and 16 bits; float files get linear radiance, unexposed.
     pub tone: ToneMapping,
-    /// Of PNG and PPM; float files have 32 bits whatever is said here.
+    /// Bit depth of PNG and PPM; float files always have 32 bits.
     pub bit_depth: BitDepth,
     /// Names and values (the scene, the settings), written into PNG text chunks and the comments of EXR, HDR and
     /// PPM files. The program and its version are always written.
     pub metadata: Vec<(String, String)>,
-    /// The standard error of the picture's mean luminance, where it is known: an attribute of EXR files.
+    /// Standard error of the picture's mean luminance, an attribute of EXR files. `None` if it is not known.
     pub mean_luminance_error: Option<f64>,
 }
 
@@ -75,50 +75,49 @@ pub fn encode(
         Format::Jpeg => jpeg::encode(image, options, token),
         Format::Ppm => ppm::encode(image, options, token),
     };
-    // An encoder that was stopped tells of its writer.
+    // An encoder that was stopped reports an error of its writer.
     token.check()?;
     bytes
 }
 
-/// Whether a picture can be written here, as far as can be told before the work rather than after it. Leaves nothing
-/// behind. Gives the format that the ending names.
+/// Checks that a picture can be written to this path, as far as this is possible before the work. Leaves nothing behind.
+/// Returns the format of the ending.
 ///
 /// # Errors
-/// An ending that names no format; a directory that is missing or takes no files; a target that is a directory or that may
-/// not be written.
+/// No format has the ending; the directory is missing or takes no files; the target is a directory or may not be written.
 pub fn check_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::of(path)?;
     place::check(path)?;
     Ok(format)
 }
 
-/// The same without a try in the directory, for those who look often.
+/// [`check_target`] without a trial in the directory, for frequent checks.
 ///
 /// # Errors
-/// As [`check_target`], but for a directory that takes no files although it may be written.
+/// As [`check_target`], but not for a directory that takes no files although it may be written.
 pub fn look_at_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::of(path)?;
     look_at_place(path)?;
     Ok(format)
 }
 
-/// [`look_at_target`] of any file.
+/// [`look_at_target`] for any file.
 ///
 /// # Errors
-/// As [`look_at_target`], but for the ending.
+/// As [`look_at_target`], but not for the ending.
 pub fn look_at_place(path: &Path) -> Result<(), OutputError> {
     place::find(path).map(drop)
 }
 
-/// Whether any file can be written here, as far as can be told before the work.
+/// Checks that any file can be written to this path, as far as this is possible before the work.
 ///
 /// # Errors
-/// As [`check_target`], but for the ending.
+/// As [`check_target`], but not for the ending.
 pub fn check_place(path: &Path) -> Result<(), OutputError> {
     place::check(path)
 }
 
-/// A component as files hold it that know no infinity.
+/// A component as a finite number, for files without infinity.
 fn as_finite(component: f32) -> f32 {
     if component.is_nan() { 0.0 } else { component.clamp(-f32::MAX, f32::MAX) }
 }

@@ -1,4 +1,4 @@
-//! Whether glimt wrote the file that a write would replace: the content says so, whatever the name ends in. A kind of file
+//! Whether glimt wrote the file that a write would replace: its content decides, whatever its ending. A kind of file
 //! replaces its own kind alone.
 
 use std::fs::File;
@@ -13,15 +13,15 @@ use super::{PROGRAM, SOFTWARE};
 
 /// Bytes of the chunks before a picture's pixels; those of glimt take some hundred.
 const HEADER_BYTES: usize = 1 << 20;
-/// Bytes of the largest plot that is looked into.
+/// Largest plot that is examined, in bytes.
 const PLOT_BYTES: u64 = 64 << 20;
 
-/// What a write would replace.
+/// File that a write would replace.
 #[derive(Debug)]
 pub enum Replaced {
-    /// Nothing, or what may be replaced.
+    /// No file, or one that may be replaced.
     Own,
-    /// What somebody else may want to keep, and what glimt would write there: "a report".
+    /// A file that somebody else may want to keep, and the kind that glimt would write there: "a report".
     Foreign(&'static str),
     /// A file that cannot be read.
     Unreadable(io::Error),
@@ -42,7 +42,7 @@ impl Replaced {
         }
     }
 
-    /// As [`Self::of`], for texts: an empty file may be replaced too.
+    /// [`Self::of`] for texts: an empty file may be replaced too.
     fn of_text(path: &Path, kind: &'static str, is_own: impl Fn(File) -> bool) -> Self {
         let is_empty = |file: &File| file.metadata().is_ok_and(|found| found.len() == 0);
         Self::of(replaced(path), kind, |file| is_empty(&file) || is_own(file))
@@ -73,7 +73,7 @@ pub fn replaced_json<T: DeserializeOwned>(
 ) -> Replaced {
     Replaced::of_text(path, kind, |file| {
         let mut reader = BufReader::new(file);
-        // Large files of somebody else are not read to their end for nothing.
+        // Do not read large files of others to their end for nothing.
         let is_object = reader.fill_buf().is_ok_and(|start| start.trim_ascii_start().starts_with(b"{"));
         is_object && serde_json::from_reader(reader).is_ok_and(|value| is_own(&value))
     })
@@ -109,7 +109,7 @@ pub fn signed(svg: &str) -> String {
 fn replaced(path: &Path) -> Option<io::Result<File>> {
     match place::find(path) {
         Ok(Place::File(Target { path, existing: Some(_) })) => Some(File::open(path)),
-        // Nothing is replaced there; what cannot be written is said by whoever writes.
+        // Nothing is replaced there; whoever writes reports what cannot be written.
         Ok(Place::File(Target { existing: None, .. }) | Place::InPlace(_)) | Err(_) => None,
     }
 }

@@ -1,4 +1,4 @@
-//! Where bytes really go: links followed, special files and what may not be written told apart.
+//! The real place of a write: follows links, and recognises special files and places without write permission.
 
 use std::fs::{self, Metadata};
 use std::io::{self, ErrorKind};
@@ -12,13 +12,13 @@ use nix::unistd::{AccessFlags, access};
 use super::protection::{self, Flag};
 use super::{OutputError, temporary};
 
-/// As many links as Linux follows.
+/// Most links to follow, as in Linux.
 const LINKS: usize = 40;
 
-/// Where the bytes for a path go.
+/// Place to which the bytes for a path go.
 #[derive(Debug)]
 pub(super) enum Place {
-    /// A regular file, there or not, to be replaced as a whole.
+    /// A regular file, existing or not, to be replaced as a whole.
     File(Target),
     /// A device, a pipe or an open descriptor, to be written as it is.
     InPlace(PathBuf),
@@ -28,7 +28,7 @@ pub(super) enum Place {
 #[derive(Debug)]
 pub(super) struct Target {
     pub(super) path: PathBuf,
-    /// Of the file that is there now.
+    /// Metadata of the existing file.
     pub(super) existing: Option<Metadata>,
 }
 
@@ -39,7 +39,7 @@ impl Target {
     }
 }
 
-/// Finds the place and whether it can be written, as far as can be told without writing.
+/// Finds the place and checks that it can be written, as far as this is possible without writing.
 pub(super) fn find(path: &Path) -> Result<Place, OutputError> {
     if path.file_name().is_none() || path.as_os_str().as_bytes().ends_with(b"/") {
         return Err(is_a_directory(path));
@@ -51,13 +51,13 @@ pub(super) fn find(path: &Path) -> Result<Place, OutputError> {
     }
 }
 
-/// [`find`] before the work: also whether the directory takes a file at all.
+/// [`find`] before the work: also checks that the directory takes a file at all.
 pub(super) fn check(path: &Path) -> Result<(), OutputError> {
     match find(path)? {
         Place::File(target) => {
             let directory = target.directory();
             temporary::probe(directory).map_err(|error| match error.kind() {
-                // It was there a moment ago: this is how /proc says it.
+                // The directory existed a moment ago: /proc refuses files by this error.
                 ErrorKind::NotFound if directory.is_dir() => OutputError::Target {
                     path: path.to_owned(),
                     why: format!("the directory {} takes no files", directory.display()),
@@ -70,8 +70,8 @@ pub(super) fn check(path: &Path) -> Result<(), OutputError> {
     }
 }
 
-/// What is behind the links of a path, and what is there now. A link to an open descriptor (/dev/stdout leads to one)
-/// is not followed: what it names may be no path at all.
+/// Follows the links of a path; returns the last path and the metadata of the file there. A link to an open descriptor
+/// (/dev/stdout leads to one) is not followed: it may lead to no path at all.
 pub(super) fn follow(path: &Path) -> io::Result<(PathBuf, Option<Metadata>)> {
     let mut target = path.to_owned();
     for _ in 0..LINKS {
@@ -108,7 +108,7 @@ fn existing(path: &Path, target: PathBuf, metadata: Metadata) -> Result<Place, O
         return Ok(Place::InPlace(target));
     }
     unflagged(path, "it", &target)?;
-    // Also of a file, although its directory decides whether it can be replaced: it may be protected on purpose.
+    // Check the file too, although its directory decides whether it can be replaced: it may be protected on purpose.
     may_write(path, &target, AccessFlags::W_OK)?;
     let directory = check_directory(path, directory_of(&target))?;
     if protection::is_kept_for_owner(&directory, &metadata) {
@@ -141,7 +141,7 @@ fn check_directory(path: &Path, directory: &Path) -> Result<Metadata, OutputErro
     }
 }
 
-/// That no flag keeps the file or directory from being changed: the new file could not be given its name, nor be removed.
+/// Checks that no flag protects the file or directory from changes: the new file could be neither renamed nor removed.
 fn unflagged(path: &Path, called: &str, what: &Path) -> Result<(), OutputError> {
     let Some(flag) = Flag::of(what) else { return Ok(()) };
     let why = format!("{called} is {}", flag.words());

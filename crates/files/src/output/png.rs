@@ -8,9 +8,9 @@ use super::{BitDepth, EncodeOptions, Format, OutputError, SOFTWARE, stoppable};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
-/// Length of a keyword (PNG specification, 11.3.3.1).
+/// Most bytes of a keyword (PNG specification, 11.3.3.1).
 const KEYWORD_BYTES: usize = 79;
-/// Of the compressed data.
+/// Bytes of a chunk of compressed data.
 const CHUNK_BYTES: usize = 1 << 18;
 
 pub(super) fn encode(
@@ -46,7 +46,7 @@ fn try_encode(
     Ok(bytes)
 }
 
-/// tEXt holds Latin-1 and is read by everything; iTXt holds the rest.
+/// Adds a text. tEXt holds Latin-1, and every reader knows it; iTXt holds the rest.
 fn add_text(encoder: &mut Encoder<'_, &mut Vec<u8>>, name: &str, value: &str) -> Result<(), EncodingError> {
     let name: String =
         name.chars().filter(|c| c.is_ascii_graphic() || *c == ' ').take(KEYWORD_BYTES).collect();

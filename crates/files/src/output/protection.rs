@@ -1,5 +1,5 @@
-//! What keeps a file from being replaced where its permissions allow it: flags of chattr(1), sticky directories. rename(2)
-//! asks for them only after the new file was written.
+//! Protection of files beyond their permissions: flags of chattr(1), sticky directories. rename(2) checks them only after
+//! the new file was written.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
@@ -7,7 +7,7 @@ use std::path::Path;
 
 use nix::unistd::{Uid, geteuid};
 
-/// The mode bit by which only owners may replace what is in a directory.
+/// The mode bit of directories in which only owners may replace files.
 const STICKY: u32 = 0o1000;
 
 /// A flag that keeps even root from replacing a file, or the files of a directory.
@@ -45,7 +45,7 @@ impl Flag {
         }
     }
 
-    /// How to be rid of it.
+    /// The way to remove it.
     pub(super) fn way_out(self) -> &'static str {
         match self {
             Self::AppendOnly => "take the flag away (chattr -a) or choose another place",
@@ -54,7 +54,7 @@ impl Flag {
     }
 }
 
-/// Whether a sticky directory keeps this process from replacing a file in it: neither is its own, and it may not act for
+/// Whether a sticky directory protects a file in it from this process: the process owns neither, and may not act for
 /// their owners.
 pub(super) fn is_kept_for_owner(directory: &Metadata, file: &Metadata) -> bool {
     let user = geteuid();
@@ -62,7 +62,7 @@ pub(super) fn is_kept_for_owner(directory: &Metadata, file: &Metadata) -> bool {
     directory.mode() & STICKY != 0 && !is_own(directory) && !is_own(file) && !acts_for_owners(user)
 }
 
-/// Whether this thread may do what only owners may.
+/// Whether this thread has the rights of owners.
 #[cfg(target_os = "linux")]
 fn acts_for_owners(user: Uid) -> bool {
     use rustix::thread::{CapabilitySet, capabilities};
@@ -90,7 +90,7 @@ mod tests {
     struct Flagged(PathBuf);
 
     impl Flagged {
-        /// `None` where flags cannot be had: another user than root, a file system without them.
+        /// Sets a flag. `None` if the system refuses: for users other than root, and on file systems without flags.
         fn new(path: PathBuf, flag: IFlags) -> Option<Self> {
             let set = change(&path, |flags| flags | flag);
             if let Err(error) = &set {
@@ -151,7 +151,7 @@ mod tests {
         assert_eq!(fs::read(&old).expect("read"), b"new");
     }
 
-    /// Only root can try: a thread of its own becomes another user.
+    /// Only root can test this: a thread of its own becomes another user.
     #[test]
     fn a_sticky_directory_keeps_files_for_their_owners() {
         use rustix::thread::{set_thread_res_gid, set_thread_res_uid};

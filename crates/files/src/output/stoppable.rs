@@ -1,4 +1,4 @@
-//! Developing and encoding in parts small enough to be stopped between.
+//! Developing and encoding in small parts, with polls of the token between.
 
 use std::fs::File;
 use std::io::{self, Cursor, ErrorKind, Seek, SeekFrom, Write};
@@ -18,7 +18,7 @@ const PIXELS: usize = 1 << 18;
 /// Bytes compressed or written between two polls of the token.
 pub(super) const BYTES: usize = 1 << 15;
 
-/// The components of the developed picture, from the top: a byte each, or two with the high one first, as PNG and PPM hold
+/// Develops the picture from the top. Components have one byte each, or two with the high one first, as PNG and PPM hold
 /// them. `take` gets them in order, at most [`BYTES`] at a time.
 pub(super) fn developed(
     image: &RadianceImage,
@@ -44,7 +44,7 @@ pub(super) fn developed(
     Ok(())
 }
 
-/// Bytes in memory that take no more once the work is cancelled, so that encoders which know no token end too.
+/// A writer into memory that fails once the work is cancelled, so that encoders which do not poll the token end too.
 pub(super) struct Stoppable<'a> {
     bytes: Cursor<Vec<u8>>,
     token: &'a CancelToken,
@@ -77,7 +77,7 @@ impl Seek for Stoppable<'_> {
     }
 }
 
-/// Write all, or stop between two parts.
+/// Writes all bytes, or stops between two parts.
 pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     for part in bytes.chunks(1 << 20) {
         token.check().map_err(io::Error::other)?;
@@ -86,9 +86,9 @@ pub(super) fn write_all(mut to: impl Write, bytes: &[u8], token: &CancelToken) -
     Ok(())
 }
 
-/// [`write_all`] to a pipe or a socket, whose reader may take nothing for as long as it likes.
+/// [`write_all`] to a pipe or a socket, whose reader may block as long as it likes.
 pub(super) fn write_as_taken(mut to: &File, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
-    /// A pipe is ready when a page of it is free: a write of so many bytes does not wait then.
+    /// Bytes of a write. A pipe is ready when a page of it is free: a write of so many bytes does not block then.
     const PART: usize = 4096;
     let mut rest = bytes;
     while !rest.is_empty() {
@@ -96,7 +96,7 @@ pub(super) fn write_as_taken(mut to: &File, bytes: &[u8], token: &CancelToken) -
         match to.write(&rest[..rest.len().min(PART)]) {
             Ok(0) => return Err(ErrorKind::WriteZero.into()),
             Ok(taken) => rest = &rest[taken..],
-            // Somebody else writes there too, and was faster.
+            // Another process writes there too, and was faster.
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
             Err(error) => return Err(error),
         }
@@ -118,8 +118,8 @@ fn wait_for_room(to: &File, token: &CancelToken) -> io::Result<()> {
     }
 }
 
-/// What became of writing: having been stopped is no error of the file. Only the error itself says that it was; the token
-/// may have been cancelled later, when the file was there already.
+/// Result of a write: a cancellation is not an error of the file. Only the error itself shows that the write was
+/// cancelled; the token may have been cancelled later, when the file was complete.
 pub(super) fn or_cancelled<T>(
     result: io::Result<T>,
     error: impl FnOnce(io::Error) -> OutputError,

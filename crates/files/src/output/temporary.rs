@@ -1,4 +1,4 @@
-//! Temporary files beside a target: named after their writer, locked while it lives, removed when it does not.
+//! Temporary files beside a target: named after their writer, locked while it lives, removed when it has died.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -12,10 +12,10 @@ use nix::fcntl::OFlag;
 
 /// Longest file name of nearly every file system.
 const NAME_BYTES: usize = 255;
-/// Names to try before giving up; a second one is needed only if another program clears up at the wrong moment.
+/// Names to try before giving up; a second one is needed only if another program removes the first at the wrong moment.
 const ATTEMPTS: usize = 64;
 
-/// A file that goes away unless it is given its final name.
+/// A file that is removed unless it gets its final name.
 #[derive(Debug)]
 pub(super) struct Temporary {
     pub(super) file: File,
@@ -42,17 +42,17 @@ impl Temporary {
         Err(io::Error::new(ErrorKind::AlreadyExists, "no free name for a temporary file"))
     }
 
-    /// Locks it. False if another writer took it for a stale one before that.
+    /// Locks it. False if another writer took it for a stale file before that.
     fn claim(&self) -> io::Result<bool> {
         match self.file.try_lock() {
             Err(TryLockError::WouldBlock) => Ok(false),
-            // A file system without locks: nobody can take it for stale there.
+            // On a file system without locks, nobody can take it for stale.
             Err(TryLockError::Error(_)) => Ok(true),
             Ok(()) => is_same(&self.file, &self.path),
         }
     }
 
-    /// Gives it its final name, in place of whatever had that.
+    /// Gives it its final name, replacing any file of that name.
     pub(super) fn rename_to(mut self, target: &Path) -> io::Result<()> {
         fs::rename(&self.path, target)?;
         self.kept = true;
@@ -63,14 +63,14 @@ impl Temporary {
 impl Drop for Temporary {
     fn drop(&mut self) {
         if !self.kept {
-            // Nothing is left to do if this fails; the next write tries again.
+            // Ignore a failure: the next write tries again.
             let _ = fs::remove_file(&self.path);
         }
     }
 }
 
-/// Whether a file can be made in a directory, found by making one that has no name, or where that is not possible, one that
-/// is removed at once: a directory may allow writing and take no files all the same, such as /proc.
+/// Tests whether a file can be made in a directory. It makes a file without a name, or, if that is not possible, one that
+/// it removes at once. A directory may allow writing and still take no files, such as /proc.
 pub(super) fn probe(directory: &Path) -> io::Result<()> {
     if nameless(directory).is_ok() {
         return Ok(());
@@ -88,8 +88,8 @@ fn nameless(_: &Path) -> io::Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
-/// Removes the temporary files that writers left in a directory when they were killed. Files of living writers are
-/// locked and stay, and so do those that are kept. What cannot be removed stays too: it is no reason not to write.
+/// Removes the temporary files of killed writers from a directory. Files of living writers are locked and stay, and so
+/// do kept ones. A file that cannot be removed stays too: it must not prevent the write.
 pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     let Ok(entries) = fs::read_dir(directory) else { return };
     for entry in entries.flatten() {
@@ -101,7 +101,7 @@ pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
 }
 
 fn remove_if_stale(path: &Path) -> io::Result<()> {
-    // Between the look and the opening it may have become a link or a pipe.
+    // Since the check it may have become a link or a pipe.
     let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
     let file = OpenOptions::new().read(true).custom_flags(flags.bits()).open(path)?;
     if file.try_lock().is_ok() && is_same(&file, path)? {
@@ -110,7 +110,7 @@ fn remove_if_stale(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Whether the open file is the one that has this name now.
+/// Whether the open file still has this name.
 fn is_same(file: &File, path: &Path) -> io::Result<bool> {
     let opened = file.metadata()?;
     match fs::symlink_metadata(path) {

@@ -315,7 +315,7 @@ fn a_guard_is_asked_of_the_real_file_when_the_new_one_is_whole() {
     assert_eq!(std::fs::read(&real).expect("read"), b"old");
 }
 
-/// Who writes a file of somebody else cannot give it back. Only root can try: a thread of its own becomes `nobody`
+/// A writer cannot give a file back to another owner. Only root can test this: a thread of its own becomes `nobody`
 /// towards the file system (setfsuid(2)).
 #[cfg(target_os = "linux")]
 #[test]

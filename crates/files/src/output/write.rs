@@ -1,4 +1,4 @@
-//! Atomic writes: the file that was there stays until the new one is whole.
+//! Atomic writes: the old file stays until the new one is whole.
 
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions};
@@ -18,37 +18,37 @@ use super::temporary::{self, Temporary};
 use super::{Losses, OutputError, stoppable};
 use crate::control::CancelToken;
 
-/// Standard output. It is open: opening it by this name would fail where it is a socket.
+/// Standard output. It is already open: opening it by this name would fail for a socket.
 pub const STDOUT: &str = "/dev/stdout";
 
-/// Writes a file as a whole: a locked temporary file beside it, synchronised, renamed, the directory synchronised. At
-/// any moment, whatever ends the process, the file is the old one or the new one. Its permissions, its access list, its
-/// attributes and its flags stay, as does its owner if this process may give files away; a link stays and what it points to is replaced. Temporary files of killed writers in the same directory are removed.
+/// Writes a file as a whole: a locked temporary file beside it, synchronised, renamed, the directory synchronised. At any moment,
+/// whatever ends the process, the file is the old one or the new one. Its permissions, access list, attributes and flags stay, as
+/// does its owner if this process may give files away. A link stays, and its target is replaced. Temporary files of killed writers
+/// in the same directory are removed.
 ///
 /// Devices, pipes and open descriptors ([`STDOUT`]) are written in place.
 ///
 /// # Errors
-/// Names the path, what the system said and the way out; the old file is untouched then, and no temporary file is
-/// left.
+/// Names the path, the system's message and the way out. The old file is then untouched, and no temporary file is left.
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Told(&|_| ()) };
     atomic_until(path, bytes, &guard, &CancelToken::new())
 }
 
-/// What a write must leave as it is. Both are asked at the last moment and of the real path, links followed.
+/// Files that a write must not touch. Both functions are called at the last moment, with the real path, links followed.
 pub struct Guard<'a> {
-    /// Whether a file stays that has the name of a killed writer's temporary file.
+    /// Whether to keep a file with the name of a killed writer's temporary file.
     pub is_kept: &'a dyn Fn(&Path) -> bool,
-    /// Whether the new file may take the place of this one, there or not; or whether it may be written to in place.
+    /// Whether the new file may replace this one, existing or not; or whether it may be written in place.
     pub may_replace: &'a dyn Fn(&Path) -> Result<(), OutputError>,
-    /// Whether a file whose owner, access list or attributes cannot be kept may be replaced.
+    /// Policy for a file whose owner, access list or attributes cannot be kept.
     pub losses: Losses<'a>,
 }
 
-/// [`atomic`] that can be stopped as long as the new file is not whole, and that a guard watches.
+/// [`atomic`] with a guard; it can be stopped until the new file is whole.
 ///
 /// # Errors
-/// As [`atomic`], those of the guard, and [`OutputError::Cancelled`].
+/// As [`atomic`], the guard's errors, and [`OutputError::Cancelled`].
 pub fn atomic_until(
     path: &Path,
     bytes: &[u8],
@@ -95,8 +95,8 @@ pub fn prepare_process() {
     });
 }
 
-/// The new file, empty, beside the one that it is to replace, with what that one has besides its bytes. Until it is
-/// whole, only its owner and those whom an access list names can read it.
+/// Makes the new file, empty, beside the one that it is to replace, with the attributes of that. Until it is whole,
+/// only its owner and users on its access list can read it.
 fn beside(target: &Target, guard: &Guard<'_>) -> io::Result<(Temporary, Option<Carried>)> {
     let directory = target.directory();
     temporary::remove_stale(directory, guard.is_kept);
@@ -116,8 +116,8 @@ fn fill(new: &Temporary, bytes: &[u8], carried: Option<&Carried>, token: &Cancel
     new.file.sync_all()
 }
 
-/// So that the rename survives a loss of power. File systems and directories that do not let themselves be synchronised are
-/// left alone: the file is there.
+/// Synchronises a directory, so that the rename survives a loss of power. Failures are ignored, as some file systems and
+/// directories refuse: the file is there.
 fn sync_directory(directory: &Path) -> io::Result<()> {
     use ErrorKind::{InvalidInput, PermissionDenied, Unsupported};
     match File::open(directory).and_then(|directory| directory.sync_all()) {
@@ -126,17 +126,17 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
     }
 }
 
-/// Appends, so that a descriptor that is a file keeps what it has.
+/// Writes in place. It appends, so that a descriptor of a file keeps its content.
 fn in_place(path: &Path, bytes: &[u8], token: &CancelToken) -> io::Result<()> {
     if path == Path::new(STDOUT) {
-        // What the program has said before comes first; its own lock is held by nobody while the reader takes its time.
+        // Flush earlier output first; do not hold its lock while the reader takes its time.
         io::stdout().flush()?;
         let stdout = File::from(io::stdout().as_fd().try_clone_to_owned()?);
         return stoppable::write_as_taken(&stdout, bytes, token);
     }
     let mut options = OpenOptions::new();
     options.append(true);
-    // A pipe that nobody reads would hold the process for ever: not waiting makes that an error.
+    // A pipe that nobody reads would block the process for ever: do not wait, so that it is an error.
     let is_pipe = fs::metadata(path)?.file_type().is_fifo();
     if is_pipe {
         options.custom_flags(OFlag::O_NONBLOCK.bits());

@@ -1,30 +1,30 @@
-//! Boxes of trees along a ray, for pictures of the trees and of the work that they take.
+//! Boxes of trees along a ray, for views of the trees and of their traversal cost.
 
 use crate::geometry::{Aabb, Ray};
 
 /// A node of a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Its box.
+    /// Bounding box of the node.
     pub bounds: Aabb,
-    /// Nodes above it.
+    /// Number of nodes above it.
     pub depth: u32,
-    /// Shapes that it holds itself; 0 where it has children.
+    /// Number of shapes that the node holds itself; 0 if it has children.
     pub shapes: u32,
 }
 
-/// A stretch of a ray inside of a box.
+/// Interval of a ray inside of a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
-    /// Where it goes in, with the axis of the side; below 0 where the ray starts inside.
+    /// Distance at which the ray enters, with the axis of the face; below 0 if the ray starts inside.
     pub enter: (f32, usize),
-    /// Where it comes out, with the axis of the side.
+    /// Distance at which the ray leaves, with the axis of the face.
     pub leave: (f32, usize),
 }
 
 impl Stretch {
-    /// Of a ray's line in a box; none where it misses that between the ray's ends. By the plain slab test: what only touches a box
-    /// may go either way.
+    /// Intersects a ray's line with a box. `None` if the line misses the box between the ray's ends. By the plain slab test: a ray
+    /// that only touches a box may count either way.
     #[inline]
     pub fn new(bounds: &Aabb, ray: &Ray) -> Option<Self> {
         let (mut enter, mut leave) = ((f32::NEG_INFINITY, 0), (f32::INFINITY, 0));

@@ -1,6 +1,5 @@
-//! Trees over boxes and ids. They know no shape: a closure tests what an id stands for. The exceptions are
-//! [`wide_bvh`], a tree over triangles whose leaves hold them ready for vector instructions, and [`kd_tree`], its
-//! alternative.
+//! Trees over boxes and ids. They know no shape: a closure tests the shape of an id. The exceptions are [`wide_bvh`], a
+//! tree over triangles whose leaves hold them ready for vector instructions, and [`kd_tree`], its alternative.
 
 mod along;
 pub mod bvh;

@@ -1,4 +1,4 @@
-//! What breaks trees, and what they are to answer.
+//! Meshes that break trees, and their right answers.
 
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
@@ -79,7 +79,7 @@ pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
     rays
 }
 
-/// A hit as what can be compared to the bit.
+/// The bits of a hit, to compare.
 pub fn bits(hit: Option<ShapeHit>) -> Option<(u32, u32, u32, u32)> {
     hit.map(|hit| (hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits()))
 }

@@ -1,4 +1,4 @@
-//! Boxes in vector registers, and what is left of a triangle inside one.
+//! Boxes in vector registers, and the part of a triangle inside one.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3, Vec4};
 
-/// A box; the last lanes mean nothing. The greatest corner is held with the other sign, so that boxes grow by minima alone.
+/// A box; the last lanes mean nothing. The greatest corner is held negated, so that boxes grow by minima alone.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub struct Bounds {
@@ -18,13 +18,13 @@ pub struct Bounds {
 impl Bounds {
     pub const EMPTY: Self = Self { min: Vec4::INFINITY, minus_max: Vec4::INFINITY };
 
-    /// Between two corners.
+    /// The box between two corners.
     #[inline(always)]
     pub fn new(min: Vec4, max: Vec4) -> Self {
         Self { min, minus_max: -max }
     }
 
-    /// Around references.
+    /// The box around references.
     #[inline]
     pub fn around(references: &[Reference]) -> Self {
         references.iter().fold(Self::EMPTY, |mut all, reference| {
@@ -39,7 +39,7 @@ impl Bounds {
         -self.minus_max
     }
 
-    /// From the least to the greatest corner.
+    /// The extent, from the least to the greatest corner.
     #[inline(always)]
     pub fn extent(&self) -> Vec4 {
         self.max() - self.min
@@ -73,21 +73,21 @@ impl Bounds {
     }
 }
 
-/// Set in the numbers that references hold as the bits of floats: without it they would be denormal, which some processors are
-/// slow with.
+/// Bit that is set in the numbers that references hold as the bits of floats: without it they would be denormal, which slows
+/// some processors down.
 const NORMAL: u32 = 1 << 29;
 
 const _: () = assert!(TriangleMesh::MOST_TRIANGLES < 1 << 29);
 
-/// A triangle's number and the box around what of it is inside a cell.
+/// A triangle's number and the box around its part inside a cell.
 #[derive(Clone, Copy, Debug)]
 pub struct Reference {
-    /// The last lane of `min` holds the bits of the number.
+    /// Bounds whose `min` holds the bits of the number in its last lane.
     pub bounds: Bounds,
 }
 
 impl Reference {
-    /// Of all triangles but those that cannot be hit or whose box has no finite size, by their numbers.
+    /// References to all triangles, by their numbers, but those that cannot be hit or whose box has no finite size.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -105,11 +105,11 @@ impl Reference {
         Ok(references)
     }
 
-    /// Of the whole triangle.
+    /// The reference to a whole triangle.
     #[inline]
     pub fn new(id: u32, corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(|corner| corner.extend(0.0));
-        // `min` and `max` drop a NaN: it is put back.
+        // `min` and `max` drop a NaN: put it back.
         let poison = (a + b + c).truncate().to_array().map(|sum| if sum.is_nan() { f32::NAN } else { 0.0 });
         let mut min = a.min(b).min(c) + Vec3::from(poison).extend(0.0);
         min.w = f32::from_bits(id | NORMAL);
@@ -125,13 +125,13 @@ impl Reference {
         self.bounds.min.w.to_bits() & !NORMAL
     }
 
-    /// Whether it can be hit at all and its box has a size.
+    /// Whether the triangle can be hit at all and its box has a size.
     fn is_usable(&self) -> bool {
         self.bounds.extent().truncate().is_finite()
     }
 
-    /// What is on each side of a plane through the box: the box around that part of the whole triangle, as small as rounding
-    /// outwards lets it be, as far as it is in the box; all of the box on that side where rounding leaves nothing.
+    /// References to the parts on each side of a plane through the box. Each box contains that part of the whole triangle,
+    /// rounded outwards, and stays in the old box. If rounding leaves nothing on a side, that whole side counts.
     #[inline]
     pub fn split(&self, axis: usize, at: f32, corners: [Vec3; 3]) -> [Self; 2] {
         let mut parts = [Bounds::EMPTY; 2];
@@ -158,7 +158,7 @@ impl Reference {
         [self.within(left, &parts[0]), self.within(right, &parts[1])]
     }
 
-    /// The same triangle where two boxes overlap; in the first where they do not.
+    /// The reference with the overlap of two boxes; with `half` if they do not overlap.
     #[inline(always)]
     fn within(&self, half: Bounds, part: &Bounds) -> Self {
         let mut both = Bounds { min: half.min.max(part.min), minus_max: half.minus_max.max(part.minus_max) };
@@ -168,7 +168,7 @@ impl Reference {
     }
 }
 
-/// A box around a point that is rounded.
+/// A box around a point in double precision, rounded outwards.
 #[inline(always)]
 fn around_rounded(exact: DVec3) -> Bounds {
     let near = exact.as_vec3();
@@ -194,7 +194,7 @@ pub struct Polygon {
 impl Polygon {
     const NOTHING: Self = Self { points: [DVec3::ZERO; 9], count: 0 };
 
-    /// What is inside a box, its faces included.
+    /// The part of a triangle inside a box, its faces included.
     pub fn clipped(corners: [Vec3; 3], bounds: &Aabb) -> Self {
         let (least, greatest) =
             (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
@@ -216,7 +216,7 @@ impl Polygon {
         *from
     }
 
-    /// Keep what is above the plane, or below where `side` is −1.
+    /// Keeps the part above the plane, or below it if `side` is −1.
     fn cut(&self, axis: usize, at: f64, side: f64, kept: &mut Self) {
         kept.count = 0;
         let Some(mut before) = self.points().last().copied() else { return };
@@ -235,7 +235,8 @@ impl Polygon {
         }
     }
 
-    /// Nine points are the most that six planes leave of a triangle, but for rounding, whose surplus adds no extent.
+    /// Adds a corner. Six planes leave at most nine points of a triangle, but for rounding, whose surplus points add no
+    /// extent.
     fn push(&mut self, point: DVec3) {
         if let Some(place) = self.points.get_mut(self.count) {
             *place = point;
@@ -243,12 +244,12 @@ impl Polygon {
         }
     }
 
-    /// Its corners.
+    /// Corners of the polygon.
     pub fn points(&self) -> &[DVec3] {
         &self.points[..self.count]
     }
 
-    /// Least and greatest coordinates; ∞ and −∞ where nothing is left.
+    /// Least and greatest coordinates; ∞ and −∞ if nothing is left.
     pub fn extent(&self) -> (DVec3, DVec3) {
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.points().iter().fold(none, |(min, max), &p| (min.min(p), max.max(p)))

@@ -1,4 +1,4 @@
-//! Brute force, the tree of planes and the tree of boxes beside each other.
+//! Comparison of brute force, the tree of planes and the tree of boxes.
 
 use rayon::prelude::*;
 
@@ -43,7 +43,7 @@ fn cuboid(squares: u32) -> Mesh {
         .collect()
 }
 
-/// Triangles of all sizes anywhere, long ones among them.
+/// Triangles of all sizes at random places, long ones among them.
 fn noise(seed: u64, count: usize) -> Mesh {
     let mut next = random(seed);
     let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
@@ -55,7 +55,7 @@ fn noise(seed: u64, count: usize) -> Mesh {
     (0..count).map(triangle).collect()
 }
 
-/// Fifty and more: each pathological mesh, boxes and noise, as it is, far from the origin, tiny and huge.
+/// More than fifty meshes: each pathological mesh, boxes and noise, as it is, far from the origin, tiny and huge.
 fn scenes() -> Vec<Mesh> {
     let shorten = |mesh: Mesh| mesh.into_iter().take(240).collect::<Mesh>();
     let mut own: Vec<Mesh> = meshes().into_iter().map(shorten).collect();
@@ -70,8 +70,8 @@ fn scenes() -> Vec<Mesh> {
     [own, tiny, huge, far].concat()
 }
 
-/// A ray at a mesh: from outside, from far outside, from one of its corners or edges; at one of its points, anywhere, along
-/// an axis, in the plane of two axes.
+/// A ray at a mesh. It starts outside, far outside, or at a corner or an edge; it goes to one of the mesh's points,
+/// anywhere, along an axis, or in the plane of two axes.
 fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut() -> f32) -> Ray {
     let (center, size) = (bounds.center(), bounds.extent().max_element().max(f32::MIN_POSITIVE));
     let mut pick = || mesh[((next() * 0.5 + 0.5) * mesh.len() as f32) as usize % mesh.len()];
@@ -94,7 +94,7 @@ fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut()
     match kind / 28 % 4 {
         0 => direction[kind % 3] = zero,
         1 => {
-            // Beside the target along an axis, to meet it.
+            // Start beside the target along an axis, to meet it.
             let axis = kind % 3;
             let mut origin = target;
             origin[axis] = center[axis] + 2.0 * size;
@@ -108,7 +108,7 @@ fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut()
     Ray { t_max, ..Ray::new(origin, direction) }
 }
 
-/// How many of so many rays at a scene each get another answer from either tree than by brute force, and the first.
+/// Number of rays at a scene for which either tree's answer differs from brute force, and the first such ray.
 fn differences(mesh: &[[Vec3; 3]], seed: u64, count: usize) -> (usize, Option<String>) {
     let (planes, boxes) = (kd_tree(mesh), wide_bvh(mesh));
     let mut next = random(seed);
@@ -182,7 +182,7 @@ fn every_scene_has_a_sound_tree_of_planes() {
     }
 }
 
-/// Planes split this mesh into many leaves: were it one leaf, no test above would test a plane.
+/// Checks that planes split this mesh into many leaves: if it were one leaf, no test above would test a plane.
 #[test]
 fn planes_part_what_can_be_parted() {
     let mesh = noise(9, 3000);

@@ -35,7 +35,7 @@ fn rays_side_by_side_have_the_bits_that_each_has_alone() {
     let mut next = signed(7);
     let (mut hits, mut shared) = (0, 0);
     for round in 0..20_000 {
-        // Corners that many triangles have, among them flat ones; rays along axes, into corners and from surfaces.
+        // Corners that many triangles share, among them flat ones; rays along axes, into corners and from surfaces.
         let step = [1.0, 0.25, 1e-6][round % 3];
         let corners: Vec<Vec3> = (0..6)
             .map(|_| (Vec3::new(next(), next(), next()) / step).round() * step + Vec3::splat(0.5))

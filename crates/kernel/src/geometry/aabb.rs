@@ -3,7 +3,7 @@
 use crate::math::float::gamma;
 use crate::math::{DVec3, Vec3};
 
-/// All points between two corners, the faces included. Empty where `min > max`.
+/// All points between two corners, the faces included. Empty if `min > max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Aabb {
@@ -43,17 +43,17 @@ impl Aabb {
         !self.min.cmple(self.max).all()
     }
 
-    /// Whether a point is in both.
+    /// Whether the two have a point in common.
     pub fn meets(&self, other: &Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
-    /// So much larger on every side.
+    /// The box, larger by `margin` on every side.
     pub fn grown(self, margin: Vec3) -> Self {
         Self { min: self.min - margin, max: self.max + margin }
     }
 
-    /// Max − min; negative or NaN where empty.
+    /// Max − min; negative or NaN if empty.
     pub fn extent(&self) -> Vec3 {
         self.max - self.min
     }
@@ -63,48 +63,49 @@ impl Aabb {
         self.min * 0.5 + self.max * 0.5
     }
 
-    /// Half of the area of its surface; 0 where empty.
+    /// Half of the surface area; 0 if empty.
     pub fn half_area(&self) -> f32 {
         let e = self.extent().max(Vec3::ZERO);
         e.x * e.y + e.y * e.z + e.z * e.x
     }
 }
 
-/// Factor on distances that makes up for the rounding of [`SlabRay::enter`].
+/// Factor on distances that compensates the rounding of [`SlabRay::enter`].
 pub const SLAB_PAD: f32 = 1.0 + 2.0 * gamma(3);
 
-/// The same as a factor on the inverse of a direction, which is rounded once more.
+/// [`SLAB_PAD`] as a factor on the inverse of a direction, which is rounded once more.
 pub const FAR_PAD: f32 = 1.0 + 2.0 * gamma(4);
 
-/// What the watertight test of triangles may be off across a ray, as a part of the distance: it errs by less than 13
-/// units of rounding in what it projects.
+/// Error of the watertight triangle test across a ray, relative to the distance: less than 13 units of rounding in the
+/// projected coordinates.
 pub const TRIANGLE_ERROR: f32 = 16.0 * f32::EPSILON;
 
-/// A ray made ready for many boxes.
+/// A ray prepared for many boxes.
 #[derive(Clone, Copy, Debug)]
 pub struct SlabRay {
     origin: Vec3,
-    /// Added to boxes on each side.
+    /// Margin added to boxes on each side.
     margin: f32,
     inverse: Vec3,
 }
 
 impl SlabRay {
-    /// Prepare it.
+    /// Prepares a ray.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self { origin, margin: 0.0, inverse: direction.recip() }
     }
 
-    /// Prepare it for boxes around triangles in `whole`: no box is missed whose triangle the watertight test may find.
+    /// Prepares a ray for boxes around triangles in `whole`: it misses no box whose triangle the watertight test may
+    /// find.
     pub fn for_triangles(origin: Vec3, direction: Vec3, whole: &Aabb) -> Self {
         Self { margin: triangle_margin(origin, whole), ..Self::new(origin, direction) }
     }
 
-    /// Where the ray enters the box, if it meets it at a t in [0, `t_max`]. Never misses a box that the exact ray meets:
-    /// the far distance is padded by the slab test's own rounding (Ize, *Robust BVH Ray Traversal*, JCGT
-    /// 2013); a ray inside the plane of a face makes 0·∞ = NaN, which every comparison drops in favour of the
-    /// interval so far, so that both zeros of a direction behave the same.
-    /// The ray's own end is padded alike, so that a box is not missed whose hit is exactly there.
+    /// Distance at which the ray enters the box, if it meets it at a t in [0, `t_max`]. It never misses a box that the
+    /// exact ray meets: the far distance is padded by the slab test's own rounding (Ize, *Robust BVH Ray Traversal*,
+    /// JCGT 2013). A ray inside the plane of a face makes 0·∞ = NaN, which every comparison drops in favour of the
+    /// interval so far; thus both zeros of a direction behave the same. The ray's own end is padded alike, so that it
+    /// does not miss a box with a hit exactly there.
     #[inline(always)]
     pub fn enter(&self, min: Vec3, max: Vec3, t_max: f32) -> Option<f32> {
         let a = (min - (self.origin + self.margin)) * self.inverse;
@@ -121,7 +122,7 @@ impl SlabRay {
     }
 }
 
-/// How far boxes in `whole` must reach beyond their triangles for a ray from `origin`.
+/// Margin that boxes in `whole` must have around their triangles for a ray from `origin`.
 pub fn triangle_margin(origin: Vec3, whole: &Aabb) -> f32 {
     (whole.min - origin).abs().max((whole.max - origin).abs()).max_element() * TRIANGLE_ERROR
 }
@@ -134,7 +135,7 @@ mod tests {
         SlabRay::new(origin, direction).enter(min, max, f32::INFINITY)
     }
 
-    /// A small generator for aimed rays.
+    /// A small generator of numbers for aimed rays.
     fn random(state: &mut u64) -> f32 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((*state >> 40) as f32) / (1_u64 << 24) as f32

@@ -1,4 +1,4 @@
-//! What shapes around an axis have in common: their frame, lines brought near them, and the parts that a line meets.
+//! Shapes around an axis: their frame, lines moved near them, and the intersections of a line with their parts.
 
 use std::f64::consts::PI;
 
@@ -11,12 +11,12 @@ use crate::math::{DMat3, DVec2, DVec3};
 pub struct AxialFrame {
     /// The origin in world coordinates.
     pub origin: DVec3,
-    /// From the frame's coordinates to the world's.
+    /// Axes of the frame as columns: map from the frame's coordinates to the world's.
     axes: DMat3,
 }
 
 impl AxialFrame {
-    /// From an origin and an axis of any length but 0.
+    /// A frame from an origin and an axis of any length but 0.
     pub fn new(origin: DVec3, axis: DVec3) -> Self {
         let n = axis.normalize();
         let (u, v) = flat_axes(n);
@@ -28,23 +28,23 @@ impl AxialFrame {
         self.axes.z_axis
     }
 
-    /// A point to the world.
+    /// Transforms a point to the world.
     pub fn point(&self, local: DVec3) -> DVec3 {
         self.origin + self.axes * local
     }
 
-    /// A direction to the world.
+    /// Transforms a direction to the world.
     pub fn vector(&self, local: DVec3) -> DVec3 {
         self.axes * local
     }
 
-    /// A point from the world.
+    /// Transforms a point from the world.
     #[inline(always)]
     pub fn local(&self, point: DVec3) -> DVec3 {
         self.axes.transpose() * (point - self.origin)
     }
 
-    /// A ray's line from its point nearest to the origin.
+    /// Line of a ray, from its point nearest to the origin.
     #[inline(always)]
     pub fn line(&self, ray: &RayF64) -> Line {
         let origin = self.local(ray.origin);
@@ -58,8 +58,8 @@ impl AxialFrame {
         self.ball_bounds(height, radius, 0.0)
     }
 
-    /// The box around all balls of one radius with their centres on a circle about the axis at a height; room for the
-    /// rounding of the sums included.
+    /// The box around all balls of one radius with their centres on a circle about the axis at a height, with room for
+    /// the rounding of the sums.
     pub fn ball_bounds(&self, height: f64, radius: f64, ball: f64) -> Aabb {
         let center = self.point(DVec3::new(0.0, 0.0, height));
         let across = |i: usize| DVec2::new(self.axes.x_axis[i], self.axes.y_axis[i]).length() * radius + ball;
@@ -71,7 +71,7 @@ impl AxialFrame {
 }
 
 /// A line in a frame's coordinates. It starts at its point nearest to the origin, so that no number is larger than the
-/// shape and rays from afar keep their digits there.
+/// shape and rays from afar keep their digits.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     /// The point nearest to the origin.
@@ -82,7 +82,7 @@ pub struct Line {
     pub start: f64,
 }
 
-/// A stretch of a line, counted from its foot; each end with the part of the shape that it is on.
+/// Interval of a line, counted from its foot; each end with the part of the shape that it is on.
 #[derive(Clone, Copy, Debug)]
 pub struct Stretch {
     /// Its beginning.
@@ -95,12 +95,12 @@ impl Stretch {
     /// The whole line.
     pub const WHOLE: Self = Self { enter: (f64::NEG_INFINITY, 0), leave: (f64::INFINITY, 0) };
 
-    /// Between two distances on the side, which is part 0.
+    /// The interval between two distances on the side, which is part 0.
     pub fn of_side(enter: f64, leave: f64) -> Self {
         Self { enter: (enter, 0), leave: (leave, 0) }
     }
 
-    /// Between two heights, each with its part.
+    /// The interval between two heights, each with its part.
     pub fn between(line: &Line, low: (f64, u32), high: (f64, u32)) -> Option<Self> {
         let (z, dz) = (line.foot.z, line.direction.z);
         if dz == 0.0 {
@@ -116,8 +116,8 @@ impl Stretch {
     }
 }
 
-/// The first t of the ray, with its part, on a side between its ends: of the solid if it is closed, of the bare side
-/// if not. `starts_on` says whether the ray starts on a part, as far as rounding can tell: that is no hit.
+/// First t of the ray between its ends, with its part: on the solid if it is closed, on the bare side if not.
+/// `starts_on` says whether the ray starts on a part, within rounding, which is no hit.
 pub fn meet(
     ray: &RayF64,
     line: &Line,
@@ -126,7 +126,7 @@ pub fn meet(
     closed: bool,
     starts_on: impl Fn(u32) -> bool,
 ) -> Option<(f64, u32)> {
-    // Of both meetings with a side the one next to the start is the start.
+    // Of the two intersections with a side, the one next to the start is the start itself.
     let other_on_side = |along: f64| {
         let other = if along == side.enter.0 { side.leave.0 } else { side.enter.0 };
         (line.start + other).abs()
@@ -155,11 +155,11 @@ pub fn meet(
     [enter, leave].into_iter().find_map(accepted)
 }
 
-/// Square of the distance, over that of a hit from the shape's origin, within which a hit may be the start of its ray: at a grazing angle
-/// rounding moves it by the root of the last digit.
+/// Square of the distance within which a hit may be the start of its ray, relative to the distance from the shape's origin: at a
+/// grazing angle, rounding moves the hit by the root of the last digit.
 const NEAR_START: f64 = 1e-12;
 
-/// Whether a distance of a ray's start from a surface is rounding; `size` is that of the numbers it comes from.
+/// Whether a distance of a ray's start from a surface is within rounding; `size` is that of the numbers it comes from.
 pub fn is_rounding(distance: f64, size: f64) -> bool {
     distance.abs() <= 8.0 * f64::EPSILON * size
 }
@@ -169,8 +169,8 @@ pub fn across(along: f64) -> f64 {
     (1.0 - along * along).max(0.0).sqrt()
 }
 
-/// ∫max(0, a·cos φ + b) over an area whose normals lie evenly on a ring around an axis: what of it faces a direction, times
-/// the cosines. The normals have the product a·cos φ + b with the direction, at the angle φ around the axis.
+/// Projected area of a surface whose normals lie evenly on a ring around an axis: ∫max(0, a·cos φ + b) over the area. At
+/// the angle φ around the axis, the normal's product with the direction is a·cos φ + b.
 pub fn ring_shown(area: f64, a: f64, b: f64) -> f64 {
     if b >= a {
         area * b
@@ -181,12 +181,12 @@ pub fn ring_shown(area: f64, a: f64, b: f64) -> f64 {
     }
 }
 
-/// A meeting as a hit.
+/// A hit from a distance and a part.
 pub fn hit((t, primitive): (f64, u32)) -> ShapeHit {
     ShapeHit { primitive, ..ShapeHit::at(t as f32) }
 }
 
-/// The t of a hit with all its digits, from finding it again; as rounded where that is another one.
+/// The t of a hit with all its digits, from a second intersection; the rounded t if that finds another hit.
 pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     match again {
         Some((t, part)) if t as f32 == hit.t && part == hit.primitive => t,
@@ -194,7 +194,7 @@ pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     }
 }
 
-/// Unit vector towards a point in the plane; x at the middle.
+/// Unit vector towards a point in the plane; x for the origin.
 pub fn radial(p: DVec2) -> DVec2 {
     p.try_normalize().unwrap_or(DVec2::X)
 }
@@ -222,13 +222,13 @@ mod tests {
 
     #[test]
     fn who_starts_on_a_round_surface_does_not_meet_it_there() {
-        // All of these touch z = 0 from behind at the origin, or are cut off there.
+        // All of these touch z = 0 from behind at the origin, or end there.
         let cylinder = |a, b, radius| Cylinder::new(a, b, radius, true);
         let mut next = unit(7);
         for _ in 0..2000 {
             let [x, y, z] = std::array::from_fn(|_| next() - 0.5);
             let out = Vec3::new(x, y, -z.abs() - 1e-6);
-            // Whatever way it lies.
+            // The axis lies in any direction.
             let [x, y] = std::array::from_fn(|_| f64::from(next()) - 0.5);
             let along = DVec3::new(x, y, 0.0);
             let middle = DVec3::Z;

@@ -11,11 +11,11 @@ use crate::math::{DVec2, DVec3, Vec2};
 
 /// A cone with a round base, or its bare side; the front is outside. Parts: 0 the side, 1 the cap at the base.
 ///
-/// Texture coordinates of the side: u once around, v from 0 at the base to 1 at the tip, so that on a cone that stands
-/// on its base pictures stand and are not mirrored; of the cap as for a [`Disk`].
+/// Texture coordinates of the side: u once around, v from 0 at the base to 1 at the tip. On a cone that stands on its
+/// base, pictures therefore stand and are not mirrored. The cap's are those of a [`Disk`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
-    /// Its origin is the tip, its axis goes to the base.
+    /// Frame whose origin is the tip and whose axis goes to the base.
     frame: AxialFrame,
     height: f64,
     radius: f64,
@@ -25,7 +25,7 @@ pub struct Cone {
 }
 
 impl Cone {
-    /// From the middle of its base, a tip elsewhere, and the base's radius > 0.
+    /// A cone from the middle of its base, a tip elsewhere, and the base's radius > 0.
     pub fn new(base: DVec3, tip: DVec3, radius: f64, capped: bool) -> Self {
         let height = (base - tip).length();
         let slant = libm::hypot(height, radius);
@@ -45,7 +45,7 @@ impl Cone {
         axial::meet(ray, &line, self.side_stretch(&line)?, ends, self.capped, starts_on)
     }
 
-    /// Whether a ray starts on a part, as far as rounding can tell.
+    /// Whether a ray starts on a part, within rounding.
     fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
         let local = self.frame.local(ray.origin);
         let distance = match part {
@@ -55,10 +55,10 @@ impl Cone {
         is_rounding(distance, self.reach())
     }
 
-    /// Where the line is inside the side, extended beyond the base and, by its image, beyond the tip: |p| ≤ k|z|. The
-    /// quadratic A·s² − 2B·s + C is that of the foot of the tip on the line, which is why B is one product; B² − AC
-    /// is a difference of squares of the line's moment about the tip, exact to the last digits also for lines that
-    /// graze the side next to the tip.
+    /// Interval in which the line is inside the side, extended beyond the base and, by its image, beyond the tip:
+    /// |p| ≤ k|z|. The quadratic A·s² − 2B·s + C is that of the foot of the tip on the line, so that B is one
+    /// product. B² − AC is a difference of squares of the line's moment about the tip, exact to the last digits also for lines
+    /// that graze the side next to the tip.
     fn side_stretch(&self, line: &Line) -> Option<Stretch> {
         let k = self.radius / self.height;
         let (p, d) = (line.foot, line.direction);
@@ -74,7 +74,7 @@ impl Cone {
             return None;
         }
         let q = b + discriminant.max(0.0).sqrt().copysign(b);
-        // A line as steep as the side meets it once; its other root is where slightly steeper ones have it.
+        // A line as steep as the side meets it once: put the other root where slightly steeper lines have it.
         let a = if a == 0.0 { -0.0 } else { a };
         let (s0, s1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
         Some(match (crosses_both, d.z > 0.0) {
@@ -104,7 +104,8 @@ impl Cone {
         )
     }
 
-    /// The unit vector from the tip down the side, as (outwards, along the axis), and how far down a point is.
+    /// Unit vector from the tip down the side, as (outwards, along the axis), and the distance of a point down the
+    /// side.
     fn along(&self, local: DVec3) -> (DVec2, f64) {
         let down = DVec2::new(self.radius, self.height) / self.slant;
         (down, DVec2::new(local.truncate().length(), local.z).dot(down).clamp(0.0, self.slant))
@@ -122,7 +123,8 @@ impl Cone {
         DVec2::new(turn(mirrored(radial(local.truncate()))), 1.0 - along / self.slant)
     }
 
-    /// Mean curvature at a point of a part; that of the normals' turn around the axis, which has no end at the tip.
+    /// Mean curvature at a point of a part; for the side, that of the normals' turn around the axis, which is unbounded
+    /// at the tip.
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         let across = self.frame.local(point).truncate().length();
         if part == 0 && across > 0.0 { 0.5 * self.height / (self.slant * across) } else { 0.0 }
@@ -168,11 +170,11 @@ impl Cone {
         self.frame.point(DVec3::Z * (self.height * (side * 2.0 / 3.0 + cap) / (side + cap)))
     }
 
-    /// The area that faces a unit direction, times the cosines.
+    /// Projected area: the area that faces a unit direction, times the cosines.
     pub fn shown(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap] = self.areas();
-        // Of the side's normals, what is across the axis, and what is towards the tip.
+        // The side's normals have these components across the axis and towards the tip.
         let (cosine, sine) = (self.height / self.slant, self.radius / self.slant);
         ring_shown(side, cosine * across(along), -sine * along) + cap * along.max(0.0)
     }
@@ -210,7 +212,7 @@ impl Cone {
     }
 }
 
-/// Angles are counted about the axis from base to tip, against the frame's.
+/// Mirrors a point: angles are counted about the axis from base to tip, opposite to the frame's.
 fn mirrored(p: DVec2) -> DVec2 {
     DVec2::new(p.x, -p.y)
 }
@@ -221,7 +223,7 @@ mod tests {
     use crate::geometry::Ray;
     use crate::math::Vec3;
 
-    /// On the ground, its tip at y = 2, its base of radius 1.
+    /// A cone on the ground, with its tip at y = 2 and a base of radius 1.
     fn hat(capped: bool) -> Cone {
         Cone::new(DVec3::ZERO, DVec3::Y * 2.0, 1.0, capped)
     }
@@ -241,7 +243,7 @@ mod tests {
         assert_eq!(met(&closed, [0.5, -3.0, 0.0], Vec3::Y), Some((3.0, 1, Vec3::NEG_Y)));
         assert_eq!(met(&closed, [0.5, 0.5, 0.0], Vec3::NEG_Y), Some((0.5, 1, Vec3::NEG_Y)));
         assert_eq!(met(&closed, [0.5, 5.0, 0.0], Vec3::NEG_Y), Some((4.0, 0, right)));
-        // The image of the side beyond the tip is no part of it.
+        // The image of the side beyond the tip does not belong to it.
         assert_eq!(met(&closed, [-9.0, 3.0, 0.0], Vec3::X), None);
         assert_eq!(met(&closed, [0.5, 2.5, 0.0], Vec3::Y), None);
     }
@@ -262,7 +264,7 @@ mod tests {
 
     #[test]
     fn the_tip_is_as_sharp_as_it_is() {
-        // Rays past the tip at a millionth of its radius there decide right, near the tip as anywhere.
+        // Rays past the tip at a millionth of its radius there are decided right, near the tip as anywhere.
         for below in [1e-3_f64, 1e-6, 1e-9] {
             let radius = below / 2.0;
             for (factor, is_hit) in [(1.0 - 1e-5, true), (1.0 + 1e-5, false)] {

@@ -12,12 +12,12 @@ use crate::math::{DMat3, DVec2, DVec3, Vec2};
 pub struct Cuboid {
     center: DVec3,
     half: DVec3,
-    /// From the box's axes to the world's.
+    /// Axes of the box as columns: map from the box's coordinates to the world's.
     axes: DMat3,
 }
 
 impl Cuboid {
-    /// From its centre, edge lengths > 0 and rotation in degrees about x, then y, then z.
+    /// A box from its centre, edge lengths > 0 and rotation in degrees about x, then y, then z.
     pub fn new(center: DVec3, size: DVec3, rotate_degrees: DVec3) -> Self {
         Self { center, half: size * 0.5, axes: rotation_xyz(rotate_degrees) }
     }
@@ -100,7 +100,7 @@ impl Cuboid {
     /// Texture coordinates of a point of the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         let local = self.axes.transpose() * (point - self.center);
-        // The face that it is on is the one that it is farthest out to.
+        // The point is on the face towards which it lies farthest out.
         let axis = (local / self.half).abs().max_position();
         let face = 2 * axis as u32 + u32::from(local[axis] > 0.0);
         self.chart(face).uv(local)
@@ -111,7 +111,7 @@ impl Cuboid {
         Chart { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
     }
 
-    /// A hit along its axes, from the centre, put onto the face.
+    /// Position of a hit along the box's axes, from the centre, put onto the face.
     #[inline(always)]
     fn local(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let from_center = ray.at(f64::from(hit.t)) - self.center;
@@ -182,7 +182,7 @@ impl Cuboid {
         (self.axes.transpose() * (point - self.center)).abs().cmplt(self.half).all()
     }
 
-    /// The area that faces a unit direction, times the cosines.
+    /// Projected area: the area that faces a unit direction, times the cosines.
     pub fn shown(&self, direction: DVec3) -> f64 {
         let along = (self.axes.transpose() * direction).abs();
         let [x, _, y, _, z, _] = self.areas();
@@ -190,7 +190,7 @@ impl Cuboid {
     }
 }
 
-/// How a face has its texture coordinates: unit vectors along u and v in the box's axes, and the face's sides.
+/// Chart of a face for its texture coordinates: unit vectors along u and v in the box's axes, and the face's sides.
 struct Chart {
     u: DVec3,
     v: DVec3,

@@ -12,11 +12,11 @@ use crate::math::{DVec2, DVec3, Vec2};
 /// A round bar between two end points, or the bare tube; the front is outside. Parts: 0 the side, 1 the cap at the
 /// first end, 2 the cap at the second.
 ///
-/// Texture coordinates of the side: u once around, v from 0 at the first end to 1 at the second, so that on a cylinder
-/// that stands on its first end pictures stand and are not mirrored; of the caps as for a [`Disk`].
+/// Texture coordinates of the side: u once around, v from 0 at the first end to 1 at the second. On a cylinder that
+/// stands on its first end, pictures therefore stand and are not mirrored. The caps' are those of a [`Disk`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
-    /// Its origin is in the middle, its axis from the first end to the second.
+    /// Frame whose origin is in the middle and whose axis goes from the first end to the second.
     frame: AxialFrame,
     half_length: f64,
     radius: f64,
@@ -24,7 +24,7 @@ pub struct Cylinder {
 }
 
 impl Cylinder {
-    /// From two different end points and a radius > 0.
+    /// A cylinder from two different end points and a radius > 0.
     pub fn new(a: DVec3, b: DVec3, radius: f64, capped: bool) -> Self {
         let frame = AxialFrame::new((a + b) * 0.5, b - a);
         Self { frame, half_length: (b - a).length() * 0.5, radius, capped }
@@ -43,7 +43,7 @@ impl Cylinder {
         axial::meet(ray, &line, self.side_stretch(&line)?, ends, self.capped, starts_on)
     }
 
-    /// Whether a ray starts on a part, as far as rounding can tell.
+    /// Whether a ray starts on a part, within rounding.
     fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
         let local = self.frame.local(ray.origin);
         let distance = match part {
@@ -53,8 +53,8 @@ impl Cylinder {
         is_rounding(distance, self.reach())
     }
 
-    /// Where the line is within the radius, by the distance of its projection from the axis and without differences
-    /// of near numbers, as for a sphere (Haines, Günther, Akenine-Möller, Ray Tracing Gems, chapter 7).
+    /// Interval in which the line is within the radius, by the distance of its projection from the axis and without
+    /// differences of near numbers, as for a sphere (Haines, Günther, Akenine-Möller, Ray Tracing Gems, chapter 7).
     fn side_stretch(&self, line: &Line) -> Option<Stretch> {
         let (p, d) = (line.foot.truncate(), line.direction.truncate());
         let factors = |distance: f64| (distance - self.radius) * (distance + self.radius);
@@ -151,7 +151,7 @@ impl Cylinder {
         self.frame.origin
     }
 
-    /// The area that faces a unit direction, times the cosines.
+    /// Projected area: the area that faces a unit direction, times the cosines.
     pub fn shown(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap, _] = self.areas();
@@ -195,7 +195,7 @@ mod tests {
     use crate::geometry::Ray;
     use crate::math::Vec3;
 
-    /// About the axis x = 1, z = 0, from y = 0 to y = 4.
+    /// A bar about the axis x = 1, z = 0, from y = 0 to y = 4.
     fn bar(capped: bool) -> Cylinder {
         Cylinder::new(DVec3::X, DVec3::new(1.0, 4.0, 0.0), 0.5, capped)
     }
@@ -224,7 +224,8 @@ mod tests {
     fn a_tube_is_seen_through() {
         let tube = bar(false);
         assert_eq!(met(&tube, [1.25, 9.0, 0.25], Vec3::NEG_Y), None);
-        // In at the upper end, out through the side at x = 1.5 from inside: the front is still outside.
+        // The ray goes in at the upper end and out through the side at x = 1.5, which it hits from inside: the front is
+        // still outside.
         let slanting = met(&tube, [0.5, 5.0, 0.0], Vec3::new(1.0, -2.0, 0.0));
         assert_eq!(slanting, Some((1.0, 0, Vec3::X)));
     }

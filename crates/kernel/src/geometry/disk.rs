@@ -8,12 +8,12 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// Room given to a border in units of the size, so that two pieces which share it leave no gap; far below what an `f32`
-/// ray can tell apart.
+/// Margin of a border in units of the size, so that two pieces which share it leave no gap; far below what an `f32` ray
+/// can resolve.
 pub const BORDER: f64 = 1e-14;
 
-/// A flat round piece. Its texture coordinates are those of the square around it: (½, ½) in the middle, a picture
-/// stands upright where the disk stands, and away from −z where it lies and faces up.
+/// A flat round piece. Its texture coordinates are those of the square around it: (½, ½) in the middle. A picture
+/// stands upright if the disk stands, and away from −z if it lies and faces up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
     frame: AxialFrame,
@@ -21,12 +21,12 @@ pub struct Disk {
 }
 
 impl Disk {
-    /// From its centre, a normal of any length but 0, which is the front, and a radius > 0.
+    /// A disk from its centre, a normal of any length but 0, which is the front, and a radius > 0.
     pub fn new(center: DVec3, normal: DVec3, radius: f64) -> Self {
         Self { frame: AxialFrame::new(center, normal), radius }
     }
 
-    /// The one root of the plane, inside the border; none for rays in the plane.
+    /// The intersection with the plane, if inside the border. `None` for rays in the plane.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         self.nearest(ray).map(hit)
     }
@@ -58,7 +58,7 @@ impl Disk {
         self.surface_near(ray.at(t), self.frame.origin.abs().max_element() + self.radius)
     }
 
-    /// The surface nearest to a point, computed from lengths up to `reach`.
+    /// The surface nearest to a point, which was computed from lengths up to `reach`.
     pub fn surface_near(&self, point: DVec3, reach: f64) -> SurfacePoint {
         let (p, uv) = self.chart(point);
         let edge = 2.0 * self.radius;
@@ -72,7 +72,7 @@ impl Disk {
         )
     }
 
-    /// A point in the plane of its frame, and its texture coordinates.
+    /// A point in the plane of the disk's frame, and its texture coordinates.
     fn chart(&self, point: DVec3) -> (DVec2, DVec2) {
         let p = self.frame.local(point).truncate().clamp_length_max(self.radius);
         (p, DVec2::splat(0.5) + p / (2.0 * self.radius))
@@ -83,7 +83,7 @@ impl Disk {
         self.chart(point).1
     }
 
-    /// The point of the disk that a point of the unit disk becomes.
+    /// Maps a point of the unit disk to the disk.
     pub fn point(&self, of_unit_disk: DVec2) -> DVec3 {
         self.frame.point((of_unit_disk * self.radius).extend(0.0))
     }
@@ -93,7 +93,7 @@ impl Disk {
         self.frame.origin
     }
 
-    /// Of its border.
+    /// Radius of the border.
     pub fn radius(&self) -> f64 {
         self.radius
     }
@@ -119,12 +119,12 @@ impl Disk {
         DVec2::new((local.truncate().length() - self.radius).max(0.0), local.z).length()
     }
 
-    /// Whether a point is inside, where nothing is.
+    /// Whether a point is inside: never, as a disk encloses nothing.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
 
-    /// The area that faces a unit direction, times the cosine.
+    /// Projected area: the area that faces a unit direction, times the cosine.
     pub fn shown(&self, direction: DVec3) -> f64 {
         let [area] = self.areas();
         area * self.normal().dot(direction).max(0.0)

@@ -6,9 +6,9 @@ use crate::math::{DVec3, Vec2, Vec3};
 /// finite; no triangle has coincident corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Where the positions start, in the file's coordinates: 0, or near what is far from there.
+    /// Origin of the positions, in the file's coordinates: 0, or a point near the mesh if it is far from there.
     pub origin: DVec3,
-    /// Vertex positions, from the origin.
+    /// Vertex positions, relative to the origin.
     pub positions: Vec<Vec3>,
     /// Unit vertex normals, or empty.
     pub normals: Vec<Vec3>,
@@ -16,12 +16,12 @@ pub struct TriangleMesh {
     pub uvs: Vec<Vec2>,
     /// Corners of each triangle; front along (b − a) × (c − a).
     pub triangles: Vec<[u32; 3]>,
-    /// Material of each triangle as an index into the file's own list, or empty; `u32::MAX`: none.
+    /// Material of each triangle as an index into the file's own list, with `u32::MAX` for no material; or empty.
     pub materials: Vec<u32>,
 }
 
 impl TriangleMesh {
-    /// Most triangles of a mesh: so many fit the numbers in the nodes of every kind of tree, cut in pieces or not.
+    /// Most triangles of a mesh: such numbers fit into the nodes of every kind of tree, cut in pieces or not.
     pub const MOST_TRIANGLES: u32 = 1 << 27;
 
     /// The three corners of a triangle.
@@ -30,7 +30,7 @@ impl TriangleMesh {
         self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
     }
 
-    /// Bytes held.
+    /// Bytes that the mesh takes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.positions.as_slice())
             + size_of_val(self.normals.as_slice())

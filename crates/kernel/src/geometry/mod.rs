@@ -39,7 +39,7 @@ use sphere::Sphere;
 use torus::Torus;
 use triangle::Triangle;
 
-/// A shape that is computed from its numbers alone, in world coordinates.
+/// A shape that is computed from its parameters alone, in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// A sphere.
@@ -62,7 +62,7 @@ pub enum Shape {
     Torus(Torus),
 }
 
-/// The same asked of a shape of any kind.
+/// Calls the same method of a shape of any kind.
 macro_rules! of_any {
     ($shape:expr, $it:ident => $asked:expr) => {
         match $shape {
@@ -86,8 +86,8 @@ impl Shape {
         of_any!(self, it => it.intersect(ray))
     }
 
-    /// The nearest hits of the rays in `met`, side by side where the shape has a loop for that; the others end below 0. `found`
-    /// holds none before.
+    /// The nearest hits of the rays in `met`, side by side if the shape has a loop for that; the other rays end below 0.
+    /// `found` holds no hits before.
     #[inline(always)]
     pub fn intersect_rows(
         &self,
@@ -123,7 +123,7 @@ impl Shape {
         of_any!(self, it => it.surface(ray, hit))
     }
 
-    /// The surface at a hit, as far as it is asked for.
+    /// The requested parts of the surface at a hit.
     #[inline]
     pub fn asked_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         match self {
@@ -132,7 +132,7 @@ impl Shape {
         }
     }
 
-    /// The box around it; none where it has no end.
+    /// The box around it. `None` if the shape is infinite.
     #[inline]
     pub fn bounds(&self) -> Option<Aabb> {
         match self {
@@ -163,7 +163,7 @@ impl Shape {
         }
     }
 
-    /// Areas of its parts, by the numbers that hits give them; none where it has no end.
+    /// Areas of its parts, by the part numbers of hits; empty if the shape is infinite.
     pub fn areas(&self) -> Vec<f64> {
         of_any!(self, it => it.areas().to_vec())
     }
@@ -183,7 +183,7 @@ impl Shape {
         of_any!(self, it => it.contains(point))
     }
 
-    /// Whether it has an inside; that of a plane is behind it.
+    /// Whether it has an inside; the inside of a plane is behind it.
     #[inline]
     pub fn is_closed(&self) -> bool {
         match self {
@@ -194,7 +194,7 @@ impl Shape {
         }
     }
 
-    /// Whether a point is inside, or of a plane behind it; `None` if the shape has no inside.
+    /// Whether a point is inside, or behind a plane. `None` if the shape has no inside.
     #[inline]
     pub fn encloses(&self, point: DVec3) -> Option<bool> {
         match self {
@@ -233,7 +233,7 @@ impl Shape {
         of_any!(self, it => it.uv_at(point))
     }
 
-    /// Mean curvature at a point of a part, > 0 where it bulges to the front.
+    /// Mean curvature at a point of a part, > 0 if it bulges to the front.
     #[inline]
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         match self {
@@ -245,7 +245,8 @@ impl Shape {
         }
     }
 
-    /// The area whose front faces a unit direction, times the cosines; of a torus the mean over all directions.
+    /// Projected area: the area whose front faces a unit direction, times the cosines; for a torus, the mean over all
+    /// directions.
     pub fn shown(&self, direction: DVec3) -> f64 {
         of_any!(self, it => it.shown(direction))
     }
@@ -274,7 +275,7 @@ mod tests {
 
     const SIDE: u32 = 400;
 
-    /// The sum over the area of what is asked of its points.
+    /// The integral of a function over the area.
     fn integral(shape: &Shape, asked: impl Fn(&AreaPoint) -> f64) -> f64 {
         let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
         let over_part = |(part, area): (u32, f64)| {
@@ -378,7 +379,7 @@ mod tests {
     fn a_ray_goes_in_where_it_meets_a_front_and_out_where_it_meets_a_back() {
         for shape in shapes() {
             let mut seen = 0;
-            // A bare side has an inside as well, which it does not close.
+            // A bare side has an inside as well, although it does not close it.
             let is_closed = match shape {
                 Shape::Sphere(_) | Shape::Box(_) | Shape::Torus(_) => true,
                 Shape::Cylinder(_) | Shape::Cone(_) => shape.areas().iter().all(|&area| area > 0.0),
@@ -408,7 +409,7 @@ mod tests {
                 let point = surface.point.as_dvec3();
                 let uv = shape.uv_at(point);
                 let (u, v) = (surface.dpdu.as_dvec3(), surface.dpdv.as_dvec3());
-                // Near seams, borders and the poles a step leads elsewhere.
+                // Near seams, borders and poles, a step leads to other coordinates.
                 let step = 1e-4;
                 let is_inside = |uv: DVec2| uv.min_element() > 0.02 && uv.max_element() < 0.98;
                 let is_round =
@@ -428,7 +429,7 @@ mod tests {
                 let moved = [shape.uv_at(point + u * step) - uv, shape.uv_at(point + v * step) - uv];
                 let off = (moved[0] - DVec2::X * step).length().max((moved[1] - DVec2::Y * step).length());
                 assert!(off < 0.02 * step, "{shape:?} at {uv}: {moved:?}");
-                // By the contract u grows from x to z on spheres: their pictures are mirrored, those on other shapes are not.
+                // By the contract, u grows from x to z on spheres: pictures are mirrored on spheres, and on no other shape.
                 let is_mirrored = u.cross(v).dot(surface.normal.as_dvec3()) < 0.0;
                 assert_eq!(is_mirrored, matches!(shape, Shape::Sphere(_)), "{shape:?}");
                 assert!((u.dot(surface.normal.as_dvec3())).abs() < 1e-5 * u.length(), "{shape:?}");

@@ -6,8 +6,8 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Folds, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// Room given to a quad's border in units of its edges, so that two quads which share an edge leave no gap between
-/// them; far below what an `f32` ray can tell apart.
+/// Margin of a quad's border in units of its edges, so that two quads which share an edge leave no gap between them;
+/// far below what an `f32` ray can resolve.
 const BORDER: f64 = 1e-14;
 
 /// The points corner + s·u + t·v with s, t in [0, 1]; the front is along u × v.
@@ -27,7 +27,7 @@ pub struct Parallelogram {
 }
 
 impl Parallelogram {
-    /// From a corner and two edges that are not parallel.
+    /// A quad from a corner and two edges that are not parallel.
     pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
         let normal = u.cross(v);
         let area_squared = normal.length_squared();
@@ -41,7 +41,7 @@ impl Parallelogram {
         }
     }
 
-    /// The one root of the plane, inside the edges.
+    /// The intersection with the plane, if inside the edges.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let to_corner = self.corner - ray.origin;
         let t = self.normal.dot(to_corner) / self.normal.dot(ray.direction);
@@ -81,7 +81,7 @@ impl Parallelogram {
         SurfacePoint::exact(point, normal, self.uv(ray, hit).as_vec2(), self.u, self.v, reach)
     }
 
-    /// Of a hit along the edges, in [0, 1].
+    /// Coordinates of a hit along the edges, in [0, 1].
     #[inline(always)]
     fn coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
         self.coordinates_of(ray.at(f64::from(hit.t)))
@@ -125,12 +125,12 @@ impl Parallelogram {
         self.corner + (self.u + self.v) * 0.5
     }
 
-    /// Whether a point is inside, where nothing is.
+    /// Whether a point is inside: never, as a quad encloses nothing.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
 
-    /// The area that faces a unit direction, times the cosine.
+    /// Projected area: the area that faces a unit direction, times the cosine.
     pub fn shown(&self, direction: DVec3) -> f64 {
         self.normal.dot(direction).max(0.0)
     }
@@ -153,7 +153,7 @@ impl Mapped for Parallelogram {
     }
 }
 
-/// Whether a coordinate is between the edges, or on one.
+/// Whether a coordinate is between the edges, or on one of them.
 #[inline(always)]
 fn is_in_edge(x: f64) -> bool {
     (-BORDER..=1.0 + BORDER).contains(&x)

@@ -10,7 +10,7 @@ use crate::math::{DVec2, DVec3, Vec2};
 /// All points p with (p − point)·normal = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// A point of it, where (u, v) = (0, 0).
+    /// A point of the plane, with texture coordinates (0, 0).
     pub point: DVec3,
     /// Unit normal of its front.
     normal: DVec3,
@@ -19,14 +19,14 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// From a point and a normal of any length but 0.
+    /// A plane from a point and a normal of any length but 0.
     pub fn new(point: DVec3, normal: DVec3) -> Self {
         let normal = normal.normalize();
         let (u, v) = flat_axes(normal);
         Self { point, normal, u, v }
     }
 
-    /// Its one root; none for rays in it or parallel to it.
+    /// The intersection. `None` for rays in the plane or parallel to it.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let t = self.normal.dot(self.point - ray.origin) / self.normal.dot(ray.direction);
         (t < f64::from(f32::MAX)).then(|| ray.accept(t)).flatten().map(ShapeHit::at)
@@ -59,7 +59,7 @@ impl Plane {
         SurfacePoint { uv, ..SurfacePoint::exact(point, normal, uv.as_vec2(), self.u, self.v, reach) }
     }
 
-    /// Of a hit along its axes.
+    /// Coordinates of a hit along the plane's axes.
     #[inline(always)]
     fn coordinates(&self, ray: &RayF64, hit: &ShapeHit) -> [f64; 2] {
         self.coordinates_of(ray.at(f64::from(hit.t)))
@@ -76,17 +76,17 @@ impl Plane {
         DVec2::from_array(self.coordinates_of(point))
     }
 
-    /// It has no part with an area.
+    /// Areas of its parts: it has no part with an area.
     pub fn areas(&self) -> [f64; 0] {
         []
     }
 
-    /// The point that it was made from: none of it is as likely as any other.
+    /// The point that the plane was made from, as no point is as likely as any other.
     pub fn place(&self, _: u32, _: Vec2) -> AreaPoint {
         AreaPoint { point: self.point, normal: self.normal }
     }
 
-    /// The point that it was made from.
+    /// The point that the plane was made from.
     pub fn middle(&self) -> DVec3 {
         self.point
     }
@@ -111,7 +111,7 @@ impl Plane {
         self.normal.dot(point - self.point) < 0.0
     }
 
-    /// The area that faces a unit direction, times the cosine.
+    /// Projected area: the area that faces a unit direction, times the cosine.
     pub fn shown(&self, direction: DVec3) -> f64 {
         if self.normal.dot(direction) > 0.0 { f64::INFINITY } else { 0.0 }
     }

@@ -1,4 +1,4 @@
-//! Rays as half-lines and segments, and where to start one that leaves a surface.
+//! Rays as half-lines and segments, and starts of rays that leave a surface.
 
 use crate::math::{DVec3, Vec3};
 
@@ -6,11 +6,11 @@ use crate::math::{DVec3, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Ray {
-    /// Where it starts.
+    /// Start of the ray.
     pub origin: Vec3,
-    /// Where it goes; of any length, which is the unit of t.
+    /// Direction, of any length, which is the unit of t.
     pub direction: Vec3,
-    /// Its end; ∞ for a half-line.
+    /// End of the ray; ∞ for a half-line.
     pub t_max: f32,
 }
 
@@ -20,8 +20,8 @@ impl Ray {
         Self { origin, direction, t_max: f32::INFINITY }
     }
 
-    /// The segment that ends just before `to`, shortened by the rounding errors of its two ends, so that a surface
-    /// through `to` is not hit (t = 1 is the far end before that).
+    /// The segment that ends just before `to`, shortened by the rounding errors of its two ends, so that it does not
+    /// hit a surface through `to` (t = 1 is the far end before shortening).
     #[inline(always)]
     pub fn segment(from: Vec3, to: Vec3) -> Self {
         let direction = to - from;
@@ -31,7 +31,7 @@ impl Ray {
         Self { origin: from, direction, t_max: 1.0 - shortening.min(0.5) }
     }
 
-    /// A segment, longer by what its ends may be off.
+    /// The segment, extended by the error of its end.
     #[inline(always)]
     pub fn beyond(self, error: Vec3) -> Self {
         let relative = 4.0 * error.max_element() / self.direction.abs().max_element();
@@ -53,14 +53,14 @@ impl Ray {
     }
 }
 
-/// A [`Ray`] in double precision, for the shapes that are computed so.
+/// A [`Ray`] in double precision, for shapes that are computed in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayF64 {
-    /// Where it starts.
+    /// Start of the ray.
     pub origin: DVec3,
-    /// Where it goes.
+    /// Direction.
     pub direction: DVec3,
-    /// Its end.
+    /// End of the ray.
     pub t_max: f64,
 }
 
@@ -70,16 +70,16 @@ impl RayF64 {
         self.origin + self.direction * t
     }
 
-    /// `t` as `f32`, if the ray has such a point and that is finite.
+    /// `t` as `f32`, if the ray has such a point and it is finite.
     pub fn accept(&self, t: f64) -> Option<f32> {
         let single = t as f32;
         (single > 0.0 && single < f32::INFINITY && f64::from(single) <= self.t_max).then_some(single)
     }
 }
 
-/// A start for a ray that leaves `point` towards `direction`: on that side of the surface for certain, where each
-/// component of `point` is off by at most `error` (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th
-/// ed., section 6.8.6).
+/// Start of a ray that leaves `point` towards `direction`: on that side of the surface for certain, if the error of
+/// each component of `point` is at most `error` (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed.,
+/// section 6.8.6).
 #[inline(always)]
 pub fn offset_origin(point: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {
     let distance = normal.abs().dot(error);

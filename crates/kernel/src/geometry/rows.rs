@@ -1,4 +1,4 @@
-//! Up to sixteen rays side by side, a row for each coordinate: what a shape tests in a loop without branches, which
+//! Up to sixteen rays side by side, a row for each coordinate. A shape tests them in a loop without branches, which
 //! compilers turn into vector instructions. Every lane gets the bits that its ray gets alone.
 
 use super::{Ray, RayF64, ShapeHit};
@@ -11,7 +11,8 @@ pub const PACKET: usize = LANES;
 /// One number for each ray of a packet.
 pub type Row = [f32; PACKET];
 
-/// Where each ray of a packet ends, in place of its own `t_max`; below 0 where there is none, or where it is not traced.
+/// End of each ray of a packet, in place of its own `t_max`; below 0 for a lane without a ray, or whose ray is not
+/// traced.
 pub type Ends = Row;
 
 /// A bit for each ray that has an end.
@@ -38,14 +39,14 @@ pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
 /// The rays of a packet; lanes without a ray are all 0, and have no end.
 #[derive(Clone, Debug)]
 pub struct RayRows {
-    /// Coordinates of where they start.
+    /// Coordinates of the origins.
     pub origin: [Row; 3],
-    /// Coordinates of where they go.
+    /// Coordinates of the directions.
     pub direction: [Row; 3],
 }
 
 impl RayRows {
-    /// From coordinates.
+    /// Rows of these coordinates.
     #[inline(always)]
     pub fn of(origin: [Row; 3], direction: [Row; 3]) -> Self {
         Self { origin, direction }
@@ -57,12 +58,12 @@ impl RayRows {
         Ray::new(of(&self.origin), of(&self.direction))
     }
 
-    /// At most [`PACKET`] rays, and their ends.
+    /// Rows of at most [`PACKET`] rays, and their ends.
     #[inline(always)]
     pub fn new(rays: &[Ray]) -> (Self, Ends) {
         let mut rows = Self::of([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
         let mut ends = [-1.0; PACKET];
-        // Compiled once for the full packets, whose loop has a known length.
+        // Compile full packets apart: their loop has a known length.
         match <&[Ray; PACKET]>::try_from(rays) {
             Ok(full) => rows.fill(&mut ends, full),
             Err(_) => rows.fill(&mut ends, rays),
@@ -94,10 +95,10 @@ impl RayRows {
     }
 }
 
-/// What the rays of a packet hit, [`ShapeHit`]s side by side.
+/// Hits of the rays of a packet: [`ShapeHit`]s side by side.
 #[derive(Clone, Debug)]
 pub struct HitRows {
-    /// [`ShapeHit::t`]; NaN where nothing is hit.
+    /// [`ShapeHit::t`]; NaN for a ray without a hit.
     pub t: Row,
     /// [`ShapeHit::primitive`].
     pub primitive: [u32; PACKET],
@@ -124,14 +125,14 @@ impl HitRows {
         folds.bits(&any)
     }
 
-    /// Write down a hit.
+    /// Stores a hit.
     pub fn put(&mut self, lane: usize, hit: &ShapeHit) {
         self.t[lane] = hit.t;
         self.primitive[lane] = hit.primitive;
         (self.u[lane], self.v[lane]) = (hit.u, hit.v);
     }
 
-    /// What the ray in a lane hits.
+    /// The hit of the ray in a lane.
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Option<ShapeHit> {
         let hit =
@@ -140,7 +141,7 @@ impl HitRows {
     }
 }
 
-/// [`RayF64::accept`] without a branch: NaN in place of nothing.
+/// [`RayF64::accept`] without a branch; NaN in place of `None`.
 #[inline(always)]
 pub(super) fn accept(t: f64, end: f32) -> f32 {
     let single = t as f32;
@@ -148,8 +149,8 @@ pub(super) fn accept(t: f64, end: f32) -> f32 {
     if is_on_it { single } else { f32::NAN }
 }
 
-/// Whether [`accept`] may take the quotient of `above` and `along`; where not, nobody need divide. The factor is more than
-/// rounding to `f32` makes of the quotient, the terms make up for what is too small for it.
+/// Whether [`accept`] may take the quotient of `above` and `along`; if not, the division can be saved. The factor is more
+/// than the effect of rounding the quotient to `f32`; the terms make up for numbers too small for it.
 #[inline(always)]
 pub(super) fn may_accept(above: f64, along: f64, end: f32) -> bool {
     let is_ahead = ((above > 0.0) & (along > 0.0)) | ((above < 0.0) & (along < 0.0));

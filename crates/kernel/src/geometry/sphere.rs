@@ -19,8 +19,8 @@ pub struct Sphere {
 
 impl Sphere {
     /// The nearest root in the ray's interval. The discriminant comes from the distance of the centre to the ray, not
-    /// from b² − ac, and the roots without subtraction (Haines, Günther, Akenine-Möller, *Precision
-    /// Improvements for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
+    /// from b² − ac, and the roots come without subtraction (Haines, Günther, Akenine-Möller, *Precision Improvements
+    /// for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let to_origin = ray.origin - self.center;
         let a = ray.direction.length_squared();
@@ -78,7 +78,7 @@ impl Sphere {
         SurfacePoint::exact(point, normal, uv, dpdu * self.radius, dpdv * self.radius, reach)
     }
 
-    /// The same without texture coordinates.
+    /// [`Sphere::surface`] without texture coordinates.
     pub fn bare_surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
         SurfacePoint::exact(point, normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, reach)
@@ -122,14 +122,15 @@ impl Sphere {
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
         let (distance, radius) = ((point - self.center).length_squared(), self.radius * self.radius);
-        // The root, which takes long, decides what is nearer than its rounding and that of the squares.
+        // The root, which takes long, decides only if the point is nearer than the rounding of the root and of the
+        // squares.
         if (distance - radius).abs() > radius * (16.0 * f64::EPSILON) {
             return distance < radius;
         }
         (point - self.center).length() < self.radius
     }
 
-    /// The area that faces a unit direction, times the cosines: of every direction that of the great circle.
+    /// Projected area: for every direction, that of the great circle.
     pub fn shown(&self, _: DVec3) -> f64 {
         PI * self.radius * self.radius
     }
@@ -147,8 +148,8 @@ impl Exact for Sphere {
     }
 }
 
-/// Texture coordinates u = ½ + atan2(z, x)/2π, v = ½ + asin(y)/π of a unit normal, and how the normal changes with
-/// each; at the poles any pair of perpendicular tangents.
+/// Texture coordinates u = ½ + atan2(z, x)/2π, v = ½ + asin(y)/π of a unit normal, and the change of the normal with
+/// each; at the poles, any pair of perpendicular tangents.
 fn sphere_parametrisation(n: DVec3) -> (Vec2, DVec3, DVec3) {
     let u = 0.5 + libm::atan2(n.z, n.x) / (2.0 * PI);
     let v = 0.5 + libm::asin(n.y.clamp(-1.0, 1.0)) / PI;

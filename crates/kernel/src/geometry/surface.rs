@@ -1,13 +1,13 @@
-//! What a shape says about a hit.
+//! Surface of a shape at a hit.
 
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// The nearest meeting of a ray and a shape.
+/// The nearest intersection of a ray and a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapeHit {
     /// Distance along the ray in units of its direction's length.
     pub t: f32,
-    /// Which part of the shape: triangle of a mesh, face of a box; else 0.
+    /// Part of the shape: triangle of a mesh, face of a box; else 0.
     pub primitive: u32,
     /// Weight of a triangle's second corner; else 0.
     pub u: f32,
@@ -31,22 +31,23 @@ pub struct SurfacePoint {
     pub error: Vec3,
     /// Unit geometric normal of the front side.
     pub normal: Vec3,
-    /// Where light is looked for on the side of the eye, if nothing is on the way there: the point, or above it where facets
-    /// stand for a surface that bulges.
+    /// Start of shadow rays on the side of the camera, if nothing is on the way there: the point, or a place above it if
+    /// facets stand for a surface that bulges.
     pub shadow_point: Vec3,
     /// Unit interpolated normal on the same side.
     pub shading_normal: Vec3,
-    /// Texture coordinates; far from its point those of a plane are large, and count by their fractions.
+    /// Texture coordinates. For a plane they are large far from its point, and count by their fractions.
     pub uv: DVec2,
-    /// Change of the point with u, any length; 0 where the parametrisation has none.
+    /// Change of the point with u, of any length; 0 if there is no parametrisation.
     pub dpdu: Vec3,
     /// Change of the point with v.
     pub dpdv: Vec3,
-    /// Weights of a triangle's corners; (1 − u − v, u, v) of the texture coordinates elsewhere.
+    /// Weights of a triangle's corners; for other shapes (1 − u − v, u, v) of the texture coordinates.
     pub barycentric: Vec3,
 }
 
-/// What of a [`SurfacePoint`] is asked for beside the point and its normals; the rest may stay 0, or be the point itself.
+/// Requested parts of a [`SurfacePoint`] beside the point and its normals. Other parts may stay 0, or be the point
+/// itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Asked {
     /// Texture coordinates and their tangents.
@@ -60,7 +61,7 @@ impl Asked {
     pub const ALL: Self = Self { uv: true, shadow_point: true };
 }
 
-/// A point of a surface that light leaves.
+/// A point of a surface that emits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AreaPoint {
     /// The point.
@@ -70,9 +71,9 @@ pub struct AreaPoint {
 }
 
 impl SurfacePoint {
-    /// A point computed in double precision on a surface without shading normals. Its error is that of rounding to `f32`
-    /// and, where the point is small beside the lengths that it and the next hit are computed from, theirs: `reach`
-    /// is the greatest of those.
+    /// A point computed in double precision on a surface without shading normals. Its error is that of rounding to
+    /// `f32`. If the point is small beside the lengths from which it and the next hit are computed, their error counts
+    /// too: `reach` is the greatest of these lengths.
     pub fn exact(point: DVec3, normal: DVec3, uv: Vec2, dpdu: DVec3, dpdv: DVec3, reach: f64) -> Self {
         let normal = normal.normalize().as_vec3();
         let point = point.as_vec3();
@@ -90,8 +91,8 @@ impl SurfacePoint {
     }
 }
 
-/// Bound on each component's error of a point that was computed in double precision from lengths up to `reach`, and of
-/// the next test from there.
+/// Bound on each component's error, for a point that was computed in double precision from lengths up to `reach`, and
+/// for the next test from there.
 #[inline(always)]
 pub fn error(point: Vec3, reach: f64) -> Vec3 {
     rounding_error(point) + Vec3::splat(double_error(reach))
@@ -109,8 +110,8 @@ pub fn rounding_error(point: Vec3) -> Vec3 {
     point.abs() * f32::EPSILON + Vec3::splat(f32::MIN_POSITIVE)
 }
 
-/// Tangents (u, v) of a flat surface with unit normal `n`, such that u × v = n: v goes up where the surface
-/// stands, and towards −z where it lies and faces up.
+/// Tangents (u, v) of a flat surface with unit normal `n`, such that u × v = n: v goes up if the surface stands, and
+/// towards −z if it lies and faces up.
 pub fn flat_axes(n: DVec3) -> (DVec3, DVec3) {
     let across = DVec3::Y.cross(n);
     let u = if across.length_squared() > 1e-12 { across } else { DVec3::X - n * n.x };

@@ -1,4 +1,4 @@
-//! Surfaces at the hits of a packet, side by side, for the shapes that are most seen.
+//! Surfaces at the hits of a packet, side by side, for the most common shapes.
 
 use super::rows::{HitRows, PACKET, RayRows, lanes};
 use super::surface::error;
@@ -6,7 +6,7 @@ use super::{RayF64, Shape, ShapeHit};
 use crate::math::lanes::{Lanes3, set_lane, take, truths};
 use crate::math::{DVec2, DVec3};
 
-/// What of [`SurfacePoint`](super::SurfacePoint)s lights need, side by side.
+/// Parts of [`SurfacePoint`](super::SurfacePoint)s that lights need, side by side.
 #[derive(Clone, Debug)]
 pub struct SurfaceRow {
     /// The points.
@@ -15,19 +15,19 @@ pub struct SurfaceRow {
     pub error: Lanes3,
     /// Unit geometric normals of the front sides.
     pub normal: Lanes3,
-    /// A bit for each with the two that follow.
+    /// A bit for each lane whose shading normal and shadow point are set.
     pub smooth: u32,
     /// Unit interpolated normals on the same sides.
     pub shading_normal: Lanes3,
     /// [`SurfacePoint::shadow_point`](super::SurfacePoint::shadow_point)s.
     pub shadow_point: Lanes3,
-    /// Texture coordinates, where they were asked for.
+    /// Texture coordinates, if requested.
     pub uv: [[f64; PACKET]; 2],
 }
 
 /// A point of a surface before it is rounded.
 pub struct ExactPoint {
-    /// The point.
+    /// The point, in world coordinates.
     pub point: DVec3,
     /// Normal of the front side, of any length.
     pub normal: DVec3,
@@ -35,13 +35,13 @@ pub struct ExactPoint {
     pub reach: f64,
 }
 
-/// A shape whose surface is found without branches.
+/// A shape whose surface is computed without branches.
 pub trait Exact {
     /// The surface at a hit.
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint;
 }
 
-/// A shape whose texture coordinates are found without branches.
+/// A shape whose texture coordinates are computed without branches.
 pub trait Mapped {
     /// Texture coordinates of a hit.
     fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2;
@@ -54,7 +54,7 @@ impl Default for SurfaceRow {
 }
 
 impl SurfaceRow {
-    /// Nothing known.
+    /// Surfaces of which nothing is known.
     pub const EMPTY: Self = Self {
         point: [[0.0; PACKET]; 3],
         error: [[0.0; PACKET]; 3],
@@ -65,7 +65,8 @@ impl SurfaceRow {
         uv: [[0.0; PACKET]; 2],
     };
 
-    /// The surfaces of those hits of a packet whose bits are set, all of one shape; whether there is a loop for it.
+    /// Computes the surfaces of the hits of a packet whose bits are set, all of one shape. Returns whether the shape
+    /// has a loop for it.
     #[inline(always)]
     pub fn fill(&mut self, shape: &Shape, rays: &RayRows, hits: &HitRows, of: u32) -> bool {
         match shape {
@@ -79,7 +80,7 @@ impl SurfaceRow {
         true
     }
 
-    /// Texture coordinates of those hits of a packet whose bits are set, all of one shape.
+    /// Computes the texture coordinates of the hits of a packet whose bits are set, all of one shape.
     #[inline(always)]
     pub fn fill_uv(&mut self, shape: &Shape, rays: &RayRows, hits: &HitRows, of: u32) {
         match shape {
@@ -130,7 +131,7 @@ impl SurfaceRow {
         self.take(of, &found);
     }
 
-    /// Take points, errors and normals of another row.
+    /// Takes points, errors and normals of another row.
     #[inline(always)]
     pub fn take(&mut self, of: u32, found: &Self) {
         let of = truths(of);
@@ -141,7 +142,7 @@ impl SurfaceRow {
         }
     }
 
-    /// Take shading normals and shadow points of another row.
+    /// Takes shading normals and shadow points of another row.
     #[inline(always)]
     pub fn take_smooth(&mut self, of: u32, found: &Self) {
         self.smooth |= of;

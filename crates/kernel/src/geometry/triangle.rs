@@ -18,8 +18,8 @@ pub struct Triangle {
 }
 
 impl Triangle {
-    /// The hit, from either side. Edges are tested by triple products of the corners as seen from the origin, which
-    /// two triangles at one edge compute alike but for the sign: no gap between them.
+    /// The hit, from either side. Edges are tested by triple products of the corners relative to the ray's origin. Two
+    /// triangles at one edge compute these alike but for the sign: there is no gap between them.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let (a, b, c) = (self.a - ray.origin, self.b - ray.origin, self.c - ray.origin);
         let d = ray.direction;
@@ -90,18 +90,18 @@ impl Triangle {
         (self.a + self.b + self.c) / 3.0
     }
 
-    /// Whether a point is inside, where nothing is.
+    /// Whether a point is inside: never, as a triangle encloses nothing.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
 
-    /// The area that faces a unit direction, times the cosine.
+    /// Projected area: the area that faces a unit direction, times the cosine.
     pub fn shown(&self, direction: DVec3) -> f64 {
         (0.5 * self.normal().dot(direction)).max(0.0)
     }
 }
 
-/// Weights of the second and the third corner of a triangle that make a point of it.
+/// Barycentric weights of the second and the third corner at a point of a triangle.
 pub fn weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let normal = ab.cross(ac);

@@ -5,10 +5,11 @@ use super::ShapeHit;
 use crate::math::float::gamma;
 use crate::math::{DVec3, Vec3};
 
-/// A triangle is a needle to a ray where the bound on the error of t is a larger part of its distance than this.
+/// Limit of a needle: a triangle is a needle to a ray if the bound on the error of t is a larger part of its distance
+/// than this.
 pub const ILL_CONDITIONED: f32 = 1.0 / 32.0;
 
-/// A ray made ready for many triangles: its longest axis is z and it is sheared to run along it.
+/// A ray prepared for many triangles: its longest axis is z, and it is sheared to run along it.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
     origin: Vec3,
@@ -18,7 +19,7 @@ pub struct ShearedRay {
 }
 
 impl ShearedRay {
-    /// Prepare it.
+    /// Prepares a ray.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         let size = direction.abs();
         let z = if size.x > size.y {
@@ -41,7 +42,7 @@ impl ShearedRay {
         }
     }
 
-    /// The axes of the world that are its x, y and z.
+    /// World axes that are the ray's x, y and z.
     pub fn axes(&self) -> [usize; 3] {
         self.axes
     }
@@ -91,9 +92,9 @@ impl ShearedRay {
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: wb * inverse, v: wc * inverse })
     }
 
-    /// The hit of a triangle so thin for its distance that single precision cannot tell where it is along the ray. That the ray
-    /// goes through it is settled, so that neighbours leave no gap; where it passes by after all, the nearest point of
-    /// an edge counts.
+    /// The hit of a triangle so thin for its distance that its place along the ray is uncertain in single precision. It is
+    /// settled that the ray goes through the triangle, so that neighbours leave no gap. If the ray passes by in double
+    /// precision, the nearest point of an edge counts.
     #[cold]
     fn intersect_needle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let ([a, b, c], [wa, wb, wc]) = self.in_f64(corners);
@@ -112,8 +113,8 @@ impl ShearedRay {
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: u as f32, v: v as f32 })
     }
 
-    /// The hit of a triangle whose plane passes so near the start that single precision cannot tell on which side. That the ray
-    /// goes through the triangle is settled.
+    /// The hit of a triangle whose plane passes so near the start that its side is uncertain in single precision. It is settled
+    /// that the ray goes through the triangle.
     #[cold]
     fn intersect_at_start(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let ([a, b, c], [wa, wb, wc]) = self.in_f64(corners);
@@ -123,7 +124,7 @@ impl ShearedRay {
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u, v })
     }
 
-    /// Corners as seen along the ray, whose z are distances along it, and the edge functions.
+    /// Corners in double precision, sheared so that their z are distances along the ray, and the edge functions.
     fn in_f64(&self, corners: &[Vec3; 3]) -> ([DVec3; 3], [f64; 3]) {
         let [x, y, z] = self.axes;
         let direction = self.direction.as_dvec3();
@@ -136,8 +137,8 @@ impl ShearedRay {
         ([a, b, c], [cross(c, b), cross(a, c), cross(b, a)])
     }
 
-    /// Bound on the absolute error of t, and the greatest t of a corner. The sheared x and y err by lengths, z by units of t,
-    /// which are the same for unit directions only.
+    /// Bound on the absolute error of t, and the greatest t of a corner. The sheared x and y err by lengths, z by units of t;
+    /// these are the same for unit directions only.
     fn distance_error(&self, corners: &[(f32, f32, f32); 3], inverse_determinant: f32) -> (f32, f32) {
         let greatest = |of: fn(&(f32, f32, f32)) -> f32| corners.iter().map(of).fold(0.0, f32::max);
         let x = greatest(|corner| corner.0.abs());
@@ -153,18 +154,18 @@ impl ShearedRay {
     }
 }
 
-/// The lesser; `b` where either is NaN, as vector instructions have it.
+/// The lesser number; `b` if either is NaN, as vector instructions have it.
 fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The greater; `b` where either is NaN.
+/// The greater number; `b` if either is NaN.
 fn greatest(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Of the points between p and q, whose z are distances along a ray that is seen end-on at 0: how far off the nearest is,
-/// squared, what part of the way to q it is, and where along the ray.
+/// The point nearest to 0 between p and q, whose z are distances along the ray: its squared distance from the ray, its
+/// fraction of the way to q, and its distance along the ray.
 fn nearest_of_edge(p: DVec3, q: DVec3) -> (f64, f64, f64) {
     let (start, way) = (p.truncate(), (q - p).truncate());
     let part = (-start.dot(way) / way.length_squared()).clamp(0.0, 1.0);

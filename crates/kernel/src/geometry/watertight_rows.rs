@@ -1,5 +1,5 @@
-//! The watertight test of mesh triangles against the rays of a packet, which may go any way: with the operations of
-//! [`ShearedRay::intersect`] in their order, so that the bits are the same.
+//! The watertight test of mesh triangles against the rays of a packet, which may have any directions. The operations of
+//! [`ShearedRay::intersect`] come in their order, so that the bits are the same.
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, lanes};
 use super::watertight::{ILL_CONDITIONED, ShearedRay};
@@ -7,21 +7,21 @@ use crate::math::Vec3;
 use crate::math::float::gamma;
 use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, Truths, take, take_u32};
 
-/// The rays of a packet, made ready for some triangles.
+/// The rays of a packet, prepared for some triangles.
 pub struct ShearedRows<'a> {
     rays: &'a RayRows,
     /// Whether the longest axis of a ray is x, and whether it is y.
     longest: [Truths; 2],
-    /// Whether a ray goes down its longest axis: its other axes are swapped then. Edge functions are negated by that, and nothing else.
+    /// Whether a ray goes down its longest axis: then its other axes are swapped, which only negates the edge functions.
     is_down: Truths,
-    /// Of the axes after the longest one.
+    /// Shears of the axes after the longest one.
     shear: Lanes3,
 }
 
-/// What the rays of a packet hit of one triangle.
+/// Hits of the rays of a packet on one triangle.
 struct Hits {
     hit: Truths,
-    /// What the scalar test has to decide.
+    /// Lanes that the scalar test has to decide.
     doubtful: Truths,
     t: Lanes,
     u: Lanes,
@@ -29,7 +29,7 @@ struct Hits {
 }
 
 impl<'a> ShearedRows<'a> {
-    /// Prepare them.
+    /// Prepares rays.
     #[inline(always)]
     pub fn new(rays: &'a RayRows) -> Self {
         let (mut longest, mut is_down) = ([[0; PACKET]; 2], [0; PACKET]);
@@ -71,8 +71,8 @@ impl<'a> ShearedRows<'a> {
         Self { rays, longest, is_down, shear }
     }
 
-    /// Take what is nearer on a triangle, of higher number than those before; `met` are the bits of the rays that are traced, the others
-    /// end below 0.
+    /// Takes the nearer hits on a triangle whose number is higher than those before. `met` are the bits of the traced rays; the
+    /// others end below 0.
     #[inline(always)]
     pub fn closest(
         &self,
@@ -84,7 +84,7 @@ impl<'a> ShearedRows<'a> {
         let hits = self.hits(corners, ends);
         let mut is_nearer = [0; PACKET];
         for i in 0..PACKET {
-            // At the end of a ray a hit counts, and one as far as another that was found before does not.
+            // A hit at the end of a ray counts; a hit as far as one on an earlier triangle does not.
             let is_tie = !found.t[i].is_nan() & (hits.t[i] == found.t[i]);
             is_nearer[i] = if is_tie { 0 } else { hits.hit[i] };
         }
@@ -133,7 +133,7 @@ impl<'a> ShearedRows<'a> {
         ShearedRay::new(ray.origin, ray.direction).intersect(corners, end)
     }
 
-    /// A corner as each ray sees it.
+    /// A corner in each ray's sheared coordinates.
     #[inline(always)]
     fn sheared(&self, corner: Vec3) -> Lanes3 {
         let mut seen = [[0.0; PACKET]; 3];
@@ -189,7 +189,7 @@ impl<'a> ShearedRows<'a> {
             let inverse = 1.0 / (wa + wb + wc);
             let shear_z = self.shear[2][i];
             let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
-            // `ShearedRay::distance_error`.
+            // Bound the error as `ShearedRay::distance_error` does.
             let first = greatest([ax, bx, cx]);
             let second = greatest([ay, by, cy]);
             let depth = greatest([az, bz, cz]);
@@ -214,7 +214,7 @@ impl<'a> ShearedRows<'a> {
     }
 }
 
-/// The greatest size of three numbers.
+/// The greatest absolute value of three numbers.
 #[inline(always)]
 fn greatest([a, b, c]: [f32; 3]) -> f32 {
     let (a, b, c) = (a.abs(), b.abs(), c.abs());

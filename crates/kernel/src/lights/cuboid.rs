@@ -1,4 +1,4 @@
-//! Box lights: the faces that a point sees, by their solid angles.
+//! Box lights, sampled by the solid angles of the visible faces.
 
 use super::Met;
 use super::emitter::Arrival;
@@ -12,28 +12,28 @@ pub struct BoxEmitter {
     center: DVec3,
     /// Half the lengths along the axes.
     half: [f32; 3],
-    /// Unit vectors.
+    /// Unit vectors of the axes.
     axes: [Vec3; 3],
 }
 
-/// A box as it is seen from a point, mirrored so that the point is on the positive side of each axis.
+/// A box relative to a point, mirrored so that the point is on the positive side of each axis.
 struct View {
     /// Sign of the point's coordinates.
     signs: [f32; 3],
-    /// The positive faces. Of each the first coordinate is along the next axis and the second along the one after that.
+    /// The positive faces. The first coordinate of each is along the next axis, the second along the one after that.
     faces: [Face; 3],
 }
 
-/// A face as it is seen from a point.
+/// A face relative to a point.
 #[derive(Clone, Copy)]
 struct Face {
     rectangle: SphericalRectangle,
-    /// In sr, nearly that if the face is small; 0 from behind.
+    /// Solid angle in sr, approximate if the face is small; 0 from behind.
     solid_angle: f32,
 }
 
 impl BoxEmitter {
-    /// All of a box.
+    /// The emitter of a whole box.
     pub fn new(cuboid: &Cuboid) -> Self {
         let axes = cuboid.axes();
         Self {
@@ -54,7 +54,7 @@ impl BoxEmitter {
         View { signs: local.map(|x| 1.0_f32.copysign(x)), faces: [face(0), face(1), face(2)] }
     }
 
-    /// A face by its solid angle, and a point of that by solid angle.
+    /// Samples a face by its solid angle, then a point of it by solid angle.
     #[inline(always)]
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let View { signs, faces } = self.seen_from(point);
@@ -109,7 +109,7 @@ impl BoxEmitter {
 }
 
 impl Face {
-    /// Between coordinates as seen from the point, in a plane at z, which is negative before the face.
+    /// A face between coordinates relative to the point, in a plane at z, which is negative before the face.
     #[inline(always)]
     fn new(x: [f32; 2], y: [f32; 2], z: f32) -> Self {
         let rectangle = SphericalRectangle::new(x, y, z);
@@ -118,7 +118,7 @@ impl Face {
         Self { rectangle, solid_angle: if z < 0.0 { solid_angle } else { 0.0 } }
     }
 
-    /// A point of the face, and one over the density of its direction.
+    /// A point of the face, and the inverse pdf of its direction.
     #[inline(always)]
     fn sample(&self, u: [f32; 2]) -> (f32, f32, f32) {
         let rectangle = &self.rectangle;

@@ -13,16 +13,16 @@ use crate::sampling::warp;
 pub struct DirectionalLight {
     /// Unit direction to the middle of the light, against the way that it travels.
     pub to_light: Vec3,
-    /// On a surface that faces it.
+    /// Irradiance of a surface that faces the light.
     pub irradiance: Vec3,
-    /// 1 − cos of half the apparent diameter; 0: the light has no extent.
+    /// 1 − cos of half the apparent diameter; 0 for a light without extent.
     one_minus_cos: f32,
-    /// Of the disc; 0 without extent.
+    /// Radiance of the disc; 0 without extent.
     radiance: Vec3,
 }
 
 impl DirectionalLight {
-    /// With an apparent diameter of `angle` radians, up to π; 0 for a sharp light.
+    /// A light with an apparent diameter of `angle` radians, up to π; 0 for a sharp light.
     pub fn new(to_light: Vec3, irradiance: Vec3, angle: f64) -> Self {
         let (quarter, half) = (libm::sin(angle / 4.0), libm::sin(angle / 2.0));
         let radiance = if angle > 0.0 {
@@ -38,7 +38,7 @@ impl DirectionalLight {
         self.one_minus_cos == 0.0
     }
 
-    /// A way for its light to arrive anywhere, uniform over the solid angle of the disc.
+    /// Samples the light as it arrives anywhere, uniform over the solid angle of the disc.
     pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
         let (direction, weight) = self.arriving(u);
         (weight != Vec3::ZERO).then_some(LightSample {
@@ -49,7 +49,7 @@ impl DirectionalLight {
         })
     }
 
-    /// A unit direction to the light, and radiance over its density; without extent, irradiance.
+    /// A unit direction to the light, and radiance over its pdf; for a light without extent, irradiance.
     #[inline(always)]
     pub fn arriving(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         if self.is_sharp() {
@@ -59,35 +59,35 @@ impl DirectionalLight {
         (direction, self.radiance * self.inverse_density())
     }
 
-    /// Which directions it comes from, and its irradiance.
+    /// Directions of the light, and its irradiance.
     pub fn bounds(&self) -> LightBounds {
         LightBounds {
             space: Space::Beyond,
             center: self.to_light.as_dvec3(),
-            // The chord from the middle to the edge.
+            // Take the chord from the middle to the edge.
             radius: (2.0 * f64::from(self.one_minus_cos)).sqrt(),
             power: strength(self.irradiance),
             cone: EmissionCone::ALL,
         }
     }
 
-    /// Radiance from a direction; none from a light without extent.
+    /// Radiance from a direction; 0 for a light without extent.
     pub fn radiance(&self, direction: Vec3) -> Vec3 {
         if self.holds(direction) { self.radiance } else { Vec3::ZERO }
     }
 
-    /// Density in sr⁻¹ of [`DirectionalLight::sample`]; 0 without extent.
+    /// Pdf in sr⁻¹ of [`DirectionalLight::sample`]; 0 without extent.
     pub fn pdf(&self, direction: Vec3) -> f32 {
         if self.holds(direction) { 1.0 / self.inverse_density() } else { 0.0 }
     }
 
-    /// One over that density; 0 without extent.
+    /// Inverse of that pdf; 0 without extent.
     #[inline(always)]
     pub fn inverse_density(&self) -> f32 {
         2.0 * PI * self.one_minus_cos
     }
 
-    /// Whether a unit direction is one of the disc. By the chord between them, which is exact for small discs too.
+    /// Whether a unit direction is in the disc. Compares chords, which is exact for small discs too.
     fn holds(&self, direction: Vec3) -> bool {
         !self.is_sharp() && (direction - self.to_light).length_squared() <= 2.0 * self.one_minus_cos
     }
@@ -107,7 +107,7 @@ mod tests {
                 let u = PixelSampler::new(1, 2, 3, sample).pair(1, Decision::Light(0)).to_array();
                 let sample = sun.sample(u).expect("light");
                 assert_eq!(sample.end, End::Beyond);
-                // The very edge may be on either side.
+                // The very edge may count either way.
                 if sun.pdf(sample.direction) > 0.0 {
                     let product =
                         sun.radiance(sample.direction).x / sun.pdf(sample.direction) / sample.weight.x;

@@ -15,7 +15,7 @@ pub struct DiskEmitter {
     radius: f64,
 }
 
-/// A disk as it is seen from a point: directions in an elliptical cone.
+/// A disk relative to a point: directions in an elliptical cone.
 #[derive(Clone, Copy, Debug)]
 pub struct DiskView {
     /// Axis of the cone, and the directions of the ellipse's axes.
@@ -23,7 +23,7 @@ pub struct DiskView {
     /// Tangents of the half angles along them.
     a: f64,
     b: f64,
-    /// The density of an angle around the axis is one over p·cos² + q·sin².
+    /// Coefficients of the density of an angle around the axis, 1/(p·cos² + q·sin²).
     p: f64,
     q: f64,
     /// Height of the point above the front, > 0.
@@ -33,12 +33,12 @@ pub struct DiskView {
 }
 
 impl DiskEmitter {
-    /// All of a disk.
+    /// The emitter of a whole disk.
     pub fn new(disk: &Disk) -> Self {
         Self { center: disk.middle(), normal: disk.normal(), radius: disk.radius() }
     }
 
-    /// As seen from a point before it; else its height is not positive, and nothing else counts.
+    /// View of the disk from a point before it. From behind, the view's height is not positive, and nothing else of it counts.
     ///
     /// In the plane of the disk's normal and its middle the cone has the half angle α between the rays to the nearest and the
     /// farthest point; across, at the bisector, β (Guillén et al., *Area-Preserving Parameterizations for Spherical Ellipses*,
@@ -60,7 +60,7 @@ impl DiskEmitter {
         let h2 = height * height;
         let (l0, l1) = ((near * near + h2).sqrt(), (far * far + h2).sqrt());
         let both = l0 + l1;
-        // Where the bisector meets the plane, and how far that is.
+        // Intersect the bisector with the plane.
         let middle = (near * l1 + far * l0) / both;
         let l = (middle * middle + h2).sqrt();
         // tan α by sine and cosine of 2α times l0·l1, without differences of near numbers.
@@ -84,7 +84,7 @@ impl DiskEmitter {
         }
     }
 
-    /// Uniform within 20 % over the solid angle.
+    /// Samples the disk, uniformly within 20 % over the solid angle.
     #[inline(always)]
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let view = self.seen_from(point);
@@ -97,7 +97,7 @@ impl DiskEmitter {
         }
     }
 
-    /// Density in sr⁻¹ of a direction that meets the front.
+    /// Pdf in sr⁻¹ of a direction that hits the front.
     pub fn pdf(&self, from: Vec3, direction: Vec3) -> f64 {
         let view = self.seen_from(from);
         if view.is_front() { view.pdf(direction) } else { 0.0 }
@@ -116,7 +116,7 @@ impl DiskEmitter {
 }
 
 impl DiskView {
-    /// Whether the front is seen.
+    /// Whether the front is visible.
     #[inline(always)]
     pub fn is_front(&self) -> bool {
         self.height > 0.0
@@ -128,9 +128,9 @@ impl DiskView {
         TAU * self.a * self.b / (self.p * self.q).sqrt()
     }
 
-    /// Direction, distance to the plane, and one over the density.
+    /// Direction, distance to the plane, and the inverse pdf.
     ///
-    /// In the plane before the eye that the axis is perpendicular to, the ellipse is (a·r·cos φ, b·r·sin φ). A slice dφ fills
+    /// In a plane before the point, perpendicular to the axis, the ellipse is (a·r·cos φ, b·r·sin φ). A slice dφ fills
     /// a·b/(Q + √Q) dφ, Q = 1 + a²cos²φ + b²sin²φ, and in it cosines to the axis are uniform. φ gets the density
     /// ∝ 1/(p·cos²φ + q·sin²φ), whose denominator is Q + √Q at both axes and at least 1/1.2 of it between.
     #[inline(always)]
@@ -151,13 +151,13 @@ impl DiskView {
         (direction, distance, self.factor(cos * cos, q + root))
     }
 
-    /// One over the density, at cos²φ and Q + √Q.
+    /// Inverse pdf at cos²φ and Q + √Q.
     #[inline(always)]
     fn factor(&self, cos2: f64, slice: f64) -> f64 {
         self.solid_angle() * (self.p * cos2 + self.q * (1.0 - cos2)) / slice
     }
 
-    /// Density in sr⁻¹ of a direction inside.
+    /// Pdf in sr⁻¹ of a direction inside.
     pub fn pdf(&self, direction: Vec3) -> f64 {
         let direction = direction.as_dvec3();
         let [_, along, beside] = self.axes;
@@ -168,7 +168,7 @@ impl DiskView {
     }
 }
 
-/// A unit vector perpendicular to one.
+/// A unit vector perpendicular to another one.
 #[inline(always)]
 pub fn perpendicular(n: DVec3) -> DVec3 {
     let is_x = n.x.abs() < 0.6;

@@ -1,4 +1,4 @@
-//! Samples of lights that each point of a row picked for itself.
+//! Samples of lights for a row of points, each of which picked its own light.
 
 use super::emitter::{Arrival, Emitter};
 use super::mesh::{Facets, Sampling};
@@ -10,7 +10,7 @@ use crate::geometry::rows::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 
-/// The row of samples of convex emitters, one and its light for each lane.
+/// Samples a row of convex emitters, with a light for each lane.
 macro_rules! row_of_wholes {
     ($i:ident => $all:expr, $points:expr, $u:expr) => {{
         let mut row = row_of!(Source::Nothing, $i => {
@@ -27,8 +27,8 @@ macro_rules! row_of_wholes {
 }
 
 impl Lights {
-    /// [`Light::sample`] of a light of its own for each point whose bit is set, by numbers of its own; one over the densities
-    /// in sr⁻¹, as [`Light::inverse_densities`]; and how many texture look-ups that took.
+    /// [`Light::sample`] for each point whose bit is set, with its own light and numbers; the inverse pdfs in sr⁻¹, as
+    /// [`Light::inverse_densities`]; and the number of texture look-ups.
     #[inline(always)]
     pub fn sample_each(
         &self,
@@ -43,7 +43,7 @@ impl Lights {
         }
         let mut row = LightRow::dark(Source::Nothing);
         let mut left = used;
-        // Sample the lights of each kind side by side; lanes of other kinds look at one of these as well, which counts nothing.
+        // Sample the lights of each kind side by side. Lanes of other kinds get one of these lights as well, without effect.
         while left != 0 {
             let first = left.trailing_zeros() as usize % LANES;
             let mut of = 0;
@@ -81,7 +81,7 @@ impl Lights {
         for i in 0..LANES {
             inverse[i] = lights[i].inverse_density(lane(&row.directions, i), lane(&row.weights, i));
         }
-        // Densities are those of plain lamps.
+        // Take the pdfs of plain lamps.
         let mut lookups = 0;
         for i in lanes(used) {
             let weight = lane(&row.weights, i);
@@ -145,7 +145,7 @@ fn sampling(light: &AreaLight) -> Option<&Sampling> {
     }
 }
 
-/// The lights of one kind, and a bit of `left` for each lane that has one; the others get the filler.
+/// Lights of one kind, and a bit of `left` for each lane that has one; the other lanes get the filler.
 #[inline(always)]
 fn alike<'a, T: Copy>(
     (lights, left): (&[&'a Light; LANES], u32),
@@ -164,7 +164,7 @@ fn alike<'a, T: Copy>(
 }
 
 impl Light {
-    /// One of [`Light::inverse_densities`], by the direction and the weight of a sample.
+    /// Inverse pdf as [`Light::inverse_densities`], from the direction and the weight of a sample.
     #[inline(always)]
     fn inverse_density(&self, direction: Vec3, weight: Vec3) -> f32 {
         match self {

@@ -18,24 +18,24 @@ use crate::geometry::triangle::Triangle;
 use crate::materials::TexturePoint;
 use crate::math::{DVec2, DVec3, Vec3};
 
-/// A shape that sends out light from its front side, in every direction alike.
+/// A shape that emits from its front side, with the same radiance in every direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AreaLight {
-    /// Which shape.
+    /// Emitting shape.
     pub shape: Emitter,
-    /// Its radiance; with a pattern, what that is multiplied by.
+    /// Radiance; with a pattern, the factor on it.
     pub radiance: Vec3,
-    /// What it is multiplied by from point to point.
+    /// Emission texture, by which the radiance is multiplied from point to point.
     pub pattern: Option<Box<Pattern>>,
-    /// The object that it is.
+    /// Number of the object.
     pub object: u32,
-    /// Which part of it.
+    /// Part of the object.
     pub part: Part,
-    /// Where it is and what it sends.
+    /// Bounds on the light's position, directions and power.
     pub bounds: LightBounds,
 }
 
-/// Which part of an object a light is.
+/// Part of an object that a light is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// All of it.
@@ -51,7 +51,7 @@ pub enum Emitter {
     Sphere(SphereEmitter),
     /// A parallelogram.
     Quad(QuadEmitter),
-    /// A parallelogram that is sampled by its picture.
+    /// A parallelogram that is sampled by its emission texture.
     Picture(Box<PictureEmitter>),
     /// A box.
     Box(BoxEmitter),
@@ -69,7 +69,7 @@ pub enum Emitter {
     Mesh(MeshEmitter),
 }
 
-/// The light that a shape is where all of it shines; none where it has no end, or no area.
+/// The light of a shape that emits all over. `None` if the shape is infinite, or has no area.
 pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let emitter = match shape {
         Shape::Sphere(sphere) => {
@@ -89,8 +89,8 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
     Some(AreaLight { shape: emitter, radiance, pattern: None, object, part: Part::Whole, bounds })
 }
 
-/// Where a shape is and what it sends; none where it has no end. What is flat sends by the cosine, all else a quarter of its area
-/// times its radiance, which is the mean over the directions of what is convex (Cauchy).
+/// Bounds of a shape's emission. `None` if the shape is infinite. Flat shapes emit by the cosine. Others emit a quarter of their
+/// area times the radiance in any direction, which is the mean over directions for a convex shape (Cauchy).
 fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
     let normal = match shape {
         Shape::Quad(quad) => Some(quad.u.cross(quad.v)),
@@ -112,7 +112,7 @@ fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
 }
 
 impl AreaLight {
-    /// With a pattern, by which a quad is sampled as well.
+    /// The light with an emission texture, by which a quad is sampled as well.
     pub fn with_pattern(mut self, pattern: Pattern) -> Self {
         if let Emitter::Quad(quad) = &self.shape {
             let color = |at: [f64; 2]| pattern.texture().lookup(&TexturePoint::sharp(DVec2::from_array(at)));
@@ -124,7 +124,7 @@ impl AreaLight {
         Self { pattern: Some(Box::new(pattern)), ..self }
     }
 
-    /// The quad that its points are chosen on, and the two triangles that this is made of, if it is.
+    /// The quad on which its points are sampled, and the pair of triangles that forms the quad, if it is one.
     #[inline(always)]
     pub fn quad(&self) -> Option<(&QuadEmitter, Option<&QuadOfTwo>)> {
         match &self.shape {
@@ -155,7 +155,7 @@ impl AreaLight {
         Some(LightSample { weight: sample.weight * pattern.at(target, primitive), ..sample })
     }
 
-    /// The same without its pattern.
+    /// [`AreaLight::sample`] without its emission texture.
     #[inline]
     pub fn plain_sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: Arrival| {
@@ -213,18 +213,18 @@ impl AreaLight {
     }
 }
 
-/// A point of a light that shines on another one, computed without branches.
+/// A sample of a point on a light, computed without branches.
 #[derive(Clone, Copy, Debug)]
 pub struct Arrival {
-    /// Unit direction to there.
+    /// Unit direction to the sampled point.
     pub direction: Vec3,
-    /// Where it is.
+    /// Sampled point.
     pub target: Vec3,
-    /// One over the density of the direction, in sr; 0 where the light is seen from behind or from inside.
+    /// Inverse pdf of the direction, in sr; 0 from behind or from inside the light.
     pub factor: f32,
 }
 
 impl Arrival {
-    /// Where nothing is seen of a light.
+    /// No sample: the light is not visible.
     pub const NOTHING: Self = Self { direction: Vec3::ZERO, target: Vec3::ZERO, factor: 0.0 };
 }

@@ -1,4 +1,4 @@
-//! Light from all around.
+//! Environment light.
 
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use crate::sampling::warp;
 pub enum Environment {
     /// The same radiance everywhere.
     Constant(Vec3),
-    /// By a map.
+    /// A map of radiance.
     Map {
         /// The map.
         sky: Arc<SkyMap>,
@@ -27,26 +27,26 @@ pub enum Environment {
     },
 }
 
-/// Ways for light from all around to arrive, side by side.
+/// Samples of an environment, side by side.
 pub struct SkyRow {
-    /// Unit directions to where it comes from.
+    /// Unit directions to the light.
     pub directions: Lanes3,
     /// [`LightSample::weight`].
     pub weights: Lanes3,
-    /// One over the densities in sr⁻¹; 0 where nothing arrives.
+    /// Inverse pdfs in sr; 0 if nothing arrives.
     pub inverse_densities: Lanes,
 }
 
-/// Density of samples of a constant radiance: they are those that the front of a surface sees.
+/// Pdf of samples of a constant radiance: uniform over the hemisphere before the surface.
 const HEMISPHERE: f32 = 1.0 / (2.0 * PI);
 
 impl Environment {
-    /// A map, as bright as white times a factor, turned by an angle in degrees.
+    /// A map whose white is times a factor, turned by an angle in degrees.
     pub fn map(sky: Arc<SkyMap>, factor: Vec3, degrees: f64) -> Self {
         Self::Map { sky, factor, turn: (degrees / 360.0).rem_euclid(1.0) as f32 }
     }
 
-    /// All directions, and the irradiance of a surface by its mean radiance.
+    /// Bounds: all directions, and the irradiance of a surface by the mean radiance.
     pub fn bounds(&self) -> LightBounds {
         let mean = match self {
             Self::Constant(radiance) => strength(*radiance),
@@ -56,7 +56,7 @@ impl Environment {
         LightBounds { space: Space::Beyond, center: DVec3::ZERO, radius: 1.0, power, cone: EmissionCone::ALL }
     }
 
-    /// Radiance from a unit direction, and the density in sr⁻¹ of [`Environment::sample`] on the side of the surface that the
+    /// Radiance from a unit direction, and the pdf in sr⁻¹ of [`Environment::sample`], on the side of the surface that the
     /// normal is on.
     #[inline(always)]
     pub fn arriving(&self, direction: Vec3) -> (Vec3, f32) {
@@ -69,7 +69,7 @@ impl Environment {
         }
     }
 
-    /// [`Environment::arriving`] from directions side by side.
+    /// [`Environment::arriving`] for directions side by side.
     #[inline(always)]
     pub fn arriving_row(&self, directions: &Lanes3) -> (Lanes3, Lanes) {
         match self {
@@ -87,7 +87,7 @@ impl Environment {
         }
     }
 
-    /// Ways for its light to arrive at surfaces of these normals, side by side.
+    /// Samples of the environment for surfaces of these normals, side by side.
     #[inline(always)]
     pub fn sample_row(&self, normals: &Lanes3, u: &[Lanes; 2]) -> SkyRow {
         let (directions, mut weights, densities) = match self {
@@ -111,7 +111,7 @@ impl Environment {
         };
         let mut inverse_densities = [0.0; LANES];
         for i in 0..LANES {
-            // In the corner of a cell that is dark but for the others.
+            // The pdf is 0 in the corner of a cell that is dark but for its neighbours.
             inverse_densities[i] = if densities[i] > 0.0 { 1.0 / densities[i] } else { 0.0 };
             let weight = lane(&weights, i) * inverse_densities[i];
             set_lane(&mut weights, i, weight);
@@ -119,20 +119,21 @@ impl Environment {
         SkyRow { directions, weights, inverse_densities }
     }
 
-    /// One over the density of its samples from a direction, in sr.
+    /// Inverse pdf of its samples at a direction, in sr.
     #[inline(always)]
     pub fn inverse_density(&self, direction: Vec3) -> f32 {
         let (_, density) = self.arriving(direction);
         if density > 0.0 { 1.0 / density } else { 0.0 }
     }
 
-    /// A unit direction to its light, and radiance over its density; the direction is any, not one that a surface sees.
+    /// A unit direction to its light, and radiance over its pdf; over all directions, not only those that a surface
+    /// sees.
     pub fn arriving_anywhere(&self, u: [f32; 2]) -> (Vec3, Vec3) {
         match self {
             Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
             Self::Map { sky, factor, turn } => {
                 let (direction, color, density) = sky.sample(u, *turn);
-                // In the corner of a cell that is dark but for the others.
+                // The pdf is 0 in the corner of a cell that is dark but for its neighbours.
                 (direction, color * *factor * if density > 0.0 { 1.0 / density } else { 0.0 })
             }
         }
@@ -146,7 +147,7 @@ impl Environment {
         }
     }
 
-    /// A way for its light to arrive at a surface of this normal.
+    /// Samples the environment for a surface of this normal.
     pub fn sample(&self, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let (direction, radiance, density) = match self {
             Self::Constant(radiance) => {

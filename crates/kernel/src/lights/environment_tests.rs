@@ -16,7 +16,7 @@ fn light(texels: &Arc<Texels>, degrees: f64) -> Environment {
     Environment::map(Arc::new(SkyMap::new(Arc::clone(texels)).expect("light")), Vec3::ONE, degrees)
 }
 
-/// Something irregular with black parts and a bright spot.
+/// An irregular map with black parts and a bright spot.
 fn patchy(width: u32, height: u32) -> Arc<Texels> {
     map(width, height, |x, y| {
         let random = (x.wrapping_mul(7919).wrapping_add(y.wrapping_mul(104_729)) >> 3) % 97;
@@ -92,7 +92,7 @@ fn samples_have_the_density_that_their_directions_have() {
         for i in 0..20_000 {
             let Some(sample) = environment.sample(Vec3::Y, random(i)) else { continue };
             let (radiance, density) = environment.arriving(sample.direction);
-            // The direction is rounded: next to a dark corner of a cell, or in the next cell, it has other numbers.
+            // The direction is rounded: next to a dark corner of a cell, or in the next cell, its numbers differ.
             let expected = radiance * (1.0 / density);
             off += u32::from(!((sample.weight - expected).length() <= 2e-3 * expected.length()));
             assert!((sample.direction.length() - 1.0).abs() < 1e-6);
@@ -105,8 +105,8 @@ fn samples_have_the_density_that_their_directions_have() {
     }
 }
 
-/// The light of a grey map arrives by samples of one weight: 4π times the mean, but that rows of cells at the poles are interpolated by
-/// angles and sampled by heights.
+/// The light of a grey map arrives by samples of equal weight, 4π times the mean; but rows of cells at the poles are interpolated
+/// by angles and sampled by heights.
 #[test]
 fn samples_are_as_dense_as_the_light_between_texels() {
     let (width, height) = (64, 32);
@@ -145,7 +145,7 @@ fn where_there_is_light_there_are_samples_and_densities_make_a_whole() {
     }
 }
 
-/// χ² of samples over cells of (turn, height), each with what the densities say; cells of less than 5 are put together.
+/// χ² of samples over cells of (turn, height), against the pdfs; cells of less than 5 expected samples are merged.
 #[test]
 fn samples_come_as_often_as_their_densities_say() {
     let (width, height) = (24_usize, 12_usize);

@@ -1,19 +1,19 @@
-//! Densities that are linear between a few places.
+//! Piecewise linear densities.
 
-/// A density on [0, 1] in proportion to these at places as far from one another, and linear between.
+/// A density on [0, 1] in proportion to these values at equidistant nodes, and linear between them.
 #[derive(Clone, Copy, Debug)]
 pub struct Linear<const NODES: usize>(pub [f64; NODES]);
 
 impl<const NODES: usize> Linear<NODES> {
     const PIECES: f64 = (NODES - 1) as f64;
 
-    /// The mean of what is told.
+    /// Mean of the values.
     pub fn mean(&self) -> f64 {
         let inner: f64 = self.0[1..NODES - 1].iter().sum();
         (inner + 0.5 * (self.0[0] + self.0[NODES - 1])) / Self::PIECES
     }
 
-    /// The place below which there is a share in [0, 1) of all, and its density.
+    /// The place below which lies a share in [0, 1) of the whole, and its density.
     pub fn sample(&self, share: f64) -> (f64, f64) {
         let mean = self.mean();
         let (mut rest, mut piece) = (share * mean * Self::PIECES, 0);

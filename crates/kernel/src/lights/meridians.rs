@@ -1,13 +1,12 @@
-//! Angles around a pole, chosen by what their half planes show of a light.
+//! Angles around a pole, chosen by the part of a light in their half planes.
 
 use super::linear::Linear;
 use crate::math::{DVec3, Vec3};
 
-/// How many angles to one side have the density that is told.
+/// Number of nodes to one side at which the density is evaluated.
 const NODES: usize = 9;
 
-/// Angles around a pole to both sides of 0, as far as a light reaches. Their density is linear between a few angles, where it is
-/// as told.
+/// Angles around a pole to both sides of 0, up to the reach of a light. Their density is linear between a few nodes.
 #[derive(Clone, Copy, Debug)]
 pub struct Meridians {
     /// The greatest angle.
@@ -25,10 +24,10 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// Of half the angle, in [0, π].
+    /// Sine and cosine of half the angle, in [0, π].
     fn half(self) -> Self {
         let cos = (0.5 * (1.0 + self.cos)).max(0.0).sqrt();
-        // Where the cosine is 0 the angle was π.
+        // If the cosine is 0, the angle was π.
         let sin = if cos > 0.5 { 0.5 * self.sin / cos } else { (0.5 * (1.0 - self.cos)).max(0.0).sqrt() };
         Self { sin, cos }
     }
@@ -40,7 +39,7 @@ impl Turn {
         }
     }
 
-    /// Of an angle.
+    /// Sine and cosine of an angle.
     pub fn of(angle: f64) -> Self {
         let (sin, cos) = libm::sincos(angle);
         Self { sin, cos }
@@ -48,7 +47,7 @@ impl Turn {
 }
 
 impl Meridians {
-    /// Up to an angle in [0, π], with densities in proportion to what is told of angles in [0, π].
+    /// Angles up to a reach in [0, π], with densities in proportion to the weights of angles in [0, π].
     pub fn new(reach: Turn, weight: impl Fn(Turn) -> f64) -> Self {
         let step = reach.half().half().half();
         let mut turn = Turn { sin: 0.0, cos: 1.0 };
@@ -78,14 +77,14 @@ impl Meridians {
     }
 }
 
-/// Directions by the angle from a pole and that around it.
+/// Directions by the angle from a pole and the angle around it.
 #[derive(Clone, Copy, Debug)]
 pub struct Pole {
     /// The pole.
     pub pole: DVec3,
     /// Perpendicular to it, at the angle 0.
     pub front: DVec3,
-    /// At a right angle.
+    /// Perpendicular to both, at a right angle.
     pub side: DVec3,
 }
 

@@ -1,4 +1,5 @@
-//! Emissive triangles of a mesh: two that make a parallelogram as a quad is, few others by area, many by a tree over them.
+//! Emissive triangles of a mesh: two that form a parallelogram are sampled as a quad, a few others by area, many by a
+//! light tree.
 
 use super::emitter::Arrival;
 use super::rectangle::QuadEmitter;
@@ -12,27 +13,27 @@ use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 use crate::sampling::warp;
 
-/// Triangles that shine along (b − a) × (c − a).
+/// Triangles that emit along (b − a) × (c − a).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshEmitter {
-    /// Corners in world coordinates, with the number each has in its object.
+    /// Corners in world coordinates, with the number of each triangle in its object.
     triangles: Vec<([DVec3; 3], u32)>,
     by_area: Discrete,
     /// Centre of area.
     center: DVec3,
-    /// Where the triangles are and what they send, for a unit of radiance.
+    /// Bounds of the triangles' positions and emission, for a unit of radiance.
     bounds: LightBounds,
     sampling: Sampling,
 }
 
-/// How points of a mesh are chosen.
+/// Sampling of the points of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sampling {
-    /// As those of a quad.
+    /// Sampling as a quad.
     Quad(Box<QuadOfTwo>),
     /// Uniform over the area.
     Area(Facets),
-    /// A triangle by a tree over all, and a point by what is seen of it.
+    /// Sampling by a light tree over all triangles, then by the visible part of the triangle.
     Tree(LightTree),
 }
 
@@ -40,7 +41,7 @@ pub enum Sampling {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadOfTwo {
     quad: QuadEmitter,
-    /// An offset from the corner times this is below 1 on the triangle at the corner, above on the other.
+    /// The product of this and an offset from the corner is below 1 on the triangle at the corner, above on the other.
     across: Vec3,
     /// The numbers of the two triangles in the object.
     primitives: [u32; 2],
@@ -67,10 +68,10 @@ struct Facet {
 }
 
 impl MeshEmitter {
-    /// From corners with their primitive numbers, which increase; none where there is no area.
+    /// An emitter from corners with their primitive numbers, which increase. `None` if there is no area.
     ///
     /// # Errors
-    /// [`Cancelled`] when the token was told so.
+    /// [`Cancelled`] if the token is cancelled.
     pub fn new(triangles: Vec<([DVec3; 3], u32)>, token: &CancelToken) -> Result<Option<Self>, Cancelled> {
         let vector_area_of = |[a, b, c]: &[DVec3; 3]| (*b - *a).cross(*c - *a) * 0.5;
         let areas = triangles.iter().map(|(corners, _)| vector_area_of(corners).length());
@@ -90,12 +91,12 @@ impl MeshEmitter {
         Ok(Some(Self { triangles, by_area, center, bounds, sampling }))
     }
 
-    /// The numbers that its triangles have in their object.
+    /// Numbers of its triangles in their object.
     pub fn primitives(&self) -> impl Iterator<Item = u32> {
         self.triangles.iter().map(|(_, primitive)| *primitive)
     }
 
-    /// A point of one of its triangles, uniform over it, with the triangle's area and its number in the object.
+    /// Samples a point of one of its triangles uniformly; with the triangle's area and its number in the object.
     pub fn place(&self, index: usize, u: Vec2) -> (AreaPoint, f64, u32) {
         let ([a, b, c], primitive) = &self.triangles[index];
         let weights = warp::triangle(u).as_dvec3();
@@ -105,12 +106,12 @@ impl MeshEmitter {
         (AreaPoint { point, normal: vector_area / area }, area, *primitive)
     }
 
-    /// Where the triangles are and what they send, for a unit of radiance.
+    /// Bounds of the triangles' positions and emission, for a unit of radiance.
     pub fn bounds(&self) -> LightBounds {
         self.bounds
     }
 
-    /// How its points are chosen.
+    /// Sampling of its points.
     #[inline(always)]
     pub fn sampling(&self) -> &Sampling {
         &self.sampling
@@ -124,7 +125,7 @@ impl MeshEmitter {
         }
     }
 
-    /// A way for its light to arrive at a point of a surface with this normal.
+    /// Samples its light at a point of a surface with this normal.
     #[inline(always)]
     pub fn sample(
         &self,
@@ -185,17 +186,17 @@ impl MeshEmitter {
 }
 
 impl QuadOfTwo {
-    /// How far the fourth corner of a parallelogram may be off, in units of its size.
+    /// Largest deviation of the fourth corner from a parallelogram, in units of its size.
     const FLATNESS: f64 = 1e-5;
 
-    /// Two triangles that share an edge and make a parallelogram; `None` of others.
+    /// The parallelogram of two triangles that share an edge. `None` if they form none.
     fn of(triangles: &[([DVec3; 3], u32)]) -> Option<Self> {
         let [(first, one), (second, two)] = triangles else { return None };
         let normal = |[a, b, c]: &[DVec3; 3]| (b - a).cross(c - a);
         if normal(first).dot(normal(second)) <= 0.0 {
             return None;
         }
-        // The corner of the first that the second lacks, and the one that the first lacks.
+        // Find the corner of the first that the second lacks, and the corner that the first lacks.
         let corner = (0..3).find(|&i| !second.contains(&first[i]))?;
         let [p, x, y] = [0, 1, 2].map(|i| first[(corner + i) % 3]);
         let far = second.iter().find(|other| !first.contains(other))?;
@@ -216,7 +217,7 @@ impl QuadOfTwo {
         &self.quad
     }
 
-    /// The number of the triangle that a target of a sample for a point is on.
+    /// Number of the triangle that contains the target of a sample for a point.
     #[inline(always)]
     pub fn part(&self, point: Vec3, target: Vec3) -> u32 {
         let offset = (target - point) - self.quad.corner_from(point);
@@ -235,7 +236,7 @@ impl Facets {
         Self { all, by_area: by_area.clone(), area: by_area.total() as f32 }
     }
 
-    /// A way for their light to arrive at a point.
+    /// Samples their light at a point.
     #[inline(always)]
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let (index, rest) = self.by_area.sample(u[0]);
@@ -249,7 +250,7 @@ impl Facets {
         Arrival { direction, target: point + offset, factor }
     }
 
-    /// The number of the triangle that a sample comes from, by its first random number.
+    /// Number of the triangle of a sample, by its first random number.
     #[inline(always)]
     pub fn part(&self, u: f32) -> u32 {
         self.all[self.by_area.sample(u).0].primitive

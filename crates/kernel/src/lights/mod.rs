@@ -1,4 +1,4 @@
-//! Lights: where light comes from, as seen from a point.
+//! Lights, and the sampling of their light at a point.
 
 pub mod cuboid;
 pub mod directional;
@@ -43,47 +43,47 @@ use crate::math::Vec3;
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Light {
-    /// Without extent.
+    /// A light without extent.
     Point(PointLight),
-    /// Without extent, into a cone.
+    /// A light without extent that emits into a cone.
     Spot(SpotLight),
-    /// From beyond the scene.
+    /// A light from beyond the scene, in one direction or a small disc.
     Directional(DirectionalLight),
-    /// From all around.
+    /// An environment, from all around.
     Environment(Environment),
     /// A shape that emits.
     Area(AreaLight),
 }
 
-/// One way for light to arrive at a point.
+/// A sample of the light that arrives at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
-    /// Where it comes from.
+    /// End of the shadow ray.
     pub end: End,
-    /// Unit direction to there.
+    /// Unit direction to the light.
     pub direction: Vec3,
-    /// Radiance over the density of the direction in sr⁻¹: times f and the cosine it is a contribution. For lights
+    /// Radiance over the pdf of the direction in sr⁻¹: times f and the cosine, it is the contribution. For lights
     /// without extent, irradiance at normal incidence.
     pub weight: Vec3,
-    /// What the shadow ray need not hit: the light itself.
+    /// Objects that the shadow ray ignores: the light itself.
     pub source: Source,
 }
 
-/// Where light comes from.
+/// End of a shadow ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum End {
     /// A point, in world coordinates.
     At(Vec3),
-    /// From beyond everything in the scene.
+    /// A place beyond everything in the scene.
     Beyond,
 }
 
-/// Where the middle of a light is.
+/// Position of the middle of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Middle {
     /// A point, in world coordinates.
     At(Vec3),
-    /// Beyond everything, in this unit direction.
+    /// A place beyond everything, in this unit direction.
     Towards(Vec3),
 }
 
@@ -92,13 +92,13 @@ pub enum Middle {
 pub enum Source {
     /// Nothing that can be hit.
     Nothing,
-    /// A convex object: no ray to its near side meets it before.
+    /// A convex object: no ray to its near side hits it before.
     Object(u32),
     /// One primitive of an object.
     Primitive(u32, u32),
 }
 
-/// A point of a light, as a ray from elsewhere meets it.
+/// A point of a light that a ray from elsewhere hits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Met {
     /// Unit direction of the ray.
@@ -107,12 +107,12 @@ pub struct Met {
     pub distance: f32,
     /// Unit normal of the light's front there.
     pub normal: Vec3,
-    /// The part of the object that was met.
+    /// Number of the primitive that was hit.
     pub primitive: u32,
 }
 
 impl Met {
-    /// Density in sr⁻¹ of directions to points that are uniform over an area; 0 from behind.
+    /// Pdf in sr⁻¹ of directions to points that are uniform over an area; 0 from behind.
     fn pdf_by_area(&self, area: f64) -> f32 {
         let cosine = -self.normal.dot(self.direction);
         if cosine > 0.0 { self.distance * self.distance / (area as f32 * cosine) } else { 0.0 }
@@ -120,8 +120,8 @@ impl Met {
 }
 
 impl Light {
-    /// Density in sr⁻¹ with which its samples for the point `from` of a surface with this normal come from what a ray from there
-    /// met; 0 where none does, and of lights that no ray meets.
+    /// Light-sampling pdf in sr⁻¹ of a hit's direction, for the point `from` of a surface with this normal; 0 if the light is
+    /// never sampled there, or no ray can hit it.
     #[inline]
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &Met) -> f32 {
         match self {
@@ -130,8 +130,8 @@ impl Light {
         }
     }
 
-    /// A way for its light to arrive at a point of a surface with this normal, by numbers in [0, 1); none where what was chosen
-    /// sends nothing there.
+    /// Samples its light at a point of a surface with this normal, by numbers in [0, 1). `None` if the chosen point sends
+    /// nothing there.
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
             Self::Point(light) => light.sample(point),
@@ -142,7 +142,7 @@ impl Light {
         }
     }
 
-    /// The same, as if it sent the same radiance from everywhere.
+    /// [`Light::sample`] without an emission texture.
     #[inline]
     pub fn plain_sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
@@ -153,7 +153,7 @@ impl Light {
         }
     }
 
-    /// Where it is and what it sends, for a [`LightTree`]; none of a light that has none.
+    /// Bounds of its position and emission, for a [`LightTree`]. `None` if it emits nothing.
     pub fn bounds(&self) -> Option<LightBounds> {
         match self {
             Self::Point(light) => Some(light.bounds()),
@@ -165,7 +165,7 @@ impl Light {
         .filter(|bounds| bounds.power > 0.0)
     }
 
-    /// What its radiance is multiplied by from point to point; none: nothing.
+    /// Emission texture, by which its radiance is multiplied from point to point. `None` if it has none.
     #[inline(always)]
     pub fn pattern(&self) -> Option<&Pattern> {
         match self {
@@ -182,7 +182,7 @@ impl Light {
         }
     }
 
-    /// Whether it is light from all around.
+    /// Whether it is an environment.
     pub fn is_from_all_around(&self) -> bool {
         match self {
             Self::Environment(_) => true,
@@ -190,7 +190,7 @@ impl Light {
         }
     }
 
-    /// Whether there is but one way.
+    /// Whether its light arrives in a single direction.
     pub fn is_single(&self) -> bool {
         match self {
             Self::Point(_) | Self::Spot(_) => true,
@@ -199,7 +199,7 @@ impl Light {
         }
     }
 
-    /// The middle of the light, and what a ray to there need not hit: the light itself. Light from all around has none.
+    /// Middle of the light, and the objects that a ray to there ignores: the light itself. `None` for an environment.
     pub fn middle(&self) -> Option<(Middle, Source)> {
         Some(match self {
             Self::Point(PointLight { position, .. })

@@ -1,7 +1,7 @@
-//! Lamps that do not send the same radiance from everywhere.
+//! Emission textures: lamps whose radiance differs from point to point.
 //!
-//! Samples of a quad follow its texture, those of other shapes are taken as if they did; each counts the texture at its point:
-//! densities are those of the emitter, and exact.
+//! Samples of a quad follow its texture; samples of other shapes do not. Each sample is multiplied by the texture at its
+//! point. Pdfs are those of the emitter, and exact.
 
 use std::sync::Arc;
 
@@ -11,19 +11,19 @@ use crate::materials::TexturePoint;
 use crate::materials::texture::Texture;
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// What the radiance of a lamp is multiplied by, from point to point.
+/// Factor on the radiance of a lamp, from point to point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pattern {
     texture: Arc<Texture>,
     chart: Chart,
 }
 
-/// How the points of a lamp find their texture coordinates.
+/// Map from the points of a lamp to their texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Chart {
-    /// As the shape has them.
+    /// The shape's own texture coordinates.
     Shape(Shape),
-    /// By the triangles of a mesh, in the order of their numbers.
+    /// Texture coordinates of the triangles of a mesh, in the order of their numbers.
     Triangles(Vec<Patch>),
 }
 
@@ -39,17 +39,17 @@ pub struct Patch {
 }
 
 impl Pattern {
-    /// Of a texture, on a lamp with these texture coordinates.
+    /// The emission texture of a lamp with these texture coordinates.
     pub fn new(texture: &Arc<Texture>, chart: Chart) -> Self {
         Self { texture: Arc::clone(texture), chart }
     }
 
-    /// What is looked up.
+    /// Texture that it looks up.
     pub fn texture(&self) -> &Texture {
         &self.texture
     }
 
-    /// At a point of the lamp; `primitive` is the triangle of a mesh that it is on.
+    /// Factor at a point of the lamp; `primitive` is the triangle of the mesh that contains the point.
     #[inline]
     pub fn at(&self, point: Vec3, primitive: u32) -> Vec3 {
         self.texture.lookup(&TexturePoint::sharp(self.chart.uv(point.as_dvec3(), primitive)))

@@ -1,4 +1,4 @@
-//! Quad lamps with a picture on them: sampled by the picture as well as by what a point sees of them.
+//! Textured quad lights, sampled by their emission texture as well as by solid angle.
 
 use super::Met;
 use super::emitter::Arrival;
@@ -7,33 +7,34 @@ use super::tree::bounds::strength;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::grid::{Grid, InGrid};
 
-/// A parallelogram with a picture on it. A part of the samples is chosen by the picture, the others by the solid angle; their
-/// density is the mean of both (the balance heuristic for one sample: Veach, *Robust Monte Carlo Methods for Light Transport
-/// Simulation*, 1997, section 9.2.4).
+/// A parallelogram with an emission texture. A fraction of the samples is chosen by the texture, the others by the solid
+/// angle. Their pdf is the mean of both (the balance heuristic for one sample: Veach, *Robust Monte Carlo Methods for Light
+/// Transport Simulation*, 1997, section 9.2.4).
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureEmitter {
     quad: QuadEmitter,
-    /// Along both edges.
+    /// Number of cells along both edges.
     size: [usize; 2],
-    /// How bright the parts are.
+    /// Brightness of the cells.
     cells: Grid,
-    /// Of the samples, those that are chosen by it.
+    /// Fraction of the samples that the texture chooses.
     share: f32,
-    /// A point's offset from the corner times these is how far it is along the edges.
+    /// The products of these and a point's offset from the corner are its coordinates along the edges.
     along: [Vec3; 2],
 }
 
-/// Cells along an edge at most.
+/// Most cells along an edge.
 const MOST_CELLS: usize = 256;
 
-/// Look-ups in a cell along an edge, at least and at most.
+/// Least and greatest number of look-ups in a cell along an edge.
 const LOOKUPS: (usize, usize) = (2, 4);
 
-/// Of the samples, those that are chosen by a picture at most: what it does not tell is how near a part is.
+/// Largest fraction of the samples that a texture chooses: the texture ignores distances.
 const MOST_BY_PICTURE: f64 = 0.9;
 
 impl PictureEmitter {
-    /// Of the colours at places along both edges, in [0, 1], for so many texels along these; none where they tell nothing.
+    /// An emitter from the colours at places along both edges, in [0, 1], with so many texels along the edges. `None` if
+    /// the texture has too little contrast.
     pub fn new(quad: QuadEmitter, texels: [f64; 2], color: impl Fn([f64; 2]) -> Vec3) -> Option<Self> {
         let size = texels.map(|count| (count.ceil() as usize).clamp(1, MOST_CELLS));
         let lookups: [usize; 2] = std::array::from_fn(|i| {
@@ -53,14 +54,14 @@ impl PictureEmitter {
         let rows: Vec<Vec<f64>> = (0..size[1]).map(row).collect();
         let (sum, squares) =
             rows.iter().flatten().fold((0.0, 0.0), |(sum, squares), one| (sum + one, squares + one * one));
-        // The variance of the brightness by the mean of its square: 0 where it is the same everywhere.
+        // Divide the variance of the brightness by the mean of its square: 0 if the brightness is constant.
         let contrast = 1.0 - sum * sum / (squares * (size[0] * size[1]) as f64);
         let share = (MOST_BY_PICTURE * contrast) as f32;
         let cells = Grid::new(size[0], rows.into_iter()).filter(|_| share > LEAST_SHARE)?;
         Some(Self { along: quad.along(), quad, size, cells, share })
     }
 
-    /// By the picture or by the solid angle.
+    /// Samples by the texture or by the solid angle.
     #[inline(always)]
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let by_picture = u[0] < self.share;
@@ -96,7 +97,7 @@ impl PictureEmitter {
         if of_quad > 0.0 { self.density(met.direction * met.distance, to_corner, of_quad) } else { 0.0 }
     }
 
-    /// Density in sr⁻¹ at an offset from the point that sees it, by that of the quad alone.
+    /// Pdf in sr⁻¹ at an offset from the point, given the pdf of the quad alone.
     #[inline(always)]
     fn density(&self, offset: Vec3, to_corner: Vec3, of_quad: f32) -> f32 {
         let on_quad = offset - to_corner;
@@ -108,7 +109,7 @@ impl PictureEmitter {
         self.share * of_cell / self.quad.shown(offset) + (1.0 - self.share) * of_quad
     }
 
-    /// Of a cell, its density over the area by that of a picture which is the same everywhere.
+    /// Density of a cell over the area, relative to that of a constant texture.
     #[inline(always)]
     fn cell_density(&self, column: usize, row: usize) -> f32 {
         let probability = self.cells.row_probability(row) * self.cells.column_probability(row, column);
@@ -121,5 +122,5 @@ impl PictureEmitter {
     }
 }
 
-/// Pictures with less contrast are not worth a look.
+/// Least fraction; textures with less contrast are not worth a look-up.
 const LEAST_SHARE: f32 = 0.05;

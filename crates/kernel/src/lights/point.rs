@@ -5,19 +5,19 @@ use super::{End, LightSample, Source};
 use crate::choice;
 use crate::math::{DVec3, Vec3};
 
-/// A light without extent that shines everywhere alike.
+/// A light without extent, with the same intensity in every direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLight {
-    /// Where.
+    /// Position.
     pub position: DVec3,
-    /// W·sr⁻¹; without fall-off irradiance at normal incidence.
+    /// Intensity in W·sr⁻¹; without fall-off, irradiance at normal incidence.
     pub intensity: Vec3,
-    /// How it weakens with distance.
+    /// Fall-off with distance.
     pub falloff: Falloff,
 }
 
 choice! {
-    /// How a point light weakens with distance.
+    /// Fall-off of a point light with distance.
     pub enum Falloff {
         /// With the square of the distance.
         Square = "square",
@@ -27,14 +27,14 @@ choice! {
 }
 
 impl PointLight {
-    /// The one way from here.
+    /// Samples it by the only direction.
     pub fn sample(&self, point: Vec3) -> Option<LightSample> {
         let (direction, weight) = self.arriving(point);
         let end = End::At(self.position.as_vec3());
         (weight != Vec3::ZERO).then_some(LightSample { end, direction, weight, source: Source::Nothing })
     }
 
-    /// Where it is and what it sends.
+    /// Bounds of its position and emission.
     pub fn bounds(&self) -> LightBounds {
         let space = match self.falloff {
             Falloff::Square => Space::Weakening,
@@ -44,7 +44,7 @@ impl PointLight {
         LightBounds { space, center: self.position, radius: 0.0, power, cone: EmissionCone::ALL }
     }
 
-    /// Unit direction to the light, and irradiance at normal incidence; none at the light itself.
+    /// Unit direction to the light, and irradiance at normal incidence; 0 at the light itself.
     #[inline(always)]
     pub fn arriving(&self, point: Vec3) -> (Vec3, Vec3) {
         let to_light = self.position - point.as_dvec3();

@@ -1,4 +1,4 @@
-//! Quad lights: rectangles by solid angle, other parallelograms and distant ones by area.
+//! Quad lights: rectangles are sampled by solid angle, other parallelograms and distant ones by area.
 
 use std::f32::consts::PI;
 
@@ -7,19 +7,20 @@ use super::emitter::Arrival;
 use crate::math::elementary::{acos, sin_cos};
 use crate::math::{DVec3, Vec3};
 
-/// Below this solid angle in sr the sum of four angles has lost too many digits, and uniform over the area is as good.
+/// Least solid angle in sr for sampling by it. Below, the sum of four angles has lost too many digits, and sampling by
+/// area is as good.
 const LEAST_SOLID_ANGLE: f32 = 0.02;
 
-/// A parallelogram that shines along u × v.
+/// A parallelogram that emits along u × v.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadEmitter {
     corner: DVec3,
     u: Vec3,
     v: Vec3,
-    /// Unit normal of the shining side.
+    /// Unit normal of the emitting side.
     normal: Vec3,
     area: f32,
-    /// Lengths and unit directions of the edges, where they are perpendicular.
+    /// Lengths and unit directions of the edges. `None` if they are not perpendicular.
     rectangle: Option<Rectangle>,
 }
 
@@ -32,7 +33,7 @@ struct Rectangle {
 }
 
 impl QuadEmitter {
-    /// From a corner and two edges that are not parallel.
+    /// A quad from a corner and two edges that are not parallel.
     pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
         let normal = u.cross(v);
         let perpendicular = u.dot(v).abs() <= 1e-6 * u.length() * v.length();
@@ -52,7 +53,7 @@ impl QuadEmitter {
         }
     }
 
-    /// Uniform over the solid angle of a rectangle, over the area of another parallelogram.
+    /// Samples a rectangle by solid angle, another parallelogram by area.
     #[inline(always)]
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let to_corner = self.corner_from(point);
@@ -75,20 +76,20 @@ impl QuadEmitter {
         Arrival { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
     }
 
-    /// From a point to the corner.
+    /// Offset from a point to the corner.
     #[inline(always)]
     pub(super) fn corner_from(&self, point: Vec3) -> Vec3 {
         (self.corner - point.as_dvec3()).as_vec3()
     }
 
-    /// From the point that sees it to a point uniform over the area, and that as solid angle.
+    /// Offset from the point to a point uniform over the area, and the inverse pdf as solid angle.
     #[inline(always)]
     pub(super) fn by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
         let offset = to_corner + self.u * u[0] + self.v * u[1];
         (offset, self.shown(offset))
     }
 
-    /// The solid angle that it would fill if all of it were at an offset from the point that sees it; not above 0 from behind.
+    /// Solid angle that the quad would fill if all of it were at this offset from the point; not above 0 from behind.
     #[inline(always)]
     pub(super) fn shown(&self, offset: Vec3) -> f32 {
         let nearness = 1.0 / offset.length_squared().sqrt();
@@ -96,14 +97,14 @@ impl QuadEmitter {
         height * nearness * nearness * nearness
     }
 
-    /// Density in sr⁻¹ of samples, seen from the front, where they are uniform over the solid angle.
+    /// Pdf in sr⁻¹ of samples by solid angle, from the front. `None` if the quad is sampled by area.
     #[inline(always)]
     pub(super) fn density(&self, to_corner: Vec3) -> Option<f32> {
         let spherical = self.rectangle.as_ref().map(|rectangle| rectangle.seen_from(to_corner, self.normal));
         spherical.filter(SphericalRectangle::is_told).map(|spherical| 1.0 / spherical.solid_angle)
     }
 
-    /// What an offset from the corner is multiplied by to tell how far along the edges it is.
+    /// Vectors whose products with an offset from the corner are its coordinates along the edges.
     pub(super) fn along(&self) -> [Vec3; 2] {
         let (u, v, n) = (self.u.as_dvec3(), self.v.as_dvec3(), self.normal.as_dvec3());
         let (across_v, across_u) = (v.cross(n), n.cross(u));
@@ -135,7 +136,7 @@ pub struct SphericalRectangle {
     /// z components of the unit normals of the planes through the lower and the upper side.
     lower: f32,
     upper: f32,
-    /// Angle that the slices start at.
+    /// Start angle of the slices.
     start: f32,
     solid_angle: f32,
 }
@@ -148,20 +149,20 @@ impl Rectangle {
     }
 }
 
-/// Of the unit vector towards a side from a line whose squared distance is `d2`, the part along the plane.
+/// Component along the plane of the unit vector from a line towards a side; `d2` is the squared distance of the line.
 #[inline(always)]
 fn towards(side: f32, d2: f32) -> f32 {
     side / (d2 + side * side).sqrt()
 }
 
-/// Between two planes through sides.
+/// Angle between two planes through sides.
 #[inline(always)]
 fn angle(a: f32, b: f32) -> f32 {
     acos((-a * b).max(-1.0).min(1.0))
 }
 
 impl SphericalRectangle {
-    /// Between coordinates, in a plane at z.
+    /// A rectangle between coordinates, in a plane at z.
     #[inline(always)]
     pub fn new([x0, x1]: [f32; 2], [y0, y1]: [f32; 2], z: f32) -> Self {
         let z2 = z * z;
@@ -180,7 +181,7 @@ impl SphericalRectangle {
         }
     }
 
-    /// One of three, which is chosen number by number.
+    /// Chooses each number among those of three rectangles.
     #[inline(always)]
     pub fn each(three: [Self; 3], of: impl Fn([f32; 3]) -> f32) -> Self {
         Self {
@@ -194,19 +195,19 @@ impl SphericalRectangle {
         }
     }
 
-    /// In sr.
+    /// Solid angle in sr.
     #[inline(always)]
     pub fn solid_angle(&self) -> f32 {
         self.solid_angle
     }
 
-    /// Of its plane.
+    /// Coordinate z of its plane.
     #[inline(always)]
     pub fn z(&self) -> f32 {
         self.z
     }
 
-    /// A point uniform over the area, and that area as solid angle.
+    /// A point uniform over the area, and the inverse pdf as solid angle.
     #[inline(always)]
     pub fn by_area(&self, u: [f32; 2]) -> (f32, f32, f32) {
         let (width, height) = (self.x[1] - self.x[0], self.y[1] - self.y[0]);
@@ -221,12 +222,12 @@ impl SphericalRectangle {
         self.solid_angle >= LEAST_SOLID_ANGLE
     }
 
-    /// Coordinates of a point uniform over the solid angle.
+    /// Coordinates of a point, uniform over the solid angle.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> [f32; 2] {
         // A slice of the sphere up to x takes its share of the solid angle.
         let (sin, cos) = sin_cos(u[0] * self.solid_angle + self.start);
-        // sin² of the angle that the lower plane stands at.
+        // Take sin² of the angle of the lower plane.
         let tilt = 1.0 - self.lower * self.lower;
         // Along the slice x/−z = sin/√(slope² − tilt·sin²), with the sign of the slope.
         let slope = cos * self.lower - self.upper;

@@ -1,4 +1,4 @@
-//! Lights with a round side, and caps: cylinders and cones.
+//! Lights with a round side and caps: cylinders and cones.
 
 use super::Met;
 use super::disk::{DiskEmitter, perpendicular};
@@ -8,7 +8,7 @@ use crate::geometry::cone::Cone;
 use crate::geometry::cylinder::Cylinder;
 use crate::math::{DVec3, Vec3};
 
-/// A side and its caps, of which a point sees one at most.
+/// A side and its caps; at most one cap is visible from a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoundEmitter<S> {
     side: S,
@@ -16,35 +16,36 @@ pub struct RoundEmitter<S> {
     middle: DVec3,
 }
 
-/// The side of a light: half planes around a pole each show one stretch of it.
+/// The side of a light: each half plane around a pole cuts one interval from it.
 pub trait Side {
-    /// As seen from a point.
+    /// The side relative to a point.
     type View: SideView;
 
-    /// As seen from a point; none where it shows its back.
+    /// The side relative to a point. `None` if the point is behind it.
     fn seen_from(&self, point: Vec3) -> Option<Self::View>;
 }
 
-/// A side as it is seen from a point.
+/// A side relative to a point.
 pub trait SideView {
-    /// The pole.
+    /// Pole, around which the half planes turn.
     fn pole(&self) -> &Pole;
 
-    /// The greatest angle around the pole at which the side is seen.
+    /// The greatest angle around the pole at which the side is visible.
     fn reach(&self) -> Turn;
 
-    /// Difference of the cosines at the ends of the stretch which is seen at an angle around the pole.
+    /// Difference of the cosines at the ends of the interval that is visible at an angle around the pole.
     fn stretch(&self, around: Turn) -> f64;
 
-    /// The point of the stretch that divides the cosines by a share in [0, 1): its angle from the pole, and its distance.
+    /// The point of the interval that divides the cosines by a share in [0, 1): its angle from the pole, and its
+    /// distance.
     fn place(&self, around: Turn, share: f64) -> (Turn, f64);
 }
 
-/// What is seen of a light, with its angles.
+/// Visible part of a light, with its angles.
 struct View<V> {
     side: Option<(V, Meridians)>,
     cap: Option<(super::disk::DiskView, DVec3)>,
-    /// The side's part of all.
+    /// Share of the side in the whole.
     share: f64,
 }
 
@@ -63,7 +64,7 @@ impl<S: Side> RoundEmitter<S> {
         View { side, cap, share }
     }
 
-    /// Uniform over the solid angle, but for how fast that changes from one meridian to the next, and for a cap's 20 %.
+    /// Samples by solid angle: uniform but for its change from one meridian to the next, and for the 20 % of a cap.
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let view = self.view(point);
         let share = view.share as f32;
@@ -118,21 +119,22 @@ pub struct CylinderSide {
     radius: f64,
 }
 
-/// The pole is along the axis, and the half planes are those of the angles at which the circle is seen in a plane across.
+/// A cylinder relative to a point. The pole is along the axis; the half planes are at the angles of the circle in a plane
+/// across.
 pub struct CylinderView {
     pole: Pole,
     reach: Turn,
     radius: f64,
-    /// From the axis.
+    /// Distance from the axis.
     distance: f64,
-    /// Its square less that of the radius.
+    /// Square of the distance less that of the radius.
     power: f64,
     /// Heights of the ends above the point.
     ends: [f64; 2],
 }
 
 impl RoundEmitter<CylinderSide> {
-    /// All of a cylinder.
+    /// The emitter of a whole cylinder.
     pub fn of_cylinder(cylinder: &Cylinder) -> Self {
         let caps = [1, 2].map(|number| cylinder.cap(number));
         let across = caps[1].middle() - caps[0].middle();
@@ -211,19 +213,20 @@ pub struct ConeSide {
     tip: DVec3,
     /// Unit vector from the tip to the base.
     axis: DVec3,
-    /// Of the half angle at the tip.
+    /// Sine and cosine of the half angle at the tip.
     opening: (f64, f64),
-    /// From the tip to the border of the base.
+    /// Length from the tip to the border of the base.
     slant: f64,
 }
 
-/// The pole is in the direction of the tip, and each half plane shows one straight line of the side from there to the base.
+/// A cone relative to a point. The pole points to the tip; each half plane shows one straight line of the side, from tip to
+/// base.
 pub struct ConeView {
     pole: Pole,
     reach: Turn,
-    /// To the tip.
+    /// Distance to the tip.
     distance: f64,
-    /// Cosine, seen from the tip, between the point and the axis, and the sine.
+    /// Cosine and sine, at the tip, of the angle between the point and the axis.
     off_axis: (f64, f64),
     /// Cosine of the half angle at the tip.
     cos_opening: f64,
@@ -231,7 +234,7 @@ pub struct ConeView {
 }
 
 impl RoundEmitter<ConeSide> {
-    /// All of a cone.
+    /// The emitter of a whole cone.
     pub fn of_cone(cone: &Cone) -> Self {
         let (base, tip) = (cone.base(), cone.tip());
         let (height, radius) = ((base.middle() - tip).length(), base.radius());
@@ -273,13 +276,13 @@ impl Side for ConeSide {
 }
 
 impl ConeView {
-    /// Of the line of the side that a half plane shows: the angle at the tip between it and the point.
+    /// Angle at the tip between the point and the line of the side in a half plane.
     fn at_tip(&self, around: Turn) -> Turn {
         let ((m, sin), c) = (self.off_axis, self.cos_opening);
         let q = sin * around.cos;
         let square = m * m + q * q;
         let w = (square - c * c).max(0.0).sqrt();
-        // The nearer of both lines whose angle with the axis is that of the side.
+        // Take the nearer of both lines whose angle with the axis is that of the side.
         let sin = if m > 0.0 { (c - m) * (c + m) / (q * c + m * w) } else { (q * c - m * w) / square };
         Turn { sin, cos: (m * c + q * w) / square }
     }

@@ -7,20 +7,20 @@ use super::{End, Light, LightSample, Source};
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane, take, take_u32, truths};
 
-/// Ways for the light of one lamp to arrive at some points: [`LightSample`]s side by side.
+/// Samples of the light of one lamp at some points: [`LightSample`]s side by side.
 #[derive(Clone, Debug)]
 pub struct LightRow {
-    /// Unit directions to where it comes from.
+    /// Unit directions to the light.
     pub directions: Lanes3,
-    /// Where that is.
+    /// Sampled points.
     pub targets: Lanes3,
-    /// [`LightSample::weight`]; 0 where nothing arrives.
+    /// [`LightSample::weight`]; 0 if nothing arrives.
     pub weights: Lanes3,
-    /// What the shadow rays need not hit.
+    /// Objects that the shadow rays ignore.
     pub sources: SourceRow,
-    /// A bit for each whose light comes from beyond everything.
+    /// A bit for each sample whose light comes from beyond everything.
     pub beyond: u32,
-    /// One over the densities in sr⁻¹, of light from all around alone: others tell theirs when they are asked.
+    /// Inverse pdfs in sr, for an environment alone; those of other lights are computed on request.
     of_sky: Lanes,
 }
 
@@ -31,29 +31,29 @@ pub struct SourceRow {
     pub object: [u32; LANES],
     /// The primitive; [`SourceRow::NONE`] for all of the object.
     pub part: [u32; LANES],
-    /// Whether there is any object.
+    /// Whether any of them is an object.
     pub is_any: bool,
 }
 
 impl SourceRow {
-    /// No object, or no part of one.
+    /// Number in place of an object, or of a part of one.
     pub const NONE: u32 = u32::MAX;
 
-    /// The same for all.
+    /// The same source in all lanes.
     #[inline(always)]
     pub fn of(source: Source) -> Self {
         let (object, part) = numbers(source);
         Self { object: [object; LANES], part: [part; LANES], is_any: object != Self::NONE }
     }
 
-    /// Take one of another row.
+    /// Takes a lane of another row.
     #[inline(always)]
     pub fn copy(&mut self, lane: usize, other: &Self, from: usize) {
         (self.object[lane], self.part[lane]) = (other.object[from], other.part[from]);
         self.is_any |= other.is_any;
     }
 
-    /// One of them.
+    /// The source of a lane.
     #[inline]
     pub fn source(&self, lane: usize) -> Source {
         match (self.object[lane], self.part[lane]) {
@@ -63,7 +63,7 @@ impl SourceRow {
         }
     }
 
-    /// Of one of them.
+    /// Sets the source of a lane.
     #[inline(always)]
     pub fn set(&mut self, lane: usize, source: Source) {
         (self.object[lane], self.part[lane]) = numbers(source);
@@ -80,8 +80,8 @@ fn numbers(source: Source) -> (u32, u32) {
     }
 }
 
-/// The row of directions, targets and weights that are told of each place; all lanes at once. A function that is given a closure
-/// would not always be compiled as part of its caller, for the caller's instructions.
+/// Makes a row from the directions, targets and weights of each lane, all lanes at once. It is no function: one with a closure
+/// would not always be compiled as part of its caller, with the caller's instructions.
 macro_rules! row_of {
     ($source:expr, $i:ident => $sample:expr) => {{
         let mut row = LightRow::dark($source);
@@ -97,7 +97,7 @@ macro_rules! row_of {
 
 pub(super) use row_of;
 
-/// The same of directions and weights of light from beyond everything.
+/// [`row_of`] for directions and weights of light from beyond everything.
 macro_rules! row_beyond {
     ($i:ident => $sample:expr) => {{
         let row = row_of!(Source::Nothing, $i => {
@@ -108,7 +108,7 @@ macro_rules! row_beyond {
     }};
 }
 
-/// The row of samples of facets, those of one light for each lane.
+/// Makes the row of samples of facets, with a light for each lane.
 macro_rules! row_of_facets {
     ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
         let mut row = row_of!(Source::Nothing, $i => {
@@ -125,7 +125,7 @@ macro_rules! row_of_facets {
 
 pub(super) use row_of_facets;
 
-/// The row of samples of one light where there is no loop for its shape.
+/// Makes the row of samples of one light if its shape has no loop.
 macro_rules! one_by_one {
     ($light:expr, $points:expr, $normals:expr, $used:expr, $u:expr) => {
         LightRow::one_by_one($points, $used, |i, point| {
@@ -135,7 +135,7 @@ macro_rules! one_by_one {
 }
 
 impl LightRow {
-    /// Take the samples of another row in the lanes whose bits are set.
+    /// Takes the samples of another row in the lanes whose bits are set.
     #[inline(always)]
     pub(super) fn take_lanes(&mut self, bits: u32, other: &Self) {
         let of = truths(bits);
@@ -172,7 +172,7 @@ impl LightRow {
         }
     }
 
-    /// From the samples of the points whose bits are set.
+    /// A row from the samples of the points whose bits are set.
     pub(super) fn one_by_one(
         points: &Lanes3,
         used: u32,
@@ -189,7 +189,7 @@ impl LightRow {
 }
 
 impl Light {
-    /// [`Light::sample`] for the points whose bits are set, each by numbers of its own; without the pattern of a lamp.
+    /// [`Light::sample`] for the points whose bits are set, each by its own numbers; without an emission texture.
     #[inline(always)]
     pub fn sample_row(&self, points: &Lanes3, normals: &Lanes3, used: u32, u: &[Lanes; 2]) -> LightRow {
         let light = match self {
@@ -224,7 +224,7 @@ impl Light {
                 })
             };
         }
-        // One loop for all quads: of a second one, compilers make no vector instructions.
+        // One loop serves all quads: compilers make no vector instructions of a second one.
         if let Some((quad, of_two)) = light.quad() {
             let mut row = row_by!(quad);
             if let Some(two) = of_two {
@@ -255,8 +255,8 @@ impl Light {
 }
 
 impl Light {
-    /// One over the densities in sr⁻¹ of samples of this light; 0 of a light without extent, which has no other way to be found,
-    /// and where nothing arrives.
+    /// Inverse pdfs in sr of samples of this light. 0 if nothing arrives, and for a light without extent, which no other
+    /// technique finds.
     #[inline(always)]
     pub fn inverse_densities(&self, samples: &LightRow) -> Lanes {
         let mut inverse = [0.0; LANES];

@@ -1,4 +1,4 @@
-//! All lights of a scene, and which of them a hit is on.
+//! All lights of a scene, and the map from hits to lights.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -9,70 +9,70 @@ use super::{AreaLight, DirectionalLight, Environment, Light};
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// The lights of a scene, known by their index.
+/// The lights of a scene, which an index names.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lights {
     all: Vec<Light>,
     by_object: HashMap<u32, OfObject>,
-    /// Those that rays see which leave the scene, with their numbers.
+    /// Directional lights, which rays see that leave the scene, with their numbers.
     suns: Vec<(u32, DirectionalLight)>,
-    /// The same of light from all around.
+    /// The environment, with its number.
     environment: Option<(u32, Environment)>,
-    /// Over all of them, where they are many.
+    /// Tree over all lights. `None` if they are few.
     tree: Option<Arc<LightTree>>,
-    /// Over those that are in the scene, where these are more than paths sample.
+    /// Tree over the lights in the scene, without those beyond. `None` if paths sample all of them.
     tree_of_lamps: Option<Arc<LightTree>>,
 }
 
-/// What the samples of lights at a vertex are for.
+/// Purpose of the light samples at a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Receivers {
-    /// All that is seen of the light.
+    /// Direct light in the picture, which has no other noise.
     Eye,
-    /// A vertex of a path, which has other noise as well.
+    /// Vertices of paths, whose light has other noise as well.
     Paths,
 }
 
-/// From which lights vertices pick some.
+/// Set of lights from which vertices pick some.
 #[derive(Clone, Copy, Debug)]
 pub struct Selection<'a> {
-    /// Over the lights that are picked from.
+    /// Tree over the lights to pick from.
     pub tree: &'a LightTree,
-    /// How.
+    /// Effort of picking.
     pub picks: Picks,
-    /// Whether light from beyond the scene is not in the tree, and is sampled at every vertex: what the scene hides of it, its bounds
-    /// do not tell.
+    /// Whether light from beyond the scene is outside of the tree, and is sampled at every vertex: its bounds ignore what the scene
+    /// occludes.
     pub leaves_beyond: bool,
 }
 
-/// How vertices pick lights, where not all of them are sampled.
+/// Effort of picking lights at a vertex, if not all of them are sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Picks {
-    /// Lights that a vertex picks, for each sample of a light that it is asked for.
+    /// Lights that a vertex picks for each requested light sample.
     pub count: u32,
-    /// Nodes of the tree that it looks at for all of them, at most.
+    /// Most nodes of the tree that it examines for all of them.
     nodes: usize,
 }
 
 impl Picks {
-    /// Where all that is seen of the light are these: as good as a look at each of a thousand lights.
+    /// Picks for direct light alone: as good as examining each of a thousand lights.
     pub const BY_EYE: Self = Self { count: MOST_WITHOUT as u32, nodes: Cut::MOST };
 
-    /// Of paths, which have other noise as well: more rays cost more than they bring.
+    /// Picks for paths, which have other noise as well: more rays cost more than they gain.
     pub const BY_PATHS: Self = Self { count: 1, nodes: 8 };
 
-    /// What points pick from.
+    /// The cut of a tree for these picks.
     #[inline(always)]
     pub fn cut(self, tree: &LightTree) -> Cut<'_> {
         Cut::new(tree, self.nodes)
     }
 }
 
-/// How often a vertex samples lights, for each time that it is asked to.
+/// Expected number of light samples at a vertex, for each requested one.
 pub struct Samples<'a>(Option<(Selection<'a>, Cut<'a>)>);
 
 impl Samples<'_> {
-    /// How often it is expected to sample the light of this number.
+    /// Expected number of samples of the light of this number.
     #[inline]
     pub fn of(&self, number: u32) -> f32 {
         self.0.as_ref().map_or(1.0, |(selection, cut)| {
@@ -85,20 +85,20 @@ impl Samples<'_> {
     }
 }
 
-/// The lights that an object is.
+/// Lights of an object.
 #[derive(Clone, Debug, PartialEq)]
 enum OfObject {
-    /// One.
+    /// A single light.
     Whole(u32),
-    /// One or none for each primitive.
+    /// A light, or none, for each primitive.
     Primitives(Vec<Option<u32>>),
 }
 
 impl Lights {
-    /// These, in this order.
+    /// The lights in this order.
     ///
     /// # Errors
-    /// [`Cancelled`] when the token was told so.
+    /// [`Cancelled`] if the token is cancelled.
     pub fn new(all: Vec<Light>, token: &CancelToken) -> Result<Self, Cancelled> {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
@@ -125,10 +125,11 @@ impl Lights {
         Ok(Self { all, ..lights })
     }
 
-    /// So many lamps are all sampled by the vertices of a path; of more, some are picked. Measured in rooms of 1 to 32 lamps.
+    /// Most lamps of a scene whose paths sample all lamps at each vertex; of more, vertices pick some. Measured in rooms of 1 to
+    /// 32 lamps.
     const MOST_BY_PATHS: usize = 8;
 
-    /// What vertices pick lights from; none where they sample all of them.
+    /// Set of lights from which vertices pick. `None` if they sample all lights.
     pub fn selection(&self, receivers: Receivers) -> Option<Selection<'_>> {
         match receivers {
             Receivers::Eye => {
@@ -142,18 +143,17 @@ impl Lights {
         }
     }
 
-    /// How often a vertex that picks in this way samples lights, at a point of a surface with this normal, if nothing else is known
-    /// of that.
+    /// Expected number of light samples at a point of a surface with this normal, if nothing else is known of the surface.
     #[inline]
     pub fn samples_at(&self, receivers: Receivers, point: Vec3, normal: Vec3) -> Samples<'_> {
-        // What is not picked from is not moved: a cut is large.
+        // Without picks no cut is copied, which is large.
         let Some(selection) = self.selection(receivers) else { return Samples(None) };
         let mut cut = selection.picks.cut(selection.tree);
         cut.go_to(&Receiver::plain(point, normal));
         Samples(Some((selection, cut)))
     }
 
-    /// Bytes that trees over lights and over the triangles of lights hold.
+    /// Bytes of the trees over lights and over the triangles of lights.
     pub fn memory_bytes(&self) -> usize {
         let of_mesh = |light: &Light| match light {
             Light::Area(AreaLight { shape: Emitter::Mesh(mesh), .. }) => {
@@ -201,22 +201,22 @@ impl Lights {
         }
     }
 
-    /// How many.
+    /// Number of lights.
     pub fn len(&self) -> usize {
         self.all.len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no lights.
     pub fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
 
-    /// Whether a ray can find any.
+    /// Whether a ray can hit a light.
     pub fn can_be_found(&self) -> bool {
         !self.by_object.is_empty() || self.are_beyond()
     }
 
-    /// All with their numbers.
+    /// All lights with their numbers.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (u32, &Light)> {
         (0..).zip(&self.all)
@@ -232,7 +232,7 @@ impl Lights {
         self.environment.as_ref().map(|(_, environment)| environment)
     }
 
-    /// Solid angle in sr of the widest light from beyond the scene; 0 where there is none that has an extent.
+    /// Solid angle in sr of the widest light from beyond the scene; 0 if no such light has an extent.
     pub fn extent_beyond(&self) -> f32 {
         match self.environment {
             Some(_) => 4.0 * std::f32::consts::PI,
@@ -240,14 +240,14 @@ impl Lights {
         }
     }
 
-    /// Radiance that comes from beyond the scene, from a unit direction; of each light the share that is given by its number and
-    /// the density in sr⁻¹ of its samples from there.
+    /// Radiance from beyond the scene, from a unit direction. `share` weights each light by its number and its light-sampling
+    /// pdf in sr⁻¹.
     pub fn beyond_by_density(&self, direction: Vec3, share: impl Fn(u32, f32) -> f32) -> Vec3 {
         let sky = self.environment().map(|environment| environment.arriving(direction));
         self.beyond_with(sky, direction, share)
     }
 
-    /// The same where it is known what [`Environment::arriving`] says.
+    /// [`Lights::beyond_by_density`] with the result of [`Environment::arriving`].
     pub fn beyond_with(
         &self,
         sky: Option<(Vec3, f32)>,
@@ -267,7 +267,7 @@ impl Lights {
         &self.all[number as usize]
     }
 
-    /// The light that a primitive of an object is, with its number.
+    /// The light of a primitive of an object, with its number.
     #[inline]
     pub fn of_hit(&self, object: u32, primitive: u32) -> Option<(u32, &Light)> {
         let number = match self.by_object.get(&object)? {
@@ -278,7 +278,7 @@ impl Lights {
     }
 }
 
-/// How many lights these are where all that one object is counts as one.
+/// Number of these lights; all lights of one object count as one.
 fn count<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
     let object = |light: &Light| match light {
         Light::Area(light) => Some(light.object),

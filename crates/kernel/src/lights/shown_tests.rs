@@ -1,4 +1,4 @@
-//! What samples of a light scatter by, and where they fall: against a ball of the same solid angle, and against their densities.
+//! Scatter and distribution of the samples of a light: compared with a ball of the same solid angle, and with their pdfs.
 
 use super::emitter::Emitter;
 use super::picture::PictureEmitter;
@@ -30,7 +30,7 @@ impl Random {
     }
 }
 
-/// What a light sends to a point on the floor, y = 0: samples of its irradiance for L = 1.
+/// Samples of a light's irradiance at a point on the floor, y = 0, for L = 1.
 fn irradiance(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
     let mut random = Random(5);
     let mut one = || {
@@ -40,7 +40,7 @@ fn irradiance(light: &AreaLight, from: Vec3, count: u32) -> Vec<f64> {
     (0..count).map(|_| one()).collect()
 }
 
-/// Mean, and the deviation of one sample in units of that.
+/// Mean, and the deviation of one sample relative to it.
 fn spread(samples: &[f64]) -> (f64, f64) {
     let n = samples.len() as f64;
     let mean = samples.iter().sum::<f64>() / n;
@@ -48,7 +48,7 @@ fn spread(samples: &[f64]) -> (f64, f64) {
     (mean, variance.sqrt() / mean)
 }
 
-/// Lamps whose lowest points are above the origin, or beside it, by a gap; of about the size 1.
+/// Lamps of about the size 1, whose lowest points are above the origin, or beside it, by a gap.
 fn lamps(gap: f64) -> Vec<(&'static str, Shape)> {
     let at = |x: f64, y: f64| DVec3::new(x, y + gap, 0.0);
     let slant = DVec3::new(0.1, 1.0, 0.05).normalize();
@@ -95,7 +95,7 @@ fn near_and_far_lamps_scatter_at_most_twice_as_much_as_a_ball_of_their_solid_ang
                     continue;
                 }
                 let (ball, cosines) = scatter_of_a_ball(&shape, from);
-                // A long lamp has other cosines at its ends than in its middle, whatever takes its samples.
+                // A long lamp has other cosines at its ends than in its middle, whatever samples it.
                 let verdict = if scatter > (2.0 * ball).max(1.2 * cosines) + 0.04 { "TOO MUCH" } else { "" };
                 let line = format!(
                     "{gap:7} {name:20} E {mean:8.5} scatter {scatter:.3}, ball {ball:.3}, cosines {cosines:.3} {verdict}"
@@ -110,10 +110,10 @@ fn near_and_far_lamps_scatter_at_most_twice_as_much_as_a_ball_of_their_solid_ang
     assert!(worse.is_empty(), "{}", worse.join("\n"));
 }
 
-/// Of a ball that fills the solid angle which the shape fills above the floor and below, in the same mean direction; and of the
-/// cosines at the receiver in directions that are uniform over the solid angle.
+/// Scatter of a ball that fills the shape's solid angle above the floor and below, in the same mean direction; and that of the
+/// cosines at the receiver in directions uniform over the solid angle.
 fn scatter_of_a_ball(shape: &Shape, from: Vec3) -> (f64, f64) {
-    // Of directions all around the middle of the shape, what meets its front.
+    // Take directions all around the middle of the shape that hit its front.
     let frame = Frame::from_normal((shape.middle().as_vec3() - from).normalize());
     let (mut solid_angle, mut sum, mut cosines) = (0.0, Vec3::ZERO, Vec::new());
     let around = shape.bounds().expect("it has an end");
@@ -138,12 +138,12 @@ fn scatter_of_a_ball(shape: &Shape, from: Vec3) -> (f64, f64) {
 
 /// Cells of directions along a side.
 const SIDE: usize = 20;
-/// Squares of a cell along a side, in each of which a density is asked for once.
+/// Squares of a cell along a side; the pdf is evaluated once in each.
 const FINE: usize = 30;
 /// Samples of a light.
 const COUNT: usize = 400_000;
 
-/// Gaps under lamps, and the points on the floor that they are seen from.
+/// Gaps under lamps, and the points on the floor from which they are sampled.
 const PLACES: [(f64, Vec3); 2] = [(0.02, Vec3::ZERO), (0.8, Vec3::new(0.3, 0.0, -0.2))];
 
 #[test]
@@ -162,7 +162,7 @@ fn samples_of_shapes_fall_as_dense_as_they_say() {
 #[test]
 fn samples_of_pictures_fall_as_dense_as_they_say() {
     for (gap, from) in PLACES {
-        // Nearer, borders of what is bright are too slanted for the squares.
+        // Nearer, borders of bright parts are too slanted for the squares.
         for (name, shape, light) in pictures(gap + 0.3) {
             let name = format!("{name} at {gap}");
             assert!(falls_as_dense_as_it_says(&name, &shape, &light, from), "{name}");
@@ -170,13 +170,13 @@ fn samples_of_pictures_fall_as_dense_as_they_say() {
     }
 }
 
-/// Whether there are enough samples to tell.
+/// Checks that samples fall as their pdfs say; returns whether there are enough samples to decide.
 fn falls_as_dense_as_it_says(name: &str, shape: &Shape, light: &AreaLight, from: Vec3) -> bool {
     let Some((directions, bins)) = histogram(light, from) else { return false };
     check_bins(name, &bins, &expected(shape, light, from, &directions))
 }
 
-/// Quads with pictures on them, over the origin.
+/// Quads with emission textures, over the origin.
 fn pictures(gap: f64) -> Vec<(&'static str, Shape, AreaLight)> {
     let at = |x: f64, z: f64| DVec3::new(x, gap, z);
     let spot =
@@ -212,7 +212,7 @@ fn the_density_of_a_picture_is_that_of_its_samples() {
             let Some((met, _)) = met(&shape, from, sample.direction) else { continue };
             let product = light.pdf(from, Vec3::Y, &met) * sample.weight.x;
             compared += 1;
-            // What falls on a border of the picture may count to either side.
+            // A sample on a border of the texture may count to either side.
             apart += u32::from((product - 1.0).abs() > 2e-3);
         }
         assert!(compared > 3500 && apart < 10, "{name}: {apart} of {compared}");
@@ -253,7 +253,7 @@ fn a_lamp_with_a_small_bright_part_scatters_little() {
     }
 }
 
-/// Of each cell the integral of the densities, times the samples, and the variance of what is integrated.
+/// Integral of the pdf over each cell, times the samples, and the variance of the integrand.
 fn expected(shape: &Shape, light: &AreaLight, from: Vec3, directions: &Directions) -> Vec<(f64, f64)> {
     let square = directions.solid_angle() / (SIDE * SIDE * FINE * FINE) as f64 * COUNT as f64;
     let mut random = Random(3);
@@ -266,7 +266,7 @@ fn expected(shape: &Shape, light: &AreaLight, from: Vec3, directions: &Direction
             let share = met.map_or(0.0, |(met, _)| f64::from(light.pdf(from, Vec3::Y, &met)) * square);
             let (wanted, variance) = &mut bins[i / FINE * SIDE + j / FINE];
             *wanted += share;
-            // At a border a part of the square counts, or none, for all of it.
+            // At a border, a square counts in whole for a part of it, or not at all.
             if (share - before).abs() > 0.2 * share.max(before) {
                 *variance += (0.5 * (share - before)).powi(2);
             }
@@ -276,7 +276,7 @@ fn expected(shape: &Shape, light: &AreaLight, from: Vec3, directions: &Direction
     bins
 }
 
-/// Holds counts to what is expected; whether they are spread enough to tell.
+/// Compares counts with their expectations; returns whether they are spread enough to decide.
 fn check_bins(name: &str, bins: &[usize], expected: &[(f64, f64)]) -> bool {
     let total: f64 = expected.iter().map(|(wanted, _)| wanted).sum();
     let off = total - bins.iter().sum::<usize>() as f64;
@@ -300,7 +300,8 @@ fn check_bins(name: &str, bins: &[usize], expected: &[(f64, f64)]) -> bool {
     cells >= 5
 }
 
-/// Irradiance on the floor at the origin for L = 1, of samples without order, within the error that they show, which is bounded.
+/// Compares the irradiance on the floor at the origin for L = 1, by independent samples, with the exact value, within their own
+/// standard error, which is bounded.
 #[track_caller]
 fn assert_irradiance(shape: &Shape, exact: f64, greatest_error: f64) {
     let count = 40_000;
@@ -340,7 +341,7 @@ fn irradiances_of_closed_form() {
         }
     }
     for (height, exact) in [(0.1, 3.042_128), (1.0, 0.752_274_688_5), (4.0, 0.061_225_761_1)] {
-        // The square, in one and in two triangles, and as the lowest face of a box.
+        // Take the square, in one and in two triangles, and as the lowest face of a box.
         let at = |x: f64, z: f64| DVec3::new(x - 0.5, height, z - 0.5);
         assert_irradiance(&Shape::Quad(Parallelogram::new(at(0.0, 0.0), DVec3::X, DVec3::Z)), exact, error);
         let half = Triangle { a: at(0.0, 0.0), b: at(1.0, 0.0), c: at(1.0, 1.0) };
@@ -348,7 +349,7 @@ fn irradiances_of_closed_form() {
         let center = DVec3::Y * (height + 0.5);
         assert_irradiance(&Shape::Box(Cuboid::new(center, DVec3::ONE, DVec3::ZERO)), exact, error);
     }
-    // Of a convex body far away, radiance times what it shows: 2·R·h of a cylinder across, R·h of a cone.
+    // A convex body far away gives radiance times its projected area: 2·R·h for a cylinder across, R·h for a cone.
     let up = DVec3::Y * 1e5;
     let far = |shown: f64| shown * 1e-10;
     let bar = Cylinder::new(up - DVec3::X, up + DVec3::X, 0.5, true);
@@ -379,7 +380,7 @@ impl Directions {
     }
 }
 
-/// How many samples fall on each cell of the directions that they take; none where there are no samples.
+/// Number of samples in each cell of their directions. `None` if there are no samples.
 fn histogram(light: &AreaLight, from: Vec3) -> Option<(Directions, Vec<usize>)> {
     let mut random = Random(11);
     let samples: Vec<Vec3> = (0..COUNT)

@@ -1,4 +1,4 @@
-//! Equirectangular maps of the light from all around.
+//! Equirectangular environment maps.
 
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -11,9 +11,9 @@ use crate::math::{DVec3, Vec3};
 use crate::sampling::grid::{Grid, InGrid};
 use crate::sampling::warp;
 
-/// A map, top row at +y, the middle of it towards −z, its right quarter towards +x, with the distribution that its directions
-/// are sampled by. It is interpolated between the centres of its texels: its cells lie between four of those, and above the
-/// first row and below the last one between two. Samples in a cell are as dense as the luminance interpolated along the row and
+/// A map with the distribution by which its directions are sampled: top row at +y, its middle towards −z, its right quarter
+/// towards +x. Colours are interpolated between the centres of texels. A cell lies between four of these; above the first row
+/// and below the last one, between two. Within a cell, samples are as dense as the luminance, interpolated along the row and
 /// the height.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkyMap {
@@ -21,9 +21,9 @@ pub struct SkyMap {
     cells: Grid,
     /// Cosines of the angles from the top at which rows of cells begin, and −1.
     heights: Vec<f64>,
-    /// Density in sr⁻¹ of a row, were its columns alike.
+    /// Pdf in sr⁻¹ of a row as if its columns were alike.
     densities: Vec<f32>,
-    /// Over all directions.
+    /// Mean luminance over all directions.
     mean_luminance: f64,
 }
 
@@ -32,14 +32,14 @@ pub struct SkyMap {
 struct Place {
     column: u32,
     row: u32,
-    /// From the left texels to the right ones, and from the upper to the lower ones by angles.
+    /// Fractions from the left texels to the right ones, and from the upper to the lower ones by angles.
     between: [f32; 2],
-    /// The same, from the upper to the lower ones by heights.
+    /// The same fractions, but from the upper to the lower ones by heights.
     along: [f32; 2],
 }
 
 impl SkyMap {
-    /// Of texels ≥ 0; none where all are black.
+    /// A map of texels ≥ 0. `None` if all are black.
     pub fn new(texels: Arc<Texels>) -> Option<Self> {
         let (columns, rows) = (texels.width as usize, texels.height as usize);
         let height = |row: usize| match row {
@@ -67,7 +67,7 @@ impl SkyMap {
             (f64::from(cells.row_probability(row)) / extent) as f32
         };
         let densities = (0..=rows).map(density).collect();
-        // Of both rows of texels around each of cells, and of heights from 1 to −1.
+        // The sum counts both rows of texels around each row of cells, and heights from 1 to −1.
         let mean_luminance = sum / (4.0 * columns as f64);
         Some(Self { texels, cells, heights, densities, mean_luminance })
     }
@@ -77,7 +77,7 @@ impl SkyMap {
         self.mean_luminance
     }
 
-    /// The mean of the colours over all directions: between the middles of rows they are linear in the angle from the top.
+    /// Mean colour over all directions: between the middles of rows, colours are linear in the angle from the top.
     pub fn mean(&self) -> Vec3 {
         let rows = self.texels.height;
         let step = std::f64::consts::PI / f64::from(rows);
@@ -85,7 +85,7 @@ impl SkyMap {
         let of_row = |row: u32| {
             let sum: DVec3 = (0..self.texels.width).map(|x| self.texels.get(x, row).as_dvec3()).sum();
             let at = f64::from(row);
-            // ∫ sin θ dθ of what it is above it, and below it.
+            // Integrate ∫ sin θ dθ of the row's weight, above it and below it.
             let above = if row == 0 { 1.0 - cos(at) } else { (sin(at) - sin(at - 1.0)) / step - cos(at) };
             let is_last = row + 1 == rows;
             let below = if is_last { 1.0 + cos(at) } else { cos(at) - (sin(at + 1.0) - sin(at)) / step };
@@ -95,8 +95,8 @@ impl SkyMap {
         (sum / (2.0 * f64::from(self.texels.width))).as_vec3()
     }
 
-    /// The colour in a unit direction, and the density in sr⁻¹ with which samples have it. `turn` are the turns of the map
-    /// about +y, counterclockwise seen from above.
+    /// Colour in a unit direction, and the pdf in sr⁻¹ of samples there. `turn` are the turns of the map about +y,
+    /// counterclockwise seen from above.
     #[inline(always)]
     pub fn lookup(&self, direction: Vec3, turn: f32) -> (Vec3, f32) {
         let place = self.place(direction, turn);
@@ -105,7 +105,7 @@ impl SkyMap {
         (color(&corners, place.between), density * share(&luminances(&corners), place.along))
     }
 
-    /// A unit direction, with what [`SkyMap::lookup`] tells of it.
+    /// A unit direction, with the results of [`SkyMap::lookup`] for it.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
         let InGrid { column, row, rest } = self.cells.sample(u);
@@ -117,14 +117,15 @@ impl SkyMap {
         (direction, color(&corners, [along[0], down]), density * share(&luminances, along))
     }
 
-    /// A unit direction of a cell, so far along its row and across it by heights; and how far across it by angles.
+    /// A unit direction at fractions of a cell along its row and across it by heights; and the fraction across it by
+    /// angles.
     #[inline(always)]
     fn towards(&self, column: f32, row: usize, along: [f32; 2], turn: f32) -> (Vec3, f32) {
         let extent = self.heights[row + 1] - self.heights[row];
         self.by_height(column, row as f32, self.heights[row] + extent * f64::from(along[1]), along[0], turn)
     }
 
-    /// A unit direction of a height in a cell, so far along its row; and how far across the row by angles.
+    /// A unit direction of a height in a cell, at a fraction along its row; and the fraction across the row by angles.
     #[inline(always)]
     fn by_height(&self, column: f32, row: f32, y: f64, along: f32, turn: f32) -> (Vec3, f32) {
         let across = ((1.0 - y) * (1.0 + y)).max(0.0).sqrt() as f32;
@@ -135,8 +136,7 @@ impl SkyMap {
         (direction, down.max(0.0).min(1.0))
     }
 
-    /// [`SkyMap::sample`] side by side: unit directions, colours and densities. What is looked up is looked up between loops
-    /// without branches.
+    /// [`SkyMap::sample`] side by side: unit directions, colours and pdfs. Look-ups lie between loops without branches.
     #[inline(always)]
     pub fn sample_row(&self, u: &[Lanes; 2], turn: f32) -> (Lanes3, Lanes3, Lanes) {
         let (mut columns, mut rows, mut rest) = ([0; LANES], [0; LANES], [[0.0; LANES]; 2]);
@@ -214,18 +214,18 @@ impl SkyMap {
     /// Column and row of coordinates.
     #[inline(always)]
     fn cell(&self, x: f32, y: f32) -> (u32, u32) {
-        // A number just below 0 was rounded up to the width.
+        // A number just below 0 may have been rounded up to the width.
         ((x as u32).min(self.texels.width - 1), (y as u32).min(self.texels.height))
     }
 
-    /// The part of a row's extent in height that is above a direction in it.
+    /// The fraction of a row's height that is above a direction in it.
     #[inline(always)]
     fn part_of_height(&self, row: u32, y: f32) -> f32 {
         let (top, bottom) = (self.heights[row as usize], self.heights[row as usize + 1]);
         (((top - f64::from(y)) / (top - bottom)) as f32).max(0.0).min(1.0)
     }
 
-    /// Places of the texels around a cell: the upper left one, the upper right one, the lower left one, the lower right one.
+    /// Indices of the texels around a cell: upper left, upper right, lower left, lower right.
     #[inline(always)]
     fn corner_places(&self, column: u32, row: u32) -> [usize; 4] {
         let (width, column) = (self.texels.width as usize, column as usize);
@@ -235,7 +235,7 @@ impl SkyMap {
         [upper + column, upper + right, lower + column, lower + right]
     }
 
-    /// The texels around cells. Each loop waits once for what is not in the cache.
+    /// The texels around cells. Each loop waits only once for memory that is not in the cache.
     #[inline(always)]
     fn corner_rows(&self, columns: &[u32; LANES], rows: &[u32; LANES]) -> [Lanes3; 4] {
         let mut places = [[0; LANES]; 4];
@@ -252,14 +252,14 @@ impl SkyMap {
         corners
     }
 
-    /// The density in sr⁻¹ of a cell, were it the same all over it.
+    /// Mean pdf of a cell in sr⁻¹.
     #[inline(always)]
     fn density(&self, column: u32, row: u32) -> f32 {
         self.densities[row as usize] * self.cells.column_probability(row as usize, column as usize)
     }
 }
 
-/// Between the texels around a cell.
+/// Interpolates between the texels around a cell.
 #[inline(always)]
 fn color(corners: &[Vec3; 4], between: [f32; 2]) -> Vec3 {
     corners[0].lerp(corners[1], between[0]).lerp(corners[2].lerp(corners[3], between[0]), between[1])
@@ -270,7 +270,7 @@ fn luminances(corners: &[Vec3; 4]) -> [f32; 4] {
     corners.map(luminance)
 }
 
-/// How many times the density of a cell a place in it has.
+/// Pdf at a place in a cell, relative to the cell's mean.
 #[inline(always)]
 fn share(luminances: &[f32; 4], along: [f32; 2]) -> f32 {
     let [a, b, c, d] = *luminances;

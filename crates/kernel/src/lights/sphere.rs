@@ -1,4 +1,4 @@
-//! Sphere lights, sampled over the cone that they fill.
+//! Sphere lights, sampled over the cone that they subtend.
 
 use std::f32::consts::PI;
 
@@ -17,7 +17,8 @@ pub struct SphereEmitter {
 }
 
 impl SphereEmitter {
-    /// Uniform over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exact for narrow cones too.
+    /// Samples uniformly over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exactly for
+    /// narrow cones too.
     #[inline(always)]
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let (axis, distance, sin2_max) = self.cone_around(point);
@@ -37,17 +38,17 @@ impl SphereEmitter {
         }
     }
 
-    /// [`Light::pdf`](super::Light::pdf): the same in all directions that meet it.
+    /// [`Light::pdf`](super::Light::pdf): the same in all directions that hit the sphere.
     pub fn pdf(&self, from: Vec3) -> f32 {
         self.cone(from).map_or(0.0, |(_, _, sin2_max)| 1.0 / (2.0 * PI * one_minus_cos(sin2_max)))
     }
 
-    /// Unit direction to the centre, distance, and sin² of the half angle; none from inside.
+    /// Unit direction to the centre, distance, and sin² of the half angle. `None` from inside.
     fn cone(&self, point: Vec3) -> Option<(Vec3, f32, f32)> {
         Some(self.cone_around(point)).filter(|(_, _, sin2)| *sin2 < 1.0)
     }
 
-    /// The same; from inside with a sine that no angle has.
+    /// [`SphereEmitter::cone`]; from inside, with a sine that no angle has.
     #[inline(always)]
     fn cone_around(&self, point: Vec3) -> (Vec3, f32, f32) {
         let to_center = self.center - point.as_dvec3();
@@ -57,7 +58,7 @@ impl SphereEmitter {
     }
 }
 
-/// 1 − cos of the angle whose sin² this is, up to 90°.
+/// 1 − cos of an angle up to 90°, from its sin².
 #[inline(always)]
 pub(super) fn one_minus_cos(sin2: f32) -> f32 {
     sin2 / (1.0 + (1.0 - sin2).sqrt())

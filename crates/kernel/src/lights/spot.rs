@@ -9,7 +9,7 @@ use crate::math::elementary::{acos, sin_cos};
 use crate::math::frame::Frame;
 use crate::sampling::warp;
 
-/// A point light that shines into a cone.
+/// A point light that emits into a cone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpotLight {
     /// The same light without the cone.
@@ -18,19 +18,19 @@ pub struct SpotLight {
     pub axis: Vec3,
     /// Half the angle of the cone, in radians, in (0, π].
     pub half_angle: f32,
-    /// The outer part of the half angle over which it fades, linearly in the angle, in [0, 1].
+    /// Outer fraction of the half angle, in [0, 1], over which it fades linearly in the angle.
     pub blend: f32,
 }
 
 impl SpotLight {
-    /// The one way from here.
+    /// Samples it by the only direction.
     pub fn sample(&self, point: Vec3) -> Option<LightSample> {
         let (direction, weight) = self.arriving(point);
         let end = End::At(self.point.position.as_vec3());
         (weight != Vec3::ZERO).then_some(LightSample { end, direction, weight, source: Source::Nothing })
     }
 
-    /// Where it is and what it sends.
+    /// Bounds of its position and emission.
     pub fn bounds(&self) -> LightBounds {
         let cone = EmissionCone::within(self.axis.as_dvec3(), f64::from(self.half_angle));
         LightBounds { cone, ..self.point.bounds() }
@@ -43,10 +43,10 @@ impl SpotLight {
         (direction, weight * self.share(-direction))
     }
 
-    /// The share of the intensity on the axis that it sends into a direction.
+    /// Intensity in a direction, relative to that on the axis.
     #[inline(always)]
     pub fn share(&self, away: Vec3) -> f32 {
-        // The sine of half the angle, which is exact where the cosine of a small one is not.
+        // Take the sine of half the angle, which is exact even if the cosine of a small angle is not.
         let half_sine = (away - self.axis).length() * 0.5;
         let half_sine = if half_sine < 1.0 { half_sine } else { 1.0 };
         let angle = 2.0 * (FRAC_PI_2 - acos(half_sine));
@@ -56,15 +56,15 @@ impl SpotLight {
         if inside > 0.0 || self.half_angle >= PI { share } else { 0.0 }
     }
 
-    /// The power over the intensity on the axis, in sr: that of the inner cone of the half angle (1 − blend)·H, and the integral
-    /// of (H − θ)/(blend·H) over the directions around it.
+    /// Power over the intensity on the axis, in sr: the inner cone of the half angle (1 − blend)·H, and the integral of
+    /// (H − θ)/(blend·H) over the directions around it.
     #[inline]
     pub fn solid_angle(&self) -> f64 {
         let Cones { inner, faded, .. } = self.cones();
         inner + faded
     }
 
-    /// A direction that its light goes into, by numbers in [0, 1), with a density that its share has.
+    /// Samples an emitted direction by numbers in [0, 1), in proportion to its intensity.
     pub fn direction(&self, u: [f32; 2]) -> Vec3 {
         let Cones { half, width, inner, faded } = self.cones();
         let goal = f64::from(u[0]) * (inner + faded);
@@ -95,16 +95,16 @@ impl SpotLight {
 struct Cones {
     /// Half its angle.
     half: f64,
-    /// The part of that over which it fades.
+    /// Width of the outer part, over which it fades.
     width: f64,
     /// Power of the inner part over the intensity on the axis, in sr.
     inner: f64,
-    /// The same of the outer part.
+    /// Power of the outer part over the intensity on the axis, in sr.
     faded: f64,
 }
 
-/// ∫ t·sin(H − t) dt from the edge of a cone inwards to δ; of small angles by the first terms of the sine, whose rest is less
-/// than 1e-9 of it.
+/// ∫ t·sin(H − t) dt from the edge of a cone inwards to δ; for small angles by the first terms of the sine, whose rest is
+/// less than 1e-9 of it.
 fn edge(half: f64, delta: f64) -> f64 {
     if half < 0.02 {
         let (h2, d2) = (half * half, delta * delta);
@@ -115,12 +115,12 @@ fn edge(half: f64, delta: f64) -> f64 {
     delta * cos - 2.0 * sin_half * (cos * cos_half - sin * sin_half)
 }
 
-/// The way from the edge of a cone inwards, in [0, width], behind which there is a part of all that [`edge`] sums up: Newton's
-/// method between bounds, whose last step is far smaller than the one before.
+/// Distance from the edge of a cone inwards, in [0, width], at which [`edge`] has a given part of its total: Newton's method
+/// between bounds, whose last step is far smaller than the one before.
 fn from_edge(half: f64, width: f64, part: f64) -> f64 {
     let goal = part * edge(half, width);
     let (mut low, mut high) = (0.0, width);
-    // Near the edge the sum goes by the square, or by the cube where the cone is as wide as there is.
+    // Near the edge the sum goes by the square, or by the cube for the widest cone.
     let mut delta = width * part.sqrt();
     for _ in 0..60 {
         let off = edge(half, delta) - goal;
@@ -142,7 +142,7 @@ mod tests {
     use super::*;
     use crate::math::DVec3;
 
-    /// The share that a cone of a half angle in degrees sends into a direction at an angle in degrees from its axis.
+    /// Relative intensity of a cone with a half angle in degrees, in a direction at an angle in degrees from its axis.
     fn share(half_angle: f64, blend: f32, angle: f64) -> f32 {
         let position = DVec3::new(1.0, 2.0, 3.0);
         let point = PointLight { position, intensity: Vec3::ONE, falloff: Falloff::None };

@@ -1,4 +1,4 @@
-//! Densities of samples, and the way from a hit back to its light.
+//! Pdfs of samples, and the map from a hit back to its light.
 
 use super::emitter::Emitter;
 use super::mesh::MeshEmitter;
@@ -18,7 +18,7 @@ use crate::math::DVec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
 use crate::sampling::{Decision, PixelSampler};
 
-/// Every way to sample a shape: rectangles by solid angle, other parallelograms and distant ones by area.
+/// Shapes for every sampling method: rectangles by solid angle, other parallelograms and distant ones by area.
 fn shapes() -> Vec<Shape> {
     let (p, q) = (DVec3::new(0.3, -0.2, 0.1), DVec3::new(1.0, 0.5, -0.4));
     vec![
@@ -46,7 +46,7 @@ fn lights_of(shape: &Shape) -> Lights {
 const POINT: PointLight =
     PointLight { position: DVec3::ZERO, intensity: Vec3::ONE, falloff: point::Falloff::Square };
 
-/// What a ray from a point meets, and where.
+/// The hit of a ray from a point on a shape.
 pub fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(Met, ShapeHit)> {
     let ray = Ray::new(from, direction).to_f64();
     let hit = shape.intersect(&ray)?;
@@ -54,7 +54,7 @@ pub fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(Met, ShapeHit)
     Some((Met { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
 }
 
-/// Samples of a light for a point: directions, where they end, and one over their densities.
+/// Samples of a light for a point: directions, their ends, and inverse pdfs.
 fn samples(light: &Light, number: u32, from: Vec3, count: u32) -> Vec<(Vec3, Vec3, f32)> {
     let one = |sample: u32| {
         let u = PixelSampler::new(1, 2, 3, sample).pair(1, Decision::Light(number));
@@ -152,7 +152,7 @@ fn the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds() {
             for (number, light) in lights.iter().skip(1) {
                 for (direction, target, factor) in samples(light, number, from, 64) {
                     let Some((met, hit)) = met(&shape, from, direction) else { continue };
-                    // A torus may hide the point, and the very edge of a shape may be missed.
+                    // A torus may occlude the point, and a ray may miss the very edge of a shape.
                     if (from + direction * met.distance - target).length() > 1e-3 {
                         hidden += 1;
                         continue;
@@ -190,7 +190,8 @@ fn densities_integrate_to_one_over_the_directions_that_meet_the_light() {
             }
             for (sum, (number, light)) in sums.iter().zip(lights.iter()).skip(1) {
                 let all = samples(light, number, from, 1024);
-                // By area, samples on the back count for nothing: what is seen sums to the part that faces the point.
+                // Of samples by area, those on the back count for nothing: the visible ones sum to the part that faces
+                // the point.
                 let expected = all.len() as f64 / 1024.0;
                 assert!(
                     (sum - expected).abs() < 0.03,

@@ -1,4 +1,4 @@
-//! Torus lights: slices around the axis, and in each the part of the tube's circle that faces the point.
+//! Torus lights: sampled by slices around the axis, and in each by the part of the tube's circle that faces the point.
 
 use std::f64::consts::PI;
 
@@ -12,33 +12,34 @@ use crate::geometry::torus::Torus;
 use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec3};
 
-/// A torus that shines outwards.
+/// A torus that emits outwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorusEmitter {
     torus: Torus,
 }
 
-/// How many slices have the density of what they show.
+/// Number of slices at which the density is evaluated.
 const SLICES: usize = 7;
 
-/// And places of a slice's circle.
+/// Number of places of a slice's circle at which the density is evaluated.
 const PLACES: usize = 5;
 
-/// Least closeness: all slices are alike from the axis.
+/// Least closeness; seen from the axis, all slices are alike.
 const LEAST_CLOSENESS: f64 = 0.01;
 
-/// A torus as it is seen from a point outside.
+/// A torus relative to a point outside.
 ///
-/// A slice through the axis stands at an angle φ from the point, told by τ with closeness·φ = sinh τ: near the point slices are
-/// as dense as its distance asks, and farther away evenly by the logarithm of theirs. What a slice's circle shows is bounded by
-/// tangents seen from the point's foot in the slice's plane; before a plane there, sines of elevations would be uniform.
+/// A slice through the axis stands at an angle φ from the point. Its parameter is τ with closeness·φ = sinh τ: near the point,
+/// slices are as dense as its distance requires; farther away they are even in the logarithm of their distance. The visible
+/// part of a slice's circle is bounded by tangents from the point's foot in the slice's plane. If there were a plane in its
+/// place, sines of elevations would be uniform.
 struct View {
     point: DVec3,
-    /// Towards the point from the axis, along the axis, and across.
+    /// Unit vectors: towards the point from the axis, along the axis, and across.
     out: DVec3,
     axis: DVec3,
     across: DVec3,
-    /// Of the point, from the axis and above the plane of the circle.
+    /// Distance of the point from the axis, and height above the plane of the circle.
     distance: f64,
     height: f64,
     radius: f64,
@@ -49,15 +50,15 @@ struct View {
     reach: f64,
 }
 
-/// What a slice shows: all lengths in its plane, seen from the foot of the point there.
+/// Visible part of a slice: all lengths in its plane, from the foot of the point there.
 struct Slice {
-    /// Sine and cosine of φ.
+    /// Sine and cosine of the angle φ.
     turn: Turn,
-    /// From the axis to the foot.
+    /// Distance from the axis to the foot.
     foot: f64,
-    /// From the plane to the point.
+    /// Distance from the plane to the point.
     off: f64,
-    /// To the circle's middle: the direction as (outwards, along the axis).
+    /// Direction to the circle's middle as (outwards, along the axis).
     to_middle: [f64; 2],
     /// Nearest distance, and the product of both distances along any line through the foot.
     gap: f64,
@@ -68,7 +69,7 @@ struct Slice {
 
 /// A point of a slice's circle.
 struct Place {
-    /// From the foot.
+    /// Offset from the foot, outwards and along the axis.
     outwards: f64,
     upwards: f64,
     /// Solid angle per φ and per sine, the sine in units of the greatest one.
@@ -76,7 +77,7 @@ struct Place {
 }
 
 impl TorusEmitter {
-    /// All of a torus.
+    /// The emitter of a whole torus.
     pub fn new(torus: Torus) -> Self {
         Self { torus }
     }
@@ -86,8 +87,8 @@ impl TorusEmitter {
         self.torus.middle()
     }
 
-    /// In a direction whose first meeting with the torus shines on the point: where a direction meets it twice, both count for
-    /// its density, and none is behind another.
+    /// Samples a direction whose first hit on the torus faces the point. If a direction hits it twice, both hits count for its
+    /// pdf, so that no sample is occluded.
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let Some(view) = View::new(&self.torus, point) else { return Arrival::NOTHING };
         let slices = view.slices();
@@ -137,8 +138,8 @@ impl View {
             return None;
         }
         let closeness = ((distance * radius).sqrt() / gap).max(LEAST_CLOSENESS);
-        // From between the planes of its top and its bottom, outside of the ring, nothing is seen of the ring's far side, and
-        // this side as far as the circles come.
+        // From between the planes of its top and its bottom, outside of the ring, the ring's far side is invisible, and its
+        // near side is visible up to the circles' reach.
         let is_beside = height.abs() < tube && beside > 0.0;
         let widest = if is_beside {
             let half = ((tube - height) * (tube + height)).sqrt();
@@ -161,7 +162,7 @@ impl View {
         })
     }
 
-    /// Slices to one side by τ, in units of the greatest.
+    /// Density of the slices to one side by τ, in units of the greatest τ.
     fn slices(&self) -> Linear<SLICES> {
         // sinh and cosh by powers of e^step.
         let step = libm::exp(self.reach / (SLICES - 1) as f64);
@@ -175,12 +176,12 @@ impl View {
         }))
     }
 
-    /// Density by φ, to both sides, of one by τ in units of the greatest τ.
+    /// Density by φ, over both sides, from one by τ in units of the greatest τ.
     fn per_turn(&self, density: f64, tau: f64) -> f64 {
         0.5 * density * self.closeness / (libm::cosh(tau) * self.reach)
     }
 
-    /// The slice at an angle φ; none where it shows nothing.
+    /// The slice at an angle φ. `None` if none of it is visible.
     fn slice(&self, turn: Turn) -> Option<Slice> {
         let foot = self.distance * turn.cos;
         let off = self.distance * turn.sin;
@@ -200,7 +201,7 @@ impl View {
         })
     }
 
-    /// From the point to a place.
+    /// Offset from the point to a place.
     fn offset(&self, slice: &Slice, place: &Place) -> DVec3 {
         let Turn { sin, cos } = slice.turn;
         let outwards = self.out * cos + self.across * sin;
@@ -208,7 +209,7 @@ impl View {
         outwards * place.outwards + self.axis * place.upwards + along * slice.off
     }
 
-    /// Sum of the densities of all places where a direction goes into the torus, in sr⁻¹, and the distance to the first one.
+    /// Sum of the densities of all places where a direction enters the torus, in sr⁻¹, and the distance to the first one.
     fn densities(&self, torus: &Torus, slices: &Linear<SLICES>, direction: DVec3) -> (f64, Option<f64>) {
         let ray = RayF64 { origin: self.point, direction, t_max: f64::INFINITY };
         let entries = torus.entries(&ray);
@@ -237,20 +238,20 @@ impl View {
 }
 
 impl Slice {
-    /// Tangent of the angle to the circle's middle, by a sine in units of the greatest.
+    /// Tangent of the angle to the circle's middle, from a sine in units of the greatest.
     fn tangent(&self, sine: f64) -> f64 {
         let sine = sine * self.sine;
         let distance = (self.gap * self.gap + self.off * self.off).sqrt();
         distance * sine / ((1.0 - sine) * (1.0 + sine)).sqrt() / self.gap
     }
 
-    /// The sine in units of the greatest, by a tangent.
+    /// Sine in units of the greatest, from a tangent.
     fn sine_of(&self, tangent: f64) -> f64 {
         let y = self.gap * tangent;
         y / (self.gap * self.gap + self.off * self.off + y * y).sqrt() / self.sine
     }
 
-    /// Sines from the least to the greatest.
+    /// Density of the sines from the least to the greatest.
     fn sines(&self, view: &View) -> Linear<PLACES> {
         let sine = |i: usize| 2.0 * i as f64 / (PLACES - 1) as f64 - 1.0;
         Linear(std::array::from_fn(|i| self.place(view, self.tangent(sine(i))).factor))

@@ -1,4 +1,4 @@
-//! Single triangles that emit: by solid angle, distant ones by area.
+//! Single triangles that emit: sampled by solid angle, distant ones by area.
 
 use std::f64::consts::TAU;
 
@@ -8,13 +8,13 @@ use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::warp;
 
-/// Below this solid angle in sr uniform over the area is as good.
+/// Least solid angle in sr for sampling by it; below, sampling by area is as good.
 const LEAST_SOLID_ANGLE: f64 = 1e-3;
 
-/// Within this of a half sphere, in sr, the corners are on one great circle but for rounding.
+/// Distance from a half sphere, in sr, within which the corners are on one great circle but for rounding.
 const ALMOST_HALF: f64 = 1e-4;
 
-/// A triangle that shines along (b − a) × (c − a).
+/// A triangle that emits along (b − a) × (c − a).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleEmitter {
     corners: [DVec3; 3],
@@ -31,7 +31,7 @@ struct Spherical {
 }
 
 impl TriangleEmitter {
-    /// All of a triangle; none without an area.
+    /// The emitter of a whole triangle. `None` without an area.
     pub fn new(triangle: &Triangle) -> Option<Self> {
         let Triangle { a, b, c } = *triangle;
         let normal = (b - a).cross(c - a);
@@ -43,7 +43,7 @@ impl TriangleEmitter {
         })
     }
 
-    /// None from behind.
+    /// The triangle relative to a point. `None` from behind.
     fn seen_from(&self, point: DVec3) -> Option<([DVec3; 3], Spherical)> {
         let offsets = self.corners.map(|corner| corner - point);
         let corners = offsets.map(DVec3::normalize);
@@ -55,7 +55,7 @@ impl TriangleEmitter {
         is_front.then_some((offsets, Spherical { corners, solid_angle }))
     }
 
-    /// Uniform over the solid angle, or over the area.
+    /// Samples uniformly over the solid angle, or over the area.
     pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let Some((offsets, spherical)) = self.seen_from(point.as_dvec3()) else { return Arrival::NOTHING };
         let (direction, distance, factor) = if spherical.is_told() {
@@ -96,16 +96,17 @@ impl Spherical {
         (LEAST_SOLID_ANGLE..TAU - ALMOST_HALF).contains(&self.solid_angle)
     }
 
-    /// Uniform over the solid angle (Arvo, *Stratified Sampling of Spherical Triangles*, 1995): a corner on the side a–c, so that
-    /// the triangle with a and b has its share of the solid angle, and on the side from b to there by its height.
+    /// Samples uniformly over the solid angle (Arvo, *Stratified Sampling of Spherical Triangles*, 1995): first a corner on the
+    /// side a–c, so that the triangle with a and b has its share of the solid angle, then a point on the side from b to there by
+    /// its height.
     fn sample(&self, u: [f64; 2]) -> DVec3 {
         let [a, b, c] = self.corners;
         // The angle at a, between the planes through b and through c.
         let (to_b, to_c) = (b - a * a.dot(b), c - a * a.dot(c));
         let alpha = libm::atan2(a.dot(to_b.cross(to_c)).abs(), to_b.dot(to_c));
         let (sin_alpha, cos_alpha) = libm::sincos(alpha);
-        // With the angles β at b and γ at the new corner, α + β + γ = π + share: of ψ = share − α, and with the cosine of the
-        // side a–b, the spherical law of cosines gives that of the side from a to the new corner.
+        // With the angles β at b and γ at the new corner, α + β + γ = π + share. With ψ = share − α and the cosine of the
+        // side a–b, the spherical law of cosines gives the side from a to the new corner.
         let (sin, cos) = libm::sincos(u[0] * self.solid_angle - alpha);
         let (p, q) = (cos - cos_alpha, sin + sin_alpha * a.dot(b));
         let cos_side = ((q * cos - p * sin) * cos_alpha - q) / ((q * sin + p * cos) * sin_alpha);

@@ -1,4 +1,4 @@
-//! What surfaces send out.
+//! Emission of surfaces.
 
 use std::sync::Arc;
 
@@ -9,22 +9,22 @@ use crate::math::Vec3;
 /// Radiance of a front side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emission {
-    /// Radiance; where there is a texture, the factor on it.
+    /// Radiance; with a texture, the factor on it.
     pub scale: Vec3,
-    /// What it is multiplied by from point to point.
+    /// Texture by which it is multiplied from point to point.
     pub texture: Option<Arc<Texture>>,
 }
 
 impl Emission {
-    /// Nothing.
+    /// No emission.
     pub const NONE: Self = Self::constant(Vec3::ZERO);
 
-    /// The same everywhere.
+    /// The same emission everywhere.
     pub const fn constant(scale: Vec3) -> Self {
         Self { scale, texture: None }
     }
 
-    /// Whether it may be more than nothing somewhere.
+    /// Whether it may be above 0 somewhere.
     pub fn shines(&self) -> bool {
         self.scale != Vec3::ZERO
     }

@@ -1,13 +1,13 @@
-//! The part of a texture that one look-up stands for.
+//! Footprints: the part of a texture that one look-up covers.
 
 use crate::math::{DVec2, Vec2, Vec3};
 
-/// A place in a texture, and how much of it is asked for.
+/// A place in a texture, with the footprint of the look-up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TexturePoint {
     /// Texture coordinates.
     pub uv: DVec2,
-    /// What is around them; filters without mip levels ignore it.
+    /// Footprint around them; filters without mip levels ignore it.
     pub footprint: Footprint,
 }
 
@@ -18,20 +18,20 @@ impl TexturePoint {
     }
 }
 
-/// An ellipse of texture coordinates, by its axes; both 0: a point.
+/// An ellipse of texture coordinates, by its axes; both are 0 for a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     axes: [Vec2; 2],
 }
 
 impl Footprint {
-    /// Without extent.
+    /// A footprint without extent.
     pub const POINT: Self = Self { axes: [Vec2::ZERO; 2] };
 
-    /// What a cone of rays around a unit direction, so wide at a surface, covers there (Akenine-Möller, Crassin, Boksansky,
-    /// Belcour, Panteleev, Wright, *Improved Shader and Texture Level of Detail Using Ray Cones*, JCGT 2021, section 5): as wide
-    /// across the direction, and by one over the cosine wider along it. `tangents` are the changes of the point with u and v; a
-    /// point where they span nothing.
+    /// Footprint of a ray cone with this width at a surface, around a unit direction (Akenine-Möller, Crassin, Boksansky,
+    /// Belcour, Panteleev, Wright, *Improved Shader and Texture Level of Detail Using Ray Cones*, JCGT 2021, section 5): `width`
+    /// across the direction, and longer by the inverse cosine along it. `tangents` are the changes of the point with u and v; if
+    /// they are parallel or 0, the footprint is a point.
     #[inline]
     pub fn of_cone(width: f32, direction: Vec3, normal: Vec3, tangents: [Vec3; 2]) -> Self {
         let cosine = normal.dot(direction);
@@ -50,10 +50,10 @@ impl Footprint {
         if axes.iter().all(|axis| axis.is_finite()) { Self { axes } } else { Self::POINT }
     }
 
-    /// Least cosine: footprints at grazing angles are cut off here.
+    /// Least cosine: at smaller ones, footprints no longer grow.
     const LEAST_COSINE: f32 = 1e-4;
 
-    /// The longer axis in texels, where so many of them are to a unit of u and of v.
+    /// The longer axis in texels, for so many texels in a unit of u and of v.
     pub fn texels(&self, per_unit: Vec2) -> f32 {
         let lengths = self.axes.map(|axis| (axis * per_unit).length());
         lengths[0].max(lengths[1])

@@ -2,13 +2,13 @@
 
 use crate::math::Vec3;
 
-/// Unpolarised reflectance, and the cosine of the transmitted direction unless all is reflected. `cos_incident` ≥ 0 on
-/// the side of the ray, `eta` = n(far side)/n(ray's side). Exact equations of both polarisations (Born and
-/// Wolf, *Principles of Optics*, section 1.5.2).
+/// Unpolarised reflectance, and the cosine of the transmitted direction. `None` for total internal reflection.
+/// `cos_incident` ≥ 0 on the side of the ray, `eta` = n(far side)/n(ray's side). Exact equations of both polarisations
+/// (Born and Wolf, *Principles of Optics*, section 1.5.2).
 #[inline]
 pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     let (cos_i, eta) = (f64::from(cos_incident.clamp(0.0, 1.0)), f64::from(eta));
-    // 1 − sin²θₜ without the cancellation that grazing rays make of it.
+    // Compute 1 − sin²θₜ without the cancellation at grazing angles.
     let cos2_t = ((eta - 1.0) * (eta + 1.0) + cos_i * cos_i) / (eta * eta);
     if !(cos2_t > 0.0) {
         return (1.0, None);
@@ -19,7 +19,8 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     ((0.5 * (parallel * parallel + perpendicular * perpendicular)) as f32, Some(cos_t as f32))
 }
 
-/// The refracted direction of unit `incident`, given the unit normal on its own side and what [`dielectric`] said (Snell).
+/// The refracted direction of unit `incident`, given the unit normal on its own side and the result of [`dielectric`]
+/// (Snell).
 pub fn refract(incident: Vec3, normal: Vec3, eta: f32, cos_transmitted: f32) -> Vec3 {
     let cos_incident = -incident.dot(normal);
     (incident / eta + normal * (cos_incident / eta - cos_transmitted)).normalize()

@@ -8,23 +8,23 @@ use crate::math::{DVec3, Vec3};
 pub struct Glass {
     /// Index of refraction inside; outside is 1.
     pub ior: f32,
-    /// Transmittance per unit of length inside, as far as its numbers reach.
+    /// Transmittance per unit of length inside, as precise as `f32` allows.
     pub tint: Vec3,
-    /// Halvings of light per unit of length: in scenes that are small for their unit, the tint of a coloured pane is too little for
+    /// Halvings of light per unit of length. In scenes that are small for their unit, the tint of a coloured pane is too small for
     /// `f32`, and in large ones too near to 1.
     density: Vec3,
 }
 
 impl Glass {
-    /// Of a transmittance in [0, 1] per unit of length inside.
+    /// Glass with a transmittance in [0, 1] per unit of length inside.
     pub fn new(ior: f32, tint: DVec3) -> Self {
-        // What lets nothing through has a large density, as ∞ over no distance is no number.
+        // Opaque glass gets a large density, as ∞ over no distance would be NaN.
         let halvings =
             |part: f64| if part < 1.0 { (-libm::log2(part)).min(f32::MAX.into()) as f32 } else { 0.0 };
         Self { ior, tint: tint.as_vec3(), density: Vec3::from_array(tint.to_array().map(halvings)) }
     }
 
-    /// What is left of light after `distance` inside (Beer's law).
+    /// Transmittance over `distance` inside (Beer's law).
     #[inline]
     pub fn transmittance(&self, distance: f32) -> Vec3 {
         if self.density == Vec3::ZERO {

@@ -1,6 +1,6 @@
-//! Directions drawn from the lobes of a Phong surface: the diffuse one by the cosine, the glossy one by cos^α about the mirrored
-//! direction to the eye (Lafortune and Willems, *Using the Modified Phong Reflectance Model for Physically Based Rendering*,
-//! 1994). One of them is chosen by albedo; densities are those of both together.
+//! Directions drawn from the lobes of a Phong surface: the diffuse lobe by the cosine, the glossy one by cos^α about the
+//! mirrored direction to the viewer (Lafortune and Willems, *Using the Modified Phong Reflectance Model for Physically Based
+//! Rendering*, 1994). A lobe is chosen by albedo; pdfs are those of both together.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -8,28 +8,28 @@ use crate::math::Vec3;
 use crate::math::elementary::{power_f64, sin_cos};
 use crate::math::frame::Frame;
 
-/// The lobes of a Phong surface at one point, for one direction to the eye.
+/// The lobes of a Phong surface at one point, for one direction to the viewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lobes {
-    /// Unit normal on the eye's side, which the cosine is of.
+    /// Unit normal on the viewer's side, for the cosine.
     pub normal: Vec3,
-    /// The direction to the eye, mirrored at the normal.
+    /// The direction to the viewer, mirrored at the normal.
     pub mirrored_eye: Vec3,
     /// The largest component of kd.
     pub diffuse: f32,
     /// The largest component of ks.
     pub specular: f32,
-    /// α.
+    /// The exponent α.
     pub shininess: f32,
 }
 
 impl Lobes {
-    /// A unit direction; `lobe` chooses the lobe and `u` the direction in it, all in [0, 1).
+    /// Samples a unit direction; `lobe` chooses the lobe and `u` the direction in it, all in [0, 1).
     #[inline(always)]
     pub fn sample(&self, lobe: f32, u: [f32; 2]) -> Vec3 {
         let is_diffuse = lobe < self.diffuse_share();
         let rest = 1.0 - u[0];
-        // Of cos^α the cosine is (1 − u)^1/(α + 1). Its sine keeps the digits of narrow lobes in f64.
+        // The cosine for cos^α is (1 − u)^1/(α + 1). In f64 its sine keeps the digits of narrow lobes.
         let cosine = power_f64(f64::from(rest), 1.0 / (f64::from(self.shininess) + 1.0));
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt() as f32;
         let cosine = if is_diffuse { rest.sqrt() } else { cosine as f32 };
@@ -40,13 +40,13 @@ impl Lobes {
         about(Vec3::new(x, y, z), sine, cosine, u[1])
     }
 
-    /// [`Lobes::sample`] where there is no glossy lobe.
+    /// [`Lobes::sample`] without a glossy lobe.
     #[inline(always)]
     pub fn sample_diffuse(&self, u: [f32; 2]) -> Vec3 {
         about(self.normal, u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1])
     }
 
-    /// Density in sr⁻¹ of a direction among the samples, by what [`gloss`] says of it.
+    /// Pdf in sr⁻¹ of a direction among the samples, given its [`gloss`].
     #[inline(always)]
     pub fn density(&self, direction: Vec3, gloss: f32) -> f32 {
         let cosine = self.normal.dot(direction);
@@ -62,14 +62,14 @@ impl Lobes {
         self.diffuse * FRAC_1_PI + self.specular * ((self.shininess + 2.0) * (0.5 * FRAC_1_PI)) * gloss
     }
 
-    /// How often the diffuse lobe is chosen.
+    /// Probability of choosing the diffuse lobe.
     #[inline(always)]
     fn diffuse_share(&self) -> f32 {
         self.diffuse / (self.diffuse + self.specular)
     }
 }
 
-/// A unit direction by its angle to an axis and a number in [0, 1) for the one about it.
+/// A unit direction by its angle to an axis and a number in [0, 1) for the angle about it.
 #[inline(always)]
 fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
     let (sin_phi, cos_phi) = sin_cos(2.0 * PI * turn);
@@ -78,8 +78,8 @@ fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
     direction * (1.0 / direction.length_squared().sqrt())
 }
 
-/// What is left of the glossy lobe's peak in a direction: the cosine between it and the mirrored eye, to the power α; 0 behind.
-/// By the distance of their ends, which has the digits that the cosine of a small angle lacks.
+/// The glossy lobe's value in a direction, relative to its peak: the cosine between the direction and the mirrored viewer, to
+/// the power α; 0 behind. Uses the distance of their ends, whose digits the cosine of a small angle lacks.
 #[inline(always)]
 pub fn gloss(mirrored_eye: Vec3, direction: Vec3, shininess: f32) -> f32 {
     let cosine = 1.0 - 0.5 * f64::from((mirrored_eye - direction).length_squared());

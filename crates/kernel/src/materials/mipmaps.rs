@@ -10,10 +10,10 @@ pub struct Mipmaps {
 }
 
 impl Mipmaps {
-    /// Made level by level, each of the one before; `halve` may end that.
+    /// Makes each level from the one before; `halve` may fail.
     ///
     /// # Errors
-    /// Those of `halve`.
+    /// The errors of `halve`.
     pub fn of<E>(texels: &Texels, halve: impl Fn(&Texels) -> Result<Texels, E>) -> Result<Self, E> {
         let mut levels: Vec<Texels> = Vec::new();
         while let last = levels.last().unwrap_or(texels)
@@ -24,22 +24,22 @@ impl Mipmaps {
         Ok(Self { levels })
     }
 
-    /// Level `number` ≥ 1; the last one beyond.
+    /// Level `number` ≥ 1; beyond the last, the last.
     pub fn level(&self, number: usize) -> Option<&Texels> {
         self.levels.get(number - 1).or(self.levels.last())
     }
 
-    /// How many there are beside the image.
+    /// Number of levels beside the image.
     pub fn count(&self) -> usize {
         self.levels.len()
     }
 
-    /// Bytes held.
+    /// Bytes that the levels take.
     pub fn memory_bytes(&self) -> usize {
         self.levels.iter().map(Texels::memory_bytes).sum()
     }
 
-    /// The same of an image of so many columns and rows.
+    /// Bytes of the levels of an image of so many columns and rows.
     pub fn memory_bytes_of(width: u32, height: u32) -> u64 {
         let (mut width, mut height, mut bytes) = (u64::from(width), u64::from(height), 0);
         while width * height > 1 {
@@ -50,7 +50,7 @@ impl Mipmaps {
     }
 }
 
-/// Part of an image that is half as large.
+/// Halves an image row by row.
 pub struct Halving<'a> {
     of: &'a Texels,
     width: u32,
@@ -58,18 +58,18 @@ pub struct Halving<'a> {
 }
 
 impl<'a> Halving<'a> {
-    /// Of an image.
+    /// A halving of this image.
     pub fn new(of: &'a Texels) -> Self {
         Self { of, width: (of.width / 2).max(1), height: (of.height / 2).max(1) }
     }
 
-    /// Rows of what it makes.
+    /// Number of rows of the smaller image.
     pub fn rows(&self) -> u32 {
         self.height
     }
 
-    /// Add a row of the smaller image: every texel is the mean over the area of the larger one that it covers, so that the mean of
-    /// the whole stays, also where a side is odd.
+    /// Appends a row of the smaller image: every texel is the mean over the area of the larger one that it covers, so that the
+    /// mean of the whole stays, even if a side is odd.
     pub fn row(&self, y: u32, to: &mut Vec<Vec3>) {
         let rows = Covered::new(y, self.height, self.of.height);
         for x in 0..self.width {
@@ -79,7 +79,7 @@ impl<'a> Halving<'a> {
         }
     }
 
-    /// The smaller image, whose rows these are.
+    /// The smaller image of these rows.
     pub fn texels(&self, rows: Vec<Vec3>) -> Texels {
         Texels { width: self.width, height: self.height, data: TexelData::Float(rows), unusable: 0 }
     }
@@ -93,7 +93,7 @@ struct Covered {
 
 impl Covered {
     fn new(index: u32, of: u32, from: u32) -> Self {
-        // In units of one over `of`, a texel of the larger image takes `of` and one of the smaller image `from`.
+        // In units of 1/`of`, a texel of the larger image takes `of` and one of the smaller image `from`.
         let (start, end) = (u64::from(index) * u64::from(from), u64::from(index + 1) * u64::from(from));
         let first = start / u64::from(of);
         let weight = |next: u64| {
@@ -153,7 +153,7 @@ mod tests {
             data: TexelData::Srgb8(vec![[0; 3], [0; 3], [255; 3], [255; 3]]),
             unusable: 0,
         };
-        // In linear light, not of the bytes.
+        // The mean is taken in linear light, not of the bytes.
         assert_eq!(halved(&four).expect("made").get(0, 0), Vec3::splat(0.5));
         let line = |values: &[f32]| Texels {
             width: values.len() as u32,

@@ -2,10 +2,10 @@
 
 use crate::math::Vec3;
 
-/// Reflects in one direction.
+/// A mirror, which reflects in one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mirror {
-    /// The part of each colour that is reflected.
+    /// Reflectance of each colour.
     pub reflectance: Vec3,
 }
 

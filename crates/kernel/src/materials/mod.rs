@@ -1,4 +1,4 @@
-//! What surfaces do with light.
+//! Materials: reflection, transmission and emission of surfaces.
 
 pub mod emission;
 pub mod footprint;
@@ -24,14 +24,14 @@ pub use phong::Phong;
 use crate::math::Vec3;
 use texture::Color;
 
-/// A material, ready to be looked up.
+/// A material, ready for look-ups.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// What it does with light that arrives.
+    /// Scattering of arriving light.
     pub bsdf: Bsdf,
-    /// Radiance that its front side sends out, in every direction alike.
+    /// Radiance that its front side emits, the same in every direction.
     pub emission: Emission,
-    /// Bends the shading normals.
+    /// Normal map, which bends the shading normals.
     pub normal_map: Option<NormalMap>,
 }
 
@@ -45,7 +45,7 @@ impl Material {
         in_bsdf || self.normal_map.is_some() || self.emission.texture.is_some()
     }
 
-    /// Whether any of its textures has levels.
+    /// Whether any of its textures has mip levels.
     pub fn is_mipmapped(&self) -> bool {
         let of_bsdf = match &self.bsdf {
             Bsdf::Phong(Phong { diffuse, specular, shininess: _, ambient }) => {
@@ -58,10 +58,10 @@ impl Material {
     }
 }
 
-/// What a material does with light that arrives (a bidirectional scattering distribution function).
+/// A material's scattering of arriving light (bidirectional scattering distribution function).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Bsdf {
-    /// Diffuse and glossy.
+    /// A diffuse and glossy surface.
     Phong(Phong),
     /// A perfect mirror.
     Mirror(Mirror),
@@ -70,7 +70,7 @@ pub enum Bsdf {
 }
 
 impl Bsdf {
-    /// What it is filled with, if it is a glass.
+    /// The glass that fills the shape. `None` for other materials.
     pub fn glass(&self) -> Option<&Glass> {
         match self {
             Self::Glass(glass) => Some(glass),
@@ -78,7 +78,7 @@ impl Bsdf {
         }
     }
 
-    /// Its main colour, and how many texture look-ups that took.
+    /// Its main colour, and the number of texture look-ups for it.
     #[inline]
     pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {

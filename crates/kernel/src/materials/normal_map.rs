@@ -12,13 +12,13 @@ use crate::math::frame::Frame;
 pub struct NormalMap {
     /// The normals.
     pub texture: Arc<Texture>,
-    /// Factor on the slopes; 0 leaves the surface smooth.
+    /// Factor on the slopes; 0 makes the surface smooth.
     pub strength: f32,
 }
 
 impl NormalMap {
-    /// The bent shading normal, on the same side as `normal`; the tangents need not be unit or perpendicular, and where
-    /// there are none (0) any frame of the normal serves.
+    /// The bent shading normal, on the same side as `normal`. The tangents need not be unit vectors or perpendicular;
+    /// if they are 0, any frame of the normal serves.
     #[inline]
     pub fn bend(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
         let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;

@@ -11,31 +11,31 @@ use crate::math::Vec3;
 /// Diffuse and glossy reflection on both sides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phong {
-    /// kd.
+    /// Diffuse reflectance kd.
     pub diffuse: Color,
-    /// ks.
+    /// Specular reflectance ks.
     pub specular: Color,
-    /// α.
+    /// Exponent α.
     pub shininess: f32,
-    /// ka; none: kd.
+    /// Ambient reflectance ka. `None` stands for kd.
     pub ambient: Option<Color>,
 }
 
 /// [`Phong`] at one point: its textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhongBsdf {
-    /// kd.
+    /// Diffuse reflectance kd.
     pub diffuse: Vec3,
-    /// ks.
+    /// Specular reflectance ks.
     pub specular: Vec3,
-    /// α.
+    /// Exponent α.
     pub shininess: f32,
-    /// ka.
+    /// Ambient reflectance ka.
     pub ambient: Vec3,
 }
 
 impl Phong {
-    /// Look its textures up.
+    /// Looks its textures up.
     #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> PhongBsdf {
         let diffuse = self.diffuse.at(at, lookups);
@@ -47,12 +47,12 @@ impl Phong {
         }
     }
 
-    /// ka alone, looked up.
+    /// Looks ka alone up.
     pub fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         self.ambient.as_ref().unwrap_or(&self.diffuse).at(at, lookups)
     }
 
-    /// White in place of its textures.
+    /// The material with white in place of its textures.
     pub fn bleached(&self) -> PhongBsdf {
         let bleached = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         PhongBsdf {
@@ -65,7 +65,7 @@ impl Phong {
 }
 
 impl Phong {
-    /// What it is everywhere, if it has no textures.
+    /// Its constant value. `None` if it has textures.
     #[inline]
     pub fn constant(&self) -> Option<PhongBsdf> {
         let diffuse = self.diffuse.constant()?;
@@ -90,7 +90,7 @@ impl PhongBsdf {
         self.diffuse_value() + self.specular_peak() * gloss
     }
 
-    /// Its lobes for a direction to the eye, by the unit normal on that side.
+    /// Its lobes for a direction to the viewer, by the unit normal on that side.
     pub fn lobes(&self, normal: Vec3, to_eye: Vec3) -> Lobes {
         Lobes {
             normal,
@@ -102,12 +102,12 @@ impl PhongBsdf {
         }
     }
 
-    /// The glossy part of f in sr⁻¹ where the mirrored direction is the eye's.
+    /// The glossy part of f in sr⁻¹ at the lobe's peak.
     pub fn specular_peak(&self) -> Vec3 {
         self.specular * ((self.shininess + 2.0) / (2.0 * PI))
     }
 
-    /// Whether light that arrives can change anything.
+    /// Whether it reflects nothing.
     pub fn is_black(&self) -> bool {
         self.diffuse == Vec3::ZERO && self.specular == Vec3::ZERO
     }
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn the_lobe_of_known_value() {
-        // (n + 2)/2π·cosⁿ 10° at n = 50, looking 10° beside the mirrored direction.
+        // (n + 2)/2π·cosⁿ 10° at n = 50, viewed 10° beside the mirrored direction.
         let value = reflected(50.0, at_angle(-30.0), at_angle(20.0));
         let expected = 52.0 / (2.0 * std::f64::consts::PI) * 10.0_f64.to_radians().cos().powi(50);
         assert!((f64::from(value) - expected).abs() < 1e-4 * expected, "{value} {expected}");

@@ -1,4 +1,4 @@
-//! The numbers of an image, as compact as they came.
+//! Texels of an image, stored as compactly as in its file.
 
 use std::sync::LazyLock;
 
@@ -6,7 +6,7 @@ use crate::math::color::srgb_to_linear;
 use crate::math::lanes::{LANES, Lanes3, set_lane};
 use crate::math::{DVec3, Vec3};
 
-/// Every sRGB byte decoded.
+/// Table that decodes every sRGB byte.
 static SRGB: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
 
@@ -19,11 +19,11 @@ pub struct Texels {
     pub height: u32,
     /// `width·height` texels.
     pub data: TexelData,
-    /// Texels of the file that were negative or not finite, and are 0 there.
+    /// Number of texels that were negative or not finite in the file, and are 0 here.
     pub unusable: u64,
 }
 
-/// How texels are stored.
+/// Storage of texels.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TexelData {
     /// sRGB bytes, decoded at each look-up.
@@ -41,7 +41,7 @@ impl Texels {
         self.at(y as usize * self.width as usize + x as usize)
     }
 
-    /// Linear value at a place in the data.
+    /// Linear value at an index of the data.
     #[inline]
     pub fn at(&self, place: usize) -> Vec3 {
         match &self.data {
@@ -51,7 +51,8 @@ impl Texels {
         }
     }
 
-    /// Linear values at places in the data, side by side. In place: rows are larger than what compilers like to return.
+    /// Linear values at indices of the data, side by side. Written in place: rows are larger than compilers like to
+    /// return.
     #[inline(always)]
     pub fn fill_row(&self, places: &[usize; LANES], values: &mut Lanes3) {
         match &self.data {
@@ -85,14 +86,14 @@ impl Texels {
         }
     }
 
-    /// The mean of all.
+    /// Mean of all texels.
     pub fn mean(&self) -> Vec3 {
         let rows = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
         let sum: DVec3 = rows.map(|(x, y)| self.get(x, y).as_dvec3()).sum();
         (sum / self.len() as f64).as_vec3()
     }
 
-    /// Whether all of it is 0.
+    /// Whether all texels are 0.
     pub fn is_black(&self) -> bool {
         match &self.data {
             TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => bytes.iter().all(|texel| *texel == [0; 3]),
@@ -100,7 +101,7 @@ impl Texels {
         }
     }
 
-    /// Texels in all.
+    /// Number of texels.
     pub fn len(&self) -> usize {
         self.width as usize * self.height as usize
     }
@@ -110,7 +111,7 @@ impl Texels {
         self.len() == 0
     }
 
-    /// Bytes held.
+    /// Bytes that the texels take.
     pub fn memory_bytes(&self) -> usize {
         match &self.data {
             TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => size_of_val(bytes.as_slice()),

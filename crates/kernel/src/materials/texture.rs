@@ -23,7 +23,7 @@ choice! {
 }
 
 choice! {
-    /// What a texture is outside [0, 1].
+    /// Continuation of a texture outside [0, 1].
     pub enum Wrap {
         /// Periodic.
         Repeat = "repeat",
@@ -34,18 +34,18 @@ choice! {
     }
 }
 
-/// An image with how it is looked up.
+/// An image with its look-up settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     /// The image.
     pub texels: Arc<Texels>,
-    /// Its smaller levels, where the filter is [`TextureFilter::Mipmap`].
+    /// Its mip levels, if the filter is [`TextureFilter::Mipmap`].
     pub mipmaps: Option<Arc<Mipmaps>>,
     /// Interpolation.
     pub filter: TextureFilter,
-    /// Outside [0, 1].
+    /// Continuation outside [0, 1].
     pub wrap: Wrap,
-    /// How often it fits into u and v.
+    /// Number of repetitions in u and v.
     pub repeat: Vec2,
 }
 
@@ -54,7 +54,7 @@ pub struct Texture {
 pub enum Color {
     /// The same everywhere.
     Constant(Vec3),
-    /// Looked up.
+    /// A texture, to be looked up.
     Texture(Arc<Texture>),
 }
 
@@ -67,7 +67,7 @@ impl Color {
         }
     }
 
-    /// What it is looked up in, if it is not the same everywhere.
+    /// The texture. `None` if the colour is the same everywhere.
     pub fn texture(&self) -> Option<&Arc<Texture>> {
         match self {
             Self::Constant(_) => None,
@@ -99,13 +99,13 @@ impl Texture {
         }
     }
 
-    /// How many texels fit into u and v.
+    /// Number of texels in a unit of u and v.
     pub fn texels_across(&self) -> [f64; 2] {
         let across = size(&self.texels).as_dvec2() * self.repeat.as_dvec2();
         across.abs().to_array()
     }
 
-    /// [`Texture::lookup`] side by side, of a texture without levels.
+    /// [`Texture::lookup`] side by side, for a texture without mip levels.
     #[inline(always)]
     pub fn lookup_row(&self, uv: &[[f64; LANES]; 2]) -> Lanes3 {
         let (texels, size) = (&*self.texels, size(&self.texels));
@@ -149,13 +149,13 @@ impl Texture {
         colors
     }
 
-    /// The mean of its image, which is that of all of it where a whole number of tiles fits into u and v.
+    /// Mean of its image, which is the mean of the texture if a whole number of tiles fits into u and v.
     pub fn mean(&self) -> Vec3 {
         let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));
         last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0))
     }
 
-    /// The level where the footprint is one texel, from 0; more than 0 between two.
+    /// The level at which the footprint is one texel, from 0 on; with a fraction between two levels.
     fn level(&self, footprint: &Footprint) -> f32 {
         let texels = footprint.texels(size(&self.texels) * self.repeat);
         if texels > 1.0 { log2(texels) } else { 0.0 }
@@ -166,7 +166,7 @@ impl Texture {
         self.texel(&self.texels, (u * size.x).floor(), (v * size.y).floor())
     }
 
-    /// Between the two levels at `level`.
+    /// Interpolates between the two levels at `level`.
     fn trilinear(&self, level: f32, folded: [f32; 2]) -> Vec3 {
         let mipmaps = self.mipmaps.as_ref().filter(|_| level > 0.0);
         let Some(mipmaps) = mipmaps else { return self.bilinear(&self.texels, folded) };
@@ -191,7 +191,7 @@ impl Texture {
         lower.lerp(upper, fy)
     }
 
-    /// A texel by whole numbers, counted from the left and from the bottom, that may lie one outside.
+    /// A texel by column from the left and row from the bottom, which may lie one outside.
     fn texel(&self, texels: &Texels, x: f32, y: f32) -> Vec3 {
         let column = self.wrap.index(x as i32, texels.width as i32);
         let row_from_bottom = self.wrap.index(y as i32, texels.height as i32);
@@ -199,7 +199,7 @@ impl Texture {
     }
 }
 
-/// Places of texels by their columns, and their rows from the bottom.
+/// Indices of texels, from their columns, and their rows from the bottom.
 #[inline(always)]
 fn places(columns: &[i32; LANES], rows: &[i32; LANES], [width, height]: [i32; 2]) -> [usize; LANES] {
     let mut places = [0; LANES];
@@ -209,13 +209,13 @@ fn places(columns: &[i32; LANES], rows: &[i32; LANES], [width, height]: [i32; 2]
     places
 }
 
-/// Columns and rows.
+/// Columns and rows as a vector.
 fn size(texels: &Texels) -> Vec2 {
     Vec2::new(texels.width as f32, texels.height as f32)
 }
 
 impl Wrap {
-    /// Into [0, 1] what fits so often there.
+    /// Folds coordinates, repeated so often, into [0, 1].
     #[inline(always)]
     fn fold_row(self, x: &[f64; LANES], repeat: f64) -> Lanes {
         let mut folded = [0.0; LANES];
@@ -234,7 +234,7 @@ impl Wrap {
         folded
     }
 
-    /// [`Wrap::index`] of numbers and one more or not.
+    /// [`Wrap::index`] of numbers, each plus `more`.
     #[inline(always)]
     fn index_row(self, numbers: &[i32; LANES], more: i32, size: i32) -> [i32; LANES] {
         let mut indices = [0; LANES];
@@ -253,7 +253,7 @@ impl Wrap {
         indices
     }
 
-    /// Into [0, 1].
+    /// Folds a coordinate into [0, 1].
     #[inline(always)]
     fn fold(self, x: f64) -> f64 {
         match self {
@@ -266,7 +266,7 @@ impl Wrap {
         }
     }
 
-    /// An index at most one outside 0 … size − 1 to one inside.
+    /// Wraps an index that is at most one outside 0 … size − 1.
     #[inline(always)]
     fn index(self, i: i32, size: i32) -> i32 {
         match self {
@@ -277,7 +277,7 @@ impl Wrap {
     }
 }
 
-/// Coordinates that are not finite count as 0.
+/// The coordinate, or 0 if it is not finite.
 #[inline(always)]
 fn finite(x: f64) -> f64 {
     if x.is_finite() { x } else { 0.0 }
@@ -289,7 +289,7 @@ mod tests {
     use crate::materials::texels::TexelData;
     use crate::math::DVec2;
 
-    /// [[0, 1], [2, 3]], bottom row first.
+    /// A texture of [[0, 1], [2, 3]], bottom row first.
     fn numbered(filter: TextureFilter, wrap: Wrap) -> Texture {
         let data = [2.0, 3.0, 0.0, 1.0].map(Vec3::splat).to_vec();
         let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data), unusable: 0 });

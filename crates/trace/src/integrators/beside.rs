@@ -1,5 +1,5 @@
-//! Rays that find the light of lamps beside samples of the lamps, and what is left of those samples then (multiple importance
-//! sampling: Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
+//! Techniques that find the light of lamps beside light samples, and the MIS weights of light samples against them (multiple
+//! importance sampling: Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
 
 use super::light::{Arrived, add_work};
 use super::lit_row::{LitRow, Response};
@@ -15,10 +15,10 @@ use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
 use crate::sampling::Decision;
 use crate::world::{Hit, Loops};
 
-/// What finds light beside samples of the lamps.
+/// Technique that competes with light samples.
 #[derive(Clone, Copy)]
 pub(super) enum Others {
-    /// Nothing.
+    /// No other technique.
     Nothing,
     /// The rays of paths that go on from the vertices.
     Paths,
@@ -27,7 +27,7 @@ pub(super) enum Others {
 }
 
 impl Others {
-    /// Rays in the glossy lobes of the vertices whose bits are set, if there are any.
+    /// The technique of rays in glossy lobes, if the bits of any vertices are set.
     pub(super) fn lobes(sharp: u32) -> Self {
         if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
     }
@@ -40,7 +40,7 @@ impl Others {
         }
     }
 
-    /// Rays by the BSDF for each of so many samples of a light.
+    /// Number of rays by the BSDF for each of so many samples of a light.
     #[inline(always)]
     pub(super) fn to_each(self, count: u32) -> f32 {
         match self {
@@ -50,8 +50,8 @@ impl Others {
         }
     }
 
-    /// Multiply `values`, which samples of lights bring to the vertices of a row, by their power-heuristic weights, of which one
-    /// over the densities of these is known; `others` rays by the BSDF come on each.
+    /// Multiplies `values`, the contributions of light samples at the vertices of a row, by their power-heuristic weights. The
+    /// inverse pdfs of the samples are given; `others` rays by the BSDF come on each sample.
     #[inline(always)]
     pub(super) fn left(
         self,
@@ -84,7 +84,7 @@ impl Others {
         values
     }
 
-    /// The lobes in which rays are sent out from a vertex.
+    /// The lobes in which rays leave a vertex.
     #[inline(always)]
     fn lobes_of(self, row: &LitRow, i: usize) -> Lobes {
         match self {
@@ -93,7 +93,7 @@ impl Others {
         }
     }
 
-    /// Whether rays are sent out from a vertex.
+    /// Whether rays leave a vertex.
     #[inline(always)]
     fn start_from(self, i: usize) -> bool {
         match self {
@@ -110,8 +110,8 @@ fn glossy_lobe(row: &LitRow, i: usize) -> Lobes {
     Lobes { diffuse: 0.0, specular: 1.0, ..row.lobes(i) }
 }
 
-/// What is left of the reflected light where its glossy part is weighted so: the weight applies to that part alone, as rays in a
-/// lobe bring no diffuse light. So the parts of a picture add up to it.
+/// Reflected light with its glossy part weighted. The weight applies to that part alone, as rays in a lobe bring no diffuse
+/// light. Thereby the parts of a picture add up to it.
 #[inline(always)]
 fn left_of_gloss(row: &LitRow, i: usize, gloss: f32, weight: f32) -> Vec3 {
     let (diffuse, glossy) = (lane(&row.diffuse, i), lane(&row.specular, i) * gloss);
@@ -122,16 +122,16 @@ fn left_of_gloss(row: &LitRow, i: usize, gloss: f32, weight: f32) -> Vec3 {
     Vec3::new(part(diffuse.x, glossy.x), part(diffuse.y, glossy.y), part(diffuse.z, glossy.z))
 }
 
-/// Rays in the glossy lobes of the vertices whose bits are set, as many as samples of a lamp: a narrow lobe finds in a wide lamp
-/// what samples of the lamp hardly ever meet.
+/// Traces rays in the glossy lobes of the vertices whose bits are set, as many as samples of a lamp: a narrow lobe finds in a
+/// wide lamp what light samples hardly ever hit.
 pub(super) struct LobeRays<'a> {
     pub(super) shot: &'a Shot<'a>,
     pub(super) row: &'a LitRow,
     pub(super) sharp: u32,
     pub(super) measure: Measure,
-    /// Those that the vertices are in; none where all are in air.
+    /// Media of the vertices. `None` if all are in air.
     pub(super) media: Option<&'a [Medium]>,
-    /// What they are added to.
+    /// Light to which the rays' light is added.
     pub(super) arrived: Arrived,
 }
 
@@ -195,7 +195,7 @@ impl Loops for LobeRays<'_> {
     }
 }
 
-/// What a sample counts where another way to find the same light has a density so many times as high (the power heuristic).
+/// MIS weight of a sample, if the other technique's pdf is so many times as high (the power heuristic).
 #[inline(always)]
 pub fn weight(ratio: f32) -> f32 {
     1.0 / (1.0 + ratio * ratio)

@@ -11,10 +11,10 @@ use crate::world::{Cell, Stretch};
 /// Width of the lines in pixels.
 const LINE: f32 = 1.25;
 
-/// Boxes that look smaller than so many pixels are left out.
+/// Least size of a drawn box, in pixels.
 const LEAST_SIZE: f32 = 40.0;
 
-/// How much of a line shows behind surfaces.
+/// Opacity of a line behind surfaces.
 const FAINT: f32 = 0.3;
 
 /// Linear colours of levels, from the root down and over again.
@@ -27,14 +27,14 @@ const COLORS: [Vec3; 6] = [
     Vec3::new(1.0, 1.0, 1.0),
 ];
 
-/// A line that a ray meets.
+/// A line that a ray hits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Line {
     is_behind: bool,
     depth: u32,
 }
 
-/// Draw lines where the camera rays in the queue come near to the edges of boxes.
+/// Draws lines where the camera rays in the queue come near the edges of boxes.
 pub fn draw(shot: &Shot<'_>, queues: &mut Queues, radiance: &mut [Vec3]) -> Result<(), Cancelled> {
     let render = &shot.settings.render;
     let spread = shot.world.camera.pixel_spread(render.height);
@@ -51,7 +51,8 @@ pub fn draw(shot: &Shot<'_>, queues: &mut Queues, radiance: &mut [Vec3]) -> Resu
     Ok(())
 }
 
-/// Of the lines that a ray meets, those before the surface at `end` come first, and of those the ones of larger boxes.
+/// The first of the lines that a ray hits: lines before the surface at `end` precede the others, and among these larger
+/// boxes precede smaller ones.
 fn nearest_line(shot: &Shot<'_>, ray: &Ray, end: f32, spread: f32) -> Option<Line> {
     let mut best: Option<Line> = None;
     shot.world.geometry.along(ray, |local, Cell { bounds, depth, .. }, stretch| {
@@ -75,12 +76,12 @@ fn nearest_line(shot: &Shot<'_>, ray: &Ray, end: f32, spread: f32) -> Option<Lin
     best
 }
 
-/// How far a ray passes from the nearest edge of the side of a box that it goes through at t.
+/// Distance of a ray from the nearest edge of the side of a box that it goes through at t.
 fn edge_distance(bounds: &Aabb, ray: &Ray, (t, side): (f32, usize)) -> f32 {
     let (point, d) = (ray.at(t), ray.direction);
     let to_edge = |axis: usize| {
         let beside = (point[axis] - bounds.min[axis]).min(bounds.max[axis] - point[axis]).max(0.0);
-        // From the ray's plane along the edge, which is along the third axis.
+        // The edge is along the third axis: measure the distance from the ray's plane along it.
         beside * d[side].abs() / (d[side] * d[side] + d[axis] * d[axis]).sqrt()
     };
     to_edge((side + 1) % 3).min(to_edge((side + 2) % 3))

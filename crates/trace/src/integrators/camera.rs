@@ -14,7 +14,8 @@ use crate::sampling::filter::FilterSample;
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow, warp};
 use crate::world::{Loops, PACKET};
 
-/// Packets of camera rays that are made in one loop: each waits long for its numbers, and not for those of the others.
+/// Packets of camera rays that are made in one loop: each waits long for its random numbers, but not for those of the
+/// others.
 pub const CAMERA_ROWS: usize = 8;
 
 /// Rays through the pixels of some slots.
@@ -22,12 +23,13 @@ pub const CAMERA_ROWS: usize = 8;
 pub struct CameraRow {
     /// The rays.
     pub rays: RayRows,
-    /// A bit for each whose place in the pixel has a negative weight.
+    /// A bit for each ray whose place in the pixel has a negative weight.
     pub negative: u32,
 }
 
 impl Shot<'_> {
-    /// Rays through the pixels of some slots, in place of what is in the queue, and which of them have a negative weight.
+    /// Makes rays through the pixels of some slots, in place of the queue's content, and marks those with a negative
+    /// weight.
     pub fn camera_rays(
         &self,
         slots: Range<u32>,
@@ -46,14 +48,14 @@ impl Shot<'_> {
         }
     }
 
-    /// The rays of the first of some slots, at most [`CAMERA_ROWS`] packets, in place of what is in `rows`.
+    /// Makes the rays of the first of some slots, at most [`CAMERA_ROWS`] packets, in place of the content of `rows`.
     pub fn camera_rows(&self, slots: Range<u32>, rows: &mut Vec<CameraRow>) {
         rows.clear();
         let count = slots.len().div_ceil(PACKET).min(CAMERA_ROWS);
         self.world.geometry.instructions().run(Camera { shot: self, first: slots.start, count, rows });
     }
 
-    /// The path that a ray of the camera is.
+    /// The path of a camera ray.
     pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
         let around = self.world.glass_around(ray.origin).map(|(body, material)| Inside { body, material });
         let medium = around.fold(Medium::default(), Medium::entered);

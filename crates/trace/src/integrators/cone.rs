@@ -1,37 +1,37 @@
-//! How wide the beam is that a ray stands for: ray cones (Akenine-Möller, Crassin, Boksansky, Belcour, Panteleev, Wright, *Improved
-//! Shader and Texture Level of Detail Using Ray Cones*, JCGT 2021). They decide which level of a texture is looked up and nothing
-//! else; where no texture has levels they stay 0.
+//! Ray cones: the width of the beam around a ray (Akenine-Möller, Crassin, Boksansky, Belcour, Panteleev, Wright, *Improved Shader
+//! and Texture Level of Detail Using Ray Cones*, JCGT 2021). They only choose the mip level of texture look-ups; without mip levels
+//! they stay 0.
 
-/// A beam around a ray. Widths below 0 are of beams beyond their focus.
+/// A beam around a ray. A width below 0 means that the beam is beyond its focus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cone {
-    /// Its width where the ray starts.
+    /// Width at the ray's start.
     pub width: f32,
-    /// By how much that grows with the distance.
+    /// Growth of the width with the distance.
     pub spread: f32,
 }
 
 /// Part of a lobe's radius that the cone of one path takes: as if a hundred paths shared the lobe.
 const SHARE: f32 = 0.1;
 
-/// What a surface does to a beam that leaves it: changes with the width there.
+/// Effect of a surface on a beam that leaves it, which changes with the width there.
 #[derive(Clone, Copy, Debug)]
 pub enum Bend {
-    /// A mirror.
+    /// Reflection by a mirror.
     Reflected,
-    /// From one medium into another, whose index of refraction is so many times as high.
+    /// Refraction into another medium, whose index of refraction is so many times as high.
     Refracted(f32),
 }
 
 impl Cone {
-    /// The same from a place on the ray.
+    /// The beam at a place on the ray.
     #[inline(always)]
     pub fn after(self, distance: f32) -> Self {
         Self { width: self.width + self.spread * distance, ..self }
     }
 
-    /// From a vertex on, where a surface of this mean curvature bends it, > 0 where that bulges towards the eye; by the paraxial
-    /// equations. `cosine` is that of the angle to its normal.
+    /// The beam after a surface of this mean curvature, > 0 if the surface bulges towards the camera; by the paraxial equations.
+    /// `cosine` is that of the angle to its normal.
     pub fn bent(self, bend: Bend, curvature: f32, cosine: f32) -> Self {
         let turn = curvature * self.width / cosine.abs().max(LEAST_COSINE);
         let spread = match bend {
@@ -41,7 +41,7 @@ impl Cone {
         Self { spread, ..self }
     }
 
-    /// From a vertex on, in a direction of this density in sr⁻¹.
+    /// The beam after scattering in a direction of this pdf in sr⁻¹.
     pub fn scattered(self, density: f32) -> Self {
         // The solid angle 1/density is that of a cone of this radius in radians.
         let radius = (1.0 / (std::f32::consts::PI * density)).sqrt();
@@ -49,7 +49,7 @@ impl Cone {
     }
 }
 
-/// Beams that graze a surface are bent by no more than those at this angle.
+/// Least cosine: beams that graze a surface bend no more than at this angle.
 const LEAST_COSINE: f32 = 0.1;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What was done for a picture.
+//! Counters of rays and look-ups.
 
 /// Rays and look-ups of one tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -11,7 +11,7 @@ pub struct RayCounters {
     pub reflected_rays: u64,
     /// Refracted rays.
     pub refracted_rays: u64,
-    /// Rays that go on from diffuse and glossy surfaces.
+    /// Rays scattered by diffuse and glossy surfaces.
     pub scattered_rays: u64,
     /// Texture look-ups.
     pub texture_lookups: u64,

@@ -1,4 +1,4 @@
-//! What a ray crosses where it meets glass: all surfaces that touch there at once, and with them from one medium to another.
+//! Crossings of a ray at glass: of all surfaces that touch there at once, from one medium to another.
 
 use super::medium::{Inside, Medium};
 use super::queues::PathRay;
@@ -6,9 +6,9 @@ use super::shot::Shot;
 use super::vertices::Vertex;
 use crate::world::{Hit, Meeting, Near, NearMemory, Sides};
 
-/// What a ray crosses at a hit of glass.
+/// A ray's crossing at a hit of glass.
 pub struct Crossing {
-    /// Where rays that leave start.
+    /// Starts of the rays that leave.
     pub sides: Sides,
     /// The glass that the ray came through.
     pub arrived: Medium,
@@ -16,11 +16,11 @@ pub struct Crossing {
     pub near: Medium,
     /// The glass on the other side.
     pub far: Medium,
-    /// A surface there that nothing passes, as the ray between the sides meets it.
+    /// An opaque surface there, as the ray between the sides hits it.
     pub opaque: Option<Hit>,
 }
 
-/// Memory for what is near.
+/// Memory for the search of near surfaces.
 #[derive(Default)]
 pub struct CrossingMemory {
     around: NearMemory,
@@ -28,7 +28,7 @@ pub struct CrossingMemory {
 }
 
 impl Shot<'_> {
-    /// What a ray crosses at a hit of glass.
+    /// The crossing of a ray at a hit of glass.
     pub fn crossing(
         &self,
         path: &PathRay,
@@ -47,10 +47,10 @@ impl Shot<'_> {
         Crossing { sides, arrived, near, far, opaque }
     }
 
-    /// The media before and beyond what is near. Before it is what the ray knows; of closed shapes, beyond it is what is there. A
-    /// ray that leaves another one was in it, whatever it knows. Of open bodies those alone count that are left or entered here, so
-    /// that a ray and the one back see the same: nobody knows which way around the others the ray came. The first of the media is
-    /// the one that absorbed on the way here.
+    /// The media before and beyond the near surfaces. The ray's own record gives the medium before; for closed shapes, their
+    /// geometry gives the medium beyond. A ray that leaves another body was in it, whatever its record says. Of open bodies only
+    /// those count that are left or entered here, so that a ray and its reverse see the same, as the ray's way around the others is
+    /// unknown. The first of the media is the one that absorbed on the way here.
     fn media(&self, known: Medium, found: &[Near]) -> [Medium; 3] {
         let (mut arrived, mut near) = (known, self.without_open(known));
         let mut far = near.retained(|glass| !self.world.is_closed(glass.body));
@@ -82,7 +82,7 @@ impl Shot<'_> {
         [arrived, near, far]
     }
 
-    /// What of a medium is of closed bodies.
+    /// The closed bodies of a medium.
     pub fn without_open(&self, medium: Medium) -> Medium {
         if self.world.has_open_glass() {
             return medium.retained(|glass| !self.world.is_open(glass.body));

@@ -1,4 +1,4 @@
-//! Direct light at vertices, in rows of sixteen: every light with its own shadow rays.
+//! Direct light (next-event estimation) at vertices, in rows of sixteen: every light with its own shadow rays.
 
 use super::beside::Others;
 use super::lit_row::{LitRow, Response};
@@ -15,27 +15,27 @@ use crate::sampling::Decision;
 use crate::scene::description::Shadows;
 use crate::world::Loops;
 
-/// Lights the vertices of a row whose bits are set. It is compiled without the weights for where nothing but samples of the
-/// lamps finds their light.
+/// Lights the vertices of a row whose bits are set. It is compiled without MIS weights for cases in which only light
+/// samples find lamps.
 pub(super) struct Lighting<'a, const WEIGHED: bool> {
     pub(super) shot: &'a Shot<'a>,
     pub(super) row: &'a LitRow,
     pub(super) used: u32,
     pub(super) measure: Measure,
-    /// Not looked at where nothing is weighed.
+    /// Competing technique; unused if nothing is weighted.
     pub(super) others: Others,
-    /// Those that the vertices are in; none where all are in air.
+    /// Media of the vertices. `None` if all are in air.
     pub(super) media: Option<&'a [Medium]>,
 }
 
-/// Rays that the light of vertices took.
+/// Rays for the direct light of vertices.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LightRays {
-    /// Towards lamps.
+    /// Shadow rays.
     pub shadow: u64,
-    /// In lobes.
+    /// Rays in lobes.
     pub scattered: u64,
-    /// Look-ups of the lamps' textures.
+    /// Look-ups of emission textures.
     pub lookups: u64,
 }
 
@@ -47,18 +47,18 @@ impl std::ops::AddAssign for LightRays {
     }
 }
 
-/// What of the light that arrives at the vertices of a row gets to the eye.
+/// Light that arrives at the vertices of a row and is reflected towards the camera.
 pub(super) struct Arrived {
-    /// Before the throughput of the paths.
+    /// Reflected light, before the throughput of the paths.
     pub(super) light: Lanes3,
     pub(super) rays: LightRays,
 }
 
 /// Sums over the lights.
 pub(super) struct Sums {
-    /// Of what arrives.
+    /// Sum of the light that arrives.
     pub(super) light: Lanes3,
-    /// Of what could.
+    /// Sum of the light that could arrive.
     pub(super) total: Lanes,
     pub(super) rays: LightRays,
 }
@@ -70,7 +70,7 @@ impl Sums {
         rays: LightRays { shadow: 0, scattered: 0, lookups: 0 },
     };
 
-    /// What they come to.
+    /// The result of the sums.
     #[inline(always)]
     pub(super) fn arrived(mut self, measure: Measure) -> Arrived {
         if measure == Measure::ArrivingShare {
@@ -83,7 +83,7 @@ impl Sums {
     }
 }
 
-/// What a light could send, before one ray tells whether it does.
+/// Unoccluded light of a lamp, which waits for one shadow ray.
 struct Waiting {
     light: Lanes3,
     active: u32,
@@ -101,7 +101,7 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
 }
 
 impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
-    /// Add what each light of a kind sends.
+    /// Adds the light of all lights that `takes` accepts.
     #[inline(always)]
     pub(super) fn add_all(&self, takes: impl Fn(&Light) -> bool, sums: &mut Sums, folds: impl Folds) {
         let render = &self.shot.settings.render;
@@ -110,13 +110,14 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             if WEIGHED && self.shot.leaves_sky && light.is_from_all_around() {
                 continue;
             }
-            // Where one ray decides for all of a light, what it could send waits for that.
+            // If one ray decides for the whole light, its light waits for that ray.
             let mut waiting = Waiting { light: [[0.0; LANES]; 3], active: 0 };
             let waits = match render.shadows {
                 Shadows::Soft => false,
                 Shadows::Hard => light.middle().is_some(),
                 Shadows::Off => true,
             };
+            // Take the only direction, or the requested number of samples.
             if light.is_single() {
                 let nowhere = [[0.0; LANES]; 2];
                 let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &nowhere);
@@ -132,14 +133,16 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
                     let (mut values, active) = self.values(&samples, 1.0 / count as f32, folds);
+                    // Multiply by the emission texture.
                     if let Some(pattern) = light.pattern() {
                         values = self.tinted(pattern, &samples, active, values);
                         sums.rays.lookups += u64::from(active.count_ones());
                     }
+                    // Weight against the competing technique.
                     if WEIGHED {
                         let leaves_gloss = self.shot.lobes_find_sky && light.is_from_all_around();
                         let of_light = if leaves_gloss && self.others.are_lobes() {
-                            // As if light samples hardly ever came: lobes bring all.
+                            // Pretend that light samples hardly ever come, so that lobes bring all.
                             [f32::MAX; LANES]
                         } else {
                             light.inverse_densities(&samples)
@@ -150,13 +153,14 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                     self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
                 }
             }
+            // Trace the one ray to the middle of the light.
             if waiting.active != 0 {
                 self.add_waiting(light.middle(), &waiting, sums, folds);
             }
         }
     }
 
-    /// What glass around the vertices leaves of samples on the way.
+    /// Multiplies values by the transmittance of glass around the vertices on the way to the samples.
     #[cold]
     #[inline(never)]
     fn left_by_glass(&self, media: &[Medium], samples: &LightRow, mut values: Lanes3) -> Lanes3 {
@@ -171,7 +175,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         values
     }
 
-    /// What samples of a lamp bring by the colours of the lamp at their points.
+    /// Multiplies values by the emission texture at the sampled points.
     #[cold]
     #[inline(never)]
     fn tinted(&self, pattern: &Pattern, samples: &LightRow, active: u32, mut values: Lanes3) -> Lanes3 {
@@ -188,7 +192,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         values
     }
 
-    /// Add what samples of one light bring, if they bring anything; where it waits for one ray, it is put beside.
+    /// Adds the contributions of samples of one light, if there are any; values that wait for one ray go to `waiting`.
     #[inline(always)]
     fn add(
         &self,
@@ -216,7 +220,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         }
     }
 
-    /// What waits for one ray to the middle of its light.
+    /// Adds the light that waits for one ray to the middle of its light.
     #[inline(always)]
     fn add_waiting(
         &self,
@@ -250,7 +254,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         self.add_seen((&rays, &ends, traced), &SourceRow::of(source), &waiting.light, sums, folds);
     }
 
-    /// Add what arrives on the rays of `traced`; the others end below 0.
+    /// Adds the unoccluded light on the rays of `traced`; the others end below 0.
     #[inline(always)]
     pub(super) fn add_seen(
         &self,
@@ -268,7 +272,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         add_where(traced & !occluded, values, &mut sums.light);
     }
 
-    /// What each sample brings if nothing is in its way, and a bit for each that brings anything.
+    /// Contribution of each sample if it is not occluded, and a bit for each that is not 0.
     #[inline(always)]
     pub(super) fn values(&self, samples: &LightRow, share: f32, folds: impl Folds) -> (Lanes3, u32) {
         let Response { f, cosines, .. } = self.row.response(&samples.directions);
@@ -292,7 +296,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         (values, folds.bits(&active) & self.used)
     }
 
-    /// The rays on which the light of the samples in `active` arrives; the others have no end.
+    /// The shadow rays of the samples in `active`; the other lanes have no end.
     #[inline(always)]
     pub(super) fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayRows, Ends) {
         let (mut direction, mut ends) = (samples.directions, [-1.0; LANES]);
@@ -309,7 +313,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     }
 }
 
-/// Add what the rays whose bits are set meet in the trees, up to their ends.
+/// Adds the work of the rays whose bits are set: what they visit in the trees, up to their ends.
 #[cold]
 #[inline(never)]
 pub(super) fn add_work(shot: &Shot<'_>, rays: &RayRows, ends: &Ends, traced: u32, sums: &mut Lanes3) {
@@ -320,7 +324,7 @@ pub(super) fn add_work(shot: &Shot<'_>, rays: &RayRows, ends: &Ends, traced: u32
     }
 }
 
-/// Add the values of the lanes whose bits are set.
+/// Adds the values of the lanes whose bits are set.
 #[inline(always)]
 pub(super) fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
     for axis in 0..3 {

@@ -1,4 +1,4 @@
-//! The rows of vertices that wait to be lit, and what arrives by them.
+//! Queue of rows of vertices that wait for direct light, and the light that arrives there.
 
 use arrayvec::ArrayVec;
 
@@ -24,40 +24,40 @@ use crate::math::lanes::{Folds, LANES, Lanes3, lane};
 use crate::scene::description::Shadows;
 use crate::world::{Geometry, Loops};
 
-/// Vertices that wait to be lit, side by side; each is lit alone, whatever it shares its row with.
+/// Vertices that wait for direct light, side by side; each is lit by itself, whatever vertices share its row.
 #[derive(Default)]
 pub struct LitQueue {
     rows: Vec<LitRow>,
-    /// Rows that are in use; the others are memory.
+    /// Rows in use; the others are memory.
     count: usize,
-    /// The one that takes single vertices; full or none where this is no row in use.
+    /// Index of the row for single vertices. If no row in use has this index, the row is full or there is none.
     open: usize,
-    /// What lamps send by the vertex of each path of the round.
+    /// Light of lamps at the vertex of each path of the round.
     arrived: Vec<Vec3>,
-    /// The glass around vertices; the first is none.
+    /// The glass around vertices; the first entry is air.
     media: Vec<Medium>,
-    /// Shadow rays of some rows.
+    /// Shadow rays of several rows.
     pool: Pool,
-    /// The beams that come to the vertices of the paths of the round, where they are asked for.
+    /// Beams at the vertices of the paths of the round, if requested.
     cones: Vec<Cone>,
 }
 
-/// Rows that are lit together where lights are picked.
+/// Rows that are lit together if lights are picked.
 const ROWS: usize = 64;
 
 impl LitQueue {
-    /// Rows from which on they are lit before more come, while what they need is in the cache.
+    /// Number of rows from which they are lit before more come, while their data are in the cache.
     const FULL: usize = 64;
 
-    /// Fewer vertices of a row are put together with others.
+    /// Fewest vertices of a row of its own; fewer are put together with others.
     const WORTH_A_ROW: u32 = 8;
 
-    /// Whether they are to be lit now.
+    /// Whether the rows are to be lit now.
     pub fn is_full(&self) -> bool {
         self.count >= Self::FULL
     }
 
-    /// A round of so many paths begins, whose beams are asked for or not.
+    /// Begins a round of so many paths, with their beams or without.
     pub fn expect(&mut self, paths: usize, has_cones: bool) {
         self.clear();
         self.cones.clear();
@@ -68,15 +68,15 @@ impl LitQueue {
         self.media.push(Medium::default());
     }
 
-    /// Note the beam that comes to the vertex of a path.
+    /// Stores the beam at the vertex of a path.
     pub fn note_cone(&mut self, place: u32, cone: Cone) {
         if let Some(own) = self.cones.get_mut(place as usize) {
             *own = cone;
         }
     }
 
-    /// The round is over: the sink gets what lamps send, in the order of the paths; their slots, and whether the eye sees their
-    /// vertices, are told by their places.
+    /// Ends the round: the sink gets the light of lamps, in the order of the paths. `path` gives the slot of a place, and
+    /// whether the camera sees its vertex.
     pub fn settle(&mut self, path: impl Fn(usize) -> (u32, bool), sink: &mut Sink<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
             let (slot, is_seen) = path(place);
@@ -84,12 +84,12 @@ impl LitQueue {
         }
     }
 
-    /// The same where the slots of the paths are those from one on.
+    /// [`LitQueue::settle`] for paths whose slots are consecutive.
     pub fn settle_run(&mut self, first: u32, sink: &mut Sink<'_>) {
         sink.add_arrived_run(first, &self.arrived);
     }
 
-    /// A row to be filled, to be kept by [`LitQueue::keep`] or forgotten.
+    /// An empty row to fill, then to keep by [`LitQueue::keep`] or to drop.
     pub fn spare(&mut self) -> &mut LitRow {
         if self.count == self.rows.len() {
             self.rows.push(LitRow::EMPTY);
@@ -97,7 +97,7 @@ impl LitQueue {
         &mut self.rows[self.count]
     }
 
-    /// Keep the vertices of the spare row.
+    /// Keeps the vertices of the spare row.
     pub fn keep(&mut self) {
         let (kept, spare) = self.rows.split_at_mut(self.count);
         let Some(row) = spare.first_mut().filter(|row| row.used != 0) else { return };
@@ -120,7 +120,7 @@ impl LitQueue {
         }
     }
 
-    /// One more vertex.
+    /// Adds a vertex.
     pub fn push(&mut self, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure) {
         self.note_cone(lit.place, lit.vertex.cone);
         let mut medium = 0;
@@ -144,15 +144,15 @@ impl LitQueue {
         (row, lane)
     }
 
-    /// Forget all vertices.
+    /// Drops all vertices.
     fn clear(&mut self) {
         (self.count, self.open) = (0, 0);
-        // Rays of a round that was cancelled.
+        // A cancelled round may have left rays.
         self.pool.clear();
     }
 
-    /// Light all vertices and forget them; what rays that took. Where paths go on from them, the rays of the next round
-    /// are added to `next`.
+    /// Lights all vertices and drops them; returns the rays for it. If paths go on from the vertices, the rays of the
+    /// next round are added to `next`.
     pub fn light(
         &mut self,
         shot: &Shot<'_>,
@@ -169,6 +169,7 @@ impl LitQueue {
         let scatters = onward.filter(|onward| onward.leads_on);
         for first in (0..self.count).step_by(together) {
             let end = (first + together).min(self.count);
+            // Sample the lights at each row; rays to picked lights wait in the pool.
             for number in first..end {
                 shot.token.check()?;
                 let row = &mut self.rows[number];
@@ -182,7 +183,9 @@ impl LitQueue {
                     self.pool.trace(&shot.world.geometry, &mut group);
                 }
             }
+            // Trace the rest of the pool.
             self.pool.trace(&shot.world.geometry, &mut group);
+            // Add the light by rays in lobes and by photons, and store the result.
             for (number, sums) in (first..end).zip(group.drain(..)) {
                 let row = &self.rows[number];
                 let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
@@ -198,6 +201,7 @@ impl LitQueue {
                 rays += arrived.rays;
                 self.note(number, measure, &arrived.light);
             }
+            // Scatter the paths that go on.
             if let Some(onward) = scatters {
                 for row in &self.rows[first..end] {
                     Scattering { shot, row, used: row.used, onward }.scatter(&self.media, &self.cones, next);
@@ -208,7 +212,7 @@ impl LitQueue {
         Ok(rays)
     }
 
-    /// What finds light beside samples of the lamps.
+    /// Technique that competes with light samples.
     fn others(&self, asked: Asked, shot: &Shot<'_>, measure: Measure) -> Others {
         if asked.by_paths {
             Others::Paths
@@ -217,12 +221,12 @@ impl LitQueue {
         }
     }
 
-    /// The glass around the vertices of a row; none where all are in air.
+    /// The glass around the vertices of a row. `None` if all are in air.
     fn media_of(&self, row: &LitRow) -> Option<&[Medium]> {
         (self.media.len() > 1 && row.is_inside()).then_some(&*self.media)
     }
 
-    /// What samples of the lamps bring; rays to lamps that were picked wait in the pool, under a number.
+    /// Contributions of light samples; rays to picked lamps wait in the pool, under the row's number.
     fn sums(&mut self, asked: Asked, shot: &Shot<'_>, measure: Measure, number: u32) -> Sums {
         let mut pool = std::mem::take(&mut self.pool);
         let row = &self.rows[asked.number];
@@ -244,7 +248,7 @@ impl LitQueue {
         sums
     }
 
-    /// What arrives, with what rays in lobes bring.
+    /// Light that arrives, including that of rays in lobes.
     fn arrived(&self, asked: Asked, shot: &Shot<'_>, measure: Measure, sums: Sums) -> Arrived {
         let row = &self.rows[asked.number];
         let arrived = sums.arrived(measure);
@@ -258,7 +262,7 @@ impl LitQueue {
         }
     }
 
-    /// Note what arrives at a row.
+    /// Stores the light that arrives at a row.
     fn note(&mut self, number: usize, measure: Measure, arrived: &Lanes3) {
         let row = &self.rows[number];
         let light = match measure {
@@ -281,25 +285,25 @@ impl LitQueue {
     }
 }
 
-/// A bit for each vertex of which light that comes straight to it is shown.
+/// A bit for each vertex whose direct light is shown.
 fn shown(row: &LitRow, measure: Measure) -> u32 {
     let Ways { direct, indirect, .. } = measure.ways();
     let hidden = |bits: u32, is_shown: bool| if is_shown { 0 } else { bits };
     !(hidden(row.seen, direct) | hidden(!row.seen, indirect))
 }
 
-/// Which vertices are lit, and how.
+/// Vertices to light, and options.
 #[derive(Clone, Copy)]
 struct Asked {
     /// The number of the row.
     number: usize,
     /// A bit for each vertex.
     used: u32,
-    /// Whether rays of paths that go on from there bring their share.
+    /// Whether paths that go on from there share the light.
     by_paths: bool,
 }
 
-/// Lifts the vertices of a row to where nothing is on the way.
+/// Moves the vertices of a row above their facets, if nothing is on the way.
 struct Lifting<'a> {
     geometry: &'a Geometry,
     row: &'a mut LitRow,

@@ -1,4 +1,4 @@
-//! Vertices that wait to be lit, sixteen side by side.
+//! Vertices that wait for direct light, sixteen side by side.
 
 use super::shot::Shot;
 use super::vertices::{Lift, LitVertex};
@@ -17,53 +17,53 @@ use crate::scene::description::Shadows;
 pub struct LitRow {
     /// A bit for each lane with a vertex.
     pub used: u32,
-    /// Where lights are seen from and shadow rays start.
+    /// Origins of light samples and shadow rays.
     pub from: Lanes3,
-    /// Normals behind which nothing is seen, of the lanes whose bits are set.
+    /// Horizon normals: nothing behind them is visible, in the lanes whose bits are set.
     pub(super) horizon: Lanes3,
     pub(super) is_bounded: u32,
-    /// Points from which lights are seen all around where nothing is on the way there, of the lanes whose bits are set, and the
-    /// ends of the ways.
+    /// Points above the facets that see lights in all directions, if nothing is on the way to the points, in the lanes whose
+    /// bits are set; with the ends of these ways.
     pub(super) lifted: Lanes3,
     pub(super) lift_end: Lanes,
     pub(super) may_lift: u32,
-    /// Points of the surfaces and normals of their facets on the eye's side, of the lanes whose bits are set; of the others these are
-    /// `from` and `normal`.
+    /// Points of the surfaces and normals of their facets on the viewer's side, in the lanes whose bits are set; in other lanes
+    /// these are `from` and `normal`.
     pub(super) point: Lanes3,
     /// [`LitRow::point`].
     pub(super) facet: Lanes3,
     /// [`LitRow::point`].
     pub(super) apart: u32,
-    /// A bit for each vertex that the eye sees, be it by mirrors and glass.
+    /// A bit for each vertex that the camera sees, directly or by mirrors and glass.
     pub(super) seen: u32,
-    /// A bit for each whose path comes from a surface with a glossy lobe.
+    /// A bit for each vertex whose path comes from a surface with a glossy lobe.
     pub(super) from_gloss: u32,
-    /// Normals that the cosines are of.
+    /// Normals for the cosines.
     pub normal: Lanes3,
-    /// Those before a normal map bent them, and the cosine between; [`UNBENT`] where none did.
+    /// Normals before a normal map bent them, and the cosine between both; [`UNBENT`] without a normal map.
     pub(super) smooth_normal: Lanes3,
     pub(super) bend: Lanes,
-    /// The direction to the eye, mirrored.
+    /// The direction to the viewer, mirrored.
     pub mirrored_eye: Lanes3,
     /// The diffuse part of f in sr⁻¹, and the glossy one at its peak.
     pub diffuse: Lanes3,
     /// [`LitRow::diffuse`].
     pub specular: Lanes3,
-    /// Of the glossy lobe.
+    /// Exponent of the glossy lobe.
     pub shininess: Lanes,
-    /// The largest parts of kd and ks, whatever is shown of them.
+    /// The largest components of kd and ks, whatever parts are shown.
     pub albedos: [Lanes; 2],
-    /// Of the paths.
+    /// Throughput of the paths.
     pub throughput: Lanes3,
-    /// Of the paths.
+    /// Slots of the paths.
     pub slot: [u32; LANES],
-    /// Of the paths.
+    /// Numbers of the paths.
     pub path: [u32; LANES],
     /// Places of the paths in the round's queue.
     pub place: [u32; LANES],
     /// [`History::carried`](super::queues::History::carried) of the paths.
     pub carried: Lanes,
-    /// Places of the glass that they are in.
+    /// Indices of the glass around the vertices.
     pub medium: [u32; LANES],
     /// Whether any vertex has a glossy lobe.
     pub is_glossy: bool,
@@ -71,17 +71,18 @@ pub struct LitRow {
     pub(super) is_bent: bool,
 }
 
-/// In place of the cosine between two normals that are one.
+/// Value in place of the cosine between two equal normals.
 pub(super) const UNBENT: f32 = -2.0;
 
 impl LitRow {
-    /// The least α of lobes that are worth rays of their own whatever lights them.
+    /// Least α of lobes that are worth rays of their own under any light.
     const SHARP: f32 = 100.0;
 
-    /// Lobes are worth them too in which light from beyond the scene is so many times as wide as the lobe.
+    /// Least ratio of the width of light from beyond the scene to that of a lobe, for which the lobe is worth rays of
+    /// its own too.
     const FILLED: f32 = 1.5;
 
-    /// A bit for each vertex whose highlights of lamps samples of the lamps alone would find too seldom.
+    /// A bit for each vertex whose highlights of lamps are too rare for light samples alone.
     pub(super) fn sharp(&self, shot: &Shot<'_>, measure: Measure) -> u32 {
         let shows = match measure {
             Measure::Radiance(Parts { specular, .. }) => specular,
@@ -111,7 +112,7 @@ impl LitRow {
         SamplerRow::new(shot.settings.render.seed, &xs, &ys, &samples)
     }
 
-    /// No vertex.
+    /// A row without vertices.
     pub const EMPTY: Self = Self {
         used: 0,
         from: [[0.0; LANES]; 3],
@@ -143,7 +144,7 @@ impl LitRow {
         is_bent: false,
     };
 
-    /// For other vertices, with normals as they are.
+    /// Prepares the row for other vertices, with normals as they are.
     #[inline(always)]
     pub fn reset(&mut self) {
         (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
@@ -152,7 +153,7 @@ impl LitRow {
         self.bend = [UNBENT; LANES];
     }
 
-    /// Keep these of its vertices.
+    /// Keeps these vertices only.
     pub(super) fn keep(&mut self, these: u32) {
         let Self { used, is_bounded, may_lift, apart, seen, from_gloss, .. } = self;
         for bits in [used, is_bounded, may_lift, apart, seen, from_gloss] {
@@ -160,7 +161,7 @@ impl LitRow {
         }
     }
 
-    /// Take a vertex of another row.
+    /// Takes a vertex of another row.
     pub(super) fn copy(&mut self, i: usize, other: &Self, from: usize) {
         for (own, other) in [
             (&mut self.from, &other.from),
@@ -247,7 +248,7 @@ impl LitRow {
         }
     }
 
-    /// What the vertices make of light from some directions.
+    /// Response of the vertices to light from these directions.
     #[inline(always)]
     pub fn response(&self, directions: &Lanes3) -> Response {
         let mut cosines = [0.0; LANES];
@@ -271,7 +272,7 @@ impl LitRow {
         Response { f, cosines, glosses }
     }
 
-    /// Where the surface of a vertex is, and the normal of its facet on the eye's side.
+    /// Position of a vertex's surface, and the normal of its facet on the viewer's side.
     #[inline(always)]
     pub(super) fn place_of(&self, i: usize) -> (Vec3, Vec3) {
         if self.apart & 1 << i != 0 {
@@ -281,8 +282,8 @@ impl LitRow {
         }
     }
 
-    /// The cosine of light from a direction that a vertex is lit by, times what is left of it at the terminator, over that by which
-    /// the light comes to the facet: what photons that land there count.
+    /// Weight of photons that land at a vertex: the cosine of the light's direction, times the terminator factor, over the cosine
+    /// with the facet.
     #[inline(always)]
     pub(super) fn landed(&self, i: usize, direction: Vec3) -> f32 {
         if self.apart & 1 << i == 0 {
@@ -295,7 +296,7 @@ impl LitRow {
         if (left > 0.0) & (arriving > 0.0) { left / arriving } else { 0.0 }
     }
 
-    /// What the paths carry of light from the vertices.
+    /// Light of the vertices, times the throughput of the paths.
     #[inline(always)]
     pub(super) fn carried_on(&self, light: &Lanes3) -> Lanes3 {
         let mut carried = *light;
@@ -307,7 +308,7 @@ impl LitRow {
         carried
     }
 
-    /// The first place where there is a vertex in every lane and their places follow one another.
+    /// The first place, if there is a vertex in every lane and their places are consecutive. Otherwise `None`.
     #[inline(always)]
     pub(super) fn run(&self) -> Option<u32> {
         let mut is_run = self.used == ALL;
@@ -322,7 +323,7 @@ impl LitRow {
         lanes(self.used).any(|i| self.medium[i] != 0)
     }
 
-    /// A bit for each vertex that certainly sees nothing in a direction.
+    /// A bit for each vertex that certainly sees nothing in its direction.
     #[inline(always)]
     pub fn hidden(&self, directions: &Lanes3, folds: impl Folds) -> u32 {
         let mut hidden = [0; LANES];
@@ -336,11 +337,11 @@ impl LitRow {
     }
 }
 
-/// What vertices make of light from directions.
+/// Response of vertices to light from directions.
 pub struct Response {
-    /// The BSDF in sr⁻¹, as far as it is shown.
+    /// The BSDF in sr⁻¹, of the shown parts.
     pub f: Lanes3,
-    /// Cosines, times what is left of them at the terminator; not above 0 where nothing arrives.
+    /// Cosines, times the terminator factor; not above 0 if nothing arrives.
     pub cosines: Lanes,
     /// [`gloss`].
     pub glosses: Lanes,
@@ -349,7 +350,7 @@ pub struct Response {
 /// A bit for each lane.
 pub(super) const ALL: u32 = ((1_u64 << LANES) - 1) as u32;
 
-/// The diffuse part of f in sr⁻¹, and the glossy one at its peak, as far as they are shown.
+/// The diffuse part of f in sr⁻¹, and the glossy part at its peak, as far as they are shown.
 #[inline(always)]
 pub fn bsdf_parts(bsdf: &PhongBsdf, measure: Measure) -> [Vec3; 2] {
     let Parts { diffuse, specular, .. } = match measure {
@@ -361,8 +362,8 @@ pub fn bsdf_parts(bsdf: &PhongBsdf, measure: Measure) -> [Vec3; 2] {
     [part(diffuse, bsdf.diffuse_value()), part(specular, bsdf.specular_peak())]
 }
 
-/// Softens the edge where bent normals leave the light of the surface that they are on, 0 behind that; 1 where nothing
-/// bends them (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
+/// Terminator factor: softens the edge at which bent normals lose the light of their surface, 0 behind the surface; 1
+/// without bent normals (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
 #[inline(always)]
 fn terminator(cosine: f32, smooth: f32, bend: f32) -> f32 {
     let g = smooth / (cosine * bend);
@@ -377,7 +378,7 @@ mod tests {
 
     #[test]
     fn a_vertex_in_the_place_of_another_keeps_nothing_of_it() {
-        // All that is told by bits, of all vertices, also of those that are not used.
+        // Row whose bits are set for all vertices, also for unused ones.
         let noisy = LitRow {
             used: ALL,
             is_bounded: ALL,

@@ -1,20 +1,20 @@
-//! Which glass a ray is in, and what that does to it.
+//! The glass around a ray, and its effects on the ray.
 
 use crate::materials::Glass;
 use crate::math::Vec3;
 use crate::world::World;
 
-/// A glass that a ray is in: the parts of one body may be of several.
+/// A glass around a ray; the parts of one body may have several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Inside {
-    /// The body, by its place in the order of the file.
+    /// Number of the body: its place in the order of the file.
     pub body: u32,
-    /// The material of the surface that the ray entered by.
+    /// Material of the surface through which the ray entered.
     pub material: u32,
 }
 
-/// The glass around a ray, in the order of the file, the last of which counts. Of more than the list is long the first are
-/// forgotten.
+/// The glasses around a ray, in the order of the file; the last one counts. If the list is full, the first ones are
+/// dropped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Medium {
     inside: [Inside; 4],
@@ -26,7 +26,7 @@ impl Medium {
         &self.inside[..usize::from(self.count)]
     }
 
-    /// Whether no glass is known of.
+    /// Whether no glass is known.
     pub fn is_air(&self) -> bool {
         self.count == 0
     }
@@ -36,7 +36,7 @@ impl Medium {
         self.known().last().copied()
     }
 
-    /// After entering a glass.
+    /// The medium after entering a glass.
     pub fn entered(mut self, glass: Inside) -> Self {
         if usize::from(self.count) == self.inside.len() {
             if glass < self.inside[0] {
@@ -52,8 +52,8 @@ impl Medium {
         self
     }
 
-    /// After leaving a glass; none where the ray was in none of that body, as far as it knows. A surface of several
-    /// glasses may be entered by one and left by another: then the body's last is left.
+    /// The medium after leaving a glass. `None` if the ray was not in that body, as far as it knows. A surface of
+    /// several glasses may be entered by one and left by another: then the body's last one is left.
     pub fn left(self, glass: Inside) -> Option<Self> {
         let same = self.known().iter().rposition(|&own| own == glass);
         same.or_else(|| self.known().iter().rposition(|own| own.body == glass.body))
@@ -67,19 +67,19 @@ impl Medium {
         self
     }
 
-    /// Without the glasses that do not hold.
+    /// The medium with only the glasses for which `holds` is true.
     pub fn retained(self, holds: impl Fn(Inside) -> bool) -> Self {
         self.known().iter().copied().filter(|&glass| holds(glass)).fold(Self::default(), Self::entered)
     }
 }
 
-/// What glass leaves of radiance along a ray to its hit at `distance`.
+/// Transmittance of glass along a ray to its hit at `distance`.
 pub fn absorption(world: &World, medium: Medium, distance: f32) -> Vec3 {
     let glass = medium.glass().and_then(|inside| glass_of(world, inside));
     glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
 }
 
-/// Index of refraction of what a ray is in.
+/// Index of refraction of a ray's medium.
 pub fn ior(world: &World, medium: Medium) -> f32 {
     medium.glass().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
 }
@@ -121,9 +121,9 @@ mod tests {
     fn parts_of_one_body_are_told_apart_by_their_material() {
         let both = Medium::default().entered(part(1, 0)).entered(part(1, 5));
         assert_eq!(both.left(part(1, 0)), Some(Medium::default().entered(part(1, 5))));
-        // Entered by material 0, left by material 2.
+        // Enter by material 0, leave by material 2.
         assert_eq!(Medium::default().entered(part(1, 0)).left(part(1, 2)), Some(Medium::default()));
-        // Twice in one.
+        // Enter one body twice.
         let twice = Medium::default().entered(part(1, 0)).entered(part(1, 0));
         assert_eq!(twice.left(part(1, 0)), Some(Medium::default().entered(part(1, 0))));
     }

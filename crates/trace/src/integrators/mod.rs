@@ -1,12 +1,17 @@
-//! From a world and a tile to radiance. Rays travel in batches: a queue of camera rays, the shadow rays of their hits,
+//! Integrators: from a world and a tile to radiance. Rays travel in batches: a queue of camera rays, the shadow rays of their hits,
 //! the queue of the next bounces.
 //!
-//! What every method stands on, from below: what all rays of a tile have in common (`shot`), rays in `queues` with the beams that they
-//! stand for (`cone`), their way to hits (`trace`), the glass that they are in (`medium`), what is ready at a hit (`vertices`), what
-//! touches it (`crossing`), the ways on at mirrors and glass (`specular`), vertices that wait for light (`lit_row`, `lit_queue`), the
-//! `light` there, that of lights which are picked (`picking`, `pool`), the rays `beside` it that find lamps by their own way, and the `sink` that takes what the view shows. `wave` follows
-//! the rays round by round, for both methods; paths go `onward` from diffuse and glossy surfaces, in whitted they end there. `views` are
-//! of first hits, `bounds` are lines over the picture.
+//! Modules, from below:
+//! - `shot`: the common data of all rays of a tile; `queues`: the rays, with their beams (`cone`) and the
+//!   glass around them (`medium`).
+//! - `trace`: rays to hits; `packet`: packets of rays to hits and rows of plain surfaces.
+//! - `vertices`: all data of a hit for shading; `crossing`: surfaces that touch it; `specular`: reflection and refraction.
+//! - `lit_row`, `lit_queue`: vertices that wait for direct light; `light`: that light; `picking`, `pool`: that of picked lights;
+//!   `beside`: other techniques that find lamps, and MIS weights.
+//! - `sink`: accumulates the parts of light that the view shows.
+//! - `wave`: the rays round by round, for both methods. Paths are scattered `onward` at diffuse and glossy surfaces; in whitted
+//!   they end there.
+//! - `views`: views of first hits; `bounds`: the boxes of the trees as lines over the picture.
 
 mod beside;
 mod bounds;
@@ -52,11 +57,11 @@ pub use view::{FirstHit, Measure, Parts, Shown, View};
 /// Camera rays that go through the queues together.
 const BATCH_SIZE: usize = 1024;
 
-/// Samples number `samples` of every pixel of `tile`. A function of its arguments alone: any split of a picture
-/// into tiles and of its samples into ranges gives the same radiances.
+/// Renders samples number `samples` of every pixel of `tile`. The result depends on the arguments alone: any split of a
+/// picture into tiles and of its samples into ranges gives the same radiances.
 ///
 /// # Errors
-/// [`Cancelled`] when the token says so; it is polled every few hundred rays.
+/// [`Cancelled`] if the token is cancelled; it is polled every few hundred rays.
 pub fn render_tile(
     world: &World,
     settings: &RenderSettings,
@@ -67,7 +72,7 @@ pub fn render_tile(
     render_tile_by(None, world, settings, pixels, samples, token)
 }
 
-/// The same with photons, of which there are the maps of the samples; without, nothing is gathered.
+/// [`render_tile`] with the photon maps of the samples. Without maps, nothing is gathered.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -114,7 +119,7 @@ pub fn render_tile_by(
     Ok((TileSamples { pixels: block.pixels, samples, radiance, negative }, counters))
 }
 
-/// Mark the slots from `first` on whose bits are set.
+/// Marks the slots from `first` on whose bits are set.
 fn mark(marked: &mut [bool], first: u32, bits: u32) {
     for (lane, marked) in marked.iter_mut().skip(first as usize).take(PACKET).enumerate() {
         *marked = bits & 1 << lane != 0;

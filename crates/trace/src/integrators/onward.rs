@@ -1,5 +1,5 @@
-//! Where paths go on from diffuse and glossy surfaces, sixteen at a time; which of them end by roulette; and what a path counts
-//! that meets a lamp which light samples find too.
+//! Scattering of paths at diffuse and glossy surfaces, sixteen at a time; Russian roulette; and the MIS weights of paths that
+//! hit a lamp which light samples find too.
 
 use super::beside::weight;
 use super::cone::Cone;
@@ -17,20 +17,20 @@ use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
 use crate::sampling::Decision;
 use crate::world::{Hit, Loops};
 
-/// How paths of a round go on.
+/// Continuation of the paths of a round.
 #[derive(Clone, Copy, Debug)]
 pub struct Onward {
-    /// Whether they may, and would find anything: at the last scattering lamps alone.
+    /// Whether paths go on, and would find anything: after the last scattering, only lamps.
     pub leads_on: bool,
-    /// Whether each goes on with a chance only.
+    /// Whether Russian roulette applies.
     pub is_risked: bool,
 }
 
 impl Onward {
-    /// Scatterings after which a path goes on with a chance only.
+    /// Scatterings before Russian roulette begins.
     const SURE: u32 = 3;
 
-    /// From the vertices after so many scatterings.
+    /// The continuation from vertices after so many scatterings.
     pub fn new(shot: &Shot<'_>, depth: u32) -> Self {
         let emits = || shot.world.materials.iter().any(|material| material.emission.shines());
         let max_depth = shot.settings.render.max_depth;
@@ -39,13 +39,14 @@ impl Onward {
         Self { leads_on, is_risked: depth >= Self::SURE }
     }
 
-    /// The chance of a path to go on: the root of its throughput, as its part of the variance goes with the square of that (Bolin and Meyer, *An Error Metric for Monte Carlo Ray Tracing*, 1997).
+    /// Survival probability of a path: the root of its throughput, as its part of the variance goes with the square of its
+    /// throughput (Bolin and Meyer, *An Error Metric for Monte Carlo Ray Tracing*, 1997).
     #[inline(always)]
     fn chance(self, carried: f32) -> f32 {
         if self.is_risked & (carried < 1.0) { carried.sqrt() } else { 1.0 }
     }
 
-    /// A path after a mirror or glass: it may end there, else it counts for those that do.
+    /// Russian roulette for a path after a mirror or glass. `None` if it ends; survivors are reweighted.
     pub fn spared(self, shot: &Shot<'_>, mut path: PathRay) -> Option<PathRay> {
         let chance = self.chance(path.history.carried);
         if chance < 1.0 {
@@ -59,35 +60,35 @@ impl Onward {
     }
 }
 
-/// Sends paths on from the vertices of a row.
+/// Scatters paths at the vertices of a row.
 pub struct Scattering<'a> {
-    /// What is rendered.
+    /// Context of the tile.
     pub shot: &'a Shot<'a>,
     /// The vertices.
     pub row: &'a LitRow,
-    /// A bit for each from which they go on.
+    /// A bit for each vertex at which paths go on.
     pub used: u32,
-    /// How.
+    /// Continuation of the paths.
     pub onward: Onward,
 }
 
-/// The ways that paths go on from the vertices of a row.
+/// Scattered directions at the vertices of a row.
 pub struct Ways {
-    /// A bit for each that goes on.
+    /// A bit for each path that goes on.
     alive: u32,
     /// Unit directions.
     directions: Lanes3,
-    /// Their densities in sr⁻¹.
+    /// Their pdfs in sr⁻¹.
     densities: Lanes,
-    /// What becomes of the throughput.
+    /// Factors on the throughput.
     factors: Lanes3,
-    /// What becomes of [`History::carried`].
+    /// Factors on [`History::carried`].
     carried: Lanes,
 }
 
 impl Scattering<'_> {
-    /// Add the rays of the next round; the vertices are in these media, and beams come to them so wide, by their places, where
-    /// that is asked for.
+    /// Adds the rays of the next round. `media` are those of the vertices; `cones` are the beams at the vertices, by place, if
+    /// beams are requested.
     pub fn scatter(self, media: &[Medium], cones: &[Cone], next: &mut Vec<PathRay>) {
         let row = self.row;
         let ways = self.shot.world.geometry.instructions().run(self);
@@ -122,6 +123,7 @@ impl Loops for Scattering<'_> {
     fn run(self, folds: impl Folds) -> Ways {
         let Self { shot, row, used, onward } = self;
         let sampler = row.sampler(shot);
+        // Sample a direction for each vertex.
         let u = sampler.pairs(&row.path, Decision::Direction, 0, 1);
         let [lobe, _] =
             if row.is_glossy { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; LANES]; 2] };
@@ -135,6 +137,7 @@ impl Loops for Scattering<'_> {
                 set_lane(&mut directions, i, row.lobes(i).sample_diffuse([u[0][i], u[1][i]]));
             }
         }
+        // Evaluate the BSDF and the pdf there.
         let Response { f, cosines, glosses } = row.response(&directions);
         let [mut densities, mut carried] = [[0.0; LANES]; 2];
         let mut factors = f;
@@ -150,7 +153,9 @@ impl Loops for Scattering<'_> {
             let bit = 1 << i;
             alive |= if (cosines[i] > 0.0) & (densities[i] > 0.0) & brings { bit } else { 0 };
         }
+        // Drop directions that certainly see nothing.
         alive &= used & !row.hidden(&directions, folds);
+        // Apply Russian roulette.
         if onward.is_risked {
             let [risk, _] = sampler.pairs(&row.path, Decision::Roulette, 0, 1);
             for i in 0..LANES {
@@ -167,7 +172,7 @@ impl Loops for Scattering<'_> {
 }
 
 impl Shot<'_> {
-    /// What a path counts that meets a lamp, of which a light sample might have come.
+    /// MIS weight of a path that hits a lamp, against light samples.
     pub fn lamp_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let density = path.history.density;
         if !(density > 0.0) {
@@ -178,35 +183,35 @@ impl Shot<'_> {
         weight(self.sample_density(&path.ray, path.history.normal, (hit, normal)) * samples / density)
     }
 
-    /// What a path brings of the radiance that comes from beyond the scene; light samples bring the rest.
+    /// Weighted radiance from beyond the scene along a path; light samples bring the rest.
     pub fn light_beyond(&self, path: &PathRay) -> Vec3 {
         let environment = self.world.lights.environment();
         self.light_beyond_with(environment.map(|environment| environment.arriving(path.ray.direction)), path)
     }
 
-    /// The same where it is known what of the light from all around arrives, and the density of its samples.
+    /// [`Shot::light_beyond`], given the radiance of the environment and its light-sampling pdf.
     pub fn light_beyond_with(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
         let (lights, density) = (&self.world.lights, path.history.density);
         let samples = self.settings.render.shadow_samples as f32;
         if density.is_nan() || density <= 0.0 {
             return lights.beyond_with(sky, path.ray.direction, |_, _| 1.0);
         }
-        // No light sample finds it.
+        // No light sample finds the environment, so its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.leaves_sky { 0.0 } else { of_sky }));
         let share = |of_light: f32| weight(of_light * samples / density);
         self.shared_beyond(sky, &path.ray, path.history.normal, share)
     }
 
-    /// [`Shot::lamp_radiance`] of a ray in a glossy lobe that leaves the scene.
+    /// [`Shot::lamp_radiance`] for a ray in a glossy lobe that leaves the scene.
     pub fn radiance_beyond(&self, ray: &Ray, normal: Vec3, density: f32) -> Vec3 {
         let sky = self.world.lights.environment().map(|environment| environment.arriving(ray.direction));
-        // No light sample brings what lobes reflect of it.
+        // No light sample brings the part of it that lobes reflect.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.lobes_find_sky { 0.0 } else { of_sky }));
         self.shared_beyond(sky, ray, normal, |of_light| weight(of_light / density))
     }
 
-    /// What a ray sees that leaves the scene from a surface with this normal, where it is known what of the light from all around
-    /// arrives; of each light the share that is given by the density of its samples.
+    /// Radiance that a ray sees which leaves the scene from a surface with this normal, given the radiance of the environment and
+    /// its light-sampling pdf. Each light is weighted by its light-sampling pdf.
     fn shared_beyond(
         &self,
         sky: Option<(Vec3, f32)>,
@@ -222,8 +227,8 @@ impl Shot<'_> {
         lights.beyond_with(sky, ray.direction, |number, density| share(density * samples.of(number)))
     }
 
-    /// Density in sr⁻¹ of light samples that come from a hit, which has a normal, for each that a surface with a normal asks
-    /// for; 0 where none do.
+    /// Light-sampling pdf in sr⁻¹ of a hit's direction, per requested sample, from a surface with this normal; 0 if the hit
+    /// is not on a light.
     fn sample_density(&self, ray: &Ray, normal: Vec3, (hit, of_light): (&Hit, Vec3)) -> f32 {
         let (direction, distance, primitive) = (ray.direction, hit.shape.t, hit.shape.primitive);
         let met = Met { direction, distance, normal: of_light, primitive };
@@ -234,8 +239,8 @@ impl Shot<'_> {
         })
     }
 
-    /// What a ray from a lobe of a surface with a normal brings of the radiance that it meets; light samples, as many as there are
-    /// such rays, bring the rest.
+    /// Weighted radiance that a ray in a lobe meets, from a surface with this normal; light samples, as many as there are such
+    /// rays, bring the rest.
     pub fn lamp_radiance(
         &self,
         ray: &Ray,
@@ -257,8 +262,8 @@ impl Shot<'_> {
         radiance * weight(self.sample_density(ray, from_normal, (hit, normal)) / density)
     }
 
-    /// The same of a lamp that touches glass which the path meets with it: whether light samples find it there is decided by
-    /// what their shadow rays would.
+    /// [`Shot::lamp_weight`] for a lamp that touches the glass which the path hits with it: the result of the light samples'
+    /// shadow rays decides whether they find it there.
     pub fn touching_lamp_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment(origin, origin + direction * hit.shape.t);

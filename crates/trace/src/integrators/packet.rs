@@ -1,5 +1,5 @@
-//! What a packet of rays meets, and of plain surfaces what they are lit by: rows, where one vertex at a time would cost more than
-//! the light.
+//! Hits of a packet of rays, and rows of plain surfaces with all that direct light needs: one vertex at a time would cost more
+//! than the light.
 
 use super::camera::CameraRow;
 use super::lit_row::{LitRow, UNBENT, bsdf_parts};
@@ -19,19 +19,19 @@ use crate::sampling::CAMERA_PATH;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Loops, Object, PACKET};
 
-/// Rays that go through the scene together.
+/// Source of the rays of a packet.
 #[derive(Clone, Copy)]
 pub enum Rays<'a> {
-    /// Those of the camera, from a slot on, so many, from a place in the round's queue on.
+    /// Rays of the camera: the row, its first slot, their number, and their first place in the round's queue.
     Camera(&'a CameraRow, u32, usize, u32),
-    /// Of a queue, from a place on.
+    /// Rays of a queue, with their first place.
     Paths(&'a [PathRay], u32),
-    /// Of a queue of which it is known what they hit: those at some places.
+    /// Rays of a queue with known hits, at these places.
     Traced(&'a [PathRay], &'a [Option<Hit>], &'a [u32]),
 }
 
 impl Rays<'_> {
-    /// How many.
+    /// Number of the rays.
     pub fn count(&self) -> usize {
         match self {
             Self::Camera(_, _, count, _) => *count,
@@ -40,7 +40,7 @@ impl Rays<'_> {
         }
     }
 
-    /// The place of a lane's path in the round's queue; any number where there is no path.
+    /// The place of a lane's path in the round's queue; any number for a lane without a path.
     #[inline(always)]
     pub fn place(&self, lane: usize) -> u32 {
         match self {
@@ -49,7 +49,7 @@ impl Rays<'_> {
         }
     }
 
-    /// Of the camera: the path in a lane.
+    /// The path of a camera ray in a lane. `None` for other sources.
     #[inline(always)]
     pub fn camera_path(&self, shot: &Shot<'_>, lane: usize) -> Option<PathRay> {
         match self {
@@ -58,7 +58,7 @@ impl Rays<'_> {
         }
     }
 
-    /// Of a queue: the path in a lane.
+    /// The path of a queue in a lane. `None` for camera rays.
     #[inline(always)]
     pub fn of_queue(&self, lane: usize) -> Option<&PathRay> {
         match self {
@@ -69,32 +69,32 @@ impl Rays<'_> {
     }
 }
 
-/// The hits of a packet. A surface is plain where there is a loop for its shape and for the look-ups of its material, a Phong,
-/// and its ray is in no glass.
+/// Hits of a packet. A surface is plain if there are loops for its shape and for the look-ups of its material, a Phong, and
+/// its ray is not in glass.
 pub struct Met {
     hits: HitRows,
     object: [u32; PACKET],
-    /// A bit for each ray that meets anything.
+    /// A bit for each ray that hits anything.
     pub any: u32,
     /// A bit for each plain surface.
     pub plain: u32,
-    /// A bit for each plain surface that sends out light towards the ray.
+    /// A bit for each plain surface that emits towards the ray.
     pub shining: u32,
     /// A bit for each other surface that is in the row of surfaces.
     found: u32,
     /// Look-ups of textures of plain surfaces.
     pub lookups: u64,
-    /// [`Environment::arriving_row`](crate::lights::Environment::arriving_row) where any ray meets nothing.
+    /// [`Environment::arriving_row`](crate::lights::Environment::arriving_row), if any ray hits nothing.
     sky: (Lanes3, Lanes),
 }
 
 impl Met {
-    /// What a ray hits.
+    /// The hit of a ray.
     pub fn hit(&self, lane: usize) -> Option<Hit> {
         self.hits.get(lane).map(|shape| Hit { shape, object: self.object[lane] })
     }
 
-    /// The surface at a hit, if it is in the row of surfaces that these rays met and no plain one.
+    /// The surface at a hit. `None` if it is plain, or not in the row of surfaces.
     pub fn surface(&self, surfaces: &SurfaceRow, lane_of_ray: usize) -> Option<SurfacePoint> {
         let (i, bit) = (lane_of_ray, 1 << lane_of_ray);
         if self.found & bit == 0 {
@@ -117,12 +117,12 @@ impl Met {
         })
     }
 
-    /// The object that a ray hits; none has this number where it hits nothing.
+    /// The object that a ray hits; a number that no object has if it hits nothing.
     pub fn object(&self, lane: usize) -> u32 {
         self.object[lane]
     }
 
-    /// One of the rays.
+    /// The path of a lane.
     pub fn path(&self, shot: &Shot<'_>, rays: &Rays<'_>, lane: usize) -> PathRay {
         match rays {
             Rays::Camera(row, first, ..) => shot.camera_path(row.rays.ray(lane), first + lane as u32),
@@ -131,15 +131,15 @@ impl Met {
         }
     }
 
-    /// Radiance that a ray sees of light from all around, which meets nothing, and the density in sr⁻¹ of samples from there.
+    /// Radiance of the environment along a ray that hits nothing, and its light-sampling pdf in sr⁻¹.
     pub fn sky(&self, lane_of_ray: usize) -> (Vec3, f32) {
         (lane(&self.sky.0, lane_of_ray), self.sky.1[lane_of_ray])
     }
 }
 
 impl Shot<'_> {
-    /// What at most [`PACKET`] rays meet. The plain surfaces are put into the row, ready to be lit if they are to be; those that
-    /// reflect light are `used` in it. Others are put into the row of surfaces, as far as there are loops for them.
+    /// Traces at most [`PACKET`] rays. Plain surfaces go into the row, ready for direct light if requested; `used` are those
+    /// that reflect light. Other surfaces go into the row of surfaces, as far as there are loops for them.
     pub fn meet(
         &self,
         rays: Rays<'_>,
@@ -150,18 +150,18 @@ impl Shot<'_> {
         self.world.geometry.instructions().run(Meeting { shot: self, rays, measure, are_lit, row, surface })
     }
 
-    /// Whether rows of surfaces hold all that an object that is not plain is shaded by.
+    /// Whether rows of surfaces hold everything for shading an object that is not plain.
     #[inline(always)]
     fn is_held_by_rows(&self, object: u32) -> bool {
-        // Beams ask for tangents and curvatures.
+        // Beams need tangents and curvatures.
         self.pixel_spread == 0.0 && self.world.untextured(object).is_some()
     }
 
-    /// The material of an object, and its Phong, where the object is plain.
+    /// The material of an object, and its Phong. `None` if the object is not plain.
     #[inline(always)]
     pub fn plain_phong(&self, object: u32) -> Option<(&Material, &Phong)> {
         let (material, phong) = self.world.plain_phong(object)?;
-        // Ambient light is looked up for each by itself.
+        // Ambient light needs look-ups for each surface by itself.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
         (!has_ambient || phong.constant().is_some()).then_some((material, phong))
     }
@@ -184,6 +184,7 @@ impl Loops for Meeting<'_> {
         let Self { shot, rays, measure, are_lit, row, surface } = self;
         let world = shot.world;
         row.reset();
+        // Put the rays side by side.
         let (of_paths, traced);
         let mut ends = [-1.0; PACKET];
         let rows = match rays {
@@ -205,6 +206,7 @@ impl Loops for Meeting<'_> {
                 &of_paths
             }
         };
+        // Find their hits, or take the known ones.
         let (hits, object) = match rays {
             Rays::Camera(..) | Rays::Paths(..) => world.geometry.closest_rows(rows, &mut ends, traced, folds),
             Rays::Traced(_, known, places) => {
@@ -218,6 +220,7 @@ impl Loops for Meeting<'_> {
                 (hits, object)
             }
         };
+        // Keep the rays in air, whose surfaces may be plain.
         *surface = SurfaceRow::EMPTY;
         let any = hits.any(folds);
         let (mut left, mut plain, mut shining) = (any, 0, 0);
@@ -233,6 +236,7 @@ impl Loops for Meeting<'_> {
                 }
             }
         }
+        // Compute the surfaces of each plain object, and look its material up.
         while left != 0 {
             let id = object[left.trailing_zeros() as usize % PACKET];
             let mut of = [0; PACKET];
@@ -276,12 +280,14 @@ impl Loops for Meeting<'_> {
                 row.set_bsdf(of & !seen, &bsdf, Measure::ALL);
             }
         }
+        // Set the positions and normals of the plain vertices.
         (row.seen, row.from_gloss) = (seen, from_gloss);
         let lifts = match shot.settings.render.shadows {
             Shadows::Off => Lifts::All,
             Shadows::Hard | Shadows::Soft => Lifts::IfFree(seen),
         };
         let front = if plain == 0 { 0 } else { row.place(&rays, rows, surface, lifts, folds) };
+        // Compute the other surfaces, and the environment for rays without a hit.
         let found = shot.fill_others(surface, rows, (&hits, &object), any & !plain, folds);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
@@ -293,7 +299,7 @@ impl Loops for Meeting<'_> {
 }
 
 impl Shot<'_> {
-    /// Put the surfaces of hits that are not plain into the row; a bit for each that is there then.
+    /// Puts the surfaces of hits that are not plain into the row; returns a bit for each that is there.
     #[inline(always)]
     fn fill_others(
         &self,
@@ -324,7 +330,7 @@ impl Shot<'_> {
     }
 }
 
-/// [`PhongBsdf`](crate::materials::phong::PhongBsdf)s side by side, of one glossy lobe.
+/// [`PhongBsdf`](crate::materials::phong::PhongBsdf)s side by side, with one exponent.
 struct PhongRow {
     diffuse: Lanes3,
     specular: Vec3,
@@ -332,7 +338,7 @@ struct PhongRow {
 }
 
 impl PhongRow {
-    /// A bit for each that reflects nothing.
+    /// A bit for each BSDF that reflects nothing.
     #[inline(always)]
     fn black(&self, folds: impl Folds) -> u32 {
         if self.specular != Vec3::ZERO {
@@ -347,17 +353,17 @@ impl PhongRow {
     }
 }
 
-/// Which vertices of smooth meshes are lifted above their facets.
+/// Vertices of smooth meshes to lift above their facets.
 #[derive(Clone, Copy)]
 enum Lifts {
-    /// All.
+    /// All vertices.
     All,
-    /// Those whose bits are set, if nothing is on the way.
+    /// Vertices whose bits are set, if nothing is on the way.
     IfFree(u32),
 }
 
 impl LitRow {
-    /// The lobes of some lanes.
+    /// Sets the lobes of some lanes.
     #[inline(always)]
     fn set_bsdf(&mut self, of: u32, bsdf: &PhongRow, measure: Measure) {
         let PhongRow { diffuse, specular, shininess } = bsdf;
@@ -384,7 +390,7 @@ impl LitRow {
         self.is_glossy |= *specular != Vec3::ZERO;
     }
 
-    /// What normals and points above their facets change for the lanes of smooth surfaces.
+    /// Sets normals and points above facets for the lanes of smooth surfaces.
     #[inline(always)]
     fn smooth(&mut self, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts, folds: impl Folds) {
         let [mut normals, mut mirrored] = [[[0.0; PACKET]; 3]; 2];
@@ -417,7 +423,7 @@ impl LitRow {
             }
         };
         for axis in 0..3 {
-            // Geometric normals, before they are replaced.
+            // Save the geometric normals before they are replaced.
             let horizon = self.normal[axis];
             take(&of, &horizon, &mut self.horizon[axis]);
             take(&of, &horizon, &mut self.facet[axis]);
@@ -433,7 +439,7 @@ impl LitRow {
         self.apart |= surface.smooth;
     }
 
-    /// Where paths meet plain surfaces; a bit for each that comes to the front.
+    /// Sets the positions of plain surfaces; returns a bit for each whose front the path hits.
     #[inline(always)]
     fn place(
         &mut self,

@@ -1,4 +1,4 @@
-//! Direct light where there are more lights than a vertex samples: it picks some by a tree over all of them.
+//! Direct light with more lights than a vertex samples: it picks some by a tree over all lights.
 
 use std::ops::Range;
 
@@ -13,24 +13,24 @@ use crate::sampling::{Decision, SamplerRow};
 use crate::scene::description::Shadows;
 use crate::world::Loops;
 
-/// Lights the vertices of a row by lights that they pick.
+/// Lights the vertices of a row by picked lights.
 pub(super) struct Picking<'a, const WEIGHED: bool> {
     pub(super) lighting: Lighting<'a, WEIGHED>,
     pub(super) selection: Selection<'a>,
-    /// The number of the row, and what takes its rays.
+    /// Number of the row; then the pool for its rays.
     pub(super) number: u32,
     pub(super) pool: &'a mut Pool,
 }
 
-/// A pick of each vertex of a row. Those of one sample are in the order of the tree: so rows of rays go to places that are close
-/// together.
+/// One pick for each vertex of a row. The picks of one sample are in the order of the tree, so that rows of rays go to places
+/// close together.
 #[derive(Clone)]
 struct PickRow {
     /// Numbers of the lights.
     lights: [u32; LANES],
-    /// One over the expected numbers of samples; 0 where nothing was picked.
+    /// Inverse of the expected numbers of samples; 0 without a pick.
     shares: Lanes,
-    /// The same as a vertex without a glossy lobe would pick: what weights go by, as other rays that find the light know no more.
+    /// The same for a vertex without a glossy lobe: MIS weights use it, as other rays that find the light know no more.
     weighed: Lanes,
 }
 
@@ -45,13 +45,15 @@ impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
         let Self { lighting, selection, number, pool } = self;
         let sampler = lighting.row.sampler(lighting.shot);
         let mut sums = Sums::NOTHING;
+        // Sample all lights beyond the scene, if the tree leaves them out.
         if selection.leaves_beyond {
             lighting.add_all(Light::is_beyond, &mut sums, folds);
         }
         let samples = lighting.shot.settings.render.shadow_samples;
         let (each, tree) = (selection.picks.count, selection.tree);
-        // Where there are many, rays of one row of picks go to one place as well.
+        // With many samples, the rays of one row of picks already go to one place.
         let mut pool = (samples <= TOGETHER).then_some(pool);
+        // Pick lights for several samples together, and sample the picked ones.
         for first in (0..samples).step_by(TOGETHER as usize) {
             let picks = lighting.picks(selection, &sampler, first..(first + TOGETHER).min(samples));
             for (k, pick) in (first * each..).zip(&picks) {
@@ -63,11 +65,11 @@ impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
     }
 }
 
-/// What takes the light that a row picks, or its rays.
+/// Collector of the light that a row picks, or of its rays.
 struct Taking<'a> {
     tree: &'a LightTree,
     row: u32,
-    /// None: rays are traced at once.
+    /// Pool for the rays. `None` to trace rays at once.
     pool: Option<&'a mut Pool>,
     sums: &'a mut Sums,
 }
@@ -75,7 +77,7 @@ struct Taking<'a> {
 impl PickRow {
     const NOTHING: Self = Self { lights: [0; LANES], shares: [0.0; LANES], weighed: [0.0; LANES] };
 
-    /// Make shares of probabilities, 0 where there are none.
+    /// Turns probabilities into shares, 0 for a probability of 0.
     #[inline(always)]
     fn invert(&mut self, count: f32, is_weighed: bool) {
         for i in 0..LANES {
@@ -86,7 +88,7 @@ impl PickRow {
         }
     }
 
-    /// The lights, and a bit for each vertex that picked one. The others look at a light as well, which counts nothing.
+    /// The lights, and a bit for each vertex that picked one. Other vertices get a light as well, without effect.
     #[inline(always)]
     fn lights(&self) -> ([u32; LANES], u32) {
         let (mut lights, shares, mut used) = (self.lights, &self.shares, 0);
@@ -101,7 +103,7 @@ impl PickRow {
     }
 }
 
-/// The value of the digits that come after those of a random number.
+/// Value of the digits that follow those of a random number.
 const DIGITS: f64 = 1.0 / (1 << 24) as f64;
 
 impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
@@ -121,8 +123,8 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         for k in first..end {
             let u = sampler.pairs(&row.path, Decision::Pick, k, count);
             let place = (k - first) as usize / group * group;
-            // One of each group is in each part of [0, 1): so they are sorted. Both numbers of a pair are the digits of one:
-            // a light among many has a small share.
+            // One pick of each group is in each part of [0, 1), so that they are sorted. Both numbers of a pair are the
+            // digits of one number: a light among many has a small share.
             let (mut parts, mut digits) = ([0; LANES], [0.0; LANES]);
             for i in 0..LANES {
                 let part = (u[0][i] * way.count as f32) as i32 as u32;
@@ -145,7 +147,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         picks
     }
 
-    /// Pick from a tree of one node, all vertices side by side.
+    /// Picks from a tree of one node, all vertices side by side.
     #[inline(always)]
     fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; LANES]], picks: &mut [PickRow]) {
         let row = self.row;
@@ -173,7 +175,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         }
     }
 
-    /// Pick from any tree, one vertex after the other.
+    /// Picks from any tree, one vertex after the other.
     #[inline(always)]
     fn pick_by_cuts(&self, tree: &LightTree, way: Picks, numbers: &[[f64; LANES]], picks: &mut [PickRow]) {
         let (row, group) = (self.row, way.count as usize);
@@ -216,7 +218,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         })
     }
 
-    /// Add what a row of picked lights sends.
+    /// Adds the light of a row of picked lights.
     #[inline(always)]
     fn add_pick(
         &self,
@@ -241,7 +243,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         let (mut values, active) = self.values(&samples, 1.0, folds);
         let active = active & used;
         if WEIGHED {
-            // As many rays in lobes as samples are asked for come on all groups of picks, each of which has its own density.
+            // Each group of picks has its own pdf, and as many rays in lobes as requested samples compete with all groups.
             let others = self.others.to_each(render.shadow_samples) * render.shadow_samples as f32;
             values = self.others.left(row, &samples, values, (&inverse, others));
         }
@@ -274,7 +276,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         }
     }
 
-    /// Let rays go to the middles of the lights, where these have any.
+    /// Aims rays at the middles of the lights that have one.
     fn aim_at_middles(&self, samples: &mut LightRow, lights: &[u32; LANES], active: u32) {
         for i in lanes(active) {
             let Some((middle, source)) = self.shot.world.lights.get(lights[i]).middle() else { continue };

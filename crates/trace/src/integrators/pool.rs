@@ -1,5 +1,5 @@
-//! Shadow rays of many rows of vertices, put together by the light that they go to: rays to one corner of the scene meet the same
-//! boxes on the way, those of one row go everywhere.
+//! Shadow rays of many rows of vertices, grouped by light: rays to one corner of the scene visit the same boxes on the way, while
+//! those of one row go everywhere.
 
 use super::light::{Sums, add_where};
 use crate::geometry::rows::{Ends, RayRows, lanes};
@@ -7,7 +7,7 @@ use crate::lights::{Source, SourceRow};
 use crate::math::lanes::{Folds, LANES, Lanes3};
 use crate::world::{Geometry, Loops};
 
-/// Rays of a row of vertices, and what they bring.
+/// Rays of a row of vertices, and their contributions.
 struct Pooled {
     /// The number of the row.
     row: u32,
@@ -19,30 +19,30 @@ struct Pooled {
     values: Lanes3,
 }
 
-/// Shadow rays that wait.
+/// Shadow rays that wait to be traced.
 #[derive(Default)]
 pub struct Pool {
     rows: Vec<Pooled>,
-    /// The light's place in the tree of each ray, and its own row and lane.
+    /// Each ray's light, by its place in the tree, with the ray's own row and lane.
     order: Vec<(u32, u32)>,
-    /// Rows and lanes of the rays, put together by places.
+    /// Rows and lanes of the rays, grouped by place.
     sorted: Vec<u32>,
 }
 
-/// Runs of places that rays are put together by, at most.
+/// Most groups of places.
 const RUNS: usize = 1 << RUN_BITS;
 const RUN_BITS: u32 = 11;
 
 impl Pool {
-    /// Rows of rays from which on they are traced before more come, while they are in the cache.
+    /// Number of rows of rays from which they are traced before more come, while they are in the cache.
     const FULL: usize = 512;
 
-    /// Whether they are to be traced now.
+    /// Whether the rays are to be traced now.
     pub fn is_full(&self) -> bool {
         self.rows.len() >= Self::FULL
     }
 
-    /// Take the rays of `traced` of a row of vertices, with the places of their lights.
+    /// Takes the rays of `traced` of a row of vertices, with the places of their lights.
     #[inline(always)]
     pub(super) fn push(
         &mut self,
@@ -57,7 +57,8 @@ impl Pool {
         self.rows.push(Pooled { row, rays, ends, traced, sources: sources.clone(), values: *values });
     }
 
-    /// Trace all rays and forget them; what arrives is added to the sums of the rows, in the order in which rays came.
+    /// Traces all rays and drops them; adds the light that arrives to the sums of the rows, in the order in which rays
+    /// came.
     pub(super) fn trace(&mut self, geometry: &Geometry, sums: &mut [Sums]) {
         if self.rows.is_empty() {
             return;
@@ -71,7 +72,7 @@ impl Pool {
         self.clear();
     }
 
-    /// Put together rays to runs of places that follow one another, by counting them; those of a run stay in their order.
+    /// Groups rays by ranges of consecutive places, by counting; rays of a group stay in their order.
     fn sort(&mut self) {
         let Self { order, sorted, .. } = self;
         let greatest = order.iter().map(|&(place, _)| place).max().unwrap_or(0);
@@ -91,14 +92,14 @@ impl Pool {
         }
     }
 
-    /// Forget all rays.
+    /// Drops all rays.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.order.clear();
     }
 }
 
-/// Takes the bits of rays that are stopped.
+/// Test that finds the rays which are occluded.
 struct Tracing<'a> {
     geometry: &'a Geometry,
     rows: &'a mut [Pooled],

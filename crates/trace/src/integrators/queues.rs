@@ -13,45 +13,45 @@ use crate::geometry::surface_rows::SurfaceRow;
 use crate::math::Vec3;
 use crate::world::Hit;
 
-/// A ray on its way.
+/// A path's ray.
 #[derive(Clone, Copy)]
 pub struct PathRay {
     /// The ray; its direction is a unit vector.
     pub ray: Ray,
-    /// What radiance that it meets counts in its sample.
+    /// Throughput: the factor on the radiance that the ray meets.
     pub throughput: Vec3,
     /// The sample that it belongs to.
     pub slot: u32,
-    /// Tells the paths of one sample apart.
+    /// Number that tells the paths of one sample apart.
     pub path: u32,
-    /// The glass that it is in.
+    /// The glass around it.
     pub medium: Medium,
-    /// How it came to its direction.
+    /// Events before this ray.
     pub history: History,
-    /// The beam that it stands for.
+    /// The beam around it.
     pub cone: Cone,
 }
 
-/// What the light that a path meets depends on beside its ray.
+/// State of a path, beside its ray, that determines the weight of the light which it meets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct History {
-    /// Density in sr⁻¹ with which the direction was drawn from the lobes of the last vertex; 0 where that is the camera, a mirror
-    /// or glass, or where the path passed through glass since: no light sample finds what it meets then.
+    /// Pdf in sr⁻¹ of the direction at the last vertex's lobes. 0 after the camera, a mirror or glass, and if the path passed
+    /// through glass since: then no light sample finds what it meets.
     pub density: f32,
-    /// The normal that light samples of the last vertex went by, where there is a density.
+    /// The normal at the last vertex, by which its light samples went, if there is a pdf.
     pub normal: Vec3,
-    /// The path's throughput as roulette sees it: its largest part, of all lobes, whatever the view shows.
+    /// Throughput for Russian roulette: the largest component, of all lobes, whatever the view shows.
     pub carried: f32,
-    /// Whether there are but the camera, mirrors and glass before.
+    /// Whether only the camera, mirrors and glass come before.
     pub is_seen: bool,
-    /// Whether there is one diffuse or glossy surface before.
+    /// Whether exactly one diffuse or glossy surface comes before.
     pub is_step: bool,
     /// Whether the last such surface had a glossy lobe.
     pub is_from_gloss: bool,
 }
 
 impl History {
-    /// Of rays of the camera.
+    /// The state of camera rays.
     pub const CAMERA: Self = Self {
         density: 0.0,
         normal: Vec3::ZERO,
@@ -61,12 +61,12 @@ impl History {
         is_from_gloss: false,
     };
 
-    /// After a δ lobe with this part of the radiance.
+    /// The state after a δ lobe that keeps this part of the radiance.
     pub fn mirrored(self, part: f32) -> Self {
         Self { density: 0.0, carried: self.carried * part, ..self }
     }
 
-    /// How light that the path meets comes to the first diffuse or glossy surface: whether that way is shown.
+    /// Whether the view shows light that reaches the first diffuse or glossy surface by this path.
     pub fn shows(&self, ways: Ways) -> bool {
         match (self.is_step, self.density > 0.0) {
             (true, true) => ways.direct,
@@ -75,52 +75,53 @@ impl History {
         }
     }
 
-    /// After passing surfaces that change nothing but hide what is behind from light samples.
+    /// The state after surfaces that change nothing, but hide from light samples what is behind them.
     pub fn hidden(self) -> Self {
         self.mirrored(1.0)
     }
 }
 
 impl PathRay {
-    /// Number of the path that goes on from here; `branch` tells the ways to go on apart.
+    /// Number of the path that goes on from here; `branch` tells its continuations apart.
     pub fn next_path(&self, branch: u32) -> u32 {
-        // By XOR the number 1 would stay 1 at each reflection, and every choice of the path would be the first one again.
+        // With XOR, the number 1 would stay 1 at each reflection, and every choice of the path would repeat the first
+        // one.
         self.path.wrapping_add(branch).wrapping_mul(0x9e37_79b1).rotate_left(15).wrapping_add(branch)
     }
 }
 
-/// The memory of batches, used again by each.
+/// The memory of batches, which each uses again.
 #[derive(Default)]
 pub struct Queues {
     /// Rays of this round; camera rays at first.
     pub rays: Vec<PathRay>,
     /// Rays of the next round.
     pub next: Vec<PathRay>,
-    /// Rays of the camera that are next.
+    /// Next rays of the camera.
     pub camera: Vec<CameraRow>,
-    /// Vertices of this round that are not lit yet.
+    /// Vertices of this round that wait for direct light.
     pub lit: LitQueue,
-    /// Surfaces that a packet of rays met.
+    /// Surfaces at the hits of a packet.
     pub surfaces: SurfaceRow,
-    /// What the rays of this round hit.
+    /// Hits of the rays of this round.
     pub hits: Vec<Option<Hit>>,
-    /// Their order by what they hit.
+    /// Order of the rays by the objects that they hit.
     pub by_object: ByObject,
-    /// What is near to a hit of glass.
+    /// Memory for the surfaces near a hit of glass.
     pub crossing: CrossingMemory,
 }
 
-/// Places in a queue, those together whose rays hit the same object, so that packets of them are shaded by few loops.
+/// Places in a queue, grouped by the objects that their rays hit, so that packets of them are shaded by few loops.
 #[derive(Default)]
 pub struct ByObject {
     places: Vec<u32>,
 }
 
 impl ByObject {
-    /// Objects are told apart by so many of their last bits.
+    /// Number of groups: the last bits of an object's number choose its group.
     const KINDS: usize = 64;
 
-    /// Of these hits; what hits nothing is last, and what is alike in the order of the queue.
+    /// Groups the places of these hits. Rays without a hit come last; a group keeps the order of the queue.
     pub fn sort(&mut self, hits: &[Option<Hit>]) {
         let kind = |hit: &Option<Hit>| hit.map_or(Self::KINDS, |hit| hit.object as usize % Self::KINDS);
         let mut starts = [0_u32; Self::KINDS + 2];
@@ -146,12 +147,12 @@ impl ByObject {
 }
 
 impl Queues {
-    /// Those that this thread left from its last tile; [`Queues::leave`] them for the next.
+    /// The queues that this thread left after its last tile; [`Queues::leave`] keeps them for the next.
     pub fn of_thread() -> Self {
         QUEUES.take()
     }
 
-    /// For the next tile of this thread.
+    /// Keeps the queues for the next tile of this thread.
     pub fn leave(self) {
         QUEUES.set(self);
     }
@@ -197,7 +198,7 @@ mod tests {
 
     #[test]
     fn the_paths_of_a_sample_have_numbers_of_their_own() {
-        // All of 12 splits, and a path that is always reflected or always refracted.
+        // Follow all paths of 12 splits, and one that is always reflected or always refracted.
         let (mut round, mut seen) = (vec![CAMERA_PATH + 1], HashSet::from([CAMERA_PATH, CAMERA_PATH + 1]));
         for _ in 0..12 {
             round = round.iter().flat_map(|&path| [1, 2].map(|way| numbered(path).next_path(way))).collect();

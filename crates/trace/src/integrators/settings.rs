@@ -1,4 +1,4 @@
-//! How a world is rendered.
+//! Settings of a render.
 
 use super::{FirstHit, Measure, PhotonSettings, Shown, View};
 use crate::math::{DVec2, Vec3};
@@ -6,21 +6,21 @@ use crate::scene::description::{Integrator, Render};
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use crate::world::Lookups;
 
-/// How a world is rendered.
+/// Settings for rendering a world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
-    /// The scene's, with what this run changes of them.
+    /// The scene's settings, with the changes of this run.
     pub render: Render,
-    /// Whether the lens has its aperture; false: a pinhole.
+    /// Whether the lens has its aperture; false for a pinhole.
     pub dof: bool,
-    /// What is shown.
+    /// View to show.
     pub view: View,
-    /// Photon maps, where whitted gathers any.
+    /// Settings of photon maps. `None` if whitted gathers no photons.
     pub photons: Option<PhotonSettings>,
 }
 
 impl RenderSettings {
-    /// With the defaults in place of what is ignored.
+    /// The effective settings: ignored ones have their defaults.
     pub fn heeded(&self) -> Self {
         let mut render = self.render.heeded();
         let photons = match render.integrator {
@@ -33,8 +33,8 @@ impl RenderSettings {
         Self { render, photons, ..*self }
     }
 
-    /// Whether pictures by these settings show anything of photons. What a photon brings was scattered twice at least: by the
-    /// mirror or glass that it met, and where it is gathered.
+    /// Whether pictures with these settings show any light of photons. A photon's light was scattered at least twice: by the
+    /// mirror or glass that it met, and at the point where it is gathered.
     pub fn gathers(&self) -> bool {
         let shows = match self.view.shown() {
             Shown::FirstHit(number) => number == FirstHit::Photons,
@@ -45,22 +45,22 @@ impl RenderSettings {
         shows && self.heeded().photons.is_some()
     }
 
-    /// The textures that pictures by these settings look up.
+    /// The textures that pictures with these settings look up.
     pub fn lookups(&self) -> Lookups {
         match self.view.shown() {
             Shown::FirstHit(FirstHit::Normal) => Lookups { normals: true, ..Lookups::NONE },
             Shown::FirstHit(FirstHit::Albedo) => Lookups { diffuse: true, ..Lookups::NONE },
-            // Photons come by way of all surfaces.
+            // Photons arrive by all kinds of surfaces.
             Shown::FirstHit(FirstHit::Photons) if self.gathers() => Lookups::ALL,
             Shown::FirstHit(FirstHit::Depth | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Photons) => {
                 Lookups::NONE
             }
-            // What surfaces reflect does not count; where they face and what lights send does.
+            // The colours of surfaces do not count; their normals and the emission of lights do.
             Shown::Light(Measure::ArrivingShare) => {
                 Lookups { diffuse: false, specular: false, ambient: false, ..Lookups::ALL }
             }
             Shown::Light(Measure::Radiance(parts)) if !parts.are_reflected() => {
-                // Mirrors and glass, by which such parts are seen too, have no normal maps.
+                // Mirrors and glass, through which such parts are visible too, have no normal maps.
                 let ambient = parts.ambient && self.heeded().render.ambient != Vec3::ZERO;
                 Lookups { ambient, lights: parts.emitted, ..Lookups::NONE }
             }
@@ -71,7 +71,7 @@ impl RenderSettings {
         }
     }
 
-    /// A place in the picture, in pixels from its top left corner, as the camera takes it: from its middle to the right
+    /// A place in the picture, in pixels from its top left corner, in the camera's units: from its middle to the right
     /// and up, in halves of its height.
     #[inline(always)]
     pub fn from_middle(&self, from_corner: DVec2) -> DVec2 {
@@ -87,7 +87,7 @@ impl Fingerprinted for RenderSettings {
         key.add(&render, of).flag(dof).choice(view.sampled());
         // All trees give the same hits; these two show the trees themselves.
         match view.shown() {
-            // Lines over a picture are as bright as the exposure leaves them to be.
+            // Lines over a picture depend on the exposure.
             Shown::Bounds => key.choice(render.accel).f32(render.exposure),
             Shown::Light(Measure::Work) => key.choice(render.accel),
             Shown::Light(_) | Shown::FirstHit(_) | Shown::Film(_) => &mut *key,

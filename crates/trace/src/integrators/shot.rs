@@ -1,4 +1,4 @@
-//! What all rays of a tile have in common.
+//! Common data of all rays of a tile.
 
 use std::array;
 use std::ops::Range;
@@ -13,7 +13,7 @@ use crate::sampling::PixelSampler;
 use crate::scene::description::{Integrator, Shadows};
 use crate::world::{PACKET, World};
 
-/// A world, how it is rendered, and the samples that are asked for.
+/// Context of a tile: a world, the settings, and the requested samples.
 pub struct Shot<'a> {
     /// The scene.
     pub world: &'a World,
@@ -21,21 +21,21 @@ pub struct Shot<'a> {
     pub settings: &'a RenderSettings,
     /// The samples.
     pub block: &'a SampleBlock,
-    /// Says when to stop.
+    /// Cancels the work.
     pub token: &'a CancelToken,
-    /// By how much the beam of a pixel grows with the distance; 0 where nothing asks for it, which are textures with levels.
+    /// Growth of a pixel's beam with the distance; 0 if nothing needs it, as without mip levels.
     pub pixel_spread: f32,
-    /// The photons of the samples, where they are gathered.
+    /// Photons of the samples. `None` if none are gathered.
     pub photons: Option<&'a PhotonMaps>,
-    /// Whether paths find light that is the same from all around without samples of it: the ray that goes on anyway is as good as
-    /// one of those, or better, as nothing but what is in its way tells one direction from the other.
+    /// Whether paths find a constant environment without light samples: the ray that goes on anyway is at least as good as a
+    /// sample, as only occluders tell one direction from another.
     pub leaves_sky: bool,
-    /// The same of rays in glossy lobes and the light that these reflect.
+    /// Whether rays in glossy lobes find the environment's light that they reflect without light samples.
     pub lobes_find_sky: bool,
 }
 
 impl<'a> Shot<'a> {
-    /// Of these samples.
+    /// The context for these samples.
     pub fn new(
         world: &'a World,
         settings: &'a RenderSettings,
@@ -59,7 +59,7 @@ impl<'a> Shot<'a> {
         Self { world, settings, block, token, pixel_spread, photons: None, leaves_sky, lobes_find_sky }
     }
 
-    /// What the samples of lights at its vertices are for.
+    /// Purpose of the light samples at its vertices.
     pub fn receivers(&self) -> Receivers {
         receivers(self.settings, self.photons.is_some())
     }
@@ -71,23 +71,23 @@ impl<'a> Shot<'a> {
     }
 }
 
-/// What samples of lights are for, where photons are gathered or not: the share of it that arrives is asked of all light.
+/// Purpose of light samples, with photons or without. For the share of light that arrives, all light is sampled.
 pub fn receivers(settings: &RenderSettings, are_gathered: bool) -> Receivers {
     let goes_on = are_gathered || settings.render.integrator == Integrator::Path;
     let is_share = settings.view.shown().measure() == Measure::ArrivingShare;
     if goes_on && !is_share { Receivers::Paths } else { Receivers::Eye }
 }
 
-/// The samples of a tile. A slot is the place of a sample among them: all of the first pixel, all of the next.
+/// The samples of a tile. A slot is the index of a sample among them: all of the first pixel, then all of the next.
 pub struct SampleBlock {
     /// The pixels.
     pub pixels: Pixels,
-    /// Numbers of the samples of each.
+    /// Range of the sample numbers of each pixel.
     pub samples: Range<u32>,
 }
 
 impl SampleBlock {
-    /// Samples in all.
+    /// Number of samples.
     pub fn len(&self) -> usize {
         self.pixels.count() * self.samples.len()
     }
@@ -100,7 +100,7 @@ impl SampleBlock {
         (x, y, self.samples.start + sample)
     }
 
-    /// Columns, rows and sample numbers of slots; any where there is none.
+    /// Columns, rows and sample numbers of slots; arbitrary for a slot without a sample.
     #[inline(always)]
     pub fn places_of(&self, slots: &[u32; PACKET]) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
@@ -159,7 +159,8 @@ impl Divisor {
         Self { inverse: 1.0 / f64::from(divisor) }
     }
 
-    /// ⌊n/d⌋ as (n + ½)/d − ½, rounded by adding 3·2⁵¹: exact for d ≤ 2¹⁹ and n < 2³¹, where rounding errors are less than ½/d.
+    /// ⌊n/d⌋ as (n + ½)/d − ½, rounded by adding 3·2⁵¹: exact for d ≤ 2¹⁹ and n < 2³¹, as rounding errors are then less than
+    /// ½/d.
     #[inline(always)]
     fn quotient(self, number: u32) -> u32 {
         const LARGE: f64 = (3_u64 << 51) as f64;

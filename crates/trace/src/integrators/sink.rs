@@ -1,31 +1,31 @@
-//! What becomes of the light that is found: a view takes its parts of it.
+//! Accumulator of light: a view takes its parts of the light.
 
 use super::queues::PathRay;
 use super::view::{Measure, Parts};
 use crate::math::Vec3;
 
-/// What a contribution that no lamp sends is.
+/// Kind of a contribution that no lamp's light makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// Sent out by a surface, or by what is behind everything.
+    /// Emission of a surface, or of the background.
     Emitted,
     /// The ambient part of Phong.
     Ambient,
 }
 
-/// Takes what a view shows, of each round of paths first what no lamp sends and then what lamps send, in the order of the
-/// paths.
+/// Accumulates radiance per slot, as far as the view shows it: in each round of paths first emission and ambient light,
+/// then the light of lamps, in the order of the paths.
 pub struct Sink<'a> {
-    /// What the numbers are.
+    /// Measure of the numbers.
     pub measure: Measure,
     /// Sums, by slot.
     pub radiance: &'a mut [Vec3],
-    /// Most that a vertex which the eye does not see may bring; 0: no such limit.
+    /// Upper bound on contributions at vertices that the camera does not see; 0 for no bound.
     pub clamp: f32,
 }
 
 impl Sink<'_> {
-    /// Light that no lamp's ray brings.
+    /// Adds light that no lamp's ray brings.
     pub fn add(&mut self, slot: u32, part: Part, radiance: Vec3) {
         let parts = self.parts();
         let is_taken = match part {
@@ -37,7 +37,7 @@ impl Sink<'_> {
         }
     }
 
-    /// Light of a lamp that a path meets after a surface which the eye sees.
+    /// Adds light of a lamp that a path hits after a surface which the camera sees.
     pub fn add_met(&mut self, path: &PathRay, radiance: Vec3) {
         match self.measure {
             Measure::Radiance(parts) if path.history.shows(parts.ways) => {
@@ -47,12 +47,12 @@ impl Sink<'_> {
         }
     }
 
-    /// Work that a ray takes.
+    /// Adds the work of a ray.
     pub fn add_work(&mut self, slot: u32, count: u32) {
         self.radiance[slot as usize] += Vec3::splat(count as f32);
     }
 
-    /// The parts of radiance that are taken as they are.
+    /// The parts of radiance that are taken unchanged.
     fn parts(&self) -> Parts {
         match self.measure {
             Measure::Radiance(parts) => parts,
@@ -60,7 +60,7 @@ impl Sink<'_> {
         }
     }
 
-    /// Whether anything is taken of what lamps send.
+    /// Whether it takes any light of lamps.
     pub fn takes_reflected(&self) -> bool {
         match self.measure {
             Measure::Radiance(parts) => parts.are_reflected(),
@@ -68,19 +68,19 @@ impl Sink<'_> {
         }
     }
 
-    /// Whether anything is taken of what Phong surfaces reflect of ambient light.
+    /// Whether it takes any ambient light of Phong surfaces.
     pub fn takes_ambient(&self) -> bool {
         self.parts().ambient
     }
 
-    /// What lamps send to the eye by the vertices of the slots from one on, which the eye sees itself.
+    /// Adds the light of lamps at the vertices of consecutive slots, all of which the camera sees.
     pub fn add_arrived_run(&mut self, first: u32, contributions: &[Vec3]) {
         for (sum, contribution) in self.radiance[first as usize..].iter_mut().zip(contributions) {
             *sum += *contribution;
         }
     }
 
-    /// What lamps send to the eye by a vertex, which the eye sees itself or not.
+    /// Adds the light of lamps at a vertex, which the camera sees or not.
     pub fn add_arrived(&mut self, slot: u32, contribution: Vec3, is_seen: bool) {
         let largest = contribution.max_element();
         let is_clamped = !is_seen && self.clamp > 0.0 && largest > self.clamp;

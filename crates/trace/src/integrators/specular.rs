@@ -1,4 +1,4 @@
-//! The ways on at mirrors and glass.
+//! Reflection and refraction at mirrors and glass.
 
 use super::cone::Bend;
 use super::medium::{Medium, ior};
@@ -9,13 +9,13 @@ use crate::materials::mirror::reflect;
 use crate::math::Vec3;
 use crate::world::World;
 
-/// Which way a path goes on: tells the paths of one sample apart.
+/// Branch number of the continuation, which tells the paths of one sample apart.
 const REFLECTED: u32 = 1;
 const REFRACTED: u32 = 2;
-/// [`REFLECTED`], by a lobe that is no δ.
+/// Branch number of scattering by a lobe that is not δ.
 pub const SCATTERED: u32 = 3;
 
-/// The mirrored ray; a shading normal that sends it below the surface gives way to the geometric one.
+/// The mirrored ray. A shading normal that sends it below the surface is replaced by the geometric one.
 pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflectance: Vec3) -> PathRay {
     let incident = path.ray.direction;
     let side = -incident.dot(vertex.normal);
@@ -33,15 +33,15 @@ pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflect
     }
 }
 
-/// What the surface of a glass makes of a ray.
+/// Interaction of a ray with the surface of a glass.
 pub struct Interface {
-    /// The part of its radiance that is reflected.
+    /// Reflectance.
     pub reflectance: f32,
-    /// The ray on the other side, with all of its radiance; none where all is reflected.
+    /// The ray on the other side, with all of its radiance. `None` for total internal reflection.
     pub refracted: Option<PathRay>,
 }
 
-/// A ray that goes from one medium to another; it is in the first.
+/// The interaction of a ray that goes from one medium to another; it is in the first.
 pub fn interface(
     world: &World,
     path: &PathRay,
@@ -51,7 +51,7 @@ pub fn interface(
 ) -> Interface {
     let eta = ior(world, far) / ior(world, path.medium);
     let (reflectance, direction) = boundary(vertex, shading, path.ray.direction, eta);
-    // What is carried is basic radiance, L/n², which refraction does not change.
+    // Rays carry basic radiance, L/n², which refraction does not change.
     let refracted = direction.map(|direction| PathRay {
         ray: vertex.leaving(direction),
         path: path.next_path(REFRACTED),
@@ -63,8 +63,8 @@ pub fn interface(
     Interface { reflectance, refracted }
 }
 
-/// Reflectance and refracted direction by the shading normal. Where that looks away from the ray, or sends the refracted
-/// ray back to the side that it came from, by the geometric one: the ray must be where its medium says.
+/// Reflectance and refracted direction by the shading normal. If that normal faces away from the ray, or sends the
+/// refracted ray back to its own side, the geometric normal counts: the ray must be where its medium says.
 fn boundary(vertex: &Vertex<'_>, shading: &Shading, incident: Vec3, eta: f32) -> (f32, Option<Vec3>) {
     let (shading, geometric) = (shading.normal, vertex.normal);
     let crosses = |direction: &Vec3| direction.dot(geometric) < 0.0;

@@ -1,4 +1,4 @@
-//! From rays in queues to what they meet.
+//! From rays in queues to hits.
 
 use super::queues::PathRay;
 use super::shot::Shot;
@@ -6,11 +6,11 @@ use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::world::{Hit, PACKET};
 
-/// Rays between two looks at the token.
+/// Rays between two polls of the token.
 const POLL_INTERVAL: usize = 256;
 
 impl Shot<'_> {
-    /// The nearest hit of every ray in a queue, in place of what is in `hits`.
+    /// Finds the nearest hit of every ray in a queue, in place of the content of `hits`.
     pub fn closest_hits(&self, rays: &[PathRay], hits: &mut Vec<Option<Hit>>) -> Result<(), Cancelled> {
         hits.clear();
         hits.resize(rays.len(), None);

@@ -1,5 +1,4 @@
-//! What is ready at a hit, once for all that goes on from there: the geometry, the normal that shading goes by, what bounds it,
-//! and the BSDF.
+//! All data of a hit for shading, prepared once: the geometry, the shading normal, its bounds, and the BSDF.
 
 use super::RayCounters;
 use super::cone::{Bend, Cone};
@@ -13,50 +12,51 @@ use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Sides};
 
-/// Where a path meets a surface.
+/// A path's vertex at a surface.
 pub struct Vertex<'a> {
     /// The surface.
     pub surface: SurfacePoint,
     /// Its material.
     pub material: &'a Material,
-    /// Where rays that leave start, should that be known better than by the error of the surface.
+    /// Starts of rays that leave, if they are known better than by the error of the surface.
     sides: Option<Sides>,
-    /// Whether the path comes to the front.
+    /// Whether the path hits the front.
     pub is_front: bool,
-    /// Unit direction that the path comes from.
+    /// Unit direction to the viewer, from which the path comes.
     pub to_eye: Vec3,
-    /// Geometric normal on the eye's side.
+    /// Geometric normal on the viewer's side.
     pub normal: Vec3,
-    /// −1 where that is the back, else 1.
+    /// −1 if the viewer's side is the back, else 1.
     side: f32,
-    /// Where its textures are looked up.
+    /// Point of the texture look-ups.
     pub texture_point: TexturePoint,
-    /// The beam of the path, where it meets the surface.
+    /// The beam of the path at the surface.
     pub cone: Cone,
-    /// Mean curvature, > 0 where the surface bulges towards the eye; asked of δ surfaces alone.
+    /// Mean curvature, > 0 if the surface bulges towards the viewer; computed for δ surfaces alone.
     pub curvature: f32,
 }
 
 impl<'a> Vertex<'a> {
-    /// Where a ray hits.
+    /// The vertex at a hit.
     pub fn new(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
         let material = &shot.world.materials[shot.world.material_index(hit)];
         let surface = shot.world.geometry.surface(&path.ray, hit);
         Self::met(shot, path, (material, surface), hit, hit.shape.t)
     }
 
-    /// The same, with no more of the surface than its material asks for.
+    /// The vertex at a hit, with only those parts of the surface that its material needs.
     pub fn to_shade(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
         Self::shaded(shot, path, (&path.ray, hit), hit.shape.t)
     }
 
-    /// The same where the surface is known.
+    /// The vertex at a hit whose surface is known.
     pub fn on(shot: &Shot<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
         let material = &shot.world.materials[shot.world.material_index(hit)];
         Self::met(shot, path, (material, surface), hit, hit.shape.t)
     }
 
-    /// What touches the surface that a ray hits at a distance, as the way between the sides of both meets it.
+    /// The vertex of a surface that touches the surface of a hit at this distance, as the way between the sides of both
+    /// hits it.
     pub fn touching(shot: &Shot<'a>, path: &PathRay, (sides, hit): (Sides, &Hit), distance: f32) -> Self {
         Self { sides: Some(sides), ..Self::shaded(shot, path, (&sides.ray(), hit), distance) }
     }
@@ -105,19 +105,20 @@ impl<'a> Vertex<'a> {
         }
     }
 
-    /// Whether it sends out light towards the path.
+    /// Whether it emits towards the path.
     pub fn emits(&self) -> bool {
         self.is_front && self.material.emission.shines()
     }
 
-    /// The radiance that it sends out. To paths that light samples share their lamps with it is what those find: that of the point.
+    /// The radiance that it emits. For paths that share their lamps with light samples, it is what light samples find: that of the
+    /// point.
     pub fn emitted(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.history.density > 0.0;
         let at = if is_shared { TexturePoint::sharp(self.surface.uv) } else { self.texture_point };
         self.material.emission.at(&at, &mut counters.texture_lookups)
     }
 
-    /// The same, with rays that leave from these.
+    /// The vertex, with these starts of rays that leave.
     pub fn between(self, sides: Sides) -> Self {
         Self { sides: Some(sides), ..self }
     }
@@ -130,7 +131,7 @@ impl<'a> Vertex<'a> {
         map.bend(&self.texture_point, surface.shading_normal, surface.dpdu, surface.dpdv)
     }
 
-    /// What shading goes by.
+    /// The shading normals.
     pub fn shading(&self, counters: &mut RayCounters) -> Shading {
         let normal = self.front_shading_normal(counters) * self.side;
         let smooth_normal = self.surface.shading_normal * self.side;
@@ -138,7 +139,7 @@ impl<'a> Vertex<'a> {
         Shading { normal, smooth_normal, bend }
     }
 
-    /// The beam that goes on from here, where it is mirrored or refracted.
+    /// The beam after reflection or refraction here.
     pub fn bent_cone(&self, bend: Bend) -> Cone {
         self.cone.bent(bend, self.curvature, self.to_eye.dot(self.normal))
     }
@@ -154,10 +155,10 @@ impl<'a> Vertex<'a> {
         Ray::new(origin, direction)
     }
 
-    /// Where light is looked for. A facet of a smooth mesh looks from a point above it, so that its neighbours do not shadow
-    /// what the normals say is lit, if nothing is on the way there: what arrives at that point reaches the facet around no
-    /// corner of a closed surface. Else it looks from the facet itself, and sees nothing behind that; so does one that the eye
-    /// does not see, where the way up would cost a ray and nobody tell the difference.
+    /// Origin of light samples. A facet of a smooth mesh sees lights from a point above it, if nothing is on the way there, so
+    /// that its neighbours do not shadow what the normals say is lit. Light at that point reaches the facet without passing
+    /// around a corner of a closed surface. Otherwise the origin is on the facet itself, and nothing behind it is visible; so
+    /// it is at vertices that the camera does not see, where the way up would cost a ray without a visible difference.
     pub fn outlook(&self, shot: &Shot<'_>, is_seen: bool) -> Outlook {
         if let Some(sides) = self.sides {
             return Outlook { point: sides.before, horizon: None, lift: None };
@@ -175,8 +176,8 @@ impl<'a> Vertex<'a> {
     }
 }
 
-/// Whether the way from a facet to a point is one up from it that is worth going, and the end of the way: 1 at the point, and
-/// what that may be off.
+/// Whether the way from a facet to a point goes up far enough to matter, and the end of the way: 1 at the point, and a margin
+/// for the error.
 #[inline(always)]
 pub fn way_up(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
     let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };
@@ -184,17 +185,17 @@ pub fn way_up(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32
     (is_above, lift.beyond(error).t_max)
 }
 
-/// How many times its own error a point is to be lifted at least, or the facet serves as well.
+/// Least lift, in errors of the point; for less, the facet serves as well.
 const LEAST_LIFT: f32 = 8.0;
 
-/// Where light is looked for.
+/// Origin of light samples and shadow rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Outlook {
-    /// The point that lights are seen from and shadow rays start from.
+    /// The point from which lights are sampled and shadow rays start.
     pub point: Vec3,
-    /// A normal: nothing is seen behind it. None where the cosines say so anyway, or the shadow rays.
+    /// Horizon normal: nothing behind it is visible. `None` if the cosines or the shadow rays take care of this.
     pub horizon: Option<Vec3>,
-    /// If nothing is on the way to another point, lights are seen from there, and all around.
+    /// Another point above it. If nothing is on the way there, lights are sampled from it, in all directions.
     pub lift: Option<Lift>,
 }
 
@@ -203,38 +204,39 @@ pub struct Outlook {
 pub struct Lift {
     /// The point.
     pub to: Vec3,
-    /// The end of the way: 1 at the point, and what that may be off.
+    /// The end of the way: 1 at the point, and a margin for the error.
     pub end: f32,
 }
 
-/// The normals that shading goes by, on the eye's side.
+/// Shading normals on the viewer's side.
 pub struct Shading {
     /// The interpolated normal, bent by a normal map.
     pub normal: Vec3,
     /// The interpolated normal.
     pub smooth_normal: Vec3,
-    /// The cosine between them; none where nothing bends them apart.
+    /// The cosine between them. `None` if they are equal.
     pub bend: Option<f32>,
 }
 
 impl Shading {
-    /// The direction to the eye, mirrored: its cosine with a direction is that between the direction mirrored and the eye's.
+    /// The direction to the viewer, mirrored: its cosine with a direction is that between the mirrored direction and the
+    /// viewer's.
     pub fn mirrored(&self, to_eye: Vec3) -> Vec3 {
         // (2(n·l)n − l)·v = (2(n·v)n − v)·l.
         self.normal * (2.0 * self.normal.dot(to_eye)) - to_eye
     }
 }
 
-/// A vertex with a lobe that is no δ, ready to be lit.
+/// A vertex with a lobe that is not δ, ready for direct light.
 pub struct LitVertex<'a> {
     /// The path that came here.
     pub path: &'a PathRay,
     /// Its place in the round's queue.
     pub place: u32,
-    /// Where.
+    /// The vertex.
     pub vertex: &'a Vertex<'a>,
-    /// What shading goes by.
+    /// Its shading normals.
     pub shading: Shading,
-    /// What it makes of light.
+    /// Its BSDF.
     pub bsdf: PhongBsdf,
 }

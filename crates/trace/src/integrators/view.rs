@@ -1,10 +1,10 @@
-//! What a picture shows.
+//! Views: the contents of a picture.
 
 use crate::choice;
 use crate::film::Quantity;
 
 choice! {
-    /// What a picture shows.
+    /// Content of a picture.
     pub enum View {
         /// The picture.
         Beauty = "beauty",
@@ -46,7 +46,7 @@ choice! {
 }
 
 impl View {
-    /// What its numbers are.
+    /// Meaning of its numbers.
     pub fn shown(self) -> Shown {
         let of = |parts: Parts| Shown::Light(Measure::Radiance(parts));
         let by = |ways: Ways| of(Parts { diffuse: true, specular: true, ways, ..Parts::NONE });
@@ -82,7 +82,7 @@ impl View {
         }
     }
 
-    /// What of its samples it shows.
+    /// Quantity of the samples that it shows.
     pub fn quantity(self) -> Quantity {
         match self.shown() {
             Shown::Film(quantity) => quantity,
@@ -91,21 +91,21 @@ impl View {
     }
 }
 
-/// What the numbers of a view are.
+/// Meaning of the numbers of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
     /// A measure of light.
     Light(Measure),
-    /// A number about the first hit: no exposure or tone curve applies. But for distances it is displayed as it is.
+    /// A number about the first hit, without exposure or tone curve. All but distances are displayed unchanged.
     FirstHit(FirstHit),
-    /// All radiance, and over it the boxes of the trees.
+    /// All radiance, with the boxes of the trees over it.
     Bounds,
     /// A number about the samples of the picture.
     Film(Quantity),
 }
 
 impl Shown {
-    /// The measure of light that its samples are of; of first hits none is asked for.
+    /// The measure of light of its samples; views of first hits do not use it.
     pub fn measure(self) -> Measure {
         match self {
             Self::Light(measure) => measure,
@@ -119,9 +119,9 @@ impl Shown {
 pub enum Measure {
     /// Radiance, of these parts.
     Radiance(Parts),
-    /// The share, from 0 to 1, of what could arrive from the lights that does.
+    /// The share, from 0 to 1, of the lights' possible radiance that arrives.
     ArrivingShare,
-    /// What all rays of the sample meet in the trees.
+    /// The work of all rays of the sample: what they visit in the trees.
     Work,
 }
 
@@ -129,7 +129,7 @@ impl Measure {
     /// All radiance.
     pub const ALL: Self = Self::Radiance(Parts::ALL);
 
-    /// Whether the colours of surfaces count in what lamps send.
+    /// Whether the colours of surfaces are part of the light of lamps.
     pub fn is_colored(self) -> bool {
         match self {
             Self::Radiance(_) | Self::Work => true,
@@ -137,7 +137,7 @@ impl Measure {
         }
     }
 
-    /// How light may come to the first diffuse or glossy surface.
+    /// Ways by which light may come to the first diffuse or glossy surface.
     pub fn ways(self) -> Ways {
         match self {
             Self::Radiance(parts) => parts.ways,
@@ -149,46 +149,47 @@ impl Measure {
 /// Parts of the light that a sample sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parts {
-    /// Sent out by surfaces, and by what is behind everything.
+    /// Emission of surfaces and of the background.
     pub emitted: bool,
     /// The ambient part of Phong.
     pub ambient: bool,
-    /// The diffuse part of what lights send.
+    /// The diffuse part of the reflected light of lights.
     pub diffuse: bool,
     /// The glossy part of it.
     pub specular: bool,
-    /// How it may come to the first diffuse or glossy surface.
+    /// Ways by which it may come to the first diffuse or glossy surface.
     pub ways: Ways,
 }
 
-/// Ways of light from the lights to the first diffuse or glossy surface that the eye sees, be it by mirrors and glass.
+/// Ways of light from the lights to the first diffuse or glossy surface that the camera sees, directly or by mirrors
+/// and glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ways {
-    /// Straight.
+    /// The direct way.
     pub direct: bool,
-    /// By mirrors and glass alone.
+    /// The way by mirrors and glass alone.
     pub caustic: bool,
-    /// By others.
+    /// All other ways.
     pub indirect: bool,
 }
 
 impl Ways {
-    /// Any.
+    /// All ways.
     pub const ALL: Self = Self { direct: true, caustic: true, indirect: true };
-    /// None.
+    /// No way.
     pub const NONE: Self = Self { direct: false, caustic: false, indirect: false };
 }
 
 impl Parts {
-    /// Whether anything is taken of what lamps send.
+    /// Whether any light of lamps is taken.
     pub fn are_reflected(self) -> bool {
         self.diffuse || self.specular
     }
 
-    /// All of it.
+    /// All parts.
     pub const ALL: Self =
         Self { emitted: true, ambient: true, diffuse: true, specular: true, ways: Ways::ALL };
-    /// Nothing; what is added to it comes by all ways.
+    /// No parts; parts added to it have all ways.
     pub const NONE: Self =
         Self { emitted: false, ambient: false, diffuse: false, specular: false, ways: Ways::ALL };
 }

@@ -1,4 +1,4 @@
-//! Pictures of numbers at the first hit. But for distances their values are meant as display values in [0, 1], not as radiance.
+//! Pictures of numbers at the first hit. All but distances are display values in [0, 1], not radiance.
 
 use super::photons::Look;
 use super::queues::Queues;
@@ -10,7 +10,7 @@ use crate::geometry::SurfacePoint;
 use crate::math::lanes::PlainFolds;
 use crate::math::{DVec2, Vec3};
 
-/// Show what each camera ray in the queue hits; black where nothing.
+/// Shows the first hit of each camera ray in the queue; black without a hit.
 pub fn shade(
     shot: &Shot<'_>,
     number: FirstHit,

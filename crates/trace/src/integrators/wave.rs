@@ -1,6 +1,7 @@
-//! Rays from the eye, round by round over queues instead of recursion. In whitted they are split at glass and end at Phong
-//! surfaces, which get direct and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*, 1980). In path each
-//! stays one and goes on from all surfaces (Kajiya, *The Rendering Equation*, 1986); so it does from Phong surfaces in whitted with photons.
+//! Camera rays, round by round over queues instead of recursion. In whitted they are split at glass and end at Phong surfaces,
+//! which get direct and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*, 1980). In path each ray stays
+//! one and goes on from all surfaces (Kajiya, *The Rendering Equation*, 1986); with photons, whitted also goes on from Phong
+//! surfaces so.
 
 use std::ops::Range;
 
@@ -28,17 +29,18 @@ use crate::sampling::Decision;
 use crate::scene::description::{Integrator, Shadows};
 use crate::world::{Hit, PACKET};
 
-/// A ray is split in two while the weaker part counts at least this much of its sample; below, chance takes one of them.
+/// Least contribution of the weaker part for which a ray is split in two; below it, one part is chosen at random.
 const LEAST_SPLIT: f32 = 0.01;
 
-/// Surfaces where the glass stays the same that a ray passes in one round; each so many of them count as a scattering.
+/// Most surfaces without a change of glass that a ray passes in one round; each group of so many counts as a
+/// scattering.
 const MOST_HIDDEN: usize = 64;
 
-/// Rays between two looks at the token.
+/// Rays between two polls of the token.
 const POLL_INTERVAL: usize = 256;
 
-/// Follow the camera rays of some slots to the end; the sink takes what they see. `negative` is told which of the slots from
-/// one on have a negative weight.
+/// Follows the camera rays of some slots to the end; the sink takes the light that they see. `negative` gets the slots of
+/// negative weight.
 pub fn trace(
     shot: &Shot<'_>,
     slots: Range<u32>,
@@ -51,7 +53,7 @@ pub fn trace(
     next.clear();
     let is_path = match shot.settings.render.integrator {
         Integrator::Whitted => false,
-        // What arrives of the lamps' light is asked at what the eye sees.
+        // The share of the lamps' light that arrives is measured at the first visible surface.
         Integrator::Path => sink.measure != Measure::ArrivingShare,
     };
     let mut wave = Wave {
@@ -70,6 +72,7 @@ pub fn trace(
     };
     wave.begin_round();
     wave.lit.expect(slots.len(), shot.pixel_spread > 0.0);
+    // Make and shade the camera rays, which are the first round.
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
         shot.camera_rows(start..slots.end, camera);
         for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
@@ -78,12 +81,15 @@ pub fn trace(
             wave.shade_packet(Rays::Camera(row, first, count, first - slots.start))?;
         }
     }
+    // Light their vertices, and give the light to the sink.
     wave.light()?;
     wave.lit.settle_run(slots.start, &mut wave.sink);
     wave.next_round(rays);
+    // Follow the rays that go on, round by round.
     while !rays.is_empty() {
         wave.lit.expect(rays.len(), shot.pixel_spread > 0.0);
         if wave.goes_on {
+            // Find all hits first, so that packets are of one object.
             shot.closest_hits(rays, hits)?;
             by_object.sort(hits);
             for places in by_object.places().chunks(PACKET) {
@@ -104,22 +110,22 @@ pub fn trace(
 
 /// One round of all rays of a batch.
 struct Wave<'a, 's> {
-    /// Scatterings before the hits of this round.
+    /// Number of scatterings before the hits of this round.
     depth: u32,
     is_path: bool,
-    /// Whether rays go on from diffuse and glossy surfaces: those of path, and those by which whitted finds what photons do not bring.
+    /// Whether rays go on from diffuse and glossy surfaces: in path, and in whitted to find what photons do not bring.
     goes_on: bool,
-    /// How paths go on from Phong surfaces; none: they end there.
+    /// Continuation of paths at Phong surfaces. `None` if they end there.
     onward: Option<Onward>,
     shot: &'a Shot<'a>,
-    /// Vertices of this round that are not lit yet.
+    /// Vertices of this round that wait for direct light.
     lit: &'a mut LitQueue,
-    /// Surfaces that the packet at hand met.
+    /// Surfaces at the hits of the current packet.
     surfaces: &'a mut SurfaceRow,
     sink: Sink<'s>,
     /// Rays of the next round.
     next: &'a mut Vec<PathRay>,
-    /// Of the path at hand, in the round's queue.
+    /// Place of the current path in the round's queue.
     place: u32,
     crossing: &'a mut CrossingMemory,
     counters: &'a mut RayCounters,
@@ -139,7 +145,7 @@ impl Wave<'_, '_> {
         self.onward = self.goes_on.then(|| Onward::new(self.shot, self.depth));
     }
 
-    /// The rays of the next round are those that were found; what is in their place is memory.
+    /// Makes the found rays those of the next round; the old ones stay as memory.
     fn next_round(&mut self, rays: &mut Vec<PathRay>) {
         std::mem::swap(rays, self.next);
         self.next.clear();
@@ -147,7 +153,7 @@ impl Wave<'_, '_> {
         self.begin_round();
     }
 
-    /// What each ray of a packet meets.
+    /// Shades the hits of a packet's rays.
     fn shade_packet(&mut self, rays: Rays<'_>) -> Result<(), Cancelled> {
         let shot = self.shot;
         if (rays.place(0) as usize).is_multiple_of(POLL_INTERVAL) {
@@ -156,11 +162,13 @@ impl Wave<'_, '_> {
         let are_lit = self.depth < shot.settings.render.max_depth && self.sink.takes_reflected();
         let met = shot.meet(rays, self.sink.measure, are_lit, (self.lit.spare(), self.surfaces));
         self.counters.texture_lookups += met.lookups;
+        // Count the work of the rays, if the view shows it.
         if self.sink.measure == Measure::Work {
             for lane in 0..rays.count() {
                 self.add_work(&met.path(shot, &rays, lane), met.hit(lane));
             }
         }
+        // Queue the plain vertices for direct light.
         if are_lit {
             self.lit.keep();
             if shot.pixel_spread > 0.0 {
@@ -170,6 +178,7 @@ impl Wave<'_, '_> {
                 }
             }
         }
+        // Select the rays that find light by themselves, and those that need shading one by one.
         let render = &shot.settings.render;
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let plain = if render.ambient == Vec3::ZERO { met.shining } else { met.plain };
@@ -180,7 +189,7 @@ impl Wave<'_, '_> {
             Rays::Camera(row, first, ..) => self.add_seen(&row.rays, first, &met, (plain, beyond)),
             Rays::Paths(..) | Rays::Traced(..) => wanted |= plain | beyond,
         }
-        // In the order of the paths: what a sample gets by several is added in that.
+        // Go in the order of the paths, as the contributions to a sample are added in that order.
         for lane in lanes(wanted) {
             let (of_camera, bit) = (rays.camera_path(shot, lane), 1 << lane);
             let Some(path) = of_camera.as_ref().or_else(|| rays.of_queue(lane)) else { continue };
@@ -197,20 +206,21 @@ impl Wave<'_, '_> {
                 }
             }
         }
+        // Light the queued vertices while their data are in the cache.
         if self.lit.is_full() {
             self.light()?;
         }
         Ok(())
     }
 
-    /// Add what the ray of a path meets in the trees, up to its hit.
+    /// Adds the work of a path's ray up to its hit.
     fn add_work(&mut self, path: &PathRay, hit: Option<Hit>) {
         let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
         self.sink.add_work(path.slot, self.shot.world.geometry.work(&Ray { t_max, ..path.ray }));
     }
 
-    /// What the rays of the camera see by themselves: plain surfaces, and what is beyond everything. Each is all that its sample gets
-    /// before lamps.
+    /// Adds the emission that camera rays see: of plain surfaces, and from beyond everything. It is all that the sample of each ray
+    /// gets before lamps.
     fn add_seen(&mut self, rays: &RayRows, first: u32, met: &Met, (plain, beyond): (u32, u32)) {
         let shot = self.shot;
         let render = &shot.settings.render;
@@ -238,7 +248,7 @@ impl Wave<'_, '_> {
         }
     }
 
-    /// What a plain surface sends to the eye by itself.
+    /// Adds the emission and ambient light of a plain surface.
     fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let Some((material, phong)) = self.shot.plain_phong(hit.object) else { return };
         if is_shining {
@@ -251,7 +261,7 @@ impl Wave<'_, '_> {
         }
     }
 
-    /// What a path meets of radiance that is sent out; light samples find the rest of it.
+    /// Adds the weighted emission that a path meets; light samples find the rest.
     fn add_emitted(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
         if self.is_gathered(path) {
             return;
@@ -263,8 +273,8 @@ impl Wave<'_, '_> {
         }
     }
 
-    /// Whether the light that a path meets is found in another way: by photons behind mirrors and glass, and by light samples alone
-    /// where these make hard shadows.
+    /// Whether another technique finds the light that a path meets: photons, behind mirrors and glass, or light samples alone, for
+    /// hard shadows.
     fn is_gathered(&self, path: &PathRay) -> bool {
         let goes_on = self.shot.photons.is_some() && !path.history.is_seen;
         goes_on && !(path.history.density > 0.0 && self.shot.settings.render.shadows == Shadows::Soft)
@@ -274,7 +284,7 @@ impl Wave<'_, '_> {
         self.add_beyond(path, self.shot.light_beyond(path));
     }
 
-    /// What a path meets beyond everything; the background lights nothing.
+    /// Adds the light that a path meets beyond everything; the background illuminates nothing.
     fn add_beyond(&mut self, path: &PathRay, beyond: Vec3) {
         if path.history.is_seen {
             let background = self.shot.settings.render.background;
@@ -284,7 +294,8 @@ impl Wave<'_, '_> {
         }
     }
 
-    /// Shade the first thing that is no mere change between parts of one glass. `surface` is that of the hit, if it is known.
+    /// Shades the first surface that is more than a change between parts of one glass. `surface` is that of the hit, if it is
+    /// known.
     fn shade(&mut self, mut path: PathRay, mut hit: Hit, mut surface: Option<SurfacePoint>) {
         let shot = self.shot;
         for _ in 0..MOST_HIDDEN {
@@ -292,11 +303,13 @@ impl Wave<'_, '_> {
                 Some(surface) => Vertex::on(shot, &path, &hit, surface),
                 None => Vertex::to_shade(shot, &path, &hit),
             };
+            // Shade an opaque surface.
             if vertex.material.bsdf.glass().is_none() {
                 let weight = if vertex.emits() { shot.lamp_weight(&path, &hit) } else { 1.0 };
                 let after = shot.without_open(path.medium);
                 return self.shade_surface(path, &vertex, (hit.shape.t, after), weight);
             }
+            // At glass, find all surfaces that touch here.
             let Crossing { sides, arrived, near, far, opaque } =
                 shot.crossing(&path, &vertex, &hit, self.crossing);
             path.medium = arrived;
@@ -306,9 +319,11 @@ impl Wave<'_, '_> {
                 let weight = if vertex.emits() { shot.touching_lamp_weight(&path, &touched) } else { 1.0 };
                 return self.shade_surface(path, &vertex, (hit.shape.t, near), weight);
             }
+            // Reflect and refract at a change of glass.
             if near.glass() != far.glass() {
                 return self.shade_glass(path, &vertex.between(sides), [near, far], hit.shape.t);
             }
+            // Pass on, as nothing changes here.
             path.throughput *= absorption(shot.world, arrived, hit.shape.t);
             (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
             path.history = path.history.hidden();
@@ -327,7 +342,7 @@ impl Wave<'_, '_> {
         }
     }
 
-    /// Take what a surface sends out on the way of a path, which goes on in the medium `after`; whether the path may be scattered
+    /// Adds the emission of a surface to a path, which goes on in the medium `after`; returns whether the path may be scattered
     /// there.
     fn arrive(
         &mut self,
@@ -361,7 +376,7 @@ impl Wave<'_, '_> {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.shot.settings.render.ambient;
         let takes_ambient = ambient != Vec3::ZERO && self.sink.takes_ambient();
-        // No more textures are looked up than the picture shows.
+        // Look up no more textures than the picture shows.
         if !self.sink.takes_reflected() {
             if takes_ambient {
                 let reflectance = phong.ambient_at(at, lookups);

@@ -5,9 +5,9 @@ use crate::accel::{Cell, Stretch};
 use crate::geometry::Ray;
 
 impl Geometry {
-    /// Visit the nodes of all trees whose boxes a ray meets; `visit` gets the ray in the coordinates of the node's tree, where the
-    /// direction of a unit ray is as long as a unit of the scene is there, and says whether to go on below. Depths are counted
-    /// through both trees: a mesh's root is a step below the leaf that holds the mesh.
+    /// Visits the nodes of all trees whose boxes a ray meets. `visit` gets the ray in the coordinates of the node's tree, in which
+    /// the direction of a unit ray is as long as the scene's unit, and says whether to descend. Depths are counted through both
+    /// trees: a mesh's root is a step below the leaf that holds the mesh.
     pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &Cell, &Stretch) -> bool) {
         let mut below = Vec::new();
         self.visited().along(
@@ -28,7 +28,8 @@ impl Geometry {
         }
     }
 
-    /// Boxes that a ray meets up to its end, and shapes that it is tested against there: those of leaves, and those without an end.
+    /// Number of boxes that a ray meets up to its end, and of shapes that are tested on the way: those of leaves, and infinite
+    /// ones.
     pub fn work(&self, ray: &Ray) -> u32 {
         let mut count = self.unbounded().len() as u32;
         self.along(ray, |_, cell, _| {

@@ -4,14 +4,15 @@ use super::{Geometry, Hit, MeshInstance, Object};
 use crate::geometry::{Aabb, Ray};
 
 impl Geometry {
-    /// Visits the objects that may have a point in a box, until `visit` says that it has seen enough; whether it saw all of them.
+    /// Visits the objects that may have a point in a box, until `visit` returns false; returns whether it visited all.
     pub fn around(&self, bounds: &Aabb, mut visit: impl FnMut(u32, &Object) -> bool) -> bool {
         let mut goes_on = self.unbounded().iter().all(|&id| visit(id, &self.objects()[id as usize]));
         self.tree().meeting(bounds, |id| goes_on = goes_on && visit(id, &self.objects()[id as usize]));
         goes_on
     }
 
-    /// The nearest hit of the objects that count; of hits at one distance the object of the lowest number.
+    /// The nearest hit of the objects for which `counts` is true; of hits at one distance, the object of the lowest
+    /// number.
     pub fn closest_of(&self, ray: &Ray, counts: impl Fn(u32) -> bool) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         let mut segment = *ray;
@@ -37,8 +38,8 @@ impl Geometry {
 }
 
 impl MeshInstance {
-    /// Visits every triangle that has a point in a box of the world, and maybe others near it, some maybe more than once, until `visit`
-    /// says that it has seen enough; whether it saw all of them.
+    /// Visits every triangle that has a point in a box of the world, and maybe others near it, some maybe more than once, until
+    /// `visit` returns false; returns whether it visited all.
     pub fn around(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
         self.tree.triangles().meeting_while(&self.local_box(bounds), visit)
     }

@@ -1,4 +1,4 @@
-//! Putting a world together.
+//! Assembly of a world.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::materials::Material;
 use crate::scene::description::{self, Scene};
 
 impl World {
-    /// Put the parts together.
+    /// Assembles a world from its parts.
     pub fn new(scene: &Scene, parts: &Parts, geometry: Arc<Geometry>, lights: Arc<Lights>) -> Self {
         let (materials, object_materials) = lower_materials(scene, parts);
         let camera = parts.camera.as_ref().unwrap_or(&scene.camera);

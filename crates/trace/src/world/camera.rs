@@ -1,4 +1,4 @@
-//! The eye: a pinhole or a thin lens.
+//! The camera: a pinhole or a thin lens.
 
 use crate::assets::OrbiterCamera;
 use crate::geometry::Ray;
@@ -18,14 +18,14 @@ pub struct Camera {
     forward: DVec3,
     /// Tangent of half the vertical angle.
     tan_half_fov: f64,
-    /// Radius of the lens; 0: a pinhole.
+    /// Radius of the lens; 0 for a pinhole.
     pub aperture: f64,
     /// Distance along the axis to the plane in focus.
     pub focus: f64,
 }
 
 impl Camera {
-    /// From the scene's table, and the orbiter file where that names one.
+    /// The camera of the scene's table, and of the orbiter file if the table names one.
     pub fn new(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> Self {
         match camera {
             description::Camera::LookAt { position, look_at, up, fov, aperture, focus } => {
@@ -53,7 +53,7 @@ impl Camera {
         }
     }
 
-    /// The point that it turns about, and its distance.
+    /// The point about which it turns, and its distance.
     pub fn aim(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> (DVec3, f64) {
         match camera {
             description::Camera::LookAt { position, look_at, .. } => (*look_at, position.distance(*look_at)),
@@ -64,7 +64,7 @@ impl Camera {
         }
     }
 
-    /// A scene's camera by vectors. That of an orbiter file has short numbers, near enough to look the same, and looks at the
+    /// A scene's camera by vectors. An orbiter camera gets rounded numbers, near enough to look the same, and looks at the
     /// point of its axis that is as far away as its centre.
     pub fn viewpoint(camera: &description::Camera, orbiter: Option<&OrbiterCamera>) -> Viewpoint {
         match camera {
@@ -91,7 +91,7 @@ impl Camera {
         }
     }
 
-    /// The same in coordinates that start elsewhere.
+    /// The camera in coordinates that start elsewhere.
     pub fn seen_from(self, origin: DVec3) -> Self {
         Self { position: self.position - origin, ..self }
     }
@@ -114,8 +114,8 @@ impl Camera {
         }
     }
 
-    /// The ray through a point of the picture, seen from its middle to the right and up in halves of its height, from a
-    /// point of the unit lens disk; its direction has unit length.
+    /// The ray through a point of the picture, given from its middle to the right and up in halves of its height, from
+    /// a point of the unit lens disk. Its direction has unit length.
     #[inline(always)]
     pub fn ray(&self, place: DVec2, lens: Vec2) -> Ray {
         let direction = self.direction(place);
@@ -131,14 +131,14 @@ impl Camera {
         Ray::new(self.position.as_vec3(), self.direction(place).normalize().as_vec3())
     }
 
-    /// From the middle of the lens to a place, as far as the view axis goes in 1.
+    /// Direction from the middle of the lens to a place, with a component of 1 along the view axis.
     #[inline(always)]
     fn direction(&self, place: DVec2) -> DVec3 {
         let place = place * self.tan_half_fov;
         self.forward + self.right * place.x + self.up * place.y
     }
 
-    /// By how much the beam of a pixel grows with the distance in the middle of a picture of so many rows.
+    /// Growth of a pixel's beam with the distance, in the middle of a picture of so many rows.
     pub fn pixel_spread(&self, rows: u32) -> f32 {
         (2.0 * self.tan_half_fov / f64::from(rows)) as f32
     }
@@ -149,10 +149,10 @@ impl Camera {
     }
 }
 
-/// A camera whose upward axis has at least this much of y is not upside down, and does not look straight up or down.
+/// Least y of the upward axis of a camera that is not upside down, and does not look straight up or down.
 const UPRIGHT: f64 = 1e-3;
 
-/// Stands where an orbiter camera is without its file, which the pipeline does not let happen.
+/// Orbiter camera in place of a missing file, which the pipeline does not allow.
 const DEFAULT_ORBITER: OrbiterCamera = OrbiterCamera {
     center: [0.0; 3],
     position: [0.0; 2],

@@ -1,8 +1,8 @@
-//! What lies so near to a point of a surface that no ray can tell which of them comes first.
+//! Surfaces in contact at a point, so near to each other that no ray can decide which comes first.
 //!
-//! Surfaces that touch are where they are but for rounding. A ray that meets one of them meets all that are within the error
-//! of the hit: they are crossed together, on the way from a point that is certainly before all of them to one that is
-//! certainly beyond. Rays that leave start at these two, so that none is missed and none is met again.
+//! The positions of touching surfaces are equal within rounding. A ray that hits one of them hits all surfaces within the
+//! error of the hit. It crosses them together, on the way from a point that is certainly before all of them to one that is
+//! certainly beyond. Rays that leave start at these two points, so that none is missed and none is hit again.
 
 use super::lonely::meets;
 use super::{Geometry, Hit, MeshInstance, Object, World};
@@ -13,9 +13,9 @@ use crate::math::{DVec3, Vec3};
 /// The points on both sides of surfaces that touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sides {
-    /// On the side that a ray comes from.
+    /// The point on the side from which a ray comes.
     pub before: Vec3,
-    /// On the other side.
+    /// The point on the other side.
     pub beyond: Vec3,
 }
 
@@ -26,7 +26,7 @@ impl Sides {
     }
 }
 
-/// A thing at or between the two points.
+/// A surface or shape at or between the two points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Near {
     /// A shape of glass that encloses the point beyond.
@@ -36,35 +36,35 @@ pub enum Near {
         /// Its material.
         material: u32,
     },
-    /// Any other surface, as the ray between the points meets it.
+    /// Any other surface, as the ray between the points hits it.
     Surface {
-        /// Where.
+        /// Hit of that ray.
         hit: Hit,
         /// Its material.
         material: u32,
-        /// Whether its front is on the side of the point before; of glass, whether the outside of its body is.
+        /// Whether its front, or for glass the outside of its body, is on the side of the point before.
         is_front: bool,
     },
 }
 
-/// Memory for what may be near.
+/// Memory for candidates that may be near.
 #[derive(Debug, Default)]
 pub struct NearMemory {
     objects: Vec<u32>,
-    /// Objects and triangles of them.
+    /// Objects and their triangles.
     triangles: Vec<(u32, u32)>,
 }
 
-/// What is asked of a contact.
+/// Query for a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meeting {
     /// The hit of one of the surfaces.
     pub hit: Hit,
     /// A point of that surface.
     pub surface: SurfacePoint,
-    /// Its normal on the side that a ray comes from.
+    /// Its normal on the side from which a ray comes.
     pub normal: Vec3,
-    /// By how much others may be before it and were not found to be: the rounding of the ray's t along the normal.
+    /// Distance before it within which surfaces may have been missed: the rounding of the ray's t along the normal.
     pub lead: f32,
 }
 
@@ -76,7 +76,7 @@ struct Probe {
 }
 
 impl Probe {
-    /// A part of the way that is a little more than that to the close point.
+    /// Fraction of the way that is a little more than that to the close point.
     fn lead_end(&self) -> f32 {
         let way = self.sides.ray().direction;
         (self.close - self.sides.before).dot(way) / way.length_squared()
@@ -84,7 +84,8 @@ impl Probe {
 }
 
 impl World {
-    /// The sides of all surfaces that touch at a point, and what is there, in an order that depends on the scene alone.
+    /// Finds the sides of all surfaces that touch at a point, and visits these in an order that depends on the scene
+    /// alone.
     #[inline]
     pub fn contact(&self, at: &Meeting, memory: &mut NearMemory, visit: impl FnMut(Near)) -> Sides {
         let margin = self.geometry.margin(at);
@@ -99,7 +100,7 @@ impl World {
         self.contact_of(at, (memory, error), visit)
     }
 
-    /// Whether an object is a sphere whose other side is far from what is near a point of it.
+    /// Whether an object is a sphere whose other side is far from the surfaces near a point of it.
     fn is_large_ball(&self, object: u32, margin: Vec3) -> bool {
         match &self.geometry.objects()[object as usize] {
             Object::Shape(Shape::Sphere(sphere)) => sphere.radius > 8.0 * f64::from(margin.max_element()),
@@ -117,7 +118,8 @@ impl World {
         }
     }
 
-    /// [`World::contact_of`] a large ball of glass that nothing else is near: the side that the ray comes from tells all.
+    /// [`World::contact_of`] for a large ball of glass with nothing else near: the side from which the ray comes decides
+    /// everything.
     fn contact_of_ball(&self, at: &Meeting, mut visit: impl FnMut(Near)) -> Sides {
         let SurfacePoint { point, error, normal, .. } = at.surface;
         let object = at.hit.object;
@@ -130,7 +132,7 @@ impl World {
         }
     }
 
-    /// The same of what may be near, where points may be off by so much.
+    /// Finds the sides among the given candidates, whose points may be in error by at most `error`.
     pub(super) fn contact_of(
         &self,
         at: &Meeting,
@@ -202,7 +204,7 @@ impl World {
         self.bodies.place(object)
     }
 
-    /// Whether any body of glass is open: no ray knows whether it is in such a one.
+    /// Whether any body of glass is open, so that rays cannot know whether they are inside it.
     pub fn has_open_glass(&self) -> bool {
         self.has_open_glass
     }
@@ -217,7 +219,7 @@ impl World {
         self.materials[material as usize].bsdf.glass().is_some()
     }
 
-    /// Whether an object says itself where its inside is; where glass is around any other one, the rays must remember.
+    /// Whether an object by itself determines its inside; around other objects, rays must remember the glass.
     pub fn is_closed(&self, object: u32) -> bool {
         match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.is_closed(),
@@ -225,7 +227,7 @@ impl World {
         }
     }
 
-    /// The closed shapes of glass around a point at the eye, by their objects and materials.
+    /// The closed shapes of glass around a point at the camera, by their objects and materials.
     pub fn glass_around(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
         let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
@@ -242,7 +244,7 @@ impl World {
         })
     }
 
-    /// Whether an object is a shape that has a point inside.
+    /// Whether an object is a shape that contains a point.
     pub fn encloses(&self, object: u32, point: Vec3) -> bool {
         match &self.geometry.objects()[object as usize] {
             Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
@@ -270,15 +272,15 @@ impl World {
 }
 
 impl Geometry {
-    /// How much farther than the error of a point what touches it is looked for.
+    /// Distance within which touching surfaces are searched, in errors of the point.
     const REACH: f32 = 16.0;
 
-    /// How near what touches a point is looked for, along each axis.
+    /// Distance along each axis within which surfaces that touch a point are searched.
     pub(super) fn margin(&self, at: &Meeting) -> Vec3 {
         (at.surface.error * Self::REACH).max(Vec3::splat(self.mesh_rounding() + 2.0 * at.lead))
     }
 
-    /// Collect what was hit as the only thing that may be near; a bound on each component's distance to it.
+    /// Collects the hit itself as the only candidate; returns a bound on each component's distance to it.
     pub(super) fn only(&self, at: &Meeting, memory: &mut NearMemory) -> Vec3 {
         let Hit { shape, object } = at.hit;
         memory.objects.clear();
@@ -295,7 +297,7 @@ impl Geometry {
         }
     }
 
-    /// Collect the shapes and triangles of meshes that may touch a point; a bound on each component's distance to what touches it.
+    /// Collects the shapes and triangles of meshes that may touch a point; returns a bound on each component's distance to them.
     pub(super) fn search(&self, at: &Meeting, memory: &mut NearMemory) -> Vec3 {
         let NearMemory { objects, triangles } = memory;
         objects.clear();
@@ -331,7 +333,7 @@ impl MeshInstance {
         Aabb::around_f64((0..8).map(corner))
     }
 
-    /// What a triangle near a point may be off: its corners by their rounding in the file, and the tests of rays there.
+    /// Error of a triangle near a point: rounding of its corners in the file, and of ray tests there.
     fn touch_error(&self, triangle: u32, point: Vec3) -> Vec3 {
         let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
@@ -339,7 +341,7 @@ impl MeshInstance {
         of_tests + self.transform.reach(reach).as_vec3() * f32::EPSILON
     }
 
-    /// More than any triangle near it may be off.
+    /// Upper bound on the error of any triangle near it.
     pub(super) fn rounding(&self) -> f32 {
         let local = self.tree.bounds();
         if local.is_empty() {
@@ -349,8 +351,8 @@ impl MeshInstance {
         (reach + self.transform.translation.abs()).max_element() as f32 * (16.0 * f32::EPSILON)
     }
 
-    /// Where a triangle is crossed on the way from one point to another, and whether from its front; decided in `f64`. Of
-    /// triangles that share an edge one is crossed there.
+    /// Crossing of a triangle on the way from one point to another, and whether it is from the front; decided in `f64`.
+    /// Of triangles that share an edge, one is crossed there.
     fn crossed(&self, triangle: u32, [from, to]: [DVec3; 2]) -> Option<(ShapeHit, bool)> {
         let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
         let normal = (b - a).cross(c - a);
@@ -360,7 +362,7 @@ impl MeshInstance {
         }
         let direction = to - from;
         let facing = if start > 0.0 { -1.0 } else { 1.0 };
-        // The part of the triangle beyond an edge; its corner's weight but for a factor.
+        // The area beyond an edge: the weight of its corner but for a factor.
         let beyond = |p: DVec3, q: DVec3| {
             let weight = facing * direction.dot((p - from).cross(q - from));
             let is_own = (p.to_array() < q.to_array()) == (facing > 0.0);

@@ -17,16 +17,16 @@ use crate::materials::texels::Texels;
 use crate::math::DVec3;
 use crate::scene::description::{self, Scene};
 
-/// The map of the environment, by the texels of its file; none where they are black.
+/// The map of the environment, from the texels of its file. `None` if they are black.
 pub fn sky(texels: &Arc<Texels>) -> Option<Arc<SkyMap>> {
     SkyMap::new(Arc::clone(texels)).map(Arc::new)
 }
 
 /// The lights of a scene with these objects: those without extent first, then the environment, then the objects that emit.
-/// A mesh is a light for each of its emitting materials. `sky` is the map of an environment that has one.
+/// A mesh is a light for each of its emitting materials. `sky` is the environment's map, if it has one.
 ///
 /// # Errors
-/// [`Cancelled`] when the token was told so.
+/// [`Cancelled`] if the token is cancelled.
 pub fn lights(
     scene: &Scene,
     geometry: &Geometry,
@@ -56,14 +56,14 @@ pub fn lights(
     Ok(Arc::new(Lights::new(all, token)?))
 }
 
-/// What the lights of a scene with these objects send; none where they send nothing.
+/// Source of the photons of a scene with these objects. `None` if no light emits photons.
 pub fn photon_source(geometry: &Geometry, lights: &Arc<Lights>) -> Option<PhotonSource> {
     let outline = |object: u32| geometry.objects().get(object as usize).map(Object::outline);
     let balls: Vec<Ball> = geometry.objects().iter().filter_map(Object::ball).collect();
     PhotonSource::new(lights, outline, Ball::around(&balls))
 }
 
-/// Light from all around; none where it is black.
+/// The environment. `None` if it is black.
 fn around(environment: &description::Environment, sky: Option<Arc<SkyMap>>) -> Option<Environment> {
     if !environment.sends() {
         return None;
@@ -75,7 +75,7 @@ fn around(environment: &description::Environment, sky: Option<Arc<SkyMap>>) -> O
     }
 }
 
-/// A light that is no shape, in coordinates that start at `origin`.
+/// A light that is not a shape, in coordinates that start at `origin`.
 fn described(light: &description::Light, origin: DVec3) -> Light {
     let point = |light: &description::PointLight| {
         let description::PointLight { position, intensity, falloff } = *light;
@@ -95,7 +95,7 @@ fn described(light: &description::Light, origin: DVec3) -> Light {
     }
 }
 
-/// Nothing, where a texture is black all over.
+/// The emission; none if its texture is black all over.
 fn lit(emission: Emission) -> Emission {
     match &emission.texture {
         Some(texture) if emission.shines() && texture.texels.is_black() => Emission::NONE,
@@ -103,7 +103,7 @@ fn lit(emission: Emission) -> Emission {
     }
 }
 
-/// The light that a shape is which emits.
+/// The light of a shape that emits.
 fn shape_light(shape: &Shape, emission: &Emission, object: u32) -> Option<AreaLight> {
     let light = area_light(shape, emission.scale, object).filter(|_| emission.shines())?;
     let light = AreaLight { bounds: of_mean(light.bounds, emission), ..light };
@@ -118,7 +118,7 @@ fn of_mean(bounds: LightBounds, emission: &Emission) -> LightBounds {
     emission.texture.as_ref().map_or(bounds, |texture| bounds.times(texture.mean()))
 }
 
-/// Of a mesh whose triangles all emit this; none: what their own materials emit.
+/// Lights of a mesh whose triangles all have this emission. `None` stands for the emission of their own materials.
 fn mesh_lights(
     object: u32,
     mesh: &MeshInstance,
@@ -157,7 +157,7 @@ fn mesh_lights(
     lights.filter_map(Result::transpose).collect()
 }
 
-/// The triangles of one of the mesh file's own materials; none: all.
+/// The triangles of one of the mesh file's own materials. `None` stands for all triangles.
 fn triangles_of(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
     let mesh = &mesh.tree.loaded().mesh;
     let is_meant = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;

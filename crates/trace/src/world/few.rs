@@ -1,5 +1,5 @@
-//! Meshes of few triangles: each of these is tested against all rays of a packet at once, wherever they go. Hits have the bits of
-//! those under the mesh's tree.
+//! Meshes of few triangles: each triangle is tested against all rays of a packet at once, whatever their directions. Hits have
+//! the bits of those by the mesh's tree.
 
 use super::MeshInstance;
 use crate::accel::{Ends, PACKET};
@@ -8,7 +8,7 @@ use crate::geometry::watertight_rows::ShearedRows;
 use crate::math::lanes::{Folds, lane, set_lane};
 use crate::math::transform::Transform;
 
-/// Triangles of such a mesh at most: of more, the tree passes by so many that it is faster.
+/// Most triangles of such a mesh: for more, the tree skips so many that it is faster.
 const FEW: usize = 16;
 
 impl MeshInstance {
@@ -35,7 +35,7 @@ impl MeshInstance {
         }
     }
 
-    /// A bit for each ray in `met` that hits anything of it but its own of `except`; the others end below 0.
+    /// A bit for each ray in `met` that hits any triangle but its own of `except`; the others end below 0.
     #[inline(always)]
     pub(super) fn any_of_few(
         &self,

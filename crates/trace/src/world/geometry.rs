@@ -1,4 +1,4 @@
-//! All objects under one tree; those without an end beside it.
+//! All objects under one tree; infinite ones beside it.
 
 use std::sync::Arc;
 
@@ -17,9 +17,9 @@ use super::{MergedMeshes, MeshInstance, MeshTree, Object};
 /// The nearest hit in a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Where on the object.
+    /// Hit on the object.
     pub shape: ShapeHit,
-    /// Which object.
+    /// Number of the object.
     pub object: u32,
 }
 
@@ -27,21 +27,21 @@ pub struct Hit {
 #[derive(Debug)]
 pub struct Geometry {
     objects: Vec<Object>,
-    /// Where the coordinates of all of them start, in the scene's.
+    /// Origin of all coordinates, in the scene's.
     origin: DVec3,
     tree: Bvh,
     /// Small meshes under one tree.
     merged: Option<Merged>,
     /// Objects that are not in the tree.
     unbounded: Vec<u32>,
-    /// What the triangles of any mesh may be off, and room for the tests of rays there.
+    /// Error of the triangles of any mesh, with a margin for ray tests there.
     mesh_rounding: f32,
-    /// Where nothing is near a surface.
+    /// Places with nothing near their surface.
     lonely: Lonely,
     instructions: Instructions,
 }
 
-/// Small meshes under one tree, and what rays visit in place of the tree over all objects.
+/// Small meshes under one tree, and the tree that rays visit in place of that over all objects.
 #[derive(Debug)]
 pub(super) struct Merged {
     /// The meshes; their number among the objects of `over` comes after those of all objects.
@@ -51,7 +51,7 @@ pub(super) struct Merged {
 }
 
 impl Geometry {
-    /// The objects of a scene, whose mesh files have these trees, in coordinates that start at `origin`.
+    /// The objects of a scene with these trees for its mesh files, in coordinates that start at `origin`.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -65,7 +65,7 @@ impl Geometry {
         Ok(Self { origin, ..Self::build(objects.collect::<Result<_, _>>()?, token)? })
     }
 
-    /// Build the tree over objects.
+    /// Builds the tree over objects.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -89,17 +89,17 @@ impl Geometry {
         Ok(Self { objects, origin, tree, merged, unbounded, mesh_rounding, lonely, instructions })
     }
 
-    /// The objects, known by their index.
+    /// The objects, which an index names.
     pub fn objects(&self) -> &[Object] {
         &self.objects
     }
 
-    /// Where all coordinates start, in the scene's.
+    /// Origin of all coordinates, in the scene's.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
 
-    /// The tree over the objects that have an end.
+    /// The tree over the finite objects.
     pub(super) fn tree(&self) -> &Bvh {
         &self.tree
     }
@@ -109,7 +109,7 @@ impl Geometry {
         self.merged.as_ref().map_or(&self.tree, |merged| &merged.over)
     }
 
-    /// The merged meshes, if a number that [`Geometry::visited`] tells is theirs.
+    /// The merged meshes. `None` if the number from [`Geometry::visited`] is that of an object.
     #[inline(always)]
     pub(super) fn merged(&self, id: u32) -> Option<&MergedMeshes> {
         let merged = self.merged.as_ref()?;
@@ -122,7 +122,7 @@ impl Geometry {
         self.merged.is_some()
     }
 
-    /// Whether a light is all of an object that is merged: shadow rays to it visit the trees of each mesh.
+    /// Whether a light is all of a merged object: shadow rays to it visit the trees of each mesh.
     #[inline(always)]
     pub(super) fn is_whole_merged(&self, source: Source) -> bool {
         match (source, &self.merged) {
@@ -131,39 +131,39 @@ impl Geometry {
         }
     }
 
-    /// Whether any object has no end.
+    /// Whether any object is infinite.
     pub fn has_unbounded(&self) -> bool {
         !self.unbounded.is_empty()
     }
 
-    /// The objects that have none.
+    /// The infinite objects.
     pub(super) fn unbounded(&self) -> &[u32] {
         &self.unbounded
     }
 
-    /// What the triangles of any mesh may be off, and room for the tests of rays there.
+    /// Error of the triangles of any mesh, with a margin for ray tests there.
     pub(super) fn mesh_rounding(&self) -> f32 {
         self.mesh_rounding
     }
 
-    /// Where nothing is near a surface.
+    /// Places with nothing near their surface.
     pub(super) fn lonely(&self) -> &Lonely {
         &self.lonely
     }
 
-    /// The same, with packets traced by other instructions.
+    /// The geometry, with packets traced by other instructions.
     #[cfg(test)]
     pub(super) fn with(mut self, instructions: Instructions) -> Self {
         self.instructions = instructions;
         self
     }
 
-    /// What packets are traced by.
+    /// Instructions that trace packets.
     pub fn instructions(&self) -> Instructions {
         self.instructions
     }
 
-    /// The nearest hit; of hits at one distance the object of the lowest number.
+    /// The nearest hit; of hits at one distance, the object of the lowest number.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         let mut ray_f64 = ray.to_f64();
@@ -220,12 +220,12 @@ impl Geometry {
         self.asked_surface(ray, hit, Asked::ALL)
     }
 
-    /// The surface at a hit of this ray, as far as it is asked for.
+    /// The requested parts of the surface at a hit of this ray.
     pub fn asked_surface(&self, ray: &Ray, hit: &Hit, asked: Asked) -> SurfacePoint {
         self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
     }
 
-    /// Mean curvature at a hit, > 0 where the surface bulges to its front.
+    /// Mean curvature at a hit, > 0 if the surface bulges to its front.
     pub fn curvature(&self, hit: &Hit, surface: &SurfacePoint) -> f32 {
         match &self.objects[hit.object as usize] {
             Object::Shape(shape) => shape.curvature(hit.shape.primitive, surface.point.as_dvec3()) as f32,
@@ -233,21 +233,21 @@ impl Geometry {
         }
     }
 
-    /// The material that a mesh file gives the triangle that was hit, by the file's own count.
+    /// The material that a mesh file gives the triangle of a hit, by the file's own count.
     pub fn file_material(&self, hit: &Hit) -> Option<u32> {
         let mesh = self.objects[hit.object as usize].mesh()?;
         let materials = &mesh.tree.loaded().mesh.materials;
         materials.get(hit.shape.primitive as usize).copied().filter(|&own| own != u32::MAX)
     }
 
-    /// Bytes held by the objects and the tree over them, without those of meshes.
+    /// Bytes of the objects and of the tree over them, without those of meshes.
     pub fn own_memory_bytes(&self) -> usize {
         let of_merged = |merged: &Merged| merged.meshes.memory_bytes() + merged.over.memory_bytes();
         let merged = self.merged.as_ref().map_or(0, of_merged);
         self.tree.memory_bytes() + merged + size_of_val(self.objects.as_slice())
     }
 
-    /// Bytes held by this tree and by each mesh's once.
+    /// Bytes of this tree and of each mesh's, counted once.
     pub fn memory_bytes(&self) -> usize {
         let mut seen = Vec::new();
         let mut bytes = self.own_memory_bytes() - size_of_val(self.objects.as_slice());

@@ -1,8 +1,8 @@
-//! Tables of where a surface has nothing near it: a ray that crosses it there need not ask what touches it.
+//! Lonely places: parts of surfaces with nothing near them. A ray that crosses a surface there need not search for contacts.
 //!
-//! It is found out where a ray first asks, of a triangle of a mesh or of a cell of the box around a shape, and kept in a byte each.
-//! A byte depends on the geometry alone: it does not matter which ray asks first. `World::contact` gives the same by it as
-//! by its own search.
+//! The first ray that asks computes it, for a triangle of a mesh or for a cell of the box around a shape, and a byte each keeps the
+//! result. The result depends on the geometry alone: it does not matter which ray asks first. `World::contact` gives the same with
+//! it as by its own search.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -11,22 +11,23 @@ use super::{Geometry, Hit, MeshInstance, Object};
 use crate::geometry::{Aabb, Shape, SurfacePoint};
 use crate::math::{DVec3, Vec3};
 
-/// Nobody has asked yet.
+/// Value before any ray has asked.
 const UNKNOWN: u8 = 0;
 
-/// Something may be near anywhere.
+/// Value if something may be near anywhere.
 const NEVER: u8 = u8::MAX;
 
-/// Parts of 1 that a triangle's byte counts: nothing is near where each barycentric coordinate is at least so many of them.
+/// Parts of 1 in a triangle's byte: nothing is near if each barycentric coordinate is at least so many of them.
 const PARTS: f32 = 256.0;
 
 /// Most of these parts.
 const MOST_PARTS: f64 = 64.0;
 
-/// Number of margins that the lonely part of a triangle is from the edges: neighbours at an angle of 30° and more are not near.
+/// Distance of the lonely part of a triangle from its edges, in margins: neighbours at an angle of 30° and more are not near.
 const FROM_EDGES: f64 = 4.0;
 
-/// Margins between a point and what is not near: the box of a margin around the point, and room for the rounding of both.
+/// Least distance, in margins, of surfaces that are not near: the box of a margin around the point, and room for the
+/// rounding of both.
 const APART: f64 = 1.9;
 
 /// Cells along a side of the box around a shape.
@@ -35,7 +36,7 @@ const CELLS: usize = 16;
 /// Tables of all objects.
 #[derive(Debug, Default)]
 pub(super) struct Lonely {
-    /// The diagonal of the box around all objects that have an end.
+    /// The diagonal of the box around all finite objects.
     reach: f32,
     tables: Vec<OnceLock<Table>>,
 }
@@ -43,7 +44,7 @@ pub(super) struct Lonely {
 /// Table of an object.
 #[derive(Debug)]
 struct Table {
-    /// Largest margin that the table holds for.
+    /// Largest margin for which the table holds.
     margin: f32,
     /// Corner of a shape's first cell, and cells per unit of length along each axis.
     cells: [Vec3; 2],
@@ -51,7 +52,7 @@ struct Table {
 }
 
 impl Lonely {
-    /// Nothing yet of the objects in these boxes.
+    /// Empty tables of the objects in these boxes.
     pub fn new(boxes: &[Aabb]) -> Self {
         let all = boxes.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
         let reach = if all.is_empty() { 0.0 } else { all.extent().length() };
@@ -64,7 +65,7 @@ impl Table {
         Self { margin, cells, states: (0..count).map(|_| AtomicU8::new(UNKNOWN)).collect() }
     }
 
-    /// A cell for each place of the box around a shape.
+    /// A table with a cell for each place of the box around a shape.
     fn of_cells(margin: f32, bounds: &Aabb) -> Self {
         let dense = Vec3::splat(CELLS as f32) / bounds.extent();
         // A flat box is one cell thick.
@@ -72,7 +73,7 @@ impl Table {
         Self::new(margin, [bounds.min, dense], CELLS * CELLS * CELLS)
     }
 
-    /// The cell that a point is in.
+    /// The cell that contains a point.
     #[inline]
     fn cell(&self, point: Vec3) -> Cell {
         let [start, dense] = self.cells;
@@ -99,13 +100,13 @@ enum Region {
     /// A part of a triangle.
     Triangle {
         corners: [DVec3; 3],
-        /// Least distance of what is not near.
+        /// Least distance of surfaces that are not near.
         apart: f64,
     },
 }
 
 impl Geometry {
-    /// Whether nothing but the object that was hit, and of a mesh nothing but its triangle, is within a margin of a point of it.
+    /// Whether only the object of the hit, and of a mesh only its triangle, is within a margin of a point.
     pub(super) fn is_lonely(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
         let table = self.lonely().tables[hit.object as usize].get_or_init(|| self.table(object));
@@ -158,9 +159,9 @@ impl Geometry {
         let height = (b - a).cross(c - a).length() / longest;
         let least = (f64::from(PARTS) * FROM_EDGES * f64::from(margin) / height).ceil().max(1.0);
         let middle = (a + b + c) / 3.0;
-        // A part further from the edges where neighbours are at a small angle.
+        // Try a part further from the edges, for neighbours at a small angle.
         for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MOST_PARTS) {
-            // Barycentrics of at least this are a smaller triangle about the same middle.
+            // Barycentric coordinates of at least this form a smaller triangle about the same middle.
             let inner =
                 corners.map(|corner| middle + (corner - middle) * (1.0 - 3.0 * parts / f64::from(PARTS)));
             let region = Region::Triangle { corners: inner, apart: APART * f64::from(margin) };
@@ -172,7 +173,7 @@ impl Geometry {
         NEVER
     }
 
-    /// Whether nothing but an object, or its triangle, comes near to a region; what is near meets `around`.
+    /// Whether nothing but an object, or its triangle, comes near a region; near surfaces overlap `around`.
     fn is_clear(&self, around: &Aabb, region: &Region, own: u32, triangle: Option<u32>) -> bool {
         let is_near = |id: u32| match &self.objects()[id as usize] {
             Object::Shape(shape) => id != own && shape_is_near(shape, around, region),
@@ -194,7 +195,7 @@ impl Geometry {
     }
 }
 
-/// Whether a shape may have a point near to a region, or encloses it.
+/// Whether a shape may have a point near a region, or encloses it.
 fn shape_is_near(shape: &Shape, around: &Aabb, region: &Region) -> bool {
     if shape.bounds().is_some_and(|bounds| !bounds.meets(around)) {
         return false;
@@ -218,7 +219,7 @@ fn shape_is_near(shape: &Shape, around: &Aabb, region: &Region) -> bool {
 }
 
 impl Region {
-    /// Whether a triangle may be near; one that does not meet `around` is not.
+    /// Whether a triangle may be near; one that does not overlap `around` is not.
     fn is_near(&self, triangle: [DVec3; 3], around: &Aabb) -> bool {
         match self {
             Self::Cell(cell) => meets(triangle, cell),
@@ -229,7 +230,7 @@ impl Region {
     }
 }
 
-/// A cell of the box around a shape, by its place along the axes.
+/// A cell of the box around a shape, by its indices along the axes.
 struct Cell([usize; 3]);
 
 impl Cell {
@@ -238,7 +239,7 @@ impl Cell {
         (z * CELLS + y) * CELLS + x
     }
 
-    /// Its box, and room for the rounding of places.
+    /// Its box, with room for the rounding of places.
     fn bounds(&self, all: &Aabb) -> Aabb {
         let side = all.extent() / CELLS as f32;
         let min = all.min + Vec3::from(self.0.map(|along| along as f32)) * side;
@@ -246,7 +247,7 @@ impl Cell {
     }
 }
 
-/// Whether a triangle has a point in a box, but for rounding (Akenine-Möller, *Fast 3D Triangle-Box Overlap Testing*, 2001).
+/// Whether a triangle has a point in a box, within rounding (Akenine-Möller, *Fast 3D Triangle-Box Overlap Testing*, 2001).
 pub(super) fn meets(corners: [DVec3; 3], bounds: &Aabb) -> bool {
     if !Aabb::around_f64(corners).meets(bounds) {
         return false;
@@ -268,7 +269,7 @@ pub(super) fn meets(corners: [DVec3; 3], bounds: &Aabb) -> bool {
     !(parts(normal) || edges.into_iter().flat_map(across).any(parts))
 }
 
-/// Whether an axis shows that two triangles are so far from each other.
+/// Whether an axis separates two triangles by this distance.
 fn are_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> bool {
     let edges = |[a, b, c]: [DVec3; 3]| [b - a, c - b, a - c];
     let (own, others) = (edges(one), edges(other));
@@ -280,7 +281,7 @@ fn are_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> bool {
         let ([a, b], [c, d]) = (range(one, axis), range(other, axis));
         (c - b).max(a - d) > distance * axis.length()
     };
-    // The edges in the first plane tell neighbours apart.
+    // The edges in the first plane separate neighbours.
     let normal = own[0].cross(own[1]);
     if own.into_iter().any(|edge| parts(edge.cross(normal))) || parts(normal) {
         return true;

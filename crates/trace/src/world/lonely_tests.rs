@@ -132,7 +132,7 @@ fn ball(steps: u32) -> TriangleMesh {
     mesh
 }
 
-/// Scenes with what touches and what does not; places that rays are aimed at.
+/// Scenes with surfaces that touch and others that do not; with places for rays to aim at.
 fn scenes(random: &mut Random) -> Vec<(World, Vec<DVec3>)> {
     let floor = Shape::Quad { corner: v(-4.0, -4.0, -1.0), u: v(8.0, 0.0, 0.0), v: v(0.0, 8.0, 0.0) };
     let cube = |x: f64, size: f64| Shape::Box {

@@ -1,4 +1,4 @@
-//! From the description's materials and those of mesh files to materials that can be looked up.
+//! From the description's materials and those of mesh files to materials that are ready for look-ups.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -33,13 +33,13 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
     Material { bsdf, emission, normal_map }
 }
 
-/// What a material of the scene file sends out.
+/// Emission of a material of the scene file.
 pub fn emission(scene: &Scene, images: &Images, emission: &EmissionSource) -> Emission {
     let texture = emission.texture.map(|index| declared_texture(scene, images, index, TextureUse::Color));
     Emission { scale: emission.scale, texture }
 }
 
-/// What a material of a mesh file is. Models 3, 5 and 8 of the MTL format with a highlight are mirrors, 4, 6, 7 and 9 glass.
+/// Kind of a material of a mesh file. Models 3, 5 and 8 of the MTL format with a highlight are mirrors, 4, 6, 7 and 9 glass.
 enum FileKind {
     Phong,
     Mirror,
@@ -54,7 +54,7 @@ fn kind(own: &FileMaterial) -> FileKind {
     }
 }
 
-/// Whether a mesh file's material sends out light.
+/// Whether a mesh file's material emits.
 pub fn file_emits(own: &FileMaterial) -> bool {
     match kind(own) {
         FileKind::Phong => own.emission != Vec3::ZERO,
@@ -114,7 +114,7 @@ fn file_phong(images: &Images, own: &FileMaterial) -> Material {
     Material { bsdf: Bsdf::Phong(phong), emission: file_emission(images, own), normal_map }
 }
 
-/// For triangles of a mesh file that name no material.
+/// The material of triangles of a mesh file that name none.
 pub fn fallback_material() -> Material {
     let phong = Phong {
         diffuse: Color::Constant(Vec3::splat(0.7)),
@@ -151,7 +151,7 @@ fn file_texture(images: &Images, source: &TextureSource) -> Arc<Texture> {
     Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat })
 }
 
-/// The image that was loaded. A material that no object has names textures that were not: they are never looked up.
+/// The loaded image. A material that no object has may name textures that were not loaded: they are never looked up.
 fn image(images: &Images, source: &TextureSource) -> Image {
     images.get(source).cloned().unwrap_or_else(|| {
         let data = TexelData::Linear8(vec![[128, 128, 255]]);

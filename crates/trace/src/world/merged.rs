@@ -1,7 +1,7 @@
 //! Small meshes under one tree: a ray that passes many of them visits one set of boxes in place of a tree of each.
 //!
-//! The triangles are those of the instances in the scene's coordinates, rounded there; `contact` and `along` keep to the trees of the
-//! meshes themselves. Hits of instances that stand as their files have them keep their bits.
+//! The triangles are those of the instances in the scene's coordinates, rounded there; `contact` and `along` use the trees of the
+//! meshes themselves. Hits of instances that stand as in their files keep their bits.
 
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
@@ -11,10 +11,11 @@ use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
-/// Most triangles of a mesh that is merged: a larger one pays for its own tree, and an edit that moves it builds nothing again.
+/// Most triangles of a mesh that is merged: a larger one is worth its own tree, and an edit that moves it then rebuilds
+/// nothing.
 const MOST_EACH: usize = 1 << 14;
 
-/// Most triangles in all: a tree over so many is built in some 10 ms.
+/// Most triangles in all: building a tree over so many takes some 10 ms.
 const MOST_IN_ALL: usize = 1 << 17;
 
 /// Least triangles in all: fewer are as fast in rows of rays, mesh by mesh.
@@ -36,14 +37,14 @@ pub struct MergedTriangle {
 #[derive(Debug)]
 pub struct MergedMeshes {
     tree: TriangleTree,
-    /// In the order of objects, so that of hits at one distance the lowest object counts.
+    /// Triangles in the order of objects, so that of hits at one distance the lowest object counts.
     triangles: Vec<MergedTriangle>,
     /// The number of the first triangle of each object; [`MergedMeshes::NOT_HERE`] of the others.
     first: Vec<u32>,
 }
 
 impl MergedMeshes {
-    /// Stands for the first triangle of an object that is not merged.
+    /// Value in place of the first triangle of an object that is not merged.
     const NOT_HERE: u32 = u32::MAX;
 
     /// Merges the small meshes among objects; `None` if that is not worth a tree.
@@ -130,10 +131,10 @@ impl MergedMeshes {
         self.tree.any(ray, except)
     }
 
-    /// The number of no triangle.
+    /// Number that no triangle has.
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
-    /// The nearest hits of the rays in `met`, by the numbers of triangles; the others end below 0.
+    /// The nearest hits of the rays in `met`, with the numbers of triangles; the others end below 0.
     #[inline(never)]
     pub fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
         let mut hits = [None; PACKET];
@@ -145,8 +146,8 @@ impl MergedMeshes {
         }
     }
 
-    /// A bit for each ray in `met` that hits any triangle but its own of `except`, which has the number of one for each ray,
-    /// [`MergedMeshes::NO_TRIANGLE`] for none.
+    /// A bit for each ray in `met` that hits any triangle but its own of `except`; this holds a triangle's number for each
+    /// ray, or [`MergedMeshes::NO_TRIANGLE`].
     #[inline(never)]
     pub fn any_rows(&self, rows: &RayRows, met: u32, ends: &Ends, except: Option<&[u32; PACKET]>) -> u32 {
         let rays = rays(rows, met);
@@ -155,13 +156,13 @@ impl MergedMeshes {
         self.tree.any_packet(&rays, ends, &own)
     }
 
-    /// Bytes held.
+    /// Bytes that the tree takes.
     pub fn memory_bytes(&self) -> usize {
         self.tree.memory_bytes() + size_of_val(&*self.triangles) + size_of_val(&*self.first)
     }
 }
 
-/// The rays of a packet; in the place of one that is not in `met` the first that is, which goes the same way as they do.
+/// The rays of a packet; a lane that is not in `met` gets the first ray that is, which goes in a similar direction.
 #[inline]
 fn rays(rows: &RayRows, met: u32) -> [Ray; PACKET] {
     let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET); PACKET];
@@ -196,7 +197,7 @@ mod tests {
     use crate::scene::description::Accel;
     use crate::world::{Geometry, Hit, MeshTree};
 
-    /// A mesh of random triangles, some of which are there twice.
+    /// A mesh of random triangles, some of which occur twice.
     fn mesh(seed: u64, count: u32) -> Arc<MeshTree> {
         let mut next = random(seed);
         let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;

@@ -1,4 +1,4 @@
-//! A mesh, placed.
+//! Instances of meshes.
 
 use std::sync::Arc;
 
@@ -11,16 +11,16 @@ use crate::geometry::{Aabb, Asked, Ray, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::Transform;
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// A mesh, placed.
+/// An instance of a mesh.
 #[derive(Clone, Debug)]
 pub struct MeshInstance {
     /// The triangles.
     pub tree: Arc<MeshTree>,
-    /// From the mesh's coordinates to the world's.
+    /// Map from the mesh's coordinates to the world's.
     pub transform: Transform,
-    /// Interpolate vertex normals.
+    /// Whether to interpolate vertex normals.
     pub smooth: bool,
-    /// Whether rays meet it in a tree over several meshes, in the scene's coordinates.
+    /// Whether rays find it in a tree over several meshes, in the scene's coordinates.
     pub(super) is_merged: bool,
 }
 
@@ -41,7 +41,7 @@ pub(super) struct Facet {
 }
 
 impl MeshInstance {
-    /// A mesh under its own tree.
+    /// An instance of a mesh with its own tree.
     pub fn new(tree: Arc<MeshTree>, transform: Transform, smooth: bool) -> Self {
         Self { tree, transform, smooth, is_merged: false }
     }
@@ -54,7 +54,7 @@ impl MeshInstance {
         self.moved(ray)
     }
 
-    /// The same where the mesh is elsewhere.
+    /// The ray in the mesh's coordinates, if the mesh is moved.
     fn moved(&self, ray: &Ray) -> Ray {
         Ray {
             origin: self.transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
@@ -82,7 +82,7 @@ impl MeshInstance {
         if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
     }
 
-    /// Triangles of the mesh.
+    /// Number of triangles of the mesh.
     pub(super) fn triangle_count(&self) -> usize {
         self.tree.loaded().mesh.triangles.len()
     }
@@ -107,8 +107,8 @@ impl MeshInstance {
         if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
     }
 
-    /// Mean curvature of the surface that a triangle stands for, by its vertices' normals (Akenine-Möller et al. 2021, section 4), > 0
-    /// where it bulges to the front.
+    /// Mean curvature of the surface that a triangle approximates, by its vertices' normals (Akenine-Möller et al. 2021, section
+    /// 4), > 0 if it bulges to the front.
     pub(super) fn curvature(&self, triangle: u32, normal: Vec3) -> f32 {
         if !self.smooth {
             return 0.0;
@@ -127,7 +127,7 @@ impl MeshInstance {
         ((along(0) + along(1) + along(2)) / 3.0) as f32
     }
 
-    /// The surface at a hit, as far as it is asked for.
+    /// The requested parts of the surface at a hit.
     pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
@@ -160,9 +160,9 @@ impl MeshInstance {
         }
     }
 
-    /// Rounding of a point of a triangle, of the next ray's origin in the mesh's coordinates, and of what it is computed from;
-    /// where all of these are near 0, that of the double precision in which sides of the triangle are told apart. In a tree over
-    /// several meshes, also the rounding of the corners there.
+    /// Rounding of a point of a triangle, of the next ray's origin in the mesh's coordinates, and of the numbers from which the
+    /// point is computed. If all of these are near 0, the rounding of double precision counts, by which the sides of the
+    /// triangle are decided. In a tree over several meshes, the rounding of the corners there counts too.
     #[inline(always)]
     pub(super) fn error(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
         let reach = self.transform.reach(local.abs());
@@ -177,7 +177,7 @@ impl MeshInstance {
         }
     }
 
-    /// Whether rays meet triangles whose corners were rounded after they were placed.
+    /// Whether rays hit triangles whose corners were rounded after they were placed.
     #[inline(always)]
     fn has_rounded_corners(&self) -> bool {
         self.is_merged && self.transform != Transform::IDENTITY
@@ -201,7 +201,7 @@ impl MeshInstance {
         }
     }
 
-    /// Of a smooth mesh: interpolated between those of the corners and on the side of the geometric normal.
+    /// Shading normal of a smooth mesh: interpolated between those of the corners, on the side of the geometric normal.
     #[inline(always)]
     pub(super) fn shading_normal(&self, facet: &Facet, [a, b, c]: &[Vec3; 3]) -> Vec3 {
         let Facet { normal, barycentric, .. } = *facet;
@@ -215,8 +215,8 @@ impl MeshInstance {
         Vec3::new(choose(bent.x, normal.x), choose(bent.y, normal.y), choose(bent.z, normal.z))
     }
 
-    /// Of a smooth mesh: the point, lifted towards the eye to the tangent planes of the vertices where those are above it, so that
-    /// the facets of a smooth-shaded surface do not shadow what its normals say is lit (Hanika, *Hacking the Shadow
+    /// Shadow point of a smooth mesh: the point, lifted towards the viewer to the tangent planes of the vertices that are above
+    /// it. Thereby the facets of a smooth-shaded surface do not shadow what its normals say is lit (Hanika, *Hacking the Shadow
     /// Terminator*, Ray Tracing Gems II, chapter 4).
     #[inline(always)]
     pub(super) fn shadow_point(&self, facet: &Facet, normals: &[Vec3; 3], direction: DVec3) -> Vec3 {
@@ -237,7 +237,7 @@ impl MeshInstance {
         (point + lifted).as_vec3()
     }
 
-    /// Texture coordinates and their tangents; without any the barycentrics.
+    /// Texture coordinates and their tangents; without texture coordinates, the barycentric ones.
     fn parametrisation(
         &self,
         vertices: [usize; 3],
@@ -274,7 +274,7 @@ impl MeshInstance {
         }
     }
 
-    /// A bit for each ray in `met` that hits anything of it but its own of `except`.
+    /// A bit for each ray in `met` that hits any triangle but its own of `except`.
     #[inline(never)]
     pub(super) fn any_rows(
         &self,
@@ -290,8 +290,8 @@ impl MeshInstance {
         self.tree.triangles().any_packet(&local, ends, &parts)
     }
 
-    /// Those rays of a packet that are in `met` in the mesh's coordinates; in the place of each other one the first of them, which
-    /// goes the same way as they do.
+    /// The rays of a packet that are in `met`, in the mesh's coordinates; other lanes get the first of these rays, which goes in a
+    /// similar direction.
     #[inline]
     fn local_rays(&self, rows: &RayRows, met: u32) -> [Ray; PACKET] {
         let is_there = self.transform == Transform::IDENTITY;

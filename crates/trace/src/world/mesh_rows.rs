@@ -8,8 +8,8 @@ use crate::math::lanes::{Lanes3, lane, set_lane};
 use crate::math::{Vec2, Vec3};
 
 impl MeshInstance {
-    /// The surfaces of those hits of a packet whose bits are set, all of this instance; with their texture coordinates where
-    /// these are asked for.
+    /// Computes the surfaces of the hits of a packet whose bits are set, all of this instance; with their texture
+    /// coordinates if requested.
     #[inline(always)]
     pub fn fill_surfaces(
         &self,
@@ -20,7 +20,7 @@ impl MeshInstance {
         asks_uv: bool,
     ) {
         let mesh = &self.tree.loaded().mesh;
-        // The other lanes look at a triangle as well, which counts nothing.
+        // The other lanes get a triangle as well, without effect.
         let filler = hits.primitive[of.trailing_zeros() as usize % PACKET];
         let mut vertices = [[0; 3]; PACKET];
         for i in 0..PACKET {
@@ -66,13 +66,13 @@ impl MeshInstance {
     }
 }
 
-/// Texture coordinates of a point of a triangle, by those of its corners and their weights.
+/// Texture coordinates of a point of a triangle, from those of its corners and their weights.
 #[inline(always)]
 pub(super) fn uv_between([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
     a * barycentric.x + b * barycentric.y + c * barycentric.z
 }
 
-/// What the first, the second and the third vertices of triangles have.
+/// Attributes of the first, the second and the third vertices of triangles.
 #[inline(always)]
 fn of_vertices(vertices: &[[u32; 3]; PACKET], all: &[Vec3]) -> [Lanes3; 3] {
     let mut each = [[[0.0; PACKET]; 3]; 3];

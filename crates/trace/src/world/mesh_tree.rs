@@ -16,12 +16,12 @@ pub struct MeshTree {
     loaded: Arc<LoadedMesh>,
     tree: TriangleTree,
     accel: Accel,
-    /// Vertex normals, computed at their first use where the file has none.
+    /// Vertex normals, computed at their first use if the file has none.
     computed_normals: OnceLock<Vec<Vec3>>,
 }
 
 impl MeshTree {
-    /// Build it, a tree of the kind that is asked for.
+    /// Builds a tree of the requested kind.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -62,7 +62,7 @@ impl MeshTree {
         self.computed_normals.get_or_init(compute)
     }
 
-    /// Compute the normals where the file has none.
+    /// Computes the normals if the file has none.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -74,7 +74,7 @@ impl MeshTree {
         Ok(())
     }
 
-    /// Bytes held by the tree with its copy of the triangles.
+    /// Bytes of the tree with its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
         self.tree.memory_bytes()
     }

@@ -54,18 +54,18 @@ pub type Images = HashMap<TextureSource, Image>;
 pub struct Image {
     /// The image.
     pub texels: Arc<Texels>,
-    /// Its levels, where a texture asks for them.
+    /// Its mip levels. `None` if no texture needs them.
     pub mipmaps: Option<Arc<Mipmaps>>,
 }
 
-/// What a world is made of.
+/// Parts of a world.
 #[derive(Clone, Debug, Default)]
 pub struct Parts {
-    /// One for each of [`crate::scene::description::Scene::mesh_files`].
+    /// One tree for each of [`crate::scene::description::Scene::mesh_files`].
     pub meshes: Vec<Arc<MeshTree>>,
     /// The images that [`textures_needed`] named.
     pub images: Images,
-    /// Where the scene's camera is an orbiter file: that file.
+    /// The orbiter file of the scene's camera. `None` if the scene has a camera of its own.
     pub orbiter: Option<OrbiterCamera>,
     /// A camera in place of the scene's.
     pub camera: Option<description::Camera>,
@@ -76,36 +76,36 @@ pub struct Parts {
 /// A scene that can be traced.
 #[derive(Debug)]
 pub struct World {
-    /// The eye.
+    /// The camera.
     pub camera: Camera,
     /// Objects under their tree.
     pub geometry: Arc<Geometry>,
     /// Materials; objects refer to them by index.
     pub materials: Vec<Material>,
-    /// Material of each object, or where a mesh file's own materials start.
+    /// Material of each object, or the range of a mesh file's own materials.
     object_materials: Vec<ObjectMaterial>,
     /// Lights of every kind.
     pub lights: Arc<Lights>,
-    /// Which surfaces of glass are one body.
+    /// Bodies of glass: which surfaces belong together.
     bodies: Arc<Bodies>,
     /// Whether any body of glass is open.
     has_open_glass: bool,
     /// The closed shapes of glass that the lens may be in, with their materials.
     glass_at_eye: Vec<(u32, u32)>,
-    /// Whether any material has a texture with levels.
+    /// Whether any material has a texture with mip levels.
     is_mipmapped: bool,
 }
 
-/// How an object finds its material.
+/// Map from an object to its material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ObjectMaterial {
-    /// One for all of it.
+    /// One material for all of the object.
     One(u32),
-    /// Each triangle its own, counted from here.
+    /// Materials of the file, one for each triangle, counted from here.
     OfFile {
         /// Index of the file's first material.
         first: u32,
-        /// For triangles that name none.
+        /// Material of triangles that name none.
         fallback: u32,
     },
 }
@@ -134,8 +134,8 @@ impl World {
         self.materials[first as usize..][..count].iter().chain(self.materials.get(one as usize))
     }
 
-    /// The material of an object and its Phong, where nothing bends its normals, it sends out the same everywhere, and its
-    /// textures have no levels and are not of its glossy lobe.
+    /// The material of an object and its Phong. `None` if anything bends its normals, its emission is textured, or its
+    /// textures have mip levels or are those of its glossy lobe.
     pub fn plain_phong(&self, object: u32) -> Option<(&Material, &Phong)> {
         let material = match self.object_materials[object as usize] {
             ObjectMaterial::One(index) => &self.materials[index as usize],
@@ -153,7 +153,7 @@ impl World {
         }
     }
 
-    /// The material of all of an object, if it asks for no more of a surface than rows of surfaces hold: no texture coordinates or
+    /// The material of all of an object. `None` if it needs more of a surface than rows of surfaces hold: texture coordinates or
     /// tangents.
     pub fn untextured(&self, object: u32) -> Option<&Material> {
         match self.object_materials[object as usize] {
@@ -164,22 +164,22 @@ impl World {
         }
     }
 
-    /// Whether any material has a texture with levels, for which rays must know how wide their beams are.
+    /// Whether any material has a texture with mip levels, for which rays must know the width of their beams.
     pub fn is_mipmapped(&self) -> bool {
         self.is_mipmapped
     }
 
-    /// Triangles over all mesh instances and single triangles.
+    /// Number of triangles over all mesh instances and single triangles.
     pub fn triangle_count(&self) -> u64 {
         self.geometry.objects().iter().map(Object::triangle_count).sum()
     }
 
-    /// Shapes of any kind; a mesh instance counts as one.
+    /// Number of shapes of any kind; a mesh instance counts as one.
     pub fn object_count(&self) -> u64 {
         self.geometry.objects().len() as u64
     }
 
-    /// Bytes held by all trees, shared ones once.
+    /// Bytes of all trees, shared ones counted once.
     pub fn accel_memory_bytes(&self) -> usize {
         self.geometry.memory_bytes()
     }

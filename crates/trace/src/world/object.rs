@@ -1,4 +1,4 @@
-//! What stands in a scene: shapes and meshes.
+//! Objects of a scene: shapes and meshes.
 
 use super::mesh_instance::MeshInstance;
 use crate::accel::{Ends, PACKET};
@@ -8,7 +8,7 @@ use crate::geometry::{Aabb, Asked, Ray, RayF64, Shape, ShapeHit, SurfacePoint};
 use crate::lights::{Ball, Outline};
 use crate::math::lanes::Folds;
 
-/// A thing that rays can hit.
+/// An object that rays can hit.
 #[derive(Clone, Debug)]
 pub enum Object {
     /// A shape.
@@ -26,7 +26,7 @@ impl Object {
         }
     }
 
-    /// Whether the ray hits anything of it but the primitive `except`.
+    /// Whether the ray hits any primitive of it but `except`.
     pub fn any(&self, ray: &Ray, ray_f64: &RayF64, except: Option<u32>) -> bool {
         match self {
             Self::Shape(shape) => shape.intersect(ray_f64).is_some_and(|hit| Some(hit.primitive) != except),
@@ -34,7 +34,8 @@ impl Object {
         }
     }
 
-    /// The nearest hits of the rays of a packet that are in `met`; the others end below 0. `found` holds none before.
+    /// The nearest hits of the rays of a packet that are in `met`; the others end below 0. `found` holds no hits
+    /// before.
     #[inline(always)]
     pub fn closest_rows(
         &self,
@@ -51,8 +52,8 @@ impl Object {
         }
     }
 
-    /// A bit for each ray in `met` that hits anything of it; the others end below 0. `except` holds the bits of the rays that
-    /// may hit one of its primitives each, and the primitives.
+    /// A bit for each ray in `met` that hits it; the others end below 0. `except` holds the bits of the rays that ignore one
+    /// primitive each, and these primitives.
     #[inline(always)]
     pub fn any_rows(
         &self,
@@ -79,7 +80,7 @@ impl Object {
         hit
     }
 
-    /// The surface at a hit, as far as it is asked for.
+    /// The requested parts of the surface at a hit.
     pub fn surface(&self, ray: &Ray, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         let ray = ray.to_f64();
         match self {
@@ -88,7 +89,7 @@ impl Object {
         }
     }
 
-    /// The box around it; none where it has no end.
+    /// The box around it. `None` if it is infinite.
     pub fn bounds(&self) -> Option<Aabb> {
         match self {
             Self::Shape(shape) => shape.bounds(),
@@ -96,7 +97,7 @@ impl Object {
         }
     }
 
-    /// A ball around it; none where it has no end, or is nothing.
+    /// A ball around it. `None` if it is infinite or empty.
     pub fn ball(&self) -> Option<Ball> {
         if let Self::Shape(Shape::Sphere(Sphere { center, radius })) = self {
             return Some(Ball { center: *center, radius: *radius });
@@ -106,7 +107,7 @@ impl Object {
         Some(Ball { center: (min + max) * 0.5, radius: (max - min).length() * 0.5 })
     }
 
-    /// How it is told to lights that are objects.
+    /// Its outline for lights that are objects.
     pub(super) fn outline(&self) -> Outline {
         match self {
             Self::Shape(shape) => Outline::Shape(*shape),
@@ -122,7 +123,7 @@ impl Object {
         }
     }
 
-    /// Triangles that it is made of.
+    /// Number of triangles in it.
     pub fn triangle_count(&self) -> u64 {
         match self {
             Self::Shape(shape) => shape.triangle_count(),

@@ -1,4 +1,4 @@
-//! Up to sixteen rays at once through a scene: what they hit is what each hits alone.
+//! Up to sixteen rays at once through a scene: each gets the hit that it would get alone.
 
 use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
@@ -9,14 +9,14 @@ use crate::lights::{Source, SourceRow};
 use crate::math::lanes::{Folds, TRUE, take, take_u32};
 
 impl Geometry {
-    /// [`Geometry::closest`] of at most [`PACKET`] rays, into as many places.
+    /// [`Geometry::closest`] for at most [`PACKET`] rays, into as many places.
     pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
         debug_assert!(rays.len() <= PACKET && rays.len() == hits.len());
         self.instructions().run(Closest { geometry: self, rays, hits });
     }
 
-    /// [`Geometry::closest_packet`] inside of such loops: hits, and of which objects they are. `traced` are the bits of the rays that
-    /// have an end.
+    /// [`Geometry::closest_packet`] inside of loops for each instruction set: hits, and their objects. `traced` are the bits of the
+    /// rays that have an end.
     #[inline(always)]
     pub fn closest_rows(
         &self,
@@ -31,8 +31,8 @@ impl Geometry {
         (nearest.hits, nearest.object)
     }
 
-    /// [`Geometry::occluded`] of the segments of a packet, each with the light that it goes to: a bit for each that is. `traced` are
-    /// the bits of those that have an end. To be called inside of loops for each instruction set.
+    /// [`Geometry::occluded`] for the segments of a packet, each with its light: a bit for each that is occluded. `traced` are the
+    /// bits of the rays that have an end. To be called inside of loops for each instruction set.
     #[inline(always)]
     pub fn occluded_rows(
         &self,
@@ -66,7 +66,7 @@ impl Geometry {
         (0..PACKET).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
 
-    /// [`Geometry::occluded`] one ray after the other.
+    /// [`Geometry::occluded`], one ray after the other.
     #[cold]
     #[inline(never)]
     fn occluded_by_each(&self, rows: &RayRows, ends: &Ends, traced: u32, sources: &SourceRow) -> u32 {
@@ -100,7 +100,7 @@ impl Loops for Closest<'_> {
 /// No object.
 const NONE: u32 = u32::MAX;
 
-/// The nearest hits so far, and of which objects they are.
+/// The nearest hits so far, and their objects.
 struct Nearest<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayRows,
@@ -139,12 +139,12 @@ impl<F: Folds> ClosestTest for Nearest<'_, F> {
     }
 }
 
-/// Tells the objects of hits of merged meshes, and has their triangles numbered by object.
+/// Returns the objects of hits of merged meshes, and renumbers their triangles by object.
 #[inline(always)]
 fn numbered_by_object(merged: &MergedMeshes, found: &mut HitRows) -> [u32; PACKET] {
     let mut objects = [NONE; PACKET];
     for lane in 0..PACKET {
-        // Rays that hit nothing look at the first triangle, which counts nothing.
+        // Rays without a hit get the first triangle, without effect.
         let is_hit = !found.t[lane].is_nan();
         let of = merged.triangle(if is_hit { found.primitive[lane] } else { 0 });
         (objects[lane], found.primitive[lane]) = (of.object, of.primitive);
@@ -152,7 +152,7 @@ fn numbered_by_object(merged: &MergedMeshes, found: &mut HitRows) -> [u32; PACKE
     objects
 }
 
-/// Looks for what is in the way of shadow rays.
+/// Test for occluders of shadow rays.
 struct Blockers<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayRows,

@@ -1,4 +1,4 @@
-//! Every shape against rays side by side, by every kind of instructions: the bits of the shape against each ray alone.
+//! Every shape against rays side by side, by every instruction set: the bits are those of each ray alone.
 
 use super::*;
 use crate::accel::{Instructions, Loops};
@@ -11,7 +11,7 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec3};
 
-/// Numbers as good as random.
+/// Pseudo-random numbers.
 struct Random(u64);
 
 impl Random {
@@ -20,7 +20,7 @@ impl Random {
         (self.0 >> 33) as usize % count
     }
 
-    /// In [−1, 1).
+    /// A number in [−1, 1).
     fn number(&mut self) -> f32 {
         self.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0
     }
@@ -29,7 +29,7 @@ impl Random {
         Vec3::new(self.number(), self.number(), self.number())
     }
 
-    /// Corners, faces, nothing, and sizes that over- and underflow where they are multiplied.
+    /// A hostile number: corners, faces, 0, and sizes whose products over- or underflow.
     fn hostile(&mut self) -> f32 {
         const HOSTILE: [f32; 16] = [
             0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -3.0, 1e-45, -1e-40, 1e-20, 1e-7, 1e10, -1e19, 3e38, -3e38,
@@ -56,7 +56,7 @@ impl Random {
     }
 }
 
-/// One of each kind on the axes and one askew, of a size.
+/// Shapes of a size: one of each kind on the axes and one askew.
 fn shapes(scale: f64) -> Vec<Object> {
     let (center, askew) = (DVec3::new(0.3, -0.2, 0.1) * scale, DVec3::new(0.3, -0.7, 0.5));
     let quad = |corner: DVec3, u: DVec3, v: DVec3| {
@@ -82,7 +82,7 @@ fn shapes(scale: f64) -> Vec<Object> {
     shapes.map(Object::Shape).to_vec()
 }
 
-/// What a packet hits, and which rays hit any part but one.
+/// Hits of a packet, and the rays that hit any part but one.
 struct Both<'a> {
     object: &'a Object,
     rays: &'a [Ray],
@@ -112,7 +112,7 @@ fn bits(hit: ShapeHit) -> [u32; 4] {
     [hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits()]
 }
 
-/// Compare a packet with its rays alone; how many hit.
+/// Compares a packet with its rays alone; returns how many hit.
 fn assert_packet(object: &Object, rays: &[Ray], met: u32, except: (u32, &[u32; PACKET])) -> usize {
     let met = met & ((1 << rays.len()) - 1);
     let alone = |lane: usize| {

@@ -1,4 +1,4 @@
-//! Which image files a scene looks up.
+//! Image files that a scene looks up.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -10,12 +10,12 @@ use crate::assets::{FileMaterial, LoadedMesh};
 use crate::math::Vec3;
 use crate::scene::description::{Encoding, Scene, TextureFilter, TextureRole, TextureUse};
 
-/// An image file, and how its numbers are read.
+/// An image file, and the encoding of its numbers.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct TextureSource {
     /// The file.
     pub path: PathBuf,
-    /// How its numbers are read.
+    /// Encoding of its numbers.
     pub encoding: ImageEncoding,
 }
 
@@ -26,13 +26,13 @@ pub struct NeededTexture {
     pub source: TextureSource,
     /// Its name on progress bars.
     pub name: String,
-    /// Index into [`Scene::textures`]; none: a mesh file's own texture.
+    /// Index into [`Scene::textures`]. `None` for a mesh file's own texture.
     pub declared: Option<usize>,
     /// Index into [`Scene::mesh_files`] of the mesh whose material names it.
     pub mesh_file: Option<usize>,
     /// Whether `[environment]` names it.
     pub is_environment: bool,
-    /// Whether its levels are looked up.
+    /// Whether its mip levels are looked up.
     pub has_mipmaps: bool,
 }
 
@@ -50,25 +50,25 @@ impl NeededTexture {
     }
 }
 
-/// What a picture looks up in textures.
+/// Textures that a picture looks up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lookups {
     /// Diffuse reflectance.
     pub diffuse: bool,
     /// Glossy reflectance.
     pub specular: bool,
-    /// What Phong surfaces reflect of ambient light.
+    /// Ambient reflectance of Phong surfaces.
     pub ambient: bool,
-    /// Pictures on lights, and the map of the environment.
+    /// Emission textures, and the map of the environment.
     pub lights: bool,
     /// Normal maps; Phong surfaces alone have them.
     pub normals: bool,
 }
 
 impl Lookups {
-    /// Everything.
+    /// All textures.
     pub const ALL: Self = Self { diffuse: true, specular: true, ambient: true, lights: true, normals: true };
-    /// Nothing.
+    /// No textures.
     pub const NONE: Self =
         Self { diffuse: false, specular: false, ambient: false, lights: false, normals: false };
 
@@ -84,7 +84,7 @@ impl Lookups {
 }
 
 /// The image files that materials of objects look up for such a picture, each once. Textures that no such material names
-/// are not among them.
+/// are left out.
 pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Lookups) -> Vec<NeededTexture> {
     let mut needed: Vec<NeededTexture> = Vec::new();
     let mut known = HashMap::new();
@@ -128,7 +128,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
     needed
 }
 
-/// Whether the levels of a texture of the scene file are looked up.
+/// Whether the mip levels of a texture of the scene file are looked up.
 fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
     match scene.textures[texture].filter {
         TextureFilter::Nearest | TextureFilter::Bilinear => false,
@@ -136,7 +136,7 @@ fn has_mipmaps(scene: &Scene, texture: usize) -> bool {
     }
 }
 
-/// Where the map of the environment comes from, where that has one that is not made black.
+/// Source of the environment's map. `None` without a map, or if its factor is black.
 pub fn environment_source(scene: &Scene) -> Option<TextureSource> {
     environment_file(scene).map(environment_map)
 }
@@ -150,7 +150,8 @@ fn environment_map(file: &Path) -> TextureSource {
     TextureSource { path: file.to_owned(), encoding: ImageEncoding::Color }
 }
 
-/// Which materials of the scene some object has, and which mesh files' own materials some instance takes.
+/// Whether each material of the scene belongs to an object, and whether each mesh file's own materials belong to an
+/// instance.
 fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     let (mut materials, mut files) =
         (vec![false; scene.materials.len()], vec![false; scene.mesh_files.len()]);
@@ -164,7 +165,7 @@ fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     (materials, files)
 }
 
-/// Where a texture of the scene file comes from when it is used for something.
+/// Source of a texture of the scene file for this use.
 pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
@@ -177,7 +178,7 @@ pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> Textu
     TextureSource { path: texture.file.value.clone(), encoding }
 }
 
-/// Where a texture of a mesh file comes from.
+/// Source of a texture of a mesh file for this use.
 pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
     let encoding = match used {
         TextureUse::Color => ImageEncoding::Color,

@@ -7,12 +7,12 @@ use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::scene::description::Accel;
 
-/// A tree over triangles that are known by their number.
+/// A tree over triangles, which a number names.
 #[derive(Debug)]
 pub enum TriangleTree {
-    /// Of boxes.
+    /// A tree of boxes.
     Boxes(WideBvh),
-    /// Of planes.
+    /// A tree of planes.
     Planes(KdTree),
 }
 
@@ -42,7 +42,7 @@ impl TriangleTree {
         }
     }
 
-    /// Bytes held by the tree with its copy of the triangles.
+    /// Bytes of the tree with its copy of the triangles.
     pub fn memory_bytes(&self) -> usize {
         match self {
             Self::Boxes(tree) => tree.memory_bytes(),
@@ -50,7 +50,7 @@ impl TriangleTree {
         }
     }
 
-    /// The nearest hit of a ray; of hits at one distance the triangle of the lowest number.
+    /// The nearest hit of a ray; of hits at one distance, the triangle of the lowest number.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         match self {
             Self::Boxes(tree) => tree.closest(ray),
@@ -66,7 +66,7 @@ impl TriangleTree {
         }
     }
 
-    /// Visit the nodes of the tree whose boxes a ray meets, parents first; `visit` says whether to go on below.
+    /// Visits the nodes of the tree whose boxes a ray meets, parents first; `visit` says whether to descend.
     pub fn along(&self, ray: &Ray, visit: impl FnMut(&Cell, &Stretch) -> bool) {
         match self {
             Self::Boxes(tree) => tree.along(ray, visit),
@@ -74,7 +74,7 @@ impl TriangleTree {
         }
     }
 
-    /// Visit every triangle that has a point in a box, and maybe others near it; some maybe more than once.
+    /// Visits every triangle that has a point in a box, and maybe others near it; some maybe more than once.
     pub fn meeting(&self, bounds: &Aabb, visit: impl FnMut(u32)) {
         match self {
             Self::Boxes(tree) => tree.meeting(bounds, visit),
@@ -82,7 +82,7 @@ impl TriangleTree {
         }
     }
 
-    /// The same until `visit` says that it has seen enough; whether it saw all of them.
+    /// [`TriangleTree::meeting`] until `visit` returns false; returns whether it visited all.
     pub fn meeting_while(&self, bounds: &Aabb, visit: impl FnMut(u32) -> bool) -> bool {
         match self {
             Self::Boxes(tree) => tree.meeting_while(bounds, visit),
@@ -103,8 +103,8 @@ impl TriangleTree {
         }
     }
 
-    /// A bit for each of at most [`PACKET`](crate::accel::PACKET) rays that hits any triangle up to its end but its own of `except`,
-    /// which may be empty.
+    /// A bit for each of at most [`PACKET`](crate::accel::PACKET) rays that hits any triangle up to its end, but its own of
+    /// `except`, which may be empty.
     pub fn any_packet(&self, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> u32 {
         match self {
             Self::Boxes(tree) => tree.any_packet(rays, ends, except),

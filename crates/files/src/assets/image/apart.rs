@@ -1,4 +1,5 @@
-//! Decoders know no token. They work on a thread of their own, which nobody waits for once the token is cancelled.
+//! Decoders do not poll the token. They work on a thread of their own, for which nobody waits once the token is
+//! cancelled.
 
 use std::io;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
@@ -9,30 +10,30 @@ use std::time::Duration;
 use crate::assets::read::Watch;
 use crate::control::{CancelToken, Cancelled};
 
-/// Between two polls of the token.
+/// Time between two polls of the token.
 const POLL: Duration = Duration::from_millis(2);
 
-/// Reports that may wait to be heard.
+/// Most reports that wait to be received.
 const WAITING: usize = 16;
 
-/// Work that nobody waits for any more and that has not ended.
+/// Threads that nobody waits for any more and that have not ended.
 static LEFT: Mutex<Vec<JoinHandle<()>>> = Mutex::new(Vec::new());
 
-/// Tells how far the work is.
+/// Reports the progress of the work.
 #[derive(Clone)]
 pub(super) struct Reporter(SyncSender<u64>);
 
 impl Reporter {
-    /// So far. An error where nobody waits: the work may end.
+    /// Reports the progress so far. Returns an error if nobody waits any more: then the work may end.
     pub(super) fn reached(&self, done: u64) -> io::Result<()> {
         self.0.send(done).map_err(|_| io::Error::other(Cancelled))
     }
 }
 
-/// Do `work` elsewhere and report what it reports, out of `total`. None where there is no thread to be had or the work
-/// panicked.
+/// Does `work` on another thread and passes its reports on, out of `total`. `None` if no thread could be started or the
+/// work panicked.
 ///
-/// Work that was left behind holds memory: new work begins when all of that has ended.
+/// Abandoned work holds memory: new work begins only when all of it has ended.
 pub(super) fn run<T: Send + 'static>(
     watch: Watch<'_>,
     total: u64,
@@ -64,7 +65,7 @@ fn wait<T>(
         match reports.recv_timeout(POLL) {
             Ok(done) => watch.tick(done as usize, total as usize)?,
             Err(RecvTimeoutError::Timeout) => watch.token.check()?,
-            // All has been read.
+            // The decoder has read everything.
             Err(RecvTimeoutError::Disconnected) => break,
         }
     }
@@ -107,7 +108,7 @@ mod tests {
         let cancel = token.clone();
         let stuck = move |report: Reporter| {
             cancel.cancel();
-            // Released only after the call has returned; 20 s are for a wrong program, so that it fails.
+            // The work is released only after the call has returned; 20 s let a wrong program fail.
             let in_time = released.recv_timeout(Duration::from_secs(20)).is_ok();
             let _ = said.send((in_time, report.reached(1).is_err()));
         };

@@ -4,13 +4,13 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use super::apart::Reporter;
 
-/// Most bytes read at once: a decoder that asks for a whole image is to report and stop as well.
+/// Most bytes read at once, so that a decoder which reads a whole image at once reports and stops as well.
 const CHUNK: usize = 1 << 16;
 
 pub(super) struct Counting<R> {
     inner: R,
     at: u64,
-    /// Farthest byte read: decoders may go back.
+    /// Farthest byte read, as decoders may go back.
     reached: u64,
     length: u64,
     report: Reporter,

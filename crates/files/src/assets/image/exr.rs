@@ -1,4 +1,4 @@
-//! EXR by `exr`: through `image`, only red, green and blue without a layer's name would be found.
+//! EXR by `exr`: `image` would only find red, green and blue without a layer's name.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Seek};
@@ -16,12 +16,12 @@ use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 /// Bytes of a pixel: three floats.
 const PIXEL_BYTES: usize = 12;
 
-/// Reads a colour or grey from one part of the file: its display window, black where there are no data, in the
-/// largest resolution.
+/// Decoder of a colour or grey from one part of the file: its display window, black outside of the data, in the largest
+/// resolution.
 pub(super) struct ExrDecoder<R> {
     reader: Reader<R>,
     part: usize,
-    /// Places of red, green and blue among the channels; all the same for grey.
+    /// Indices of red, green and blue among the channels; all the same for grey.
     channels: [usize; 3],
 }
 
@@ -43,7 +43,7 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
     }
 }
 
-/// What is unpacked at once: a tile, or some rows, with all channels.
+/// Bytes that are unpacked at once: a tile, or some rows, with all channels.
 fn block_bytes(header: &Header) -> u64 {
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
     let (width, height) = match header.blocks {
@@ -75,8 +75,8 @@ impl Layer {
     }
 }
 
-/// The part and its channels to read: colour before grey, what has no layer's name before what has one, the first
-/// of those; else the only channel of a part, by whatever name.
+/// The part and its channels to read. Colour comes before grey, channels without a layer's name before those with one,
+/// then the first; otherwise the only channel of a part, whatever its name.
 fn choose(headers: &[Header]) -> Option<(usize, [usize; 3])> {
     let flat = || headers.iter().enumerate().filter(|(_, header)| !header.deep);
     let parts: Vec<_> = flat().map(|(part, header)| (part, layers(header))).collect();
@@ -91,7 +91,7 @@ fn choose(headers: &[Header]) -> Option<(usize, [usize; 3])> {
     unnamed.or_else(|| find(true, Layer::color)).or_else(|| find(true, Layer::grey)).or_else(alone)
 }
 
-/// The layers of a part by their names, which stand before the last dot of the channels' names.
+/// Layers of a part by name; the name stands before the last dot of the channels' names.
 fn layers(header: &Header) -> BTreeMap<String, Layer> {
     let mut layers: BTreeMap<String, Layer> = BTreeMap::new();
     for (index, channel) in header.channels.list.iter().enumerate() {
@@ -151,7 +151,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
     }
 }
 
-/// The block's part of the picture.
+/// Copies the block's part of the picture.
 fn copy(block: &UncompressedBlock, header: &Header, channels: [usize; 3], samples: &mut [u8]) {
     let window = header.shared_attributes.display_window;
     let offset = header.own_attributes.layer_position - window.position;
@@ -176,7 +176,7 @@ fn copy(block: &UncompressedBlock, header: &Header, channels: [usize; 3], sample
     }
 }
 
-/// Samples of one channel, from a column on that may lie outside of the row.
+/// Copies samples of one channel, from a column on that may lie outside of the row.
 fn place<const N: usize>(
     row: &mut [u8],
     slot: usize,

@@ -1,4 +1,4 @@
-//! What the HDR decoder does not bound: it keeps every line of the header.
+//! Limits that the HDR decoder lacks: it keeps every line of the header.
 
 use std::fs::File;
 use std::io;
@@ -7,11 +7,11 @@ use std::os::unix::fs::FileExt;
 use super::in_words;
 use crate::control::CancelToken;
 
-/// Most bytes of a header, the line of the size with it: as PLY.
+/// Most bytes of a header with the line of the size; the same limit as for PLY.
 const HEADER_BYTES: u64 = 1 << 20;
 
-/// Whether the header ends where one may: at an empty line, behind which the line of the size follows. A file that ends before is the
-/// decoder's to refuse.
+/// Checks that the header ends within its limit: at an empty line, followed by the line of the size. A file that ends before is
+/// left to the decoder.
 pub(super) fn check_header(file: &File, token: &CancelToken) -> Result<(), String> {
     const CHUNK: usize = 1 << 14;
     let mut chunk = vec![0; CHUNK];

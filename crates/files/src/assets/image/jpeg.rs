@@ -1,4 +1,4 @@
-//! What the JPEG decoder forgives and a texture must not: it fills what is missing with grey.
+//! Faults that the JPEG decoder accepts and a texture must not have: it fills missing data with grey.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use crate::assets::AssetError;
 use crate::assets::read::{self, Watch};
 use crate::control::{CancelToken, unwatched};
 
-/// Whether the last scan ends: the marker of the end of the image follows that of the scan's start. Within a scan
+/// Checks that the last scan ends: the marker of the end of the image follows that of the scan's start. Within a scan
 /// neither can occur (ITU-T T.81, B.1.1.5).
 pub(super) fn check_whole(path: &Path, limit: u64, token: &CancelToken) -> Result<(), String> {
     let bytes = read::bytes(path, limit, Watch { progress: &unwatched, token });
@@ -18,7 +18,7 @@ pub(super) fn check_whole(path: &Path, limit: u64, token: &CancelToken) -> Resul
     }
 }
 
-/// Each block of 8 × 8 pixels takes at least one bit, that of its mean.
+/// Checks the size: each block of 8 × 8 pixels takes at least one bit, that of its mean.
 pub(super) fn check_plausible(width: u32, height: u32, file_bytes: u64) -> Result<(), String> {
     let blocks = u64::from(width.div_ceil(8)) * u64::from(height.div_ceil(8));
     if blocks > file_bytes.saturating_mul(8) {

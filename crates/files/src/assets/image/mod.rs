@@ -30,20 +30,20 @@ use png::PngDecoder;
 /// Most bytes of an image file.
 const FILE_LIMIT: u64 = 4 << 30;
 
-/// How the numbers of an image file are read.
+/// Encoding of the numbers of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ImageEncoding {
-    /// Whole numbers are sRGB, floats linear.
+    /// Whole numbers are sRGB, floats are linear.
     Color,
     /// Always sRGB.
     Srgb,
     /// Always linear: normal maps.
     Linear,
-    /// As [`Self::Color`], and floats stay as they are, negative or not finite: pictures that are judged.
+    /// Like [`Self::Color`], but floats stay as they are, negative or not finite: for pictures to compare.
     Raw,
 }
 
-/// What an image may cost.
+/// Limits on the size of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageLimits {
     /// Most columns, and most rows.
@@ -53,20 +53,21 @@ pub struct ImageLimits {
 }
 
 impl Default for ImageLimits {
-    /// As many a side as a picture may have; 2 GiB.
+    /// Limits of a picture in columns and rows; 2 GiB.
     fn default() -> Self {
         Self { side: 65536, memory_bytes: 2 << 30 }
     }
 }
 
-/// Read an image: PNG, JPEG, PNM, TGA, BMP, HDR, EXR, WebP, told by its first bytes, else by its ending.
+/// Reads an image: PNG, JPEG, PNM, TGA, BMP, HDR, EXR or WebP, recognised by its first bytes, else by its ending.
 ///
-/// Grey becomes RGB, alpha is left out, a camera's note on orientation is followed; texels that are negative or
-/// not finite become 0 (but for [`ImageEncoding::Raw`]). A JPEG that is cut short is an error. 16-bit and float files give linear floats. Progress is in bytes of the file.
+/// Grey becomes RGB, alpha is left out, a camera's orientation tag is followed. Texels that are negative or not finite become 0
+/// (but for [`ImageEncoding::Raw`]). A JPEG that is cut short is an error. 16-bit and float files give linear floats. Progress is
+/// in bytes of the file.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`], [`AssetError::Malformed`] where the content is not what it says or beyond the
-/// limits, [`AssetError::Cancelled`].
+/// [`AssetError::Unreadable`]; [`AssetError::Malformed`] if the content contradicts its header or exceeds the limits;
+/// [`AssetError::Cancelled`].
 pub fn load(
     path: &Path,
     encoding: ImageEncoding,
@@ -84,10 +85,10 @@ pub fn load(
     Ok(texels)
 }
 
-/// Columns, rows and the bytes that the texels of an image will take, by what its file says of its size.
+/// Columns and rows of an image, and the bytes that its texels will take, according to its header.
 ///
 /// # Errors
-/// As [`load`], as far as the start of the file shows them.
+/// As for [`load`], as far as the start of the file shows them.
 pub fn size(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<(u32, u32, u64), AssetError> {
     let watch = Watch { progress: &unwatched, token };
     let file = Source::open(path, limits, token)?;
@@ -98,7 +99,7 @@ pub fn size(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<(u3
     })
 }
 
-/// The levels of an image.
+/// The mip levels of an image.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -114,7 +115,7 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
     })
 }
 
-/// An open image file with what reading it goes by.
+/// An open image file with the settings for reading it.
 struct Source {
     path: PathBuf,
     file: File,
@@ -132,7 +133,7 @@ impl Source {
         Ok(Self { path: path.to_owned(), file, length, limits, token: token.clone() })
     }
 
-    /// Let a foreign decoder at it.
+    /// Runs a foreign decoder on it.
     fn read_apart<T: Send + 'static>(
         self,
         watch: Watch<'_>,
@@ -163,7 +164,7 @@ impl Source {
         let reader = BufReader::new(Counting::new(self.file, self.length, report));
         let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|error| in_words(&error))?;
         if reader.format().is_none() {
-            // Only TGA has nothing to be told by.
+            // Only TGA has no first bytes to recognise it by.
             let format = ImageFormat::from_path(&self.path).ok().filter(|format| *format == ImageFormat::Tga);
             reader.set_format(format.ok_or_else(unknown_format)?);
         }
@@ -194,7 +195,7 @@ fn choose<R: BufRead + Seek + 'static>(
         Some(ImageFormat::Png) => Ok(Box::new(PngDecoder::new(reader.into_inner(), memory_bytes)?)),
         Some(ImageFormat::OpenExr) => Ok(Box::new(ExrDecoder::new(reader.into_inner(), memory_bytes)?)),
         _ => {
-            // Width and height are checked by who knows how to say it.
+            // Width and height are checked elsewhere, with better messages.
             let mut limits = Limits::default();
             limits.max_alloc = Some(memory_bytes);
             reader.limits(limits);
@@ -203,8 +204,8 @@ fn choose<R: BufRead + Seek + 'static>(
     }
 }
 
-/// Refuse before anything of that size is allocated; gives the bytes of the texels. Bytes of the file that the decoder
-/// holds count too.
+/// Refuses an image before memory of its size is allocated; returns the bytes of the texels. Bytes of the file that the
+/// decoder holds count too.
 fn check_size(decoder: &dyn ImageDecoder, held_bytes: u64, limits: ImageLimits) -> Result<u64, String> {
     let (width, height) = decoder.dimensions();
     let size = format!("it has {width} × {height} pixels");
@@ -232,7 +233,7 @@ fn unknown_format() -> String {
     "its content is no image that can be read: png, jpg, ppm, tga, bmp, hdr, exr or webp".to_owned()
 }
 
-/// What a decoder says, in few words: it may have much of the file in it.
+/// A decoder's error in few words, as its own text may quote much of the file.
 fn reason(error: &ImageError) -> String {
     const MOST: usize = 200;
     let words = match error {

@@ -1,11 +1,11 @@
-//! PNG by `png`: through `image`, what stands beside the picture would be unpacked too.
+//! PNG by `png`: `image` would unpack chunks beside the picture too.
 
 use std::io::{BufRead, Seek};
 
 use ::image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-/// Reads the first picture, without colour profile and texts.
+/// Decoder of the first picture, without colour profile and texts.
 pub(super) struct PngDecoder<R: BufRead + Seek> {
     reader: png::Reader<R>,
     color_type: ColorType,

@@ -107,7 +107,7 @@ fn grey_and_alpha_become_rgb() {
     assert_eq!(data, TexelData::Srgb8(vec![[1, 2, 3]]));
 }
 
-/// A PNG whose header says another size; its checksum is right.
+/// A PNG whose header claims another size; its checksum is right.
 fn lying_png(width: u32, height: u32) -> Vec<u8> {
     let mut file = small_png();
     file[16..20].copy_from_slice(&width.to_be_bytes());

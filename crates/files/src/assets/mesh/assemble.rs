@@ -1,4 +1,4 @@
-//! What a parser found → a mesh that keeps the invariants.
+//! From a parser's results to a mesh that keeps the invariants.
 
 use std::path::PathBuf;
 
@@ -25,12 +25,12 @@ pub(super) struct Faces {
 }
 
 impl Faces {
-    /// Add a corner to the face that [`Faces::close`] will end.
+    /// Adds a corner to the face that [`Faces::close`] will end.
     pub(super) fn corner(&mut self, vertex: u32) {
         self.corners.push(vertex);
     }
 
-    /// End a face of this many corners.
+    /// Ends a face of this many corners.
     pub(super) fn close(&mut self, arity: usize) {
         if self.arities.is_empty() && arity == 3 {
             return;
@@ -46,7 +46,7 @@ impl Faces {
         self.corners.reserve(3 * triangles);
     }
 
-    /// Faces in all.
+    /// Number of faces.
     pub(super) fn len(&self) -> usize {
         if self.arities.is_empty() { self.corners.len() / 3 } else { self.arities.len() }
     }
@@ -68,7 +68,7 @@ pub(super) struct Parsed {
     pub(super) pictures: Vec<PathBuf>,
 }
 
-/// Cut, drop, compact, complete.
+/// Assembles a mesh: cuts polygons, drops bad faces, compacts the vertices, completes the normals.
 pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
     let Parsed {
         positions,
@@ -100,7 +100,7 @@ pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh
     Ok(LoadedMesh { mesh, materials, dropped, warnings, material_warnings, companions, pictures })
 }
 
-/// Positions from an origin near those that faces use. What no `f32` can hold becomes infinite.
+/// Positions from an origin near those that faces use. Numbers that no `f32` can hold become infinite.
 fn around_origin(positions: Vec<DVec3>, faces: &Faces) -> (DVec3, Vec<Vec3>) {
     let least = DVec3::splat(f64::from(f32::MIN));
     let place = |corner: &u32| positions.get(*corner as usize).copied().unwrap_or(DVec3::NAN);
@@ -174,7 +174,7 @@ impl<'a> Cutter<'a> {
         Ok(())
     }
 
-    /// The common case, in parallel: triangles only, and all of them good.
+    /// Takes all faces in parallel in the common case: triangles only, and all of them good. Returns whether it did.
     fn take_as_they_are(&mut self, faces: &Faces) -> bool {
         let (triangles, _) = faces.corners.as_chunks();
         let in_range = |corner: &u32| (*corner as usize) < self.positions.len();
@@ -194,7 +194,7 @@ impl<'a> Cutter<'a> {
         all
     }
 
-    /// Add a face's triangles, or count why it has none.
+    /// Adds a face's triangles, or counts the reason why it has none.
     fn cut(&mut self, corners: &[u32]) {
         let before = self.triangles.len();
         if corners.iter().any(|&corner| !self.positions[corner as usize].is_finite()) {
@@ -210,7 +210,7 @@ impl<'a> Cutter<'a> {
         }
     }
 
-    /// A polygon may touch itself at one place (a quad at a pole): what is left without the repeats counts.
+    /// Cuts a polygon. It may touch itself at one place (a quad at a pole): repeated corners are dropped.
     fn cut_polygon(&mut self, corners: &[u32]) {
         let place = |corner: u32| self.positions[corner as usize];
         let mut distinct = corners.to_vec();
@@ -231,14 +231,15 @@ impl<'a> Cutter<'a> {
     }
 }
 
-/// Whether three finite points span an area. In f64 neither overflow nor underflow of f32 points matters, and the
-/// products of nearby points are exact.
+/// Whether three finite points span an area. In f64, f32 points neither overflow nor underflow, and the products of
+/// nearby points are exact.
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {
     let [a, b, c] = [a, b, c].map(|point| point.as_dvec3());
     (b - a).cross(c - a) != DVec3::ZERO
 }
 
-/// Bounds are taken over all vertices, and a file may keep anything in those that it does not use.
+/// Drops unused vertices: bounds are taken over all vertices, and a file may hold anything in those that it does not
+/// use.
 fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     let mut new_index = vec![u32::MAX; mesh.positions.len()];
     for &corner in mesh.triangles.as_flattened() {
@@ -338,7 +339,7 @@ mod tests {
     fn what_is_far_from_the_origin_keeps_its_digits() {
         let far = DVec3::new(1e8, -3e7, 5e5);
         let mut positions: Vec<DVec3> = exact(&SQUARE).into_iter().map(|corner| corner + far).collect();
-        // What no face uses, or no number holds, moves nothing.
+        // Positions that no face uses, or no `f32` holds, do not move the origin.
         positions.extend([DVec3::splat(1e30), DVec3::splat(1e39)]);
         let parsed =
             Parsed { positions, faces: faces(&[&[0, 1, 2], &[0, 2, 3], &[0, 1, 5]]), ..Parsed::default() };

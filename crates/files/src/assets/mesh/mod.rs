@@ -1,5 +1,5 @@
-//! Mesh files: OBJ with MTL, OFF, PLY. Each parser gives the numbers as the file has them; `assemble` makes of
-//! them a mesh that keeps the invariants of [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
+//! Mesh files: OBJ with MTL, OFF, PLY. Each parser gives the numbers as the file has them; `assemble` makes a mesh of
+//! them that keeps the invariants of [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
 
 mod assemble;
 mod mtl;
@@ -25,17 +25,16 @@ const FILE_LIMIT: u64 = 4 << 30;
 /// The endings that [`load`] knows.
 pub const ENDINGS: [&str; 3] = ["obj", "off", "ply"];
 
-/// Read a mesh file; its ending, in any case, chooses the format.
+/// Reads a mesh file; its ending, in any case, chooses the format.
 ///
-/// Polygons are cut into triangles; faces that cannot be used are left out and counted; vertices that no
-/// triangle uses are left out. Normals are unit vectors, made where some are missing, and none where the file
-/// has none. v of texture coordinates is the file's (0 at the bottom). Progress is in bytes, reading and
-/// parsing each counting the file once.
+/// Polygons are cut into triangles; unusable faces are left out and counted; unused vertices are left out. Normals are
+/// unit vectors: if some are missing they are computed, if the file has none the mesh has none. v of texture
+/// coordinates is the file's (0 at the bottom). Progress is in bytes; reading and parsing each count the file once.
 ///
 /// # Errors
-/// [`AssetError::Unreadable`] where there is no regular file of a known ending and sensible size,
-/// [`AssetError::Malformed`] with the line (text) or the face (binary) where the file is wrong or has no usable
-/// face, [`AssetError::Cancelled`].
+/// [`AssetError::Unreadable`] if the file is not a regular one of a known ending and sensible size;
+/// [`AssetError::Malformed`] with the line (text) or the face (binary) if the file is wrong or has no usable face;
+/// [`AssetError::Cancelled`].
 pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<LoadedMesh, AssetError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
     let (parse, read): (Parser, Reader) = match ending.as_str() {
@@ -58,7 +57,7 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
 type Parser = fn(&Source<'_>) -> Result<LoadedMesh, AssetError>;
 type Reader = fn(&Path, u64, Watch<'_>) -> Result<Vec<u8>, AssetError>;
 
-/// A file in memory, and those who watch its parsing.
+/// A file in memory, with the watch on its parsing.
 #[derive(Clone, Copy)]
 struct Source<'a> {
     path: &'a Path,
@@ -67,7 +66,7 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// The parser is at this byte.
+    /// Reports that the parser is at this byte.
     fn tick(&self, at: usize) -> Result<(), AssetError> {
         Ok(self.watch.tick(self.bytes.len() + at, 2 * self.bytes.len())?)
     }

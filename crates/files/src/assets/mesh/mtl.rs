@@ -10,10 +10,10 @@ use crate::math::{DVec3, Vec3};
 /// Most bytes of a material file.
 const FILE_LIMIT: u64 = 64 << 20;
 
-/// The materials of an MTL file.
+/// Reads the materials of an MTL file.
 ///
 /// # Errors
-/// Those of reading, and [`AssetError::Malformed`] with the line.
+/// The errors of reading, and [`AssetError::Malformed`] with the line.
 pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>, AssetError> {
     let quiet = Watch { progress: &crate::control::unwatched, ..watch };
     let bytes = read::text(path, FILE_LIMIT, quiet)?;
@@ -30,8 +30,8 @@ pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>,
     Ok(materials)
 }
 
-/// A comment may follow numbers. In names `#` is a letter like others; what is a comment there is told by who looks
-/// them up.
+/// The line without a comment, which may follow numbers. In names, `#` may be a letter like others; the look-up of a
+/// name decides what is a comment there.
 fn without_comment(line: &str) -> &str {
     let is_numeric = matches!(
         line.split_whitespace().next(),
@@ -47,7 +47,7 @@ pub(super) fn cut_at_comments(text: &str) -> impl Iterator<Item = &str> {
     std::iter::once(text).chain(cuts).filter(|text| !text.is_empty())
 }
 
-/// `tobj` panics on a colour of one number and takes `nan`.
+/// Checks a line: `tobj` panics on a colour of one number and accepts `nan`.
 fn check(line: &str) -> Result<(), String> {
     let mut words = line.split_whitespace();
     let Some(keyword) = words.next() else { return Ok(()) };
@@ -74,8 +74,8 @@ fn check_words(keyword: &str, argument: Option<&str>) -> Result<(), String> {
     }
 }
 
-/// A material as the renderer knows it; files are relative to `folder`, the MTL's. What the file leaves out is as
-/// the format's readers have it: diffuse 0.6 grey without a texture, white with one.
+/// A material for the renderer; files are relative to `folder`, the MTL's. Missing values are those of other readers of
+/// the format: diffuse 0.6 grey without a texture, white with one.
 pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
     let file = |statement: Option<&str>| {
         let files =
@@ -103,7 +103,7 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
     }
 }
 
-/// The files of all maps of a material, also of those that nothing looks up.
+/// Files of all maps of a material, also of those that nothing looks up.
 pub(super) fn pictures(found: &tobj::Material, folder: &Path) -> Vec<PathBuf> {
     let known = [
         &found.ambient_texture,
@@ -130,7 +130,7 @@ pub(super) fn pictures(found: &tobj::Material, folder: &Path) -> Vec<PathBuf> {
     names.into_iter().map(|name| folder.join(name)).collect()
 }
 
-/// Negative components are 0.
+/// The colour, with 0 for negative components.
 fn color(found: Option<[f64; 3]>, otherwise: f32) -> Vec3 {
     found.map_or(Vec3::splat(otherwise), |numbers| DVec3::from_array(numbers).as_vec3().max(Vec3::ZERO))
 }

@@ -1,5 +1,5 @@
-//! Vertex normals where a file has none: each face counts by its angle at the vertex (Thürmer and Wüthrich,
-//! *Computing Vertex Normals from Polygonal Facets*, JGT 1998), so that how a surface is cut does not show.
+//! Vertex normals for files without them: each face counts by its angle at the vertex (Thürmer and Wüthrich, *Computing
+//! Vertex Normals from Polygonal Facets*, JGT 1998), so that the triangulation of a surface does not show.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -10,19 +10,19 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3};
 
-/// Vertices at one place are one surface where their own normals agree within 45 degrees (a texture's seam), and
-/// an edge beyond (a box whose file separates its sides).
+/// Least cosine between normals of one surface: vertices at one place belong together if their own normals agree within
+/// 45 degrees (a texture's seam); otherwise they form an edge (a box whose file separates its sides).
 const SEAM_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Above this many vertices at one place they are all taken together: comparing each with each is quadratic.
+/// Most vertices at one place that are compared, each with each, which is quadratic; more are all taken together.
 const COMPARED: usize = 64;
 
 /// Triangles, and vertices, between two polls of the token.
 const BATCH: usize = 1 << 16;
 
-/// A unit normal for each vertex, weighted by angle, on the front side of the faces around it. Vertices that the
-/// file separates at one place get one normal where their own agree within 45 degrees. Where faces cancel each
-/// other, the vertex gets one face's normal. The result does not depend on the number of threads.
+/// A unit normal for each vertex, weighted by angle, on the front side of the faces around it. Vertices that the file
+/// separates at one place get one normal if their own agree within 45 degrees. If faces cancel each other, the vertex
+/// gets one face's normal. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -46,7 +46,7 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     Ok(normals)
 }
 
-/// Replace normals of zero.
+/// Replaces normals of zero.
 pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Cancelled> {
     let made = vertex_normals(mesh, token)?;
     for (normal, made) in mesh.normals.iter_mut().zip(made) {
@@ -57,8 +57,8 @@ pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken)
     Ok(())
 }
 
-/// At each vertex the unit normals of its faces times their angles there, added in the order of the faces. Every thread
-/// has vertices of its own, so that no order depends on them.
+/// Sums at each vertex the unit normals of its faces times their angles there, in the order of the faces. Every thread
+/// has its own vertices, so that the order does not depend on the threads.
 fn weighted_sums(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<DVec3>, Cancelled> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     let share = sums.len().div_ceil(rayon::current_num_threads()).max(1);
@@ -99,8 +99,8 @@ fn corner_weights([a, b, c]: [Vec3; 3]) -> (DVec3, [f64; 3]) {
     (cross / doubled_area, [angle(ca, ab), angle(ab, bc), angle(bc, ca)])
 }
 
-/// The angle of (x, y) for y > 0, within 2e-8 of itself (Abramowitz and Stegun, *Handbook of Mathematical Functions*,
-/// 4.4.49): more than weights need, and without the branches that no processor can foresee.
+/// The angle of (x, y) for y > 0, with a relative error of at most 2e-8 (Abramowitz and Stegun, *Handbook of
+/// Mathematical Functions*, 4.4.49): more than weights need, and without branches that no processor can predict.
 fn angle(x: f64, y: f64) -> f64 {
     const STARTS: [f64; 4] = [0.0, FRAC_PI_2, PI, FRAC_PI_2];
     const SIGNS: [f64; 4] = [1.0, -1.0, -1.0, 1.0];
@@ -129,7 +129,7 @@ fn join(group: &[u32], sums: &[DVec3], joined: &mut [DVec3]) {
     }
 }
 
-/// For vertices whose faces cancel: the normal of one of them; up where there is none.
+/// For vertices whose faces cancel: the normal of one of these faces; up if there is none.
 fn take_face_normals(
     mesh: &TriangleMesh,
     normals: &mut [Vec3],

@@ -1,6 +1,6 @@
-//! OFF: a header word, counts, a vertex a line, a polygon a line (Geomview's manual, section *OFF*), and what
-//! occurs in the wild: counts behind the header word, no edge count, undeclared columns behind coordinates and
-//! faces, comments and blank lines anywhere.
+//! OFF: a header word, counts, a vertex a line, a polygon a line (Geomview's manual, section *OFF*). Real files vary:
+//! counts behind the header word, no edge count, undeclared columns behind coordinates and faces, comments and blank
+//! lines anywhere.
 
 use super::assemble::{Faces, Parsed, assemble};
 use super::text::{Cursor, shown};
@@ -10,7 +10,7 @@ use crate::math::{DVec2, DVec3, Vec2};
 /// Lines between two polls of the token.
 const BATCH: u64 = 1 << 13;
 
-/// What the header word says of each vertex. Colours are passed over.
+/// Columns of each vertex according to the header word. Colours are skipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Header {
     uvs: bool,
@@ -50,7 +50,7 @@ impl Reader<'_> {
         self.wrong(format!("expected {wanted}, found {}", shown(ahead.word())))
     }
 
-    /// The header word: `[ST][C][N][4]OFF`. Counts may follow it without a blank, and it may be missing.
+    /// Reads the header word: `[ST][C][N][4]OFF`. Counts may follow it without a blank, and it may be missing.
     fn header(&mut self) -> Result<Header, AssetError> {
         if !self.cursor.skip_blank() {
             return self.wrong("the file is empty");
@@ -92,7 +92,7 @@ impl Reader<'_> {
         self.number(of)
     }
 
-    /// The whole number ≥ 0 that starts here.
+    /// Reads the whole number ≥ 0 that starts here.
     fn number(&mut self, of: &str) -> Result<u64, AssetError> {
         match self.cursor.integer() {
             Some(number) => match u64::try_from(number) {
@@ -103,7 +103,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The number of edges, which nothing needs, may be missing.
+    /// Reads the number of edges, which nothing needs and which may be missing.
     fn end_counts(&mut self) -> Result<(), AssetError> {
         if self.cursor.skip_in_line() {
             self.number("edges")?;
@@ -120,7 +120,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// A vertex takes at least 6 bytes, a face at least 2: a header that claims more lies.
+    /// Checks the counts: a vertex takes at least 6 bytes, a face at least 2; a header that claims more is wrong.
     fn plausible(&self, vertices: u64, faces: u64) -> Result<(), AssetError> {
         let needed = vertices.saturating_mul(6).saturating_add(faces.saturating_mul(2));
         let remaining = self.cursor.remaining() as u64;
@@ -179,7 +179,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Texture coordinates are the last of a line, behind a colour of any length.
+    /// Reads texture coordinates, which are the last of a line, behind a colour of any length.
     fn last_two(&mut self) -> Result<Vec2, AssetError> {
         let mut last = DVec2::new(self.float("u")?, self.float("v")?);
         while self.cursor.skip_in_line() {

@@ -1,21 +1,21 @@
-//! Which vertices are at one place.
+//! Vertices that share a place.
 
 use rayon::prelude::*;
 
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// Buckets are sorted a few thousand vertices at a time: on all threads, with polls of the token between.
+/// Vertices of a bucket: buckets are sorted on all threads, with polls of the token between.
 const BUCKET: usize = 1 << 12;
 
 /// Vertices between two polls of the token.
 const BATCH: usize = 1 << 16;
 
-/// A hash and the vertex that it is of.
+/// A hash and its vertex.
 type Entry = (u32, u32);
 
-/// The places of more than one vertex, each as its vertices in ascending order. Any order of places may come, but always
-/// the same.
+/// The places that several vertices share, each as its vertices in ascending order. The order of places is arbitrary,
+/// but always the same.
 pub(super) fn shared(positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u32>>, Cancelled> {
     let bits = positions.len().div_ceil(BUCKET).next_power_of_two().ilog2();
     let mut hashes = vec![0; positions.len()];
@@ -31,20 +31,20 @@ pub(super) fn shared(positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<
     Ok(found?.into_iter().flatten().collect())
 }
 
-/// The bits of a place. Adding 0 makes −0 and 0 one.
+/// The bits of a place. Adding 0 turns −0 into 0.
 fn place(position: Vec3) -> [u32; 3] {
     (position + Vec3::ZERO).to_array().map(f32::to_bits)
 }
 
-/// By multiplication with odd constants (Knuth, *The Art of Computer Programming*, vol. 3, section 6.4); the upper bits
-/// are the good ones.
+/// Hash by multiplication with odd constants (Knuth, *The Art of Computer Programming*, vol. 3, section 6.4); the upper
+/// bits are the good ones.
 fn hash_of(position: Vec3) -> u32 {
     let [x, y, z] = place(position).map(u64::from);
     let mixed = (x | y << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ z.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
     ((mixed ^ mixed >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32) as u32
 }
 
-/// Vertices behind their hashes, by the upper bits of those, and where each bucket ends.
+/// Sorts vertices with their hashes into buckets by the upper bits; returns them with the end of each bucket.
 fn scatter(hashes: &[u32], bits: u32, token: &CancelToken) -> Result<(Vec<Entry>, Vec<usize>), Cancelled> {
     let bucket = |hash: u32| (u64::from(hash) >> (32 - bits)) as usize;
     let mut ends = vec![0; 1 << bits];
@@ -68,7 +68,7 @@ fn scatter(hashes: &[u32], bits: u32, token: &CancelToken) -> Result<(Vec<Entry>
     Ok((entries, ends))
 }
 
-/// The shared places of one bucket: equal hashes first, equal places among those.
+/// The shared places of one bucket: vertices are grouped by hash, then by place.
 fn in_bucket(bucket: &[Entry], positions: &[Vec3], token: &CancelToken) -> Result<Vec<Vec<u32>>, Cancelled> {
     token.check()?;
     let mut entries = bucket.to_vec();
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn every_shared_place_is_found_with_all_its_vertices() {
-        // Places repeat after 5000; −0 is 0.
+        // Places repeat after 5000 vertices; −0 equals 0.
         let at = |i: u32| Vec3::new((i % 5000) as f32, 0.25, if i < 5000 { 0.0 } else { -0.0 });
         let positions: Vec<_> = (0..20_000).map(at).chain([Vec3::splat(9.0), Vec3::splat(8.0)]).collect();
         let mut found = shared(&positions, &CancelToken::new()).expect("nobody cancels");

@@ -2,10 +2,10 @@
 
 use crate::math::{DVec3, Vec3};
 
-/// Above this many corners a polygon is a fan whatever its shape: clipping takes quadratic time.
+/// Most corners of a polygon that is clipped, which takes quadratic time; larger polygons become fans.
 const CLIPPED_CORNERS: usize = 1024;
 
-/// Cut a polygon of `corners.len() ≥ 3` finite points into triangles of indices into it, same orientation.
+/// Cuts a polygon of `corners.len() ≥ 3` finite points into triangles of indices into it, with the same orientation.
 pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) {
     let points: Vec<DVec3> = points.iter().map(|point| point.as_dvec3()).collect();
     let normal = newell_normal(&points);
@@ -22,15 +22,14 @@ pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) {
     }
 }
 
-/// The sum of the fan's normals, which is the same about every origin (Newell's method).
+/// The sum of the fan's normals, which is the same for every origin (Newell's method).
 fn newell_normal(points: &[DVec3]) -> DVec3 {
     let origin = points[0];
     points.windows(2).map(|pair| (pair[0] - origin).cross(pair[1] - origin)).sum()
 }
 
-/// Ear clipping (Meisters 1975): cut off convex corners whose triangle holds no other corner. `turns` is positive
-/// where three corners turn the polygon's way. What is left when no ear is found (a polygon that crosses itself)
-/// becomes a fan.
+/// Ear clipping (Meisters 1975): cuts off convex corners whose triangle contains no other corner. `turns` is positive
+/// if three corners turn the polygon's way. If no ear is found (a polygon that crosses itself), the rest becomes a fan.
 fn clip_ears(count: usize, turns: impl Fn(usize, usize, usize) -> f64, mut emit: impl FnMut([usize; 3])) {
     let mut ring: Vec<usize> = (0..count).collect();
     let mut start = 0;

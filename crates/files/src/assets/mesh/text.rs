@@ -1,10 +1,10 @@
-//! Numbers out of bytes: text files of numbers need no UTF-8 and no copies.
+//! Numbers from bytes: text files of numbers need no UTF-8 and no copies.
 
 use std::borrow::Cow;
 
 use fast_float2::parse_partial;
 
-/// The text, with line feeds where the lines end in carriage returns alone, as on a Macintosh of old.
+/// The text, with line feeds if its lines end in carriage returns alone, as on an old Macintosh.
 pub(super) fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
     if memchr::memchr(b'\n', bytes).is_some() || memchr::memchr(b'\r', bytes).is_none() {
         return Cow::Borrowed(bytes);
@@ -38,7 +38,7 @@ impl<'a> Cursor<'a> {
         self.bytes.len() - self.at
     }
 
-    /// To the next word, over line ends and comments. False at the end of the text.
+    /// Goes to the next word, over line ends and comments. False at the end of the text.
     pub(super) fn skip_blank(&mut self) -> bool {
         loop {
             match self.bytes.get(self.at) {
@@ -50,7 +50,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// To the next word of this line. False at its end or at a comment.
+    /// Goes to the next word of this line. False at its end or at a comment.
     pub(super) fn skip_in_line(&mut self) -> bool {
         loop {
             match self.bytes.get(self.at) {
@@ -61,13 +61,13 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Behind the end of this line.
+    /// Goes behind the end of this line.
     pub(super) fn end_line(&mut self) {
         let rest = &self.bytes[self.at..];
         self.at += rest.iter().position(|&byte| byte == b'\n').map_or(rest.len(), |end| end + 1);
     }
 
-    /// The word that starts here, and past it.
+    /// Takes the word that starts here.
     pub(super) fn word(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         let length = rest.iter().position(|&byte| byte.is_ascii_whitespace() || byte == b'#');
@@ -76,13 +76,13 @@ impl<'a> Cursor<'a> {
         word
     }
 
-    /// The number that starts here, and past it. Overflow is infinite, `nan` and `inf` are numbers.
+    /// Takes the number that starts here. Overflow is infinite; `nan` and `inf` are numbers.
     pub(super) fn float(&mut self) -> Option<f64> {
         let (value, length) = parse_partial::<f64, _>(&self.bytes[self.at..]).ok()?;
         self.past(length).then_some(value)
     }
 
-    /// The whole number that starts here, and past it.
+    /// Takes the whole number that starts here.
     pub(super) fn integer(&mut self) -> Option<i64> {
         let rest = &self.bytes[self.at..];
         let negative = rest.first() == Some(&b'-');
@@ -99,7 +99,7 @@ impl<'a> Cursor<'a> {
         whole.then_some(if negative { -value } else { value })
     }
 
-    /// Past a number, if it ends there.
+    /// Goes past a number, if it ends there.
     fn past(&mut self, length: usize) -> bool {
         let ends =
             self.bytes.get(self.at + length).is_none_or(|byte| byte.is_ascii_whitespace() || *byte == b'#');
@@ -108,7 +108,7 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Bytes from a file as they may be shown: at most 20 of them, controls escaped.
+/// Bytes from a file in a form to print: at most 20 of them, controls escaped.
 pub(super) fn shown(bytes: &[u8]) -> String {
     format!("{:?}", String::from_utf8_lossy(&bytes[..bytes.len().min(20)]))
 }

@@ -32,13 +32,13 @@ pub(super) struct Opponent {
 }
 
 impl Opponent {
-    /// Of linear colour.
+    /// Converts a linear colour.
     pub(super) fn of(rgb: DVec3) -> Self {
         let xyz = XYZ_OF_RGB * rgb / WHITE;
         Self { y: 116.0 * xyz.y - 16.0, cx: 500.0 * (xyz.x - xyz.y), cz: 200.0 * (xyz.y - xyz.z) }
     }
 
-    /// The colour of the display that is nearest to this one, as it is perceived.
+    /// The perceived form of the nearest colour that a display can show.
     pub(super) fn perceived(self) -> Perceived {
         let y = (self.y + 16.0) / 116.0;
         let xyz = DVec3::new(y + self.cx / 500.0, y, y - self.cz / 200.0) * WHITE;
@@ -55,7 +55,7 @@ pub(super) struct Perceived {
 }
 
 impl Perceived {
-    /// Of linear colour.
+    /// Converts a linear colour.
     pub(super) fn of(rgb: DVec3) -> Self {
         let [x, y, z] = (XYZ_OF_RGB * rgb / WHITE).to_array().map(lightness);
         let hunt = 0.01 * (116.0 * y - 16.0);
@@ -75,7 +75,7 @@ fn lightness(t: f64) -> f64 {
     if t > DELTA * DELTA * DELTA { libm::cbrt(t) } else { t / (3.0 * DELTA * DELTA) + 4.0 / 29.0 }
 }
 
-/// Between the two colours of a display that are furthest apart: green and blue.
+/// Distance of the two colours of a display that are furthest apart: green and blue.
 pub(super) fn largest_distance() -> f64 {
     Perceived::of(DVec3::Y).distance(&Perceived::of(DVec3::Z))
 }

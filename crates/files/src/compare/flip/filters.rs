@@ -17,11 +17,11 @@ const SENSITIVITY: [&[Term]; 3] = [
     &[Term { a: 1.0, b: 0.0053 }],
     &[Term { a: 34.1, b: 0.04 }, Term { a: 13.5, b: 0.025 }],
 ];
-/// The widest of them.
+/// Width of the widest term.
 const WIDEST: f64 = 0.04;
 /// Width of the feature that the eye sees best, degrees.
 const FEATURE_DEGREES: f64 = 0.082;
-/// Widths of a Gaussian that a filter reaches.
+/// Reach of a filter, in widths of its Gaussian.
 const REACH: f64 = 3.0;
 
 /// A separable blur with a weight: taps along rows and along columns.
@@ -72,7 +72,7 @@ impl Filters {
         self.radius
     }
 
-    /// What is left of the opponent channels at this distance.
+    /// Blurs the opponent channels as the eye does at this distance.
     pub(super) fn blurred(&self, planes: &[Plane; 3]) -> [Plane; 3] {
         [0, 1, 2].map(|channel| {
             let parts = self.blurs[channel].iter().map(|blur| {
@@ -88,7 +88,7 @@ impl Filters {
         })
     }
 
-    /// Edges and points in the achromatic channel.
+    /// Detects edges and points in the achromatic channel.
     pub(super) fn features(&self, y: &Plane) -> Features {
         let lightness = Plane { values: y.values.iter().map(|y| (y + 16.0) / 116.0).collect(), ..*y };
         let smooth = lightness.along_rows(&self.smooth);
@@ -123,14 +123,14 @@ fn balanced(taps: &[f64]) -> Vec<f64> {
     taps.iter().map(|tap| tap / if *tap > 0.0 { positive } else { negative }).collect()
 }
 
-/// How strong edges and points are at each pixel.
+/// Strength of edges and points at each pixel.
 pub(super) struct Features {
     edges: Vec<f64>,
     points: Vec<f64>,
 }
 
 impl Features {
-    /// Of each pixel, in [0, 1].
+    /// Feature difference of each pixel, in [0, 1].
     pub(super) fn differences<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = f64> + 'a {
         let between = |a: &'a [f64], b: &'a [f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs());
         let edges = between(&self.edges, &other.edges);

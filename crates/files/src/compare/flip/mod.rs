@@ -1,5 +1,5 @@
 //! FLIP: P. Andersson et al., "FLIP: A Difference Evaluator for Alternating Images" (2020), for pictures of low dynamic
-//! range, at [`PIXELS_PER_DEGREE`]. Beyond its border a picture goes on as its border is.
+//! range, at [`PIXELS_PER_DEGREE`]. Beyond its border, a picture continues with the pixels of its border.
 
 mod color;
 mod filters;
@@ -48,7 +48,7 @@ fn tile_errors(pair: &Pair, tile: Rect, filters: &Filters, most: f64) -> Vec<f32
     colors.zip(features).map(|(color, feature)| libm::pow(color, 1.0 - feature) as f32).collect()
 }
 
-/// What an eye perceives of a tile of the picture or of its reference.
+/// Perceived colours and features of a tile, of the picture or of its reference.
 fn seen(pair: &Pair, which: usize, tile: Rect, filters: &Filters) -> (Vec<Perceived>, Features) {
     let planes = opponents(pair, which, tile, filters.radius());
     let features = filters.features(&planes[0]);
@@ -78,7 +78,7 @@ fn opponents(pair: &Pair, which: usize, tile: Rect, margin: usize) -> [Plane; 3]
     planes
 }
 
-/// Of a distance of two colours, in [0, 1]: small ones get most of the range.
+/// Error for a distance of two colours, in [0, 1]: small distances get most of the range.
 fn color_error(distance: f64, most: f64) -> f64 {
     let error = libm::pow(distance, QC);
     let knee = PC * most;

@@ -1,4 +1,4 @@
-//! Building by binned surface area (Wald, *On fast Construction of SAH-based Bounding Volume Hierarchies*, 2007), the
+//! Builds by binned surface area (Wald, *On fast Construction of SAH-based Bounding Volume Hierarchies*, 2007), the
 //! halves of large nodes in parallel. The tree is a function of the boxes alone, not of the threads.
 
 use super::crown::Crown;
@@ -12,7 +12,7 @@ const BINS: usize = 16;
 /// Nodes with more primitives than this build their halves in parallel, and poll the token.
 const PARALLEL_SIZE: usize = 4096;
 
-/// What one step of traversal costs, in tests of a primitive.
+/// Cost of one step of traversal, in tests of a primitive.
 const TRAVERSAL_COST: f32 = 1.0;
 
 /// A box with its id while the tree is built.
@@ -29,7 +29,7 @@ impl Reference {
     }
 }
 
-/// A subtree that was built.
+/// A finished subtree.
 struct Subtree {
     root: Child,
     bounds: Aabb,
@@ -38,7 +38,7 @@ struct Subtree {
 }
 
 impl Bvh {
-    /// Build over boxes; empty ones and those with a NaN are in no leaf.
+    /// Builds a tree over boxes; empty boxes and those with a NaN are in no leaf.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -57,7 +57,7 @@ impl Bvh {
         let mut nodes = vec![Node::EMPTY; (references.len() - 1).max(1)];
         let tree = build_subtree(&mut references, &mut nodes, Start { place: 0, node: 0, depth: 0 }, token)?;
         if tree.root.count > 0 {
-            // The other side is never met, but by rays that are not finite, whose way ends there too.
+            // The other side is never visited, but by rays that are not finite; their traversal ends there too.
             nodes[0] = Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root; 2] };
         }
         let order = references.iter().map(|reference| reference.id).collect();
@@ -66,18 +66,18 @@ impl Bvh {
     }
 }
 
-/// Where a subtree is written.
+/// Place at which a subtree is written.
 #[derive(Clone, Copy)]
 struct Start {
-    /// First place of the final order.
+    /// Its first index in the final order.
     place: usize,
-    /// First node.
+    /// Index of its first node.
     node: usize,
-    /// Levels above.
+    /// Number of levels above.
     depth: usize,
 }
 
-/// Build over references, into at most one node fewer.
+/// Builds over references, into at most one node fewer than there are references.
 fn build_subtree(
     references: &mut [Reference],
     nodes: &mut [Node],
@@ -114,7 +114,7 @@ fn build_subtree(
     Ok(Subtree { root, bounds, depth: 1 + left.depth.max(right.depth) })
 }
 
-/// Sort the references into two halves; none where a leaf is cheaper.
+/// Sorts the references into two halves. `None` if a leaf is cheaper.
 fn partition(references: &mut [Reference], bounds: Aabb, start: &Start) -> Option<usize> {
     let count = references.len();
     if count == 1 {
@@ -161,7 +161,7 @@ fn bin_of(centroid: f32, start: f32, bins_per_length: f32) -> usize {
     (((centroid - start) * bins_per_length) as usize).min(BINS - 1)
 }
 
-/// The cheapest of all planes between bins; none where all centroids fall together.
+/// The cheapest of all planes between bins. `None` if all centroids coincide.
 fn best_split(references: &[Reference], centroids: Aabb) -> Option<Split> {
     let extent = centroids.extent();
     let bins_per_length = extent.map(|length| BINS as f32 / length);
@@ -190,7 +190,7 @@ fn best_split(references: &[Reference], centroids: Aabb) -> Option<Split> {
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
-/// Sweep from both ends over the bins of an axis.
+/// Sweeps from both ends over the bins of an axis.
 fn cheapest_plane(bounds: &[Aabb; BINS], counts: &[u32; BINS]) -> Option<(usize, f32)> {
     let mut right_cost = [0.0_f32; BINS];
     let (mut box_so_far, mut count) = (Aabb::EMPTY, 0);
@@ -212,7 +212,7 @@ fn cheapest_plane(bounds: &[Aabb; BINS], counts: &[u32; BINS]) -> Option<(usize,
     best
 }
 
-/// Those for which `is_left` holds first; how many there are.
+/// Moves the references for which `is_left` holds to the front and returns their number.
 fn partition_by(references: &mut [Reference], is_left: impl Fn(&Reference) -> bool) -> usize {
     let (mut start, mut end) = (0, references.len());
     while start < end {

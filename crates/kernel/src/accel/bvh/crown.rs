@@ -1,6 +1,6 @@
-//! The upper part of a tree as one row of boxes. What all rays of a packet miss is left out by one test of all boxes against the
-//! intervals that the rays' coordinates lie in: rounding is monotonic, so that what bounds the numbers of
-//! [`SlabRay::enter`] before it bounds them after it, and no box is missed that any ray meets alone.
+//! The top of a tree as one row of boxes. One test of all boxes against the intervals of the rays' coordinates skips the boxes
+//! that all rays of a packet miss. Rounding is monotonic: bounds on the inputs of [`SlabRay::enter`] bound its results too, so
+//! that no box is skipped that any ray alone would meet.
 //!
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
@@ -13,18 +13,19 @@ use crate::geometry::rows::Row;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, PlainFolds, TRUE};
 
-/// Up to [`PACKET`] subtrees that hold all primitives, in place of the upper levels; a scene of few objects is all in it.
+/// Up to [`PACKET`] subtrees that hold all primitives and replace the upper levels; a small scene is entirely in the
+/// crown.
 #[derive(Clone, Debug)]
 pub(super) struct Crown {
     min: [Row; 3],
     max: [Row; 3],
     child: [Child; PACKET],
-    /// A bit for each subtree.
+    /// A bit for each subtree in use.
     used: u32,
 }
 
 impl Crown {
-    /// Of no tree.
+    /// The crown of an empty tree.
     pub(super) const EMPTY: Self = Self {
         min: [[f32::INFINITY; PACKET]; 3],
         max: [[f32::NEG_INFINITY; PACKET]; 3],
@@ -32,7 +33,7 @@ impl Crown {
         used: 0,
     };
 
-    /// Open the largest nodes, then the largest leaves, as long as there is room.
+    /// Opens the largest nodes, then the largest leaves, as long as there is room.
     pub(super) fn new(root: (Aabb, Child), nodes: &[Node], references: &[Reference]) -> Self {
         let mut open = vec![root];
         while let Some(place) = largest(&open, |child, room| child.count == 0 && room > 0) {
@@ -65,7 +66,7 @@ impl Crown {
         (Aabb { min: corner(&self.min), max: corner(&self.max) }, self.child[i])
     }
 
-    /// A bit for each subtree whose box has a point in common with another one.
+    /// A bit for each subtree whose box overlaps another one.
     #[inline]
     pub(super) fn meeting(&self, other: &Aabb) -> u32 {
         let mut met = [TRUE; PACKET];
@@ -79,7 +80,8 @@ impl Crown {
         PlainFolds.bits(&met) & self.used
     }
 
-    /// A bit for each subtree that the rays of a beam may meet, and where they enter it at the earliest.
+    /// A bit for each subtree whose box the rays of a beam may meet, and a lower bound on the distance at which they
+    /// enter it.
     #[inline(always)]
     pub(super) fn met(&self, beam: &Beam, folds: impl Folds) -> (u32, Row) {
         let (mut near, mut far) = ([0.0_f32; PACKET], [beam.end * SLAB_PAD; PACKET]);
@@ -112,25 +114,25 @@ impl Crown {
     }
 }
 
-/// The largest box whose subtree may be opened, told also how many places more there are.
+/// The largest box whose subtree may be opened; `may_open` gets the child and the number of free places.
 fn largest(open: &[(Aabb, Child)], may_open: impl Fn(Child, usize) -> bool) -> Option<usize> {
     let room = PACKET - open.len();
     let each = open.iter().enumerate().filter(|(_, (_, child))| may_open(*child, room));
     each.max_by(|(_, (a, _)), (_, (b, _))| a.half_area().total_cmp(&b.half_area())).map(|(place, _)| place)
 }
 
-/// The intervals that rays lie in.
+/// Intervals that contain the coordinates of several rays.
 pub(super) struct Beam {
-    /// Least and greatest coordinates of where they start.
+    /// Least and greatest coordinates of the origins.
     origin: [[f32; 2]; 3],
-    /// Of the inverses of where they go.
+    /// Least and greatest coordinates of the inverse directions.
     inverse: [[f32; 2]; 3],
-    /// The end of the ray that goes on longest.
+    /// Greatest end of any ray.
     end: f32,
 }
 
 impl Beam {
-    /// Around the rays of a packet that have an end, one of which is this.
+    /// The beam around the rays of a packet that have an end, one of which is number `one`.
     #[inline(always)]
     pub(super) fn around(origin: &[Row; 3], inverse: &[Row; 3], ends: &Ends, one: usize) -> Self {
         let [x, y, z] = origin;
@@ -141,7 +143,7 @@ impl Beam {
     }
 }
 
-/// The least and the greatest number of rays that have an end.
+/// Least and greatest number of a row, over the rays that have an end.
 #[inline(always)]
 fn around(row: &Row, ends: &Ends, one: usize) -> [f32; 2] {
     let (mut traced, other) = (*row, row[one % PACKET]);
@@ -151,7 +153,7 @@ fn around(row: &Row, ends: &Ends, one: usize) -> [f32; 2] {
     [least(&traced), greatest(&traced)]
 }
 
-/// The best of sixteen numbers, by halves, which become vector instructions.
+/// Folds sixteen numbers by halves, which become vector instructions.
 macro_rules! folded {
     ($row:expr, $better:tt) => {{
         let mut row = $row;
@@ -201,7 +203,7 @@ mod tests {
     use crate::geometry::rows::{RayRows, lanes, traced};
     use crate::math::random::signed as random;
 
-    /// Notes which primitives are tested, and for which rays.
+    /// Test that notes which primitives are tested, and for which rays.
     struct Seen(Vec<u32>);
 
     impl ClosestTest for Seen {
@@ -237,7 +239,7 @@ mod tests {
                 let spread = [0.001, 0.1, 4.0][round % 3];
                 let mut ray = || {
                     let jitter = Vec3::new(next(), next(), next()) * spread;
-                    // Along an axis, from one point, from many.
+                    // Rays go along an axis, from one point, or from many.
                     match round % 7 {
                         0 => Ray::new(from + jitter, Vec3::NEG_Y),
                         1 | 2 => Ray::new(from + jitter, to - from),
@@ -246,7 +248,7 @@ mod tests {
                 };
                 let rays: Vec<Ray> = (0..=round % PACKET).map(|_| ray()).collect();
                 let (rows, mut ends) = RayRows::new(&rays);
-                // Some are not traced.
+                // Some rays are not traced.
                 for lane in (0..rays.len()).filter(|lane| round % 5 == 0 && lane % 3 == 1) {
                     ends[lane] = -1.0;
                 }

@@ -13,26 +13,27 @@ pub use packet::{AnyTest, ClosestTest};
 /// Most primitives in a leaf that the surface area heuristic may make.
 const LEAF_SIZE: usize = 4;
 
-/// Levels below which nodes are split in the middle of their primitives, so that no input makes a deep tree.
+/// Number of levels that the surface area heuristic splits. Deeper nodes are halved by number, so that no input makes a
+/// deep tree.
 const SURFACE_AREA_LEVELS: usize = 56;
 
-/// Room for the deepest tree there can be: the levels above and a halving of 2³² primitives.
+/// Stack size for the deepest possible tree: the levels above and a halving of 2³² primitives.
 const DEEP_STACK: usize = SURFACE_AREA_LEVELS + 34;
 
-/// Room for small trees, whose traversal takes less time than clearing a deep stack.
+/// Stack size for small trees, whose traversal takes less time than clearing a deep stack.
 const SHALLOW_STACK: usize = 12;
 
-/// A tree over boxes that are known by their index.
+/// A tree over boxes, which an index names.
 #[derive(Clone, Debug)]
 pub struct Bvh {
-    /// The root is node 0; empty where there are no boxes.
+    /// Nodes; the root is node 0. Empty if there are no boxes.
     nodes: Vec<Node>,
     /// Ids of the boxes, in the order of the leaves.
     order: Vec<u32>,
     bounds: Aabb,
-    /// Levels of nodes.
+    /// Number of levels of nodes.
     depth: usize,
-    /// Where packets start.
+    /// Start of the traversal by packets.
     crown: Crown,
 }
 
@@ -45,11 +46,11 @@ struct Node {
 }
 
 impl Node {
-    /// No children.
+    /// A node without children.
     const EMPTY: Self = Self { bounds: [Aabb::EMPTY; 2], child: [Child::NONE; 2] };
 }
 
-/// An inner node, or `count` > 0 places of [`Bvh::order`] from `first` on.
+/// An inner node, or a leaf of `count` > 0 entries of [`Bvh::order`] from `first` on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Child {
     first: u32,
@@ -61,13 +62,13 @@ impl Child {
 }
 
 impl Bvh {
-    /// Bytes held.
+    /// Bytes that the tree takes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.order.as_slice())
     }
 
-    /// Walks the tree and says what is wrong with it: a box that does not hold what is below it, an id that is there
-    /// twice or not at all.
+    /// Walks the tree and reports faults: a box that does not contain its subtree, an id that occurs twice or not at
+    /// all.
     ///
     /// # Errors
     /// The first fault, in words.

@@ -1,5 +1,6 @@
-//! Traversal by up to sixteen rays at once: a box is visited if any of them meets it. The arithmetic is that of
-//! [`SlabRay::enter`], side by side in plain arrays; all of it is inlined, to be compiled with its caller's instructions.
+//! Traversal by up to sixteen rays at once: a box is visited if any of the rays meets it. The arithmetic is that of
+//! [`SlabRay::enter`], side by side in plain arrays. All of it is inlined, so that it is compiled with its caller's
+//! instructions.
 //!
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
@@ -13,26 +14,26 @@ use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::rows::{RayRows, Row, lanes};
 use crate::math::lanes::{Folds, TRUE};
 
-/// Looks for the nearest hits of the rays of a packet.
+/// A test for the nearest hits of the rays of a packet.
 pub trait ClosestTest {
-    /// Test a primitive against the rays whose bits are set in `met`, and shorten the ends of those that hit it. Primitives
-    /// at exactly a ray's end are still tested, to break ties by id.
+    /// Tests a primitive against the rays whose bits are set in `met`, and shortens the ends of the rays that hit it.
+    /// Primitives at exactly a ray's end are still tested, to break ties by id.
     fn test(&mut self, id: u32, met: u32, ends: &mut Ends);
 }
 
-/// Looks for any hit of the rays of a packet.
+/// A test for any hit of the rays of a packet.
 pub trait AnyTest {
     /// The bits of the rays in `met` that hit a primitive.
     fn test(&mut self, id: u32, met: u32, ends: &Ends) -> u32;
 }
 
-/// Rays made ready for boxes.
+/// Rays prepared for the slab test.
 struct SlabPacket<'a> {
     origin: &'a [Row; 3],
     inverse: [Row; 3],
 }
 
-/// Between which distances each ray is in a box; nowhere where the first is the greater.
+/// Interval of distances in which each ray is in a box; empty if the first is the greater.
 struct Stretches {
     near: Row,
     far: Row,
@@ -73,8 +74,8 @@ impl<'a> SlabPacket<'a> {
 }
 
 impl Stretches {
-    /// Where the first of the rays that meet the box enters it. Bits of numbers from 0 on are ordered as these are, and take
-    /// no care for NaN.
+    /// Least distance at which one of the rays that meet the box enters it. Compares bits, which for numbers ≥ 0 have the
+    /// order of the numbers, and ignore NaN.
     #[inline(always)]
     fn first(&self) -> f32 {
         let mut entries = [0; PACKET];
@@ -96,7 +97,7 @@ fn met(stretches: &Stretches, folds: impl Folds) -> u32 {
     folds.bits(&met)
 }
 
-/// The end of the ray that goes on longest; below 0 where no ray is traced. Bits are ordered as in [`Stretches::first`].
+/// Greatest end of any ray; below 0 if no ray is traced. Compares bits as in [`Stretches::first`].
 #[inline(always)]
 fn greatest(ends: &Ends) -> f32 {
     let mut all = [0; PACKET];
@@ -106,10 +107,10 @@ fn greatest(ends: &Ends) -> f32 {
     f32::from_bits(folded!(all, >) as u32)
 }
 
-/// What waits to be visited by a packet: where it is entered at the earliest, the rays that may meet it, and itself.
+/// Stack of a packet: a lower bound on the entry distance, the rays that may meet the child, and the child.
 type Waiting = ArrayVec<(f32, u32, Child), DEEP_STACK>;
 
-/// Subtrees of the crown that wait, the nearest last.
+/// Subtrees of the crown still to visit, the nearest last.
 struct Near {
     entry: Row,
     order: [u8; PACKET],
@@ -141,7 +142,7 @@ impl Near {
 }
 
 impl Bvh {
-    /// The subtrees of the crown that the rays of a packet may meet, and where they are entered at the earliest.
+    /// Subtrees of the crown that the rays of a packet may meet, with lower bounds on their entry distances.
     #[inline(always)]
     fn crown_met(&self, slabs: &SlabPacket<'_>, ends: &Ends, traced: u32, folds: impl Folds) -> (u32, Row) {
         if traced == 0 {
@@ -151,8 +152,8 @@ impl Bvh {
         self.crown.met(&Beam::around(slabs.origin, &slabs.inverse, ends, one), folds)
     }
 
-    /// Visit the leaves that any of at most [`PACKET`] rays may meet, near ones first; before them primitives that are not in
-    /// the tree. `traced` are the bits of the rays that have an end.
+    /// Visits the leaves that any of at most [`PACKET`] rays may meet, near ones first. Primitives outside of the tree come
+    /// before all leaves. `traced` are the bits of the rays that have an end.
     #[inline(always)]
     pub fn closest_packet(
         &self,
@@ -213,7 +214,7 @@ impl Bvh {
         }
     }
 
-    /// A bit for each of at most [`PACKET`] rays that hits anything in the tree, or of what is not in it. `traced` are the bits of the
+    /// A bit for each of at most [`PACKET`] rays that hits anything, in the tree or outside of it. `traced` are the bits of the
     /// rays that have an end.
     #[inline(always)]
     pub fn any_packet(

@@ -1,4 +1,4 @@
-//! Ordered traversal for the closest hit, and for any.
+//! Ordered traversal for the closest hit, and traversal for any hit.
 
 use arrayvec::ArrayVec;
 
@@ -9,9 +9,8 @@ use crate::geometry::rows::lanes;
 use crate::geometry::{Aabb, Ray};
 
 impl Bvh {
-    /// Visit the leaves that the ray may meet, near ones first. `test(id, t_max)` tests one primitive and returns the new end of
-    /// the ray if it hits; primitives at exactly the ray's end are still tested, so that the caller can break ties
-    /// by id.
+    /// Visits the leaves that the ray may meet, near ones first. `test(id, t_max)` tests one primitive and returns the new end
+    /// of the ray if it hits. Primitives at exactly the ray's end are still tested, so that the caller can break ties by id.
     #[inline]
     pub fn closest(&self, ray: &Ray, test: impl FnMut(u32, f32) -> Option<f32>) {
         if self.depth < SHALLOW_STACK {
@@ -89,8 +88,8 @@ impl Bvh {
         }
     }
 
-    /// Visit the nodes whose boxes a ray meets, parents first, in an order that depends on the tree alone; `visit` says whether to go
-    /// on below, `own` gets the ids of leaves.
+    /// Visits the nodes whose boxes a ray meets, parents first, in an order that depends on the tree alone. `visit` says whether to
+    /// descend; `own` gets the ids of leaves.
     pub fn along(
         &self,
         ray: &Ray,
@@ -115,7 +114,7 @@ impl Bvh {
         }
     }
 
-    /// Visit every box that has a point in common with another one.
+    /// Visits every box that overlaps another one.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         let mut stack = ArrayVec::<Child, DEEP_STACK>::new();
         for subtree in lanes(self.crown.meeting(other)) {
@@ -171,7 +170,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::signed;
 
-    /// Boxes as shapes: the hit is where the ray enters.
+    /// Brute force over boxes as shapes: a ray hits a box at its entry.
     fn brute(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let hits =

@@ -1,8 +1,8 @@
 //! A tree of planes over triangles (J. L. Bentley, *Multidimensional binary search trees used for associative searching*,
 //! 1975): another structure altogether than the tree of boxes, with the same answers to the bit.
 //!
-//! Planes are chosen by surface areas; triangles on both sides of one are in both children, with the box of what is there
-//! of them. No leaf is missed by rounding; of hits at one distance the lowest number wins.
+//! Planes are chosen by surface areas. Triangles on both sides of a plane are in both children, each with the box of its
+//! piece. Rounding misses no leaf; of hits at one distance the lowest number wins.
 
 mod build;
 mod node;
@@ -19,17 +19,17 @@ use node::{Kind, Node, Triangle};
 /// A tree over triangles.
 #[derive(Clone, Debug)]
 pub struct KdTree {
-    /// The root is node 0, a left child follows its parent; empty where there are no triangles.
+    /// Nodes: the root is node 0, and a left child follows its parent. Empty if there are no triangles.
     nodes: Vec<Node>,
-    /// Places of `triangles`.
+    /// Indices into `triangles`, leaf by leaf.
     references: Vec<u32>,
-    /// Each once, in the order in which leaves first name them.
+    /// Each triangle once, in the order in which leaves first name them.
     triangles: Vec<Triangle>,
     bounds: Aabb,
 }
 
 impl KdTree {
-    /// Build over `count` triangles that are known by their number; those with a NaN are never hit.
+    /// Builds over `count` triangles, which a number names; triangles with a NaN are never hit.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -47,14 +47,14 @@ impl KdTree {
         self.bounds
     }
 
-    /// Bytes held.
+    /// Bytes that the tree takes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice())
             + size_of_val(self.references.as_slice())
             + size_of_val(self.triangles.as_slice())
     }
 
-    /// What a random line that meets the box around all is expected to visit, by surface areas: nodes, leaves among them,
+    /// Expected visits of a random line that meets the box around all, by surface areas: nodes, with leaves among them,
     /// and triangles.
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
@@ -69,7 +69,8 @@ impl KdTree {
         visits
     }
 
-    /// Visit every triangle that has a point in a box, and maybe others near it; one in several leaves maybe more than once.
+    /// Visits every triangle that has a point in a box, and maybe others near it. A triangle in several leaves may come more
+    /// than once.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         self.meeting_while(other, |triangle| {
             visit(triangle);
@@ -77,7 +78,7 @@ impl KdTree {
         });
     }
 
-    /// The same until `visit` says that it has seen enough; whether it saw all of them.
+    /// [`KdTree::meeting`] until `visit` returns false; returns whether it visited all.
     pub fn meeting_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
         let mut pending = [0_u32; traverse::STACK_SIZE];
         let mut size = usize::from(!self.nodes.is_empty() && self.bounds.meets(other));
@@ -106,8 +107,8 @@ impl KdTree {
         true
     }
 
-    /// Visit the nodes whose cells a ray meets, parents first, in an order that depends on the tree alone; `visit` says whether to go
-    /// on below.
+    /// Visits the nodes whose cells a ray meets, parents first, in an order that depends on the tree alone. `visit` says whether to
+    /// descend.
     pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Cell, &Stretch) -> bool) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
         while let Some((bounds, place, depth)) = pending.pop() {
@@ -127,7 +128,7 @@ impl KdTree {
         }
     }
 
-    /// Every node with its cell, parents first.
+    /// Visits every node with its cell, parents first.
     fn walk(&self, mut visit: impl FnMut(Aabb, Kind)) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(0_u32, self.bounds)] };
         while let Some((place, cell)) = pending.pop() {

@@ -1,45 +1,45 @@
-//! Nodes of eight bytes and the triangles that leaves name.
+//! Nodes of eight bytes, and the triangles that leaves name.
 
 use crate::math::Vec3;
 
-/// A leaf, where the axis of an inner node is.
+/// Tag of a leaf, in place of the axis of an inner node.
 const LEAF: u32 = 3;
 
 /// Greatest number that fits beside the axis.
 pub const MOST: u32 = u32::MAX >> 2;
 
-/// An inner node's left child is the next node.
+/// A node. The left child of an inner node is the next node.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
-    /// Of an inner node the bits of the plane's place, of a leaf its first reference.
+    /// Bits of the plane's coordinate for an inner node, index of the first reference for a leaf.
     payload: u32,
-    /// Axis or [`LEAF`] in the two low bits; above them the right child or how many references.
+    /// Axis or [`LEAF`] in the two low bits; above them the right child, or the number of references.
     tag: u32,
 }
 
-/// A node, told apart.
+/// The contents of a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// Split by a plane.
+    /// A node that a plane splits.
     Inner {
-        /// What the plane is across.
+        /// Axis of the plane's normal.
         axis: usize,
-        /// Where.
+        /// Coordinate of the plane.
         at: f32,
         /// The child above the plane.
         right: u32,
     },
-    /// References to triangles.
+    /// A leaf: references to triangles.
     Leaf {
-        /// The first.
+        /// Index of the first reference.
         first: u32,
-        /// How many.
+        /// Number of references.
         count: u32,
     },
 }
 
 impl Node {
-    /// From what it is.
+    /// Encodes a node.
     pub fn new(kind: Kind) -> Self {
         match kind {
             Kind::Inner { axis, at, right } => {
@@ -53,7 +53,7 @@ impl Node {
         }
     }
 
-    /// What it is.
+    /// Decodes a node.
     #[inline(always)]
     pub fn kind(self) -> Kind {
         let (low, high) = (self.tag & 3, self.tag >> 2);
@@ -64,7 +64,7 @@ impl Node {
         }
     }
 
-    /// The same where nodes and references stand behind so many others.
+    /// The node behind so many other nodes and references.
     pub fn moved(self, nodes: u32, references: u32) -> Self {
         Self::new(match self.kind() {
             Kind::Inner { axis, at, right } => Kind::Inner { axis, at, right: right + nodes },

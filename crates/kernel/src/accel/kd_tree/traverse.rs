@@ -1,8 +1,8 @@
-//! Front to back with a stack of what is behind.
+//! Front-to-back traversal with a stack of the far children.
 //!
-//! Every distance is padded so far that a triangle which the test says is hit is met, whatever rounding did: the test's
-//! and the planes' arithmetic displace a ray by a few roundings of the lengths that they work on, none of which is
-//! greater than the distance from the ray's origin to the far end of the mesh.
+//! Every distance is padded, so that rounding never misses a triangle that the test would hit. The arithmetic of test
+//! and planes displaces a ray by a few roundings of the lengths that they work on; no such length is greater than the
+//! distance from the ray's origin to the far end of the mesh.
 
 use super::KdTree;
 use super::node::Kind;
@@ -12,24 +12,24 @@ use crate::geometry::{Aabb, Ray, ShapeHit};
 /// Displacement of a ray by rounding, relative to the greatest length.
 const PAD: f32 = 32.0 * f32::EPSILON;
 
-/// Deepest stack: the depth limit for as many triangles as there are numbers, and one more.
+/// Size of the deepest stack: the depth limit for as many triangles as there are numbers, and one more.
 pub(super) const STACK_SIZE: usize = 64;
 
-/// A ray made ready for planes, in steps of a direction whose greatest component is between 1 and 2.
+/// A ray prepared for planes, in steps of a direction whose greatest component is between 1 and 2.
 struct PlaneRay {
     origin: [f32; 3],
     inverse: [f32; 3],
     backward: [bool; 3],
-    /// By how much a plane or the ray may be elsewhere.
+    /// Bound on the displacement of a plane or the ray.
     pad: f32,
-    /// Steps in the ray's unit of t.
+    /// Steps for each unit of the ray's t.
     steps: f32,
 }
 
 impl PlaneRay {
     fn new(ray: &Ray, bounds: &Aabb) -> Self {
         let greatest = ray.direction.abs().max_element();
-        // The power of two just below, of the exponent's bits alone: scaling by it is exact.
+        // The power of two just below, from the exponent's bits alone: scaling by it is exact.
         let steps = f32::from_bits(greatest.to_bits() & 0x7f80_0000)
             .clamp(f32::MIN_POSITIVE, 1.0 / f32::MIN_POSITIVE);
         let inverse = (ray.direction * (1.0 / steps)).recip();
@@ -43,8 +43,8 @@ impl PlaneRay {
         }
     }
 
-    /// Where it is at a plane for certain not before, and not after. Where it runs in the plane but for rounding that is
-    /// always; beside it −∞ or ∞. NaN stands for no bound.
+    /// Bounds on the ray's distance at a plane, from below and above. If the ray runs in the plane but for rounding, all
+    /// distances are within; if it runs beside the plane, −∞ or ∞. NaN stands for no bound.
     #[inline(always)]
     fn meets(&self, axis: usize, at: f32) -> (f32, f32) {
         let distance = at - self.origin[axis];
@@ -53,7 +53,7 @@ impl PlaneRay {
         if self.backward[axis] { (high, low) } else { (low, high) }
     }
 
-    /// The part of it that is in the box.
+    /// The interval of the ray that is in the box.
     fn inside(&self, bounds: &Aabb, t_max: f32) -> Option<(f32, f32)> {
         let (mut near, mut far) = (0.0_f32, self.end(t_max));
         for axis in 0..3 {
@@ -65,18 +65,18 @@ impl PlaneRay {
         (near <= far).then_some((near, far))
     }
 
-    /// Where it ends that ends at `t_max`, at the latest.
+    /// Greatest distance, in steps, of a ray that ends at `t_max`.
     #[inline(always)]
     fn end(&self, t_max: f32) -> f32 {
         t_max * self.steps + self.pad
     }
 }
 
-/// What is left for later: a node and the part of the ray in it.
+/// Entry of the stack: a node and the interval of the ray in it.
 type Pending = (u32, f32, f32);
 
 impl KdTree {
-    /// The nearest hit; of hits at one distance the triangle of the lowest number.
+    /// The nearest hit; of hits at one distance, the triangle of the lowest number.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         let sheared = ShearedRay::new(ray.origin, ray.direction);
         let mut best: Option<ShapeHit> = None;
@@ -109,8 +109,8 @@ impl KdTree {
         found
     }
 
-    /// Visit the leaves that the ray may meet, near ones first. `test` gets the places of a leaf's triangles and returns the new end of the ray; none ends the visit.
-    /// A ray that is not finite meets none.
+    /// Visits the leaves that the ray may meet, near ones first. `test` gets the indices of a leaf's triangles and returns the new
+    /// end of the ray; `None` ends the visit. A ray that is not finite meets no leaf.
     #[inline(always)]
     fn visit(&self, ray: &Ray, mut test: impl FnMut(&[u32]) -> Option<f32>) {
         if self.nodes.is_empty() || !ray.origin.is_finite() || !ray.direction.is_finite() {

@@ -1,4 +1,4 @@
-//! Whether a tree is sound, by other means than those that built it.
+//! Validation of a tree by other means than those that built it.
 
 use super::build::depth_limit;
 use super::node::Kind;
@@ -7,19 +7,19 @@ use crate::accel::reference::Polygon;
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
-/// What a walk from the root knows of a node.
+/// State of a walk from the root at a node.
 struct Visit {
     place: u32,
     cell: Aabb,
     depth: u32,
-    /// Triangles of which something is in the cell, its faces included.
+    /// Triangles with a point in the cell, its faces included.
     inside: Vec<u32>,
 }
 
 impl KdTree {
-    /// Walks the tree and says what is wrong with it: planes outside their cells (else the leaves tile the box), nodes that
-    /// are reached twice or never, a depth beyond the limit, leaves that name a triangle twice or one that is elsewhere,
-    /// leaves that do not name one which reaches into them, faces between leaves with a triangle that neither names.
+    /// Walks the tree and reports faults: planes outside their cells (otherwise the leaves tile the box), nodes that are
+    /// reached twice or never, a depth beyond the limit, leaves that name a triangle twice or one that is elsewhere, leaves
+    /// that do not name one which reaches into them, faces between leaves with a triangle that neither names.
     ///
     /// # Errors
     /// The first fault, in words.
@@ -77,7 +77,7 @@ impl KdTree {
     }
 }
 
-/// Whether a leaf names what it must and no more.
+/// Checks that a leaf names the right triangles and no more.
 fn leaf(
     place: u32,
     cell: &Aabb,
@@ -114,7 +114,7 @@ fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     })
 }
 
-/// Points of every triangle, and whether a leaf at the point names it.
+/// Points of every triangle, and for each whether a leaf at the point names the triangle.
 struct Named {
     points: Vec<(u32, Vec<(DVec3, bool)>)>,
 }

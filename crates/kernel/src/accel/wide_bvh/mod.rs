@@ -1,7 +1,7 @@
 //! A tree eight boxes wide over triangles, four in a pack.
 //!
-//! Whatever instructions traverse it, a ray gets the same hit, bit for bit: box tests may only let through too much, the
-//! arithmetic of the triangle test is one and the same, and of hits at one distance the lowest id wins.
+//! Whatever instructions traverse it, a ray gets the same hit, bit for bit: box tests may only let too much through, the
+//! arithmetic of the triangle test is always the same, and of hits at one distance the lowest id wins.
 
 mod build;
 mod node;
@@ -20,7 +20,7 @@ use node::{Node, TrianglePack};
 /// A tree over triangles.
 #[derive(Clone, Debug)]
 pub struct WideBvh {
-    /// The root is node 0; empty where there are no triangles.
+    /// Nodes; the root is node 0. Empty if there are no triangles.
     nodes: Vec<Node>,
     packs: Vec<TrianglePack>,
     bounds: Aabb,
@@ -28,18 +28,18 @@ pub struct WideBvh {
     quality: Quality,
 }
 
-/// How much work goes into a tree.
+/// Effort of building a tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quality {
-    /// Each triangle in one leaf.
+    /// Each triangle is in one leaf.
     #[default]
     Medium,
-    /// Triangles that are much smaller than their boxes in several.
+    /// Triangles that are much smaller than their boxes are in several leaves.
     High,
 }
 
 impl WideBvh {
-    /// Build over `count` triangles that are known by their number; those with a NaN are never hit.
+    /// Builds over `count` triangles, which a number names; triangles with a NaN are never hit.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -51,7 +51,7 @@ impl WideBvh {
         Self::build_with(Quality::default(), count, corners, token)
     }
 
-    /// The same with more or less work; the hits are the same.
+    /// Builds with this effort; the hits are the same.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -65,13 +65,13 @@ impl WideBvh {
         Ok(Self { nodes, packs, bounds, instructions: Instructions::best(), quality })
     }
 
-    /// The same tree, traversed by other instructions; those that the processor has not got give way to the best it has.
+    /// The same tree, traversed by other instructions. If the processor lacks them, it takes the best that it has.
     pub fn with(mut self, instructions: Instructions) -> Self {
         self.instructions = instructions.available();
         self
     }
 
-    /// What it is traversed by.
+    /// Instructions that traverse the tree.
     pub fn instructions(&self) -> Instructions {
         self.instructions
     }
@@ -81,13 +81,12 @@ impl WideBvh {
         self.bounds
     }
 
-    /// Bytes held.
+    /// Bytes that the tree takes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.packs.as_slice())
     }
 
-    /// What a random line that meets the box around all is expected to visit, by surface areas: nodes, and packs of
-    /// triangles.
+    /// Expected visits of a random line that meets the box around all, by surface areas: nodes, and packs of triangles.
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
         let mut visits = (f64::from(!self.nodes.is_empty()), 0.0);
@@ -104,8 +103,8 @@ impl WideBvh {
         visits
     }
 
-    /// Visit the nodes whose boxes a ray meets, parents first, in an order that depends on the tree alone; `visit` says whether to go
-    /// on below.
+    /// Visits the nodes whose boxes a ray meets, parents first, in an order that depends on the tree alone. `visit` says whether to
+    /// descend.
     pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Cell, &Stretch) -> bool) {
         let root = (self.bounds, node::Child::Inner(0), 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
@@ -129,7 +128,7 @@ impl WideBvh {
         }
     }
 
-    /// The nearest hit; of hits at one distance the triangle of the lowest number.
+    /// The nearest hit; of hits at one distance, the triangle of the lowest number.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         if self.nodes.is_empty() { None } else { simd::closest(self, ray) }
     }
@@ -139,8 +138,8 @@ impl WideBvh {
         !self.nodes.is_empty() && simd::any(self, ray, except)
     }
 
-    /// [`WideBvh::closest`] of at most [`PACKET`] rays up to their ends; faster where they go much the same way, as those of
-    /// neighbouring pixels do.
+    /// [`WideBvh::closest`] for at most [`PACKET`] rays up to their ends; faster if they go in much the same direction, as
+    /// rays of neighbouring pixels do.
     pub fn closest_packet(&self, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) {
         debug_assert!(rays.len() <= PACKET && rays.len() == hits.len());
         hits.fill(None);
@@ -151,8 +150,8 @@ impl WideBvh {
         }
     }
 
-    /// [`WideBvh::any`] of at most [`PACKET`] rays up to their ends: a bit for each that hits. `except` has one for each ray, or
-    /// is empty.
+    /// [`WideBvh::any`] for at most [`PACKET`] rays up to their ends: a bit for each ray that hits. `except` has one entry for
+    /// each ray, or is empty.
     pub fn any_packet(&self, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> u32 {
         debug_assert!(rays.len() <= PACKET && (except.is_empty() || rays.len() == except.len()));
         if self.nodes.is_empty() {
@@ -178,7 +177,8 @@ impl WideBvh {
         bits
     }
 
-    /// Visit every triangle that has a point in a box, and maybe others near it; one in pieces maybe more than once.
+    /// Visits every triangle that has a point in a box, and maybe others near it. A triangle in pieces may come more
+    /// than once.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         self.meeting_while(other, |triangle| {
             visit(triangle);
@@ -186,7 +186,7 @@ impl WideBvh {
         });
     }
 
-    /// The same until `visit` says that it has seen enough; whether it saw all of them.
+    /// [`WideBvh::meeting`] until `visit` returns false; returns whether it visited all.
     pub fn meeting_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
         self.nodes.is_empty() || self.meeting_below(0, other, &mut visit)
     }
@@ -203,7 +203,7 @@ impl WideBvh {
         })
     }
 
-    /// Walks the tree and says what is wrong with it.
+    /// Walks the tree and reports faults.
     ///
     /// # Errors
     /// The first fault, in words.
@@ -249,11 +249,11 @@ impl WideBvh {
     }
 }
 
-/// Fewer shadow rays are faster one by one.
+/// Number of shadow rays below which tracing them one by one is faster.
 const SMALL_GROUP: usize = 8;
 
-/// The ends of those rays together that go to the same side along each axis, and furthest along the same one, and how many
-/// they are; the others end below 0.
+/// Calls `take` for each group of rays with the same signs of direction and the same longest axis, with their ends and
+/// their number. The ends of all other rays are below 0.
 fn for_each_group(rays: &[Ray], ends: &Ends, mut take: impl FnMut(&Ends, usize)) {
     let way = |ray: &Ray| {
         let [x, y, z] = ray.direction.to_array().map(f32::abs);
@@ -324,7 +324,7 @@ mod tests {
         }
     }
 
-    /// Packets of rays that go much the same way, and some that do not, of all sizes.
+    /// Packets of rays that go in much the same direction, and some that do not, of all sizes.
     fn packets(mesh: &[[Vec3; 3]]) -> Vec<Vec<Ray>> {
         let mut next = random(17);
         let mut packets: Vec<Vec<Ray>> = rays(mesh).chunks(PACKET).map(<[Ray]>::to_vec).collect();

@@ -4,16 +4,17 @@ use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 
-/// Children of a node.
+/// Number of children of a node.
 pub const WIDTH: usize = 8;
 
-/// Triangles in a pack.
+/// Most triangles in a pack.
 pub const PACK: usize = 4;
 
 /// Most packs of a leaf.
 pub const MOST_PACKS: u32 = 8;
 
-/// Marks a leaf in [`Node::children`]; the next three bits hold its packs less one, the others the first.
+/// Bit that marks a leaf in [`Node::children`]; the next three bits hold the number of its packs less one, the others
+/// the first pack.
 const LEAF: u32 = 1 << 31;
 
 const FIRST_BITS: u32 = 28;
@@ -24,32 +25,32 @@ pub const LEAF_BITS: u32 = !((1 << FIRST_BITS) - 1);
 /// A mesh in pieces has at most 1.3 references a triangle; no pack and no node is without one of its own.
 const _: () = assert!(TriangleMesh::MOST_TRIANGLES as u64 * 13 / 10 < 1 << FIRST_BITS);
 
-/// Eight boxes as rows of their least and greatest x, y and z, and what is in them.
+/// Eight boxes as rows of their least and greatest x, y and z, and the children in them.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Node {
     /// Rows: least x, greatest x, least y, greatest y, least z, greatest z. Empty boxes are ∞ … −∞, met by no finite arithmetic.
     pub rows: [[f32; WIDTH]; 6],
-    /// See [`Child`].
+    /// Encoded children, see [`Child`].
     pub children: [u32; WIDTH],
 }
 
-/// What a box holds.
+/// Child of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
-    /// A node.
+    /// Index of a node.
     Inner(u32),
-    /// Packs.
+    /// Packs of triangles.
     Leaf {
-        /// The first.
+        /// Index of the first pack.
         first: u32,
-        /// How many.
+        /// Number of packs.
         count: u32,
     },
 }
 
 impl Child {
-    /// From how nodes hold it.
+    /// Decodes a child from its form in a node.
     #[inline(always)]
     pub fn decode(code: u32) -> Self {
         if code & LEAF == 0 {
@@ -71,14 +72,14 @@ impl Child {
 }
 
 impl Node {
-    /// Eight empty boxes. Where numbers overflow, all boxes are met; in these then is the first pack, so that the way still
-    /// ends.
+    /// Eight empty boxes. If numbers overflow, all boxes are met: an empty box leads to the first pack, so that the
+    /// traversal still ends.
     pub const EMPTY: Self = {
         let (least, greatest) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
         Self { rows: [least, greatest, least, greatest, least, greatest], children: [LEAF; WIDTH] }
     };
 
-    /// Fill a slot.
+    /// Fills a slot.
     pub fn set(&mut self, slot: usize, bounds: Aabb, child: Child) {
         for axis in 0..3 {
             self.rows[2 * axis][slot] = bounds.min[axis];
@@ -87,12 +88,12 @@ impl Node {
         self.set_child(slot, child);
     }
 
-    /// Change what a slot holds.
+    /// Changes the child of a slot.
     pub fn set_child(&mut self, slot: usize, child: Child) {
         self.children[slot] = child.encode();
     }
 
-    /// The box of a slot; none where it is empty.
+    /// The box of a slot. `None` if it is empty.
     pub fn bounds(&self, slot: usize) -> Option<Aabb> {
         let corner = |side: usize| {
             Vec3::new(self.rows[side][slot], self.rows[2 + side][slot], self.rows[4 + side][slot])
@@ -100,7 +101,7 @@ impl Node {
         Some(Aabb { min: corner(0), max: corner(1) }).filter(|bounds| !bounds.is_empty())
     }
 
-    /// What a slot holds.
+    /// The child of a slot.
     pub fn child(&self, slot: usize) -> Child {
         Child::decode(self.children[slot])
     }
@@ -112,12 +113,12 @@ impl Node {
 pub struct TrianglePack {
     /// Rows: x, y, z of the first corners, of the second, of the third.
     pub rows: [[f32; PACK]; 9],
-    /// Numbers of the triangles; `u32::MAX` where there is none.
+    /// Numbers of the triangles; `u32::MAX` in lanes without one.
     pub ids: [u32; PACK],
 }
 
 impl TrianglePack {
-    /// From at most four triangles.
+    /// A pack of at most four triangles.
     pub fn new(triangles: impl IntoIterator<Item = (u32, [Vec3; 3])>) -> Self {
         let mut pack = Self { rows: [[f32::NAN; PACK]; 9], ids: [u32::MAX; PACK] };
         for (lane, (id, corners)) in triangles.into_iter().take(PACK).enumerate() {
@@ -138,7 +139,7 @@ impl TrianglePack {
             .map(|row| Vec3::new(self.rows[row][lane], self.rows[row + 1][lane], self.rows[row + 2][lane]))
     }
 
-    /// Numbers of the triangles that are there.
+    /// Numbers of the triangles in use.
     pub fn ids(&self) -> impl Iterator<Item = u32> {
         self.ids.into_iter().filter(|&id| id != u32::MAX)
     }

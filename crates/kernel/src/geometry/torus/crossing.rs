@@ -1,26 +1,26 @@
-//! Where a line first crosses a torus.
+//! First crossing of a line and a torus.
 //!
-//! Not by the coefficients of the quartic, whose roots lose half of their digits where it grazes and more where the
-//! tube is slim. With q(s) the line's distance from the axis and the circle's radius as unit,
+//! The coefficients of the quartic are not used: its roots lose half of their digits where the line grazes, and more if
+//! the tube is slim. With q(s) the line's distance from the axis and the circle's radius as unit,
 //!
 //! ```text
 //! g(s) = (q − 1)² + z² − tube² = |p|² + 1 − tube² − 2q
 //! ```
 //!
 //! has the sign of the distance from the surface and is computed from that distance. Its second derivative is
-//! 2(1 − w/q³), where w is a constant of the line: there are at most two points of inflection, known in closed form,
-//! and on each piece between them g is convex or concave. On such a piece Newton's method from the right end goes to
-//! the nearest root without ever passing it, and tells where there is none.
+//! 2(1 − w/q³), with w a constant of the line: there are at most two points of inflection, known in closed form, and on each
+//! piece between them g is convex or concave. On such a piece, Newton's method from the right end goes to the nearest
+//! root without ever passing it, or shows that there is none.
 
 use crate::math::DVec3;
 
-/// More than halving takes from the whole line to its last digit.
+/// Most steps; more than halving takes from the whole line to its last digit.
 const MOST_STEPS: u32 = 200;
 
 /// Half the width of the neighbourhood of the axis in which slopes change their sign.
 const KINK: f64 = 1e-9;
 
-/// What rounding makes of g where it is 0, over the tube: twice that of the distance from the circle.
+/// Rounding error of g near 0, relative to the tube: twice that of the distance from the circle.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// A line near a torus about z whose circle has radius 1.
@@ -42,7 +42,7 @@ struct Sample {
 }
 
 impl UnitLine {
-    /// The stretch of the line in the ball and between the planes around the torus, both with some room in units of the
+    /// Interval of the line in the ball and between the planes around the torus, both with a margin in units of the
     /// tube.
     pub(super) fn surroundings(&self, room: f64) -> Option<(f64, f64)> {
         let height = self.tube * (1.0 + room);
@@ -60,8 +60,8 @@ impl UnitLine {
         (half > 0.0 && enter < leave).then_some((enter, leave))
     }
 
-    /// The first place from `from` to `to` at which the line goes in or out. Where it starts on the surface, as far as rounding can
-    /// tell, it goes neither there.
+    /// The first place from `from` to `to` at which the line goes in or out. If the line starts on the surface, within rounding,
+    /// its start does not count.
     pub(super) fn first_crossing(&self, from: f64, to: f64) -> Option<f64> {
         if !(from < to) {
             return None;
@@ -89,16 +89,16 @@ impl UnitLine {
         None
     }
 
-    /// Whether from here on it goes away from the circle, on whose outer side it is: both parts of the distance grow.
+    /// Whether the line goes away from the circle from here on, on the outer side: both parts of the distance grow.
     fn goes_away(&self, from: f64) -> bool {
         let p = self.foot + self.direction * from;
         let (across, d) = (p.truncate(), self.direction.truncate());
         across.length_squared() >= 1.0 && across.dot(d) >= 0.0 && p.z * self.direction.z >= 0.0
     }
 
-    /// The places from `from`, which is outside, to `to` at which the line goes in: two at most, since it leaves as often.
+    /// The places from `from`, which is outside, to `to` at which the line goes in: at most two, since it leaves as often.
     pub(super) fn entries(&self, from: f64, to: f64) -> [Option<f64>; 2] {
-        /// From a crossing to where rounding does not doubt the side, but where the line grazes.
+        /// Step beyond a crossing, after which rounding does not change the side, unless the line grazes.
         const BEYOND: f64 = 1e-10;
         let mut found = [None; 2];
         let mut start = from;
@@ -125,8 +125,8 @@ impl UnitLine {
         }
     }
 
-    /// The ends of the piece on which g is concave, where q³ < w. A line through the axis has a kink there, which the
-    /// piece is kept wide enough to hold: nothing is crossed so near to the axis.
+    /// The ends of the piece on which g is concave, with q³ < w. A line through the axis has a kink there, and the
+    /// piece is kept wide enough to contain it: no crossing is so near to the axis.
     fn inflections(&self) -> Option<[f64; 2]> {
         let (p, d) = (self.foot.truncate(), self.direction.truncate());
         let a = d.length_squared();
@@ -144,11 +144,11 @@ impl UnitLine {
             let start = if is_inside == is_convex { high } else { low };
             return Some(self.between(low.s, high.s, start, is_inside));
         }
-        // Both ends are on one side: a convex piece may dip in between, a concave one may rise out.
+        // If both ends are on one side, a convex piece may dip in between, and a concave one may rise out.
         (is_inside != is_convex).then(|| self.dip(low, high, if is_inside { -1.0 } else { 1.0 })).flatten()
     }
 
-    /// The only crossing between two places, by Newton's method where it stays between them.
+    /// The only crossing between two places, by Newton's method as long as it stays between them.
     fn between(&self, mut low: f64, mut high: f64, start: Sample, is_inside: bool) -> f64 {
         let mut x = start;
         for _ in 0..MOST_STEPS {
@@ -167,8 +167,8 @@ impl UnitLine {
     }
 
     /// The first root from `low` on of a piece on which sign·g is convex and, at both ends, positive. The root of a
-    /// tangent is never beyond that of a convex function: where the tangents lead to the rise beyond the least
-    /// value there is none.
+    /// tangent is never beyond that of a convex function: if the tangents lead to the rise beyond the least value,
+    /// there is no root.
     fn dip(&self, low: Sample, high: Sample, sign: f64) -> Option<f64> {
         if !(high.slope * sign > 0.0) {
             return None;

@@ -10,7 +10,7 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitLine;
 
-/// Room around a torus in units of its tube, so that a line comes to it from outside for certain.
+/// Margin around a torus in units of its tube, so that a line comes to it from outside for certain.
 const ROOM: f64 = 0.01;
 
 /// All points at one distance, the radius of the tube, from a circle about an axis; the front is outside.
@@ -25,7 +25,8 @@ pub struct Torus {
 }
 
 impl Torus {
-    /// From its centre, an axis of any length but 0, the radius of the circle and that of the tube, 0 < tube < radius.
+    /// A torus from its centre, an axis of any length but 0, the radius of the circle and that of the tube,
+    /// 0 < tube < radius.
     pub fn new(center: DVec3, axis: DVec3, radius: f64, tube: f64) -> Self {
         Self { frame: AxialFrame::new(center, axis), radius, tube }
     }
@@ -46,7 +47,7 @@ impl Torus {
         ray.accept(t).map(|_| (t, 0))
     }
 
-    /// A ray's line, the same in units of the circle's radius, and that unit in the ray's.
+    /// A ray's line, the line in units of the circle's radius, and that unit in the ray's.
     fn unit_line(&self, ray: &RayF64) -> (Line, UnitLine, f64) {
         let line = self.frame.line(ray);
         let length = line.direction.length();
@@ -58,7 +59,7 @@ impl Torus {
         (line, unit_line, self.radius / length)
     }
 
-    /// The t at which a ray from outside goes in: twice at most.
+    /// The t at which a ray from outside goes in: at most two.
     pub fn entries(&self, ray: &RayF64) -> [Option<f64>; 2] {
         let (line, unit_line, unit) = self.unit_line(ray);
         let Some((enter, leave)) = unit_line.surroundings(ROOM) else { return [None; 2] };
@@ -72,7 +73,7 @@ impl Torus {
         self.surface_at(out, from_circle)
     }
 
-    /// Of a point the direction from the axis, and from the circle in the plane of both.
+    /// Directions of a point from the axis, and from the circle in the plane of both.
     fn chart(&self, point: DVec3) -> (DVec2, DVec2) {
         let local = self.frame.local(point);
         let out = radial(local.truncate());
@@ -91,7 +92,7 @@ impl Torus {
         0.5 * (1.0 / self.tube + across / (self.radius + self.tube * across))
     }
 
-    /// The surface in a direction from the axis, and a direction from the circle in the plane of both.
+    /// The surface in a direction from the axis, and in a direction from the circle in the plane of both.
     fn surface_at(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;
@@ -116,8 +117,8 @@ impl Torus {
         self.frame.origin.abs().max_element() + self.radius + self.tube
     }
 
-    /// A point of the surface, uniform over the area: the angle ψ of the tube has density 1 + (tube/radius)·cos ψ, so that of the
-    /// uniform ψ and its mirror image π − ψ, whose densities sum to a constant, one is taken by its share.
+    /// A point of the surface, uniform over the area. The angle ψ of the tube has the density 1 + (tube/radius)·cos ψ. The
+    /// densities at a uniform ψ and at its mirror image π − ψ sum to a constant, so that one of the two is chosen by its share.
     pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         // cos ψ at v = y, since ψ = 0 is v = ½.
@@ -160,7 +161,7 @@ impl Torus {
         self.signed_distance(point) < 0.0
     }
 
-    /// A quarter of the area: what faces a direction, times the cosines, on average over all of them.
+    /// Projected area on average over all directions: a quarter of the area.
     pub fn shown(&self, _: DVec3) -> f64 {
         let [area] = self.areas();
         area / 4.0
@@ -183,7 +184,7 @@ mod tests {
     use crate::geometry::Ray;
     use crate::math::Vec3;
 
-    /// About y, from 1.5 to 2.5.
+    /// A torus about y, from 1.5 to 2.5.
     fn ring() -> Torus {
         Torus::new(DVec3::ZERO, DVec3::Y * 7.0, 2.0, 0.5)
     }
@@ -217,7 +218,7 @@ mod tests {
         assert_eq!(entries(x(0.0), Vec3::X), [Some(1.5), None]);
         assert_eq!(entries(x(-9.0), Vec3::NEG_X), [None; 2]);
         assert_eq!(entries(Vec3::new(2.0, 9.0, 0.0), Vec3::NEG_Y), [Some(8.5), None]);
-        // Beside the axis, through the tube on both sides of the hole, and through its outer part alone.
+        // Rays go beside the axis, through the tube on both sides of the hole, and through its outer part alone.
         let [first, second] = entries(Vec3::new(-9.0, 0.0, 1.0), Vec3::X);
         assert!((first.expect("in") - (9.0 - 5.25_f32.sqrt())).abs() < 1e-5);
         assert!((second.expect("in again") - (9.0 + 1.25_f32.sqrt())).abs() < 1e-5);

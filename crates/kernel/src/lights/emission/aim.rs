@@ -1,4 +1,4 @@
-//! What photons are aimed at.
+//! Targets of photons.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,35 +12,35 @@ use crate::math::{DVec3, Vec3};
 use crate::sampling::distribution::Discrete;
 use crate::sampling::warp;
 
-/// Balls that photons are aimed at: one is chosen by what it is expected to get, and a direction or a place uniform over what is
-/// seen of it.
+/// Balls at which photons are aimed. A ball is chosen by its expected light, and then a direction or a place uniform over its
+/// visible part.
 #[derive(Clone, Debug)]
 pub struct Targets {
     balls: Vec<Ball>,
-    /// By the squares of the radii.
+    /// Distribution by the squares of the radii.
     by_disc: Discrete,
 }
 
-/// More targets are put together to so many.
+/// Most targets; more are merged.
 pub const MOST_TARGETS: usize = 32;
 
-/// Which directions a point sends light into.
+/// Directional distribution of the light that a point emits.
 pub enum Sends<'a> {
-    /// All alike.
+    /// The same in all directions.
     Everywhere,
-    /// As a spotlight does.
+    /// The cone of a spotlight.
     Cone {
-        /// That.
+        /// The spotlight.
         light: &'a SpotLight,
         /// Its power over its intensity on the axis, in sr.
         spread: f64,
     },
-    /// By the cosine with this unit normal, before a surface.
+    /// The cosine with this unit normal, before a surface.
     Front(DVec3),
 }
 
 impl Sends<'_> {
-    /// Power over that into the brightest direction, in sr.
+    /// Power over the radiant intensity in the brightest direction, in sr.
     pub fn spread(&self) -> f64 {
         match self {
             Self::Everywhere => 4.0 * PI,
@@ -49,7 +49,7 @@ impl Sends<'_> {
         }
     }
 
-    /// What goes into a direction over what goes into the brightest one.
+    /// Intensity in a direction, relative to the brightest direction.
     pub fn share(&self, direction: Vec3) -> f64 {
         match self {
             Self::Everywhere => 1.0,
@@ -58,7 +58,7 @@ impl Sends<'_> {
         }
     }
 
-    /// A bound on that over a cone of directions, given the sine of its half angle, up to 90°.
+    /// Upper bound on [`Sends::share`] over a cone of directions, given the sine of its half angle, up to 90°.
     fn greatest(&self, axis: DVec3, sin: f64) -> f64 {
         let cos = ((1.0 - sin) * (1.0 + sin)).max(0.0).sqrt();
         // Cosine of the angle from a direction to the nearest one of the cone.
@@ -79,7 +79,7 @@ impl Sends<'_> {
 }
 
 impl Targets {
-    /// None where there are none of any extent.
+    /// Targets around these balls. `None` if none has an extent.
     pub fn new(balls: &[Ball]) -> Option<Self> {
         let balls: Vec<Ball> = balls.iter().copied().filter(|ball| ball.radius > 0.0).collect();
         let balls = together(balls);
@@ -93,23 +93,24 @@ impl Targets {
         &self.balls
     }
 
-    /// A target by a number in [0, 1), for light from beyond the scene.
+    /// Target of a number in [0, 1), for light from beyond the scene.
     pub fn by_disc(&self, u: f32) -> &Ball {
         &self.balls[self.by_disc.sample(u).0]
     }
 
-    /// The areas of all discs, in sum.
+    /// Sum of the areas of all discs.
     pub fn discs(&self) -> f64 {
         PI * self.by_disc.total()
     }
 
-    /// Density per area of places uniform over the discs of [`Targets::by_disc`], at a place that is on some of them.
+    /// Density per area of places uniform over the discs of [`Targets::by_disc`], at a place that is on some of the
+    /// discs.
     pub fn by_discs(&self, is_on: impl Fn(&Ball) -> bool) -> f64 {
         // A disc is chosen by its area: the density on each is the same.
         self.balls.iter().filter(|ball| is_on(ball)).count() as f64 / self.discs()
     }
 
-    /// As they are seen from a point that sends light.
+    /// The targets as a point that emits light sees them.
     #[inline]
     pub fn seen_from<'a>(&self, from: DVec3, sends: &'a Sends<'a>) -> View<'a> {
         let mut view = View { sends, seen: ArrayVec::new(), total: 0.0 };
@@ -128,30 +129,30 @@ impl Targets {
     }
 }
 
-/// Targets as they are seen from a point that sends light.
+/// Targets relative to a point that emits light.
 pub struct View<'a> {
     sends: &'a Sends<'a>,
-    /// Those that are reached.
+    /// Targets that the light can reach.
     seen: ArrayVec<Seen, MOST_TARGETS>,
     total: f64,
 }
 
-/// A target as it is seen from a point that sends light.
+/// A target relative to a point that emits light.
 struct Seen {
-    /// None where it is all around the point.
+    /// Cone of directions to it. `None` if the point is inside.
     cone: Option<Cone>,
-    /// A bound on what it gets, in units of what goes into the brightest direction, in sr.
+    /// Upper bound on the power it gets, in units of the intensity in the brightest direction, in sr.
     weight: f64,
 }
 
 impl View<'_> {
-    /// A bound on what all get, in units of what goes into the brightest direction, in sr.
+    /// Upper bound on the power of all targets, in units of the intensity in the brightest direction, in sr.
     pub fn total(&self) -> f64 {
         self.total
     }
 
-    /// A direction uniform over the cone of a target, and which; none where that is all around the point, or there is none:
-    /// then directions that are not aimed stand for it.
+    /// A direction uniform over the cone of a target, and the target. `None` if the point is inside the target, or there is
+    /// no target: then a direction that is not aimed takes its place.
     pub fn sample(&self, u: f32, direction: [f32; 2]) -> Option<(Vec3, usize)> {
         let goal = f64::from(u) * self.total;
         let (mut sum, mut target) = (0.0, 0);
@@ -166,8 +167,8 @@ impl View<'_> {
         Some((Frame::from_normal(cone.axis.as_vec3()).to_world(local), target))
     }
 
-    /// The density of aimed directions over that of others, at one that was made for a target or by the others. ∞ where others
-    /// are never.
+    /// Pdf of aimed directions over that of emitted ones, at a direction that was made for a target or by emission. ∞ if
+    /// emission never makes it.
     pub fn ratio(&self, direction: Vec3, made_for: Option<usize>) -> f64 {
         if !(self.total > 0.0) {
             return 1.0;
@@ -175,7 +176,7 @@ impl View<'_> {
         let (mut by_cones, mut by_others) = (0.0, 0.0);
         for (number, Seen { cone, weight }) in self.seen.iter().enumerate() {
             match cone {
-                // The very edge may be on either side.
+                // The very edge may count either way.
                 Some(cone) if made_for == Some(number) || cone.holds(direction) => {
                     by_cones += weight / cone.solid_angle();
                 }
@@ -189,16 +190,16 @@ impl View<'_> {
     }
 }
 
-/// The directions to a ball.
+/// The cone of directions to a ball.
 struct Cone {
     axis: DVec3,
-    /// Of the half angle.
+    /// Sine of the half angle.
     sin: f64,
     one_minus_cos: f32,
 }
 
 impl Cone {
-    /// None from inside.
+    /// The cone around a ball. `None` from inside.
     fn around(ball: &Ball, from: DVec3) -> Option<Self> {
         let to_center = ball.center - from;
         let distance = to_center.length();
@@ -214,13 +215,14 @@ impl Cone {
         TAU * f64::from(self.one_minus_cos)
     }
 
-    /// By the chord to the axis.
+    /// Whether a direction is inside. Compares chords to the axis.
     fn holds(&self, direction: Vec3) -> bool {
         (direction.as_dvec3() - self.axis).length_squared() <= 2.0 * f64::from(self.one_minus_cos)
     }
 }
 
-/// At most [`MOST_TARGETS`] balls around these: the largest group is cut in two along its longest side until there are so many.
+/// At most [`MOST_TARGETS`] balls around these balls: the largest group is cut in two along its longest side until there are so
+/// many.
 fn together(balls: Vec<Ball>) -> Vec<Ball> {
     if balls.len() <= MOST_TARGETS {
         return balls;

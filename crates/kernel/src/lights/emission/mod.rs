@@ -1,11 +1,11 @@
-//! PhotonSource: rays that start at lights, each with its share of their power.
+//! Photon emission: rays that start at lights, each with its share of their power.
 //!
-//! A photon of light ℓ is a ray y. Its flux is the power per measure of rays, Φ′(y), over the density with which such photons are
-//! made, so that the mean of the flux over photons is the power of all lights. There are two ways to make one, and a photon
-//! counts the density of both (one-sample multiple importance sampling; Veach, *Robust Monte Carlo Methods for Light Transport
-//! Simulation*, 1997, section 9.2.4): with probability 1 − q by the emission alone, q aimed at one of the [`Ball`]s around what is
-//! worth being met. Light and start are chosen alike in both, so with the probabilities P and A of the light, and a(y)/e(y) that
-//! of the densities of the rest,
+//! A photon of light ℓ is a ray y. Its flux is the power per measure of rays, Φ′(y), over the pdf of such photons, so that the
+//! mean of the flux over photons is the power of all lights. There are two ways to make a photon, and the flux takes the pdf of
+//! both (one-sample multiple importance sampling; Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997,
+//! section 9.2.4). With probability 1 − q it is made by emission alone, with probability q it is aimed at one of the [`Ball`]s
+//! around surfaces that need photons. Both ways choose the start alike. With the probabilities P and A of the light, and a(y)/e(y)
+//! the ratio of the other pdfs,
 //!
 //! flux = Φ′(y)/e(y) / ((1 − q)·P + q·A·a(y)/e(y)).
 
@@ -38,7 +38,7 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// Around balls: in the middle of the box around them.
+    /// A ball around balls: centred in the box around them.
     pub fn around(balls: &[Self]) -> Self {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for Self { center, radius } in balls {
@@ -50,28 +50,28 @@ impl Ball {
     }
 }
 
-/// The object that a light is.
+/// The object that emits a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outline {
     /// A shape.
     Shape(Shape),
     /// A mesh.
     Mesh {
-        /// More than any of its triangles is off where rays meet it.
+        /// Upper bound on the error of each of its triangles at a hit.
         rounding: f32,
     },
 }
 
-/// The numbers in [0, 1) that a photon is made by.
+/// Random numbers in [0, 1) for a photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Numbers {
-    /// Which light, and which piece of it.
+    /// Choice of the light, and of its piece.
     pub light: [f32; 2],
-    /// Whether it is aimed, and at which target.
+    /// Choice whether to aim, and of the target.
     pub aim: [f32; 2],
-    /// Where on the light, or on the disc that light from beyond the scene comes through.
+    /// Position on the light, or on the disc through which light from beyond the scene comes.
     pub position: [f32; 2],
-    /// Where to; of light from beyond the scene, where from.
+    /// Direction to which it goes; for light from beyond the scene, from which it comes.
     pub direction: [f32; 2],
 }
 
@@ -80,17 +80,17 @@ pub struct Numbers {
 pub struct Emitted {
     /// The number of its light.
     pub light: u32,
-    /// Where it starts.
+    /// Start of the photon.
     pub start: Start,
     /// Unit direction that it goes in.
     pub direction: Vec3,
-    /// Power in W over the density of such photons: the mean over photons is the power of all lights.
+    /// Power in W over the pdf of such photons: the mean over photons is the power of all lights.
     pub flux: Vec3,
     /// Whether it was aimed at a target.
     pub is_aimed: bool,
 }
 
-/// Where a photon starts.
+/// Start of a photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
     /// At a light without extent.
@@ -104,13 +104,13 @@ pub enum Start {
         /// Unit normal of the front.
         normal: Vec3,
     },
-    /// Beyond everything that has an end: on a plane that touches the ball around that. What has no end may lie on the way to
-    /// there from the light, against the direction of the photon.
+    /// A place beyond all finite objects: on a plane that touches the ball around them. Infinite objects may lie on the
+    /// way there from the light, against the direction of the photon.
     Beyond(Vec3),
 }
 
 impl Emitted {
-    /// Its ray, which starts as one that the surface of its light scatters.
+    /// The photon's ray, which starts as one that the surface of its light scatters.
     pub fn ray(&self) -> Ray {
         let origin = match self.start {
             Start::Point(point) | Start::Beyond(point) => point,
@@ -120,44 +120,44 @@ impl Emitted {
     }
 }
 
-/// What all lights send.
+/// Source of the photons of all lights.
 #[derive(Clone, Debug)]
 pub struct PhotonSource {
     lights: Arc<Lights>,
     sources: Vec<OfLight>,
-    /// Around all that has an end: light from beyond the scene is sent over it.
+    /// Ball around all finite objects, over which light from beyond the scene is emitted.
     around: Ball,
     by_power: Discrete,
     aim: Option<Aim>,
 }
 
-/// What a light sends.
+/// Emission of a light.
 #[derive(Clone, Debug)]
 struct OfLight {
-    /// In W.
+    /// Power in W.
     power: Vec3,
-    /// Of a light without extent: its power over its intensity on the axis, in sr.
+    /// Power over the intensity on the axis, in sr, for a light without extent.
     spread: f64,
-    /// Of a light that is an object: its places.
+    /// Surface, for a light that is an object.
     surface: Option<Surface>,
 }
 
-/// What photons are aimed at.
+/// Aiming of photons.
 #[derive(Clone, Debug)]
 struct Aim {
     targets: Targets,
-    /// The part of the photons that are aimed.
+    /// Fraction of the photons that are aimed.
     share: f32,
-    /// By what the lights send towards the targets, about.
+    /// Distribution of the lights by their estimated power towards the targets.
     by_light: Discrete,
 }
 
-/// The part of aimed photons whose light is chosen as that of others is: what is estimated as nothing may be something.
+/// Fraction of aimed photons whose light is chosen by power, as for other photons: an estimate of 0 may be wrong.
 const BY_POWER: f64 = 0.1;
 
 impl PhotonSource {
-    /// Of all lights; `outline` tells the object of a number, and `around` is a ball around all that has an end. None where
-    /// nothing is sent. Lights without fall-off and the background send nothing.
+    /// Source of the photons of all lights. `outline` gives the object of a number; `around` is a ball around all finite
+    /// objects. `None` if no light emits. Lights without fall-off and the background emit no photons.
     pub fn new(lights: &Arc<Lights>, outline: impl Fn(u32) -> Option<Outline>, around: Ball) -> Option<Self> {
         let source = |(_, light): (u32, &Light)| OfLight::new(light, &outline, around);
         let sources: Vec<OfLight> = lights.iter().map(source).collect();
@@ -165,8 +165,8 @@ impl PhotonSource {
         Some(Self { lights: Arc::clone(lights), sources, around, by_power, aim: None })
     }
 
-    /// The same with a part of the photons aimed at targets, in [0, 1]. Where all are, only rays that meet a target are made, and
-    /// the mean of their flux is the power that goes there.
+    /// The source with this fraction of the photons, in [0, 1], aimed at targets. If all are aimed, only rays that meet a target
+    /// are made, and the mean of their flux is the power that goes there.
     #[must_use]
     pub fn aimed_at(self, targets: &[Ball], share: f32) -> Self {
         let targets = Targets::new(targets).filter(|_| share > 0.0);
@@ -184,27 +184,27 @@ impl PhotonSource {
         Self { aim, ..self }
     }
 
-    /// A ball around all that has an end.
+    /// Ball around all finite objects.
     pub fn around(&self) -> Ball {
         self.around
     }
 
-    /// What a light sends, in W.
+    /// Power of a light, in W.
     pub fn power_of(&self, light: u32) -> Vec3 {
         self.sources[light as usize].power
     }
 
-    /// What all lights send, in W.
+    /// Power of all lights, in W.
     pub fn power(&self) -> Vec3 {
         self.sources.iter().map(|source| source.power.as_dvec3()).sum::<DVec3>().as_vec3()
     }
 
-    /// The part of the photons that are aimed.
+    /// Fraction of the photons that are aimed.
     pub fn aimed_share(&self) -> f32 {
         self.aim.as_ref().map_or(0.0, |aim| aim.share)
     }
 
-    /// A photon; none where what was chosen sends nothing.
+    /// Emits a photon. `None` if the chosen light or target gets nothing.
     pub fn emit(&self, u: &Numbers) -> Option<Emitted> {
         let aim = self.aim.as_ref().filter(|aim| u.aim[0] < aim.share);
         let by_light = aim.map_or(&self.by_power, |aim| &aim.by_light);
@@ -217,7 +217,7 @@ impl PhotonSource {
         let flux = (made.flux.as_dvec3() / density).as_vec3();
         let Made { start, direction, .. } = made;
         let emitted = Emitted { light: number as u32, start, direction, flux, is_aimed: aim.is_some() };
-        // Nothing is sent into a direction of infinite density.
+        // A direction of infinite density carries no flux.
         (flux != Vec3::ZERO).then_some(emitted)
     }
 
@@ -261,18 +261,18 @@ impl PhotonSource {
     }
 }
 
-/// A photon of one light, before the choice of the light counts.
+/// A photon of one light, before the probability of the light counts.
 struct Made {
     start: Start,
     direction: Vec3,
-    /// Its flux, were all photons of this light and none aimed.
+    /// Flux if all photons were of this light and none aimed.
     flux: Vec3,
-    /// The density of aimed photons over that of others.
+    /// Pdf of aimed photons over that of others.
     ratio: f64,
 }
 
 impl PhotonSource {
-    /// A direction from a point, and the density of aimed ones over that of others.
+    /// A direction from a point, and the pdf of aimed directions over that of others.
     #[inline(always)]
     fn directed(
         &self,
@@ -293,7 +293,7 @@ impl PhotonSource {
         }
     }
 
-    /// A photon from a direction, with the irradiance at normal incidence that it stands for.
+    /// A photon from a direction, with its irradiance at normal incidence.
     fn arriving_beyond(
         &self,
         to_light: Vec3,
@@ -304,7 +304,7 @@ impl PhotonSource {
         let Frame { s, t, n } = Frame::from_normal(to_light);
         let (s, t, n) = (s.as_dvec3(), t.as_dvec3(), n.as_dvec3());
         let Ball { center, radius } = self.around;
-        // On the plane through the middle of the ball.
+        // Project onto the plane through the middle of the ball.
         let through = |ball: &Ball| {
             let at = warp::disk(Vec2::from_array(u.position)).as_dvec2() * ball.radius;
             let middle = ball.center - center;
@@ -328,7 +328,7 @@ impl PhotonSource {
         is_inside.then_some(Made { start, direction: -to_light, flux, ratio })
     }
 
-    /// About what a light sends towards targets: for the choice among lights.
+    /// Estimated power of a light towards targets, for the choice among lights.
     fn towards(&self, number: u32, light: &Light, targets: &Targets) -> f64 {
         let source = &self.sources[number as usize];
         let power = strength(source.power);
@@ -359,7 +359,7 @@ impl PhotonSource {
     }
 }
 
-/// How many places of a lamp are asked what they see of the targets.
+/// Number of places of a lamp at which its view of the targets is estimated.
 const PLACES: u32 = 16;
 
 /// A lattice on the unit square (Roberts, *The Unreasonable Effectiveness of Quasirandom Sequences*, 2018).

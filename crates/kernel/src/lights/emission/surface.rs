@@ -11,16 +11,16 @@ use crate::lights::tree::bounds::strength;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 
-/// The surface of a light in pieces, which are chosen by what they send.
+/// The surface of a light in pieces, which are chosen by power.
 #[derive(Clone, Debug)]
 pub struct Surface {
     pieces: Discrete,
     on: On,
-    /// In W.
+    /// Power in W.
     power: Vec3,
 }
 
-/// What pieces are of.
+/// Geometry of the pieces.
 #[derive(Clone, Debug)]
 enum On {
     /// A shape, whose parts are cut into side × side pieces of the same area.
@@ -29,7 +29,7 @@ enum On {
         side: u32,
         /// Areas of the parts.
         areas: Vec<f64>,
-        /// The greatest of the lengths that a point is computed from.
+        /// Greatest of the lengths from which a point is computed.
         reach: f64,
     },
     /// The triangles of a mesh.
@@ -46,7 +46,8 @@ pub struct Place {
     pub normal: DVec3,
     /// Bound on the error of each of its components.
     pub error: Vec3,
-    /// What it sends by the cosine, over the density of such places: the mean is the power of the light, in W.
+    /// Emitted radiance integrated by the cosine, over the pdf of such places: the mean is the power of the light, in
+    /// W.
     pub flux: Vec3,
 }
 
@@ -54,22 +55,22 @@ pub struct Place {
 struct OnPiece {
     point: DVec3,
     normal: DVec3,
-    /// Of the piece.
+    /// Area of the piece.
     area: f64,
     primitive: u32,
 }
 
-/// How many pieces a lamp with a texture is cut into, at most.
+/// Most pieces of a lamp with a texture.
 const PIECES: usize = 1024;
 
-/// Places of a piece along a side that are asked for its texture.
+/// Places along a side of a piece at which its texture is sampled.
 const ASKED: u32 = 4;
 
-/// The part of the weight of a lamp's pieces that goes by their area: between the places that were asked may be more light.
+/// Fraction of the weight of a lamp's pieces that goes by their area: there may be more light between the sampled places.
 const BY_AREA: f64 = 0.05;
 
 impl Surface {
-    /// None of what has no area, or sends nothing.
+    /// The surface of a light. `None` if it has no area, or emits nothing.
     pub fn new(light: &AreaLight, outline: &Outline) -> Option<Self> {
         let (on, count) = match (outline, &light.shape) {
             (Outline::Shape(shape), _) => {
@@ -118,12 +119,12 @@ impl Surface {
         Some(Self { pieces, on, power: power.as_vec3() })
     }
 
-    /// What it sends, in W; of a lamp with a texture the mean over places close to each other.
+    /// Power in W; for a lamp with a texture, the mean over places close to each other.
     pub fn power(&self) -> Vec3 {
         self.power
     }
 
-    /// A place by numbers in [0, 1).
+    /// Samples a place by numbers in [0, 1).
     pub fn place(&self, light: &AreaLight, piece: f32, u: Vec2) -> Place {
         let (index, _) = self.pieces.sample(piece);
         let place = self.on.at(light, index, u);
@@ -171,13 +172,13 @@ impl On {
     }
 }
 
-/// What a place sends, W·sr⁻¹·m⁻².
+/// Radiance of a place, W·sr⁻¹·m⁻².
 fn radiance(light: &AreaLight, place: &OnPiece) -> Vec3 {
     let pattern = light.pattern.as_ref();
     light.radiance * pattern.map_or(Vec3::ONE, |pattern| pattern.at(place.point.as_vec3(), place.primitive))
 }
 
-/// No less than the lengths that the points of a shape are computed from; none where it has no end.
+/// Upper bound on the lengths from which the points of a shape are computed. `None` if the shape is infinite.
 fn reach(shape: &Shape) -> Option<f64> {
     let bounds = shape.bounds()?;
     let greatest = bounds.min.abs().max(bounds.max.abs()).as_dvec3().max_element();

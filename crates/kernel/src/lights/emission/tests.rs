@@ -28,7 +28,7 @@ const OBJECT: u32 = 0;
 const SCENE: Ball = Ball { center: DVec3::new(0.5, 1.0, -0.5), radius: 5.0 };
 const COLOR: Vec3 = Vec3::new(2.0, 1.0, 0.5);
 
-/// Numbers without order.
+/// Random numbers for photons.
 fn numbers(mut next: impl FnMut() -> f32) -> impl FnMut() -> Numbers {
     move || {
         let mut pair = || [next(), next()];
@@ -65,7 +65,7 @@ fn sun(degrees: f64) -> DirectionalLight {
     DirectionalLight::new(Vec3::new(-0.6, 0.64, -0.48), COLOR, degrees.to_radians())
 }
 
-/// A light, the object that it is, and its power over its colour.
+/// A light, its object, and its power over its colour.
 fn lights() -> Vec<(Light, Option<Shape>, f64)> {
     let disc = PI * SCENE.radius * SCENE.radius;
     let mut all = vec![(Light::Point(point(Falloff::Square)), None, 4.0 * PI)];
@@ -107,7 +107,7 @@ struct Mean {
 }
 
 impl Mean {
-    /// By means over points that are scrambled anew each time.
+    /// Mean and standard error from the means of groups, whose points are each scrambled anew.
     fn of(groups: &[f64]) -> Self {
         let n = groups.len() as f64;
         let mean = groups.iter().sum::<f64>() / n;
@@ -118,7 +118,7 @@ impl Mean {
 
 const GROUPS: u32 = 32;
 
-/// The mean of what is asked of photons; those that are none count as 0.
+/// The mean of a function over photons; attempts without a photon count as 0.
 fn mean(source: &PhotonSource, count: u32, of: impl Fn(&Emitted) -> f64) -> Mean {
     let groups = (0..GROUPS).map(|group| {
         let one = |i: u32| {
@@ -132,7 +132,7 @@ fn mean(source: &PhotonSource, count: u32, of: impl Fn(&Emitted) -> f64) -> Mean
     Mean::of(&groups.collect::<Vec<_>>())
 }
 
-/// What photons are aimed at: one ball far away, two that overlap, and one that holds most lights.
+/// Targets of photons: one ball far away, two that overlap, and one that contains most lights.
 fn targets() -> [Ball; 4] {
     let ball = |x: f64, y: f64, z: f64, radius: f64| Ball { center: DVec3::new(x, y, z), radius };
     [ball(3.0, 2.0, 1.0, 0.3), ball(-2.0, 1.0, 0.5, 0.8), ball(-2.5, 0.5, 0.5, 0.6), ball(0.2, 1.0, 0.2, 0.9)]
@@ -162,13 +162,13 @@ fn disc_normal() -> DVec3 {
     (DVec3::new(0.1, 0.8, 0.1) - DISC.center).normalize()
 }
 
-/// What a photon brings to the disc, from its front, per area.
+/// Flux that a photon brings to the disc, from its front, per area.
 fn brought(photon: &Emitted, shape: Option<&Shape>) -> f64 {
     let (ray, normal) = (photon.ray().to_f64(), disc_normal());
     let t = (DISC.center - ray.origin).dot(normal) / ray.direction.dot(normal);
     let at = ray.at(t);
     let is_met = t > 0.0 && ray.direction.dot(normal) < 0.0 && (at - DISC.center).length() < DISC.radius;
-    // A torus is in its own way.
+    // A torus may occlude itself.
     let is_free = || shape.and_then(|shape| shape.intersect(&ray)).is_none_or(|hit| f64::from(hit.t) > t);
     let area = PI * DISC.radius * DISC.radius;
     if is_met && is_free() { f64::from(photon.flux.y) / area } else { 0.0 }
@@ -367,8 +367,8 @@ fn densities_of_aimed_directions_make_a_whole() {
         for balls in [&all[..3], &all[..], &all[..1]] {
             let targets = Targets::new(balls).expect("targets");
             let view = targets.seen_from(from, &sends);
-            // Directions evenly all around: the aimed density is the ratio times that of others. Where others send nothing, aimed
-            // ones count for nothing, which is what directions drawn tell.
+            // Emit directions evenly all around: the aimed pdf is the ratio times that of others. Where emission sends nothing,
+            // aimed photons carry nothing, as samples of directions show.
             let n = 1_000_000;
             let mut whole = 0.0;
             for i in 0..n {
@@ -440,7 +440,7 @@ fn lights_without_fall_off_send_nothing() {
 
 #[test]
 fn photons_that_are_all_aimed_bring_what_meets_a_target() {
-    // Of a point the part of all directions that a ball fills, of the sun the part of the disc.
+    // For a point, the fraction of all directions that a ball fills; for the sun, the fraction of the disc.
     let ball = targets()[0];
     let of = |light: Light| {
         let source = source_of(light, None).aimed_at(&[ball], 1.0);

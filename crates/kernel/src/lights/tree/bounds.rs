@@ -1,66 +1,65 @@
-//! Bounds of lights: where they are, what they send, and into which directions.
+//! Bounds of lights: positions, power, and directions of emission.
 
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
-/// What is known of a light, or of several, without a look at each (Conty Estevez and Kulla, *Importance Sampling of Many Lights
-/// with Adaptive Tree Splitting*, 2018, section 4).
+/// Bounds of one light or of several, for estimates without examining each (Conty Estevez and Kulla, *Importance Sampling of
+/// Many Lights with Adaptive Tree Splitting*, 2018, section 4).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightBounds {
-    /// How distance acts on the light.
+    /// Effect of distance on the light.
     pub space: Space,
     /// Centre of a sphere around them.
     pub center: DVec3,
-    /// Its radius.
+    /// Radius of that sphere.
     pub radius: f64,
-    /// What they are expected to send along their axes: W·sr⁻¹, or irradiance where distance does not weaken it; mean of the
-    /// colours, > 0.
+    /// Expected emission along their axes, > 0: W·sr⁻¹, or irradiance for lights without fall-off; mean of the colours.
     pub power: f64,
-    /// Where to.
+    /// Directions of the emission.
     pub cone: EmissionCone,
 }
 
-/// What distances to lights mean.
+/// Meaning of distances to lights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Space {
-    /// Light weakens with the square of the distance.
+    /// Lights whose irradiance falls with the square of the distance.
     Weakening,
-    /// Lights have a place, but distance does not weaken them.
+    /// Lights with a position, but without fall-off.
     Steady,
-    /// Light comes from beyond the scene: the sphere is around unit vectors to it.
+    /// Light from beyond the scene: the sphere is around unit vectors to it.
     Beyond,
 }
 
-/// Directions that light is sent into.
+/// Directions into which light is emitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionCone {
     /// Unit axis of a cone around the axes of all lights.
     pub axis: DVec3,
     /// Cosine of its half angle.
     pub cos: f64,
-    /// How light fades beyond the cone.
+    /// Fall-off beyond the cone.
     pub edge: Edge,
 }
 
-/// How light fades beyond a cone.
+/// Fall-off of the emission beyond a cone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Edge {
-    /// There is none.
+    /// No emission beyond the cone.
     Sharp,
-    /// With the cosine of the angle from the cone, none from 90° on.
+    /// The cosine of the angle from the cone, 0 from 90° on.
     Cosine,
 }
 
 impl EmissionCone {
-    /// Everywhere.
+    /// All directions.
     pub const ALL: Self = Self { axis: DVec3::Z, cos: -1.0, edge: Edge::Sharp };
 
-    /// From the front of a flat surface.
+    /// Emission from the front of a flat surface.
     pub fn of_front(normal: DVec3) -> Self {
         Self { axis: normal, cos: 1.0, edge: Edge::Cosine }
     }
 
-    /// Into a cone of a half angle up to π.
+    /// Emission into a cone of a half angle up to π.
     pub fn within(axis: DVec3, half_angle: f64) -> Self {
         Self { axis, cos: libm::cos(half_angle), edge: Edge::Sharp }
     }
@@ -77,7 +76,7 @@ impl EmissionCone {
     fn widest_from(&self, axis: DVec3) -> f64 {
         let cos = self.axis.dot(axis).clamp(-1.0, 1.0);
         let (sin, own_sin) = (sine(cos), sine(self.cos));
-        // Beyond 180° together.
+        // Together they exceed 180°.
         if cos <= -self.cos { -1.0 } else { cos * self.cos - sin * own_sin }
     }
 }
@@ -92,14 +91,14 @@ impl LightBounds {
         Self { power: self.power * strength(color), ..self }
     }
 
-    /// Of a light in a box that weakens with distance.
+    /// Bounds of a light in a box, with fall-off.
     pub fn in_box(bounds: Aabb, power: f64, cone: EmissionCone) -> Self {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let radius = (max - min).length() * 0.5;
         Self { space: Space::Weakening, center: (min + max) * 0.5, radius, power, cone }
     }
 
-    /// Of a triangle with its front along (b − a) × (c − a), for a unit of radiance; none where it has no area.
+    /// Bounds of a triangle with its front along (b − a) × (c − a), for a unit of radiance. `None` if it has no area.
     pub fn of_triangle(corners: &[DVec3; 3]) -> Option<Self> {
         let [a, b, c] = *corners;
         let vector_area = (b - a).cross(c - a) * 0.5;
@@ -107,7 +106,7 @@ impl LightBounds {
         Some(Self::in_box(Aabb::around_f64(*corners), vector_area.length(), EmissionCone::of_front(normal)))
     }
 
-    /// Around all of them, which are in one space; none around none.
+    /// Bounds around all of these, which are in one space. `None` if there are none.
     pub fn around<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Option<Self> {
         let space = all.clone().next()?.space;
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -126,8 +125,8 @@ impl LightBounds {
     }
 }
 
-/// Expected intensity of several lights, averaged over directions within the spread of their axes: emitters by the cosine give all
-/// of their power where the axes agree, a quarter of it where these are uniform.
+/// Expected intensity of several lights, averaged over directions within the spread of their axes. Cosine emitters give all of
+/// their power if the axes agree, a quarter of it if the axes are uniform.
 fn power<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
     let (mut everywhere, mut by_cosine, mut axes) = (0.0, 0.0, DVec3::ZERO);
     for LightBounds { power, cone, .. } in all {
@@ -139,7 +138,7 @@ fn power<'a>(all: impl Iterator<Item = &'a LightBounds>) -> f64 {
     everywhere + 0.25 * (by_cosine + 3.0 * axes.length().min(by_cosine))
 }
 
-/// One number for a colour: lights are chosen by what they bring to all of its parts.
+/// One number for a colour, as lights are chosen by their effect on all of its components.
 pub fn strength(color: Vec3) -> f64 {
     color.as_dvec3().element_sum() / 3.0
 }

@@ -1,5 +1,5 @@
-//! Building light trees from the top: lights that are close together and send light into similar directions come under one node
-//! (Conty Estevez and Kulla, 2018, section 4.4, with bins).
+//! Building light trees from the top: lights that are close together and emit in similar directions come under one node (Conty
+//! Estevez and Kulla, 2018, section 4.4, with bins).
 
 use super::bounds::{EmissionCone, LightBounds};
 use super::node::{Child, Node};
@@ -10,10 +10,10 @@ use crate::math::float::power_of_two_below;
 use crate::math::lanes::LANES;
 
 impl LightTree {
-    /// Over these lights, known by their index; those without bounds have no light. None where no light has.
+    /// A tree over these lights, which an index names; lights without bounds emit nothing. `None` if no light emits.
     ///
     /// # Errors
-    /// [`Cancelled`] when the token was told so; a large tree takes a while.
+    /// [`Cancelled`] if the token is cancelled; a large tree takes a while.
     pub fn new(lights: &[Option<LightBounds>], token: &CancelToken) -> Result<Option<Self>, Cancelled> {
         let mut leaves: Vec<Leaf> = (0..).zip(lights).filter_map(Leaf::new).collect();
         // Lights of one space come together.
@@ -51,15 +51,15 @@ impl Leaf {
 
 struct Builder<'a> {
     nodes: Vec<Node>,
-    /// Of powers. A power of two rounds nothing, so that a scaled scene has the same picks.
+    /// Unit of powers. It is a power of two, which rounds nothing, so that a scaled scene has the same picks.
     unit: f64,
-    /// How many lights.
+    /// Number of lights.
     leaves: u32,
     token: &'a CancelToken,
 }
 
 impl Builder<'_> {
-    /// Build the node over some leaves, before which there are so many; its number.
+    /// Builds the node over some leaves, behind so many others; returns its number.
     fn node(&mut self, leaves: &mut [Leaf], before: u32) -> Result<u32, Cancelled> {
         let number = self.nodes.len() as u32;
         self.nodes.push(Node::empty(self.leaves));
@@ -85,7 +85,8 @@ impl Builder<'_> {
     }
 }
 
-/// Put leaves into groups, at most one for each child: the sizes of these. Groups are as few as will do, so that nodes are full.
+/// Forms groups of leaves, at most one for each child, and returns their sizes. There are as few groups as possible, so that
+/// nodes are full.
 fn groups(leaves: &mut [Leaf], token: &CancelToken) -> Result<Vec<usize>, Cancelled> {
     token.check()?;
     if leaves.len() <= LANES {
@@ -128,14 +129,14 @@ impl Group {
     }
 }
 
-/// What is summed over leaves to say what a node over them costs.
+/// Sums over leaves for the cost of a node over them.
 #[derive(Clone, Copy)]
 struct Sum {
     count: usize,
     power: f64,
     min: DVec3,
     max: DVec3,
-    /// Axes times powers.
+    /// Sum of axes times powers.
     axes: DVec3,
 }
 
@@ -155,7 +156,7 @@ impl Sum {
         self.count += 1;
         self.power += power;
         (self.min, self.max) = (self.min.min(center - radius), self.max.max(center + radius));
-        // The mean of the directions of a cone is so long.
+        // The mean of the directions of a cone has this length.
         self.axes += axis * (power * 0.5 * (1.0 + cos));
     }
 
@@ -167,8 +168,8 @@ impl Sum {
         self
     }
 
-    /// Power times area times solid angle (section 4.4, equation 1), the latter of a cone whose directions have this mean. In
-    /// place of the area the square of the diagonal, which is not 0 for lights in a row.
+    /// Power times area times solid angle (section 4.4, equation 1). The solid angle is that of a cone whose directions have
+    /// this mean. The square of the diagonal replaces the area, as it is not 0 for lights in a row.
     fn cost(&self) -> f64 {
         if self.count == 0 {
             return 0.0;
@@ -178,14 +179,14 @@ impl Sum {
     }
 }
 
-/// More leaves than these are not sorted, but parted between bins.
+/// Most leaves that are sorted; more are split between bins.
 const MOST_SORTED: usize = 1 << 15;
 
 /// Bins along the longest axis.
 const BINS: usize = 64;
 
-/// Put leaves into two parts along the longest axis, none of them empty: where the second begins. Few are sorted, and the first
-/// part is one of some units.
+/// Splits leaves into two parts along the longest axis, neither of them empty; returns the start of the second. Few leaves are
+/// sorted, and then the first part is a multiple of `unit`.
 fn split(leaves: &mut [Leaf], unit: usize) -> usize {
     let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for leaf in &*leaves {
@@ -215,7 +216,7 @@ fn split(leaves: &mut [Leaf], unit: usize) -> usize {
     cheapest(&parts) * unit
 }
 
-/// How many of some parts, side by side, best come together, the others being together as well; there are leaves on both sides.
+/// Number of parts, side by side, to put together at the least cost, with the others together as well; both sides have leaves.
 fn cheapest(parts: &[Sum]) -> usize {
     let mut right = parts.to_vec();
     for i in (0..parts.len() - 1).rev() {

@@ -1,6 +1,6 @@
-//! Cuts through a light tree: nodes whose children a point picks from. Where lights are not too many, these are all nodes over
-//! lights; else those that the point is so near to that their bounds say little are replaced by their children, as far as there
-//! is room. Many picks for one point share a cut.
+//! Cuts through a light tree: sets of nodes from whose children a point picks. If the lights are not too many, these are all
+//! nodes over lights. Otherwise nodes so near to the point that their bounds say little are replaced by their children, as far
+//! as there is room. Many picks for one point share a cut.
 
 use arrayvec::ArrayVec;
 
@@ -9,28 +9,29 @@ use super::{LightTree, NOWHERE, Pick, ROOT, Shares, Way, below, target};
 use crate::math::Vec3;
 use crate::math::lanes::Lanes;
 
-/// What points pick from, one after the other.
+/// A cut, for picks at one point after the other.
 pub struct Cut<'a> {
     tree: &'a LightTree,
-    /// Nodes at most.
+    /// Most nodes.
     room: usize,
     receiver: Receiver,
     /// Numbers of the nodes.
     nodes: ArrayVec<u32, { Cut::MOST }>,
-    /// The importance of their children; 0 of those that are nodes of the cut themselves.
+    /// Importance of their children; 0 for those that are nodes of the cut themselves.
     importance: ArrayVec<Lanes, { Cut::MOST }>,
-    /// Sums of all of it up to each node.
+    /// Cumulative importance up to each node.
     sums: ArrayVec<f64, { Cut::MOST }>,
 }
 
-/// Nodes are replaced from this square of the sine of half the angle on that the sphere around them fills.
+/// Least nearness at which a node is replaced: the square of the sine of half the angle that its bounding sphere
+/// subtends.
 const NEAR: f32 = 0.05;
 
 impl<'a> Cut<'a> {
-    /// Nodes of any cut at most.
+    /// Most nodes of any cut.
     pub const MOST: usize = 64;
 
-    /// Through a tree, of so many nodes at most; for no point yet.
+    /// A cut through a tree, of so many nodes at most; for no point yet.
     #[inline(always)]
     pub fn new(tree: &'a LightTree, room: usize) -> Self {
         let receiver = Receiver::plain(Vec3::ZERO, Vec3::ZERO);
@@ -45,7 +46,7 @@ impl<'a> Cut<'a> {
         }
     }
 
-    /// For a point of a surface.
+    /// Moves the cut to a point of a surface.
     #[inline(always)]
     pub fn go_to(&mut self, receiver: &Receiver) {
         let tree = self.tree;
@@ -83,14 +84,14 @@ impl<'a> Cut<'a> {
         }
     }
 
-    /// Of the importance of all nodes.
+    /// Importance of all nodes.
     #[inline(always)]
     fn total(&self) -> f64 {
         self.sums.last().copied().unwrap_or(0.0)
     }
 
-    /// [`LightTree::pick`] by the cut, for numbers that increase: each pick is told with the place of its number, but not where in
-    /// its share that was.
+    /// [`LightTree::pick`] by the cut, for numbers that increase. `picked` gets the index of each number, the light and its
+    /// probability, but no rest.
     #[inline(always)]
     pub fn pick(&self, u: impl Iterator<Item = f64>, mut picked: impl FnMut(usize, u32, f32)) {
         let all = self.total();
@@ -100,7 +101,7 @@ impl<'a> Cut<'a> {
         let inverse = 1.0 / all;
         let (mut index, mut way) = (0, Way::NEW);
         let (mut of, mut shares) = (usize::MAX, Shares::NONE);
-        // The sum before the node, and what its own is by the sum over its children, which is not rounded.
+        // Keep the sum before the node, and its own sum over the sum over its children, which is not rounded.
         let (mut before, mut scale) = (0.0, 0.0);
         for (place, u) in u.enumerate() {
             let target = target(u, all);
@@ -112,7 +113,7 @@ impl<'a> Cut<'a> {
                 before = if index == 0 { 0.0 } else { self.sums[index - 1] };
                 scale = shares.total() / (self.sums[index] - before);
             }
-            // Below the sum over the children, which is above 0 as that of the node is.
+            // Stay below the sum over the children, which is above 0 as the node's sum is.
             let part = below((target - before) * scale, shares.total());
             let child = shares.find(part);
             let probability = self.share(index, child, inverse);
@@ -128,7 +129,7 @@ impl<'a> Cut<'a> {
         }
     }
 
-    /// The probability of a child of a node, by one over the importance of all.
+    /// The probability of a child of a node, given the inverse importance of all.
     #[inline(always)]
     fn share(&self, index: usize, child: usize, inverse: f64) -> f32 {
         (f64::from(self.importance[index][child]) * inverse) as f32
@@ -141,7 +142,7 @@ impl<'a> Cut<'a> {
         if place == NOWHERE || !(self.total() > 0.0) {
             return 0.0;
         }
-        // The last node of the cut on the way to the light.
+        // Find the last node of the cut on the path to the light.
         let (mut node, mut last) = (ROOT, None);
         loop {
             let one = &self.tree.nodes[node as usize];

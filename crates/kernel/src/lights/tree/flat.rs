@@ -1,13 +1,13 @@
-//! Trees of one node: points pick from its children side by side, light by light.
+//! Trees of one node: points side by side pick from its children, light by light.
 
 use super::node::{Child, Node, ReceiverRow};
 use super::{LightTree, ROOT};
 use crate::math::lanes::{LANES, Lanes};
 
-/// What points are expected to get of each light of a tree that has one node.
+/// Importance of each light of a tree with one node, for several points.
 pub struct FlatShares<'a> {
     node: &'a Node,
-    /// By child, then by point.
+    /// Importance by child, then by point.
     importance: [Lanes; LANES],
     /// Sums over the children.
     totals: [f64; LANES],
@@ -15,16 +15,16 @@ pub struct FlatShares<'a> {
 
 /// Lights that points picked.
 pub struct FlatPicks {
-    /// Places of the lights among the children.
+    /// Indices of the lights among the children.
     children: [u32; LANES],
     /// Numbers of the lights.
     pub lights: [u32; LANES],
-    /// With which probabilities; 0 where no light arrives.
+    /// Probabilities of the picks; 0 if no light arrives.
     pub probabilities: Lanes,
 }
 
 impl LightTree {
-    /// What its lights bring to points, if it has one node.
+    /// Importance of its lights for several points. `None` if it has more than one node.
     #[inline(always)]
     pub fn flat_shares(&self, receivers: &ReceiverRow, has_lobes: bool) -> Option<FlatShares<'_>> {
         self.is_flat().then(|| FlatShares::new(&self.nodes[ROOT as usize], receivers, has_lobes))
@@ -50,12 +50,12 @@ impl<'a> FlatShares<'a> {
         Self { node, importance, totals }
     }
 
-    /// Pick a light for each point, by numbers in [0, 1).
+    /// Picks a light for each point, by numbers in [0, 1).
     #[inline(always)]
     pub fn pick(&self, u: &[f64; LANES]) -> FlatPicks {
         let mut targets = [0.0; LANES];
         for i in 0..LANES {
-            // Below the total, so that rounding leads to no child after the last that brings anything.
+            // Stay below the total, so that rounding leads to no child after the last one with importance.
             let (target, last) = (u[i] * self.totals[i], before(self.totals[i]));
             targets[i] = if target < last { target } else { last };
         }
@@ -78,7 +78,7 @@ impl<'a> FlatShares<'a> {
         FlatPicks { children, lights, probabilities: self.shares(&values) }
     }
 
-    /// The probabilities with which it picks the lights of other picks.
+    /// The probabilities that other picks have by these shares.
     #[inline(always)]
     pub fn probabilities(&self, picks: &FlatPicks) -> Lanes {
         let mut values = [0.0; LANES];

@@ -1,6 +1,6 @@
-//! A tree over many lights. Each point picks lights at random, in proportion to bounds of what they contribute (Conty Estevez and
-//! Kulla, *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018). Its nodes have sixteen children, whose importance
-//! is computed side by side.
+//! A tree over many lights. Each point picks lights at random, in proportion to bounds on their contributions (Conty Estevez and
+//! Kulla, *Importance Sampling of Many Lights with Adaptive Tree Splitting*, 2018). Its nodes have sixteen children, whose
+//! importance is computed side by side.
 
 pub mod bounds;
 mod build;
@@ -18,15 +18,15 @@ use crate::math::lanes::{LANES, Lanes};
 /// A tree over lights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightTree {
-    /// The first is the root.
+    /// Nodes; the first is the root.
     nodes: Vec<Node>,
-    /// Those whose children are lights, in the order of the tree; the others' are nodes.
+    /// Nodes whose children are lights, in the order of the tree; the children of other nodes are nodes.
     over_lights: Vec<u32>,
-    /// Place of each light in the order of the tree; [`NOWHERE`] of those that have no light.
+    /// Place of each light in the order of the tree; [`NOWHERE`] for those that emit nothing.
     places: Vec<u32>,
 }
 
-/// At most so many lights, or triangles of a light, are all sampled, without a tree.
+/// Most lights, or triangles of a light, that are all sampled, without a tree.
 pub const MOST_WITHOUT: usize = 32;
 
 /// Marks a light without a place in the tree.
@@ -40,14 +40,14 @@ const ROOT: u32 = 0;
 pub struct Pick {
     /// Its number.
     pub light: u32,
-    /// With which probability.
+    /// Probability of the pick.
     pub probability: f32,
-    /// Where in its share of [0, 1) the number was that picked it, in [0, 1).
+    /// Place of the random number in the light's share of [0, 1), in [0, 1).
     pub rest: f64,
 }
 
 impl LightTree {
-    /// Pick a light for a point of a surface, by a number in [0, 1); none where no light arrives.
+    /// Picks a light for a point of a surface, by a number in [0, 1). `None` if no light arrives.
     #[inline(always)]
     pub fn pick(&self, receiver: &Receiver, u: f64) -> Option<Pick> {
         let mut way = Way::NEW;
@@ -62,7 +62,7 @@ impl LightTree {
         }
     }
 
-    /// Pick a light under a node, which was picked itself; `way` is that of the pick before for the same point.
+    /// Picks a light under a node, which was picked itself; `way` is the path of the previous pick for the same point.
     #[inline(always)]
     fn pick_under(&self, mut node: u32, receiver: &Receiver, mut pick: Pick, way: &mut Way) -> Option<Pick> {
         let mut level = 0;
@@ -89,7 +89,7 @@ impl LightTree {
         }
     }
 
-    /// The probability of the light at a place of the tree's order, by that of a node above it.
+    /// The probability of the light at a place of the tree's order, given the probability of a node above it.
     fn probability_under(&self, mut node: u32, receiver: &Receiver, place: u32, mut probability: f32) -> f32 {
         loop {
             let one = &self.nodes[node as usize];
@@ -108,27 +108,28 @@ impl LightTree {
         self.places[light as usize] != NOWHERE
     }
 
-    /// The place of a light in the order of the tree, in which those that are close together follow one another.
+    /// The place of a light in the order of the tree, in which lights close together follow one another.
     #[inline(always)]
     pub fn place_of(&self, light: u32) -> u32 {
         self.places[light as usize]
     }
 
-    /// How many nodes it has.
+    /// Number of nodes.
     pub fn node_count(&self) -> usize {
         self.nodes.len()
     }
 
-    /// Bytes that it holds.
+    /// Bytes that the tree takes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.over_lights) + size_of_val(&*self.places)
     }
 }
 
-/// Levels of a way down a tree that are remembered.
+/// Levels of a path down a tree that are remembered.
 const LEVELS: usize = 3;
 
-/// The nodes on the way of a pick, with the importance of their children: the next pick for the point may go the same way.
+/// The nodes on the path of a pick, with the importance of their children: the next pick for the point may take the same
+/// path.
 struct Way {
     nodes: [u32; LEVELS],
     shares: [Shares; LEVELS],
@@ -138,14 +139,14 @@ impl Way {
     const NEW: Self = Self { nodes: [u32::MAX; LEVELS], shares: [Shares::NONE; LEVELS] };
 }
 
-/// Sums of the importance of children up to each.
+/// Cumulative importance of children.
 #[derive(Clone, Copy)]
 struct Shares([f64; LANES]);
 
 impl Shares {
     const NONE: Self = Self([0.0; LANES]);
 
-    /// By steps of 1, 2, 4 and 8 places, each for all children side by side.
+    /// Sums by steps of 1, 2, 4 and 8 places, each for all children side by side.
     #[inline(always)]
     fn new(importance: &Lanes) -> Self {
         let mut sums = [0.0; LANES];
@@ -165,13 +166,13 @@ impl Shares {
         if total > 0.0 { ((self.0[child] - before) / total) as f32 } else { 0.0 }
     }
 
-    /// Of all children.
+    /// Sum over all children.
     #[inline(always)]
     fn total(&self) -> f64 {
         self.0[LANES - 1]
     }
 
-    /// The child that a part of the sum falls on, which is below it.
+    /// The child whose share contains a part of the total, which is below the total.
     #[inline(always)]
     fn find(&self, target: f64) -> usize {
         let mut child = 0;
@@ -181,7 +182,7 @@ impl Shares {
         child
     }
 
-    /// Where in the share of a child a part of the sum is that falls on it, in [0, 1).
+    /// Place of a part of the total in a child's share, in [0, 1).
     #[inline(always)]
     fn rest(&self, target: f64, child: usize) -> f64 {
         let before = if child == 0 { 0.0 } else { self.0[child - 1] };
@@ -189,7 +190,7 @@ impl Shares {
     }
 }
 
-/// The sum of each number and that so many places before it.
+/// The sum of each number and the one so many places before it.
 #[inline(always)]
 fn with_those_before<const STEP: usize>(sums: &[f64; LANES]) -> [f64; LANES] {
     let mut before = [0.0; LANES];
@@ -200,20 +201,20 @@ fn with_those_before<const STEP: usize>(sums: &[f64; LANES]) -> [f64; LANES] {
     before
 }
 
-/// A number in [0, 1) as a part of a sum, below it: rounding may not lead beyond the last share.
+/// A number in [0, 1) scaled to a sum, but below it: rounding must not lead beyond the last share.
 #[inline(always)]
 fn target(u: f64, total: f64) -> f64 {
     below(u * total, total)
 }
 
-/// A part of a sum, below it.
+/// The part, kept below the total.
 #[inline(always)]
 fn below(part: f64, total: f64) -> f64 {
     let last = total.next_down();
     if part < last { part } else { last }
 }
 
-/// What is left of a part of a share, in [0, 1).
+/// Remainder of a part of a share, in [0, 1).
 #[inline(always)]
 fn rest(part: f64, share: f64) -> f64 {
     const LAST: f64 = 1.0_f64.next_down();

@@ -4,19 +4,19 @@ use super::bounds::{Edge, LightBounds, Space};
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 
-/// Children of a tree's node.
+/// A node of a tree, with its children.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
-    /// Where the children are and what they send.
+    /// Bounds of the children's positions and emission.
     bounds: BoundsRow,
-    /// Whether all children are in the scene, weaken with distance and send light everywhere, as points and balls do: of others all
-    /// that follows is looked at.
+    /// Whether all children are in the scene, fall off with distance and emit in all directions, as points and balls do. Otherwise
+    /// the computations take account of all of this.
     is_plain: bool,
-    /// What the children are.
+    /// Contents of the children.
     pub children: [Child; LANES],
-    /// The number of leaves before each child, in the order of the tree; of the whole tree where there is none.
+    /// The number of leaves before each child, in the order of the tree; that of the whole tree for an unused child.
     pub first: [u32; LANES],
-    /// How many there are.
+    /// Number of children.
     pub count: u32,
 }
 
@@ -25,22 +25,22 @@ pub struct Node {
 struct BoundsRow {
     /// Centres of the bounding spheres.
     center: Lanes3,
-    /// Radii of the same, with the rounding errors of the centres.
+    /// Radii of the spheres, with the rounding errors of the centres.
     radius: Lanes,
-    /// 1 where the spheres are in the scene, 0 where they are among directions.
+    /// 1 if the sphere is in the scene, 0 if it is among directions.
     is_place: Lanes,
-    /// 1 where light weakens with distance, else 0.
+    /// 1 if light falls off with distance, else 0.
     weakens: Lanes,
-    /// In a unit of about the tree's power; 0 where there is no light.
+    /// Power in a unit of about the tree's power; 0 in an unused lane.
     power: Lanes,
-    /// One over four times the radii.
+    /// Inverse of four times the radii.
     spread: Lanes,
-    /// Of the cones of emission.
+    /// Axes of the cones of emission.
     axis: Lanes3,
-    /// Of their half angles.
+    /// Cosines of their half angles.
     cos: Lanes,
     sin: Lanes,
-    /// Cosine of the angle from the cone at which there is no light any more.
+    /// Cosine of the angle from the cone at which emission ends.
     end: Lanes,
 }
 
@@ -58,7 +58,7 @@ impl BoundsRow {
         end: [1.0; LANES],
     };
 
-    /// Those of one lane in all.
+    /// The bounds of one lane, in all lanes.
     #[inline(always)]
     fn splat(&self, i: usize) -> Self {
         Self {
@@ -97,35 +97,35 @@ const LEAST_COSINE: f32 = 1e-3;
 const LEAST: f32 = 1e-36;
 const MOST: f32 = 1e30;
 
-/// Squares of distances count as no more.
+/// Greatest square of a distance that counts.
 const GREATEST: f32 = 1e37;
 
-/// A point of a surface that lights are expected to bring light to.
+/// A point of a surface that receives light.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
-    /// Where.
+    /// Position.
     pub point: Vec3,
-    /// Unit normal that the cosines are of.
+    /// Unit normal for the cosines.
     pub normal: Vec3,
-    /// The glossy lobe; none of a surface that has none, or of which nothing is known.
+    /// The glossy lobe. `None` if the surface has none, or it is unknown.
     pub lobe: Option<Lobe>,
 }
 
 /// A glossy lobe beside a diffuse one.
 #[derive(Clone, Copy, Debug)]
 pub struct Lobe {
-    /// The unit direction that it is around.
+    /// Unit direction of the lobe's axis.
     pub axis: Vec3,
     /// The exponent of its cosine.
     pub shininess: f32,
-    /// Its peak by the value of the diffuse lobe beside it, or by 1 where `diffuse` is 0.
+    /// Its peak, divided by the value of the diffuse lobe beside it, or by 1 if `diffuse` is 0.
     pub peak: f32,
-    /// 1, or 0 where there is no other lobe.
+    /// 1, or 0 if there is no diffuse lobe.
     pub diffuse: f32,
 }
 
 impl Receiver {
-    /// Of a surface of which nothing but this is known.
+    /// A receiver of which only position and normal are known.
     #[inline(always)]
     pub fn plain(point: Vec3, normal: Vec3) -> Self {
         Self { point, normal, lobe: None }
@@ -135,7 +135,7 @@ impl Receiver {
 /// [`Receiver`]s, side by side.
 #[derive(Clone, Debug)]
 pub struct ReceiverRow {
-    /// Where.
+    /// Positions.
     pub point: Lanes3,
     /// Unit normals.
     pub normal: Lanes3,
@@ -152,13 +152,13 @@ struct LobeRow {
 }
 
 impl ReceiverRow {
-    /// Of surfaces of which nothing but this is known.
+    /// Receivers of which only positions and normals are known.
     #[inline(always)]
     pub fn plain(point: &Lanes3, normal: &Lanes3) -> Self {
         Self { point: *point, normal: *normal, lobes: LobeRow::NONE }
     }
 
-    /// Set a glossy lobe.
+    /// Sets a glossy lobe.
     #[inline(always)]
     pub fn set_lobe(&mut self, i: usize, lobe: &Lobe) {
         let LobeRow { axis, shininess, peak, diffuse } = &mut self.lobes;
@@ -183,12 +183,12 @@ impl ReceiverRow {
 }
 
 impl LobeRow {
-    /// Of no surface.
+    /// Lobes of no surface.
     const NONE: Self =
         Self { axis: [[0.0; LANES]; 3], shininess: [0.0; LANES], peak: [0.0; LANES], diffuse: [1.0; LANES] };
 
-    /// What a surface makes of light from within an angle of a direction, at most and about: cosⁿ δ lies below
-    /// (1 + n(1 − cos δ)/8)⁻⁸, which is no narrower than a lobe of a few lamps and has no end.
+    /// Upper bound on, and estimate of, a lobe's response to light within an angle of a direction: cosⁿ δ lies below
+    /// (1 + n(1 − cos δ)/8)⁻⁸, which is no narrower than a lobe of a few lamps and never 0.
     #[inline(always)]
     fn value(&self, i: usize, cos: f32, sin: f32) -> f32 {
         let short = 1.0 - cos - sin;
@@ -200,16 +200,16 @@ impl LobeRow {
     }
 }
 
-/// What children are expected to bring to a point.
+/// Expected contributions of children at a point.
 pub struct Expected {
-    /// In a unit of the tree; 0 where certainly nothing.
+    /// Importance in a unit of the tree; 0 only if the child certainly contributes nothing.
     pub importance: Lanes,
-    /// Squares of the sines of half the angles that the spheres fill; 1 inside.
+    /// Squares of the sines of half the angles that the spheres subtend; 1 inside.
     pub nearness: Lanes,
 }
 
 impl Node {
-    /// Without children, in a tree of so many lights.
+    /// A node without children, in a tree of so many lights.
     pub fn empty(leaves: u32) -> Self {
         Self {
             bounds: BoundsRow::EMPTY,
@@ -220,7 +220,7 @@ impl Node {
         }
     }
 
-    /// Set a child; `unit` is that of powers, about the power of the whole tree.
+    /// Sets a child; `unit` is that of powers, about the power of the whole tree.
     pub fn set(&mut self, i: usize, bounds: &LightBounds, unit: f64) {
         let LightBounds { space, center, radius, power, cone } = bounds;
         let own = &mut self.bounds;
@@ -244,16 +244,16 @@ impl Node {
         };
     }
 
-    /// What its children are expected to bring to a point of a surface: power by distance, by the mean cosine at the surface, by the
-    /// least angle between the cone of emission and a direction from there (section 4.2, with bounds of cosines), and by what a lobe
-    /// makes of it. Never 0 where a light of the child might arrive.
+    /// Importance of its children for a point of a surface: power by distance, by the mean cosine at the surface, by the least
+    /// angle between the cone of emission and a direction from there (section 4.2, with bounds of cosines), and by the lobe's
+    /// response. Never 0 if light of the child might arrive.
     #[inline(always)]
     pub fn expected(&self, receiver: &Receiver) -> Expected {
         let receivers = ReceiverRow::splat(receiver);
         expected(&self.bounds, &receivers, self.is_plain, receiver.lobe.is_some())
     }
 
-    /// What one of its children is expected to bring to points of surfaces, side by side; as [`Node::expected`].
+    /// [`Node::expected`] of one child for points of surfaces, side by side.
     #[inline(always)]
     pub fn expected_of(&self, child: usize, receivers: &ReceiverRow, has_lobes: bool) -> Lanes {
         expected(&self.bounds.splat(child), receivers, self.is_plain, has_lobes).importance
@@ -266,7 +266,7 @@ impl Node {
     }
 }
 
-/// What lights are expected to bring to receivers, lane by lane.
+/// Importance of lights for receivers, lane by lane.
 #[inline(always)]
 fn expected(bounds: &BoundsRow, receivers: &ReceiverRow, is_plain: bool, has_lobes: bool) -> Expected {
     match (is_plain, has_lobes) {
@@ -290,7 +290,7 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
             offset[axis][i] = bounds.center[axis][i] - start;
         }
     }
-    // Squares of the distance, not below that of the radius; and the part along the normal.
+    // Compute squared distances, not below the squared radius, and the components along the normal.
     let [mut square, mut least, mut along] = [[0.0; LANES]; 3];
     for i in 0..LANES {
         square[i] = lane(&offset, i).length_squared();
@@ -302,15 +302,16 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         inverse[i] = at_least(square[i], least[i]);
     }
     inverse_roots(&mut inverse);
-    // Positive where θ − β < 90°, and above 1 where θ < β, with β half of the angle that the sphere fills. From inside there is
-    // light in every direction.
+    // `towards` is positive if θ − β < 90°, and above 1 if θ < β, with β half of the angle that the sphere subtends. From
+    // inside there is light in every direction.
     let [mut sin, mut towards, mut mean] = [[0.0; LANES]; 3];
     for i in 0..LANES {
         sin[i] = bounds.radius[i] * inverse[i];
         let straight = along[i] * inverse[i];
         let sum = straight + sin[i];
         towards[i] = if square[i] <= least[i] { 1.0 } else { sum };
-        // Cosines at the points of a sphere are uniform between the least and the greatest; those below 0 bring nothing.
+        // Cosines at the points of a sphere are uniform between the least and the greatest; those below 0 contribute
+        // nothing.
         let above = at_least(towards[i], 0.0);
         let cut = above * above * bounds.spread[i] * at_least(square[i], least[i]) * inverse[i];
         mean[i] = if straight > sin[i] { straight } else { cut };
@@ -353,7 +354,7 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     Expected { importance, nearness }
 }
 /// 1/√x of numbers from [`LEAST`] on, within a few units of the last place, by Newton's method: a root and a division of sixteen
-/// numbers would take longer than all else that is asked of children.
+/// numbers would take longer than all other work on children.
 #[inline(always)]
 fn inverse_roots(x: &mut Lanes) {
     for i in 0..LANES {
@@ -367,7 +368,7 @@ fn inverse_roots(x: &mut Lanes) {
     }
 }
 
-/// A bound of a cosine as it counts.
+/// Clamps the bound of a cosine.
 #[inline(always)]
 fn cosine(bound: f32) -> f32 {
     at_most(at_least(bound, LEAST_COSINE), 1.0)

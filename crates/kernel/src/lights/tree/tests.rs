@@ -16,7 +16,7 @@ use crate::lights::point::Falloff;
 use crate::lights::{DirectionalLight, Environment, Light, Lights, PointLight, SpotLight};
 use crate::math::{DVec3, Vec3, random};
 
-/// A light of some kind, of some size, somewhere.
+/// A light of a random kind, size and position.
 fn any_light(object: u32, next: &mut impl FnMut() -> f32) -> Light {
     let mut vector =
         |scale: f32| Vec3::from_array(std::array::from_fn(|_| (next() * 2.0 - 1.0) * scale)).as_dvec3();
@@ -61,13 +61,13 @@ fn place(next: &mut impl FnMut() -> f32) -> (Vec3, Vec3) {
     (vector(5.0), vector(1.0).normalize())
 }
 
-/// Of cuts: enough for some trees, and too few for others.
+/// Nodes of cuts: enough for some trees, too few for others.
 const NODES: usize = 12;
 
 /// A cut for a point.
 fn cut_for(tree: &LightTree, point: Vec3, normal: Vec3, nodes: usize) -> Cut<'_> {
     let mut cut = Cut::new(tree, nodes);
-    // What it was for before leaves nothing behind.
+    // Its previous point leaves no traces.
     cut.go_to(&Receiver::plain(normal, point));
     cut.go_to(&Receiver::plain(point, normal));
     cut
@@ -116,7 +116,7 @@ proptest! {
                     }
                 }
             }
-            // What is not picked goes to nodes whose bounds promise what none of their lights sends.
+            // The rest of the probability goes to nodes whose bounds promise more than their lights send.
             let alone: f32 = (0..count).map(|light| tree.probability(&Receiver::plain(point, normal), light)).sum();
             let cut: f32 = (0..count).map(|light| cut.probability(light)).sum();
             prop_assert!((alone + dark[0] - 1.0).abs() < 0.02, "{} {}", alone, dark[0]);
@@ -152,7 +152,8 @@ proptest! {
 
 #[test]
 fn spotlights_above_each_other_are_picked_from_between_them() {
-    // In columns, all down, as a node holds those of one column: a point below the first of them is above the middle of the node.
+    // Lights stand in columns, all pointing down, as a node holds those of one column: a point below the first of them is above
+    // the middle of the node.
     let mut next = random::unit(8);
     let spot = |i: u32| {
         let position = DVec3::new(f64::from(i % 16), 0.5 + f64::from(i / 16), 0.0);
@@ -298,7 +299,7 @@ fn picks_are_the_same_where_all_is_scaled_by_powers_of_two() {
                 Light::Point(PointLight { position, intensity, falloff: Falloff::Square })
             })
             .collect();
-        // What comes from beyond has no place and no size.
+        // Light from beyond the scene has no position and no size.
         let sun = DirectionalLight::new(Vec3::new(0.6, 0.8, 0.0), Vec3::splat(3.0), 0.0);
         lights.push(Light::Directional(sun));
         let tree = tree_of(&lights);
@@ -337,7 +338,7 @@ fn bounds_around_lights_hold_all_of_them() {
 fn lights_in_one_place_and_lights_far_apart_have_a_tree() {
     let point = |position| PointLight { position, intensity: Vec3::ONE, falloff: Falloff::Square };
     let same: Vec<Light> = (0..5000).map(|_| Light::Point(point(DVec3::ONE))).collect();
-    // Each twice as far as the one before.
+    // Each light is twice as far as the one before.
     let apart: Vec<Light> =
         (0..120).map(|i| Light::Point(point(DVec3::splat(1e-18 * 2_f64.powi(i))))).collect();
     for lights in [same, apart] {
@@ -401,7 +402,7 @@ fn points_side_by_side_pick_from_one_node_as_each_does_alone() {
                     "{} {own}",
                     picks.probabilities[i]
                 );
-                // Sums in another order may have a number fall on the next light.
+                // Sums in another order may make a number fall on the next light.
                 picked += u32::from(alone.light == picks.lights[i]);
             }
             let greatest = shares.pick(&[1.0_f64.next_down(); LANES]);

@@ -1,4 +1,4 @@
-//! Directions against densities, and what they bring against known albedos.
+//! Samples of directions against pdfs, and their mean against known albedos.
 
 use super::*;
 use crate::materials::phong::PhongBsdf;
@@ -28,7 +28,7 @@ fn sample(lobes: &Lobes, next: &mut impl FnMut() -> f32) -> Vec3 {
     lobes.sample(lobe, [next(), next()])
 }
 
-/// χ² of counts; at most six standard deviations above its mean, which is of 1e-9.
+/// Compares counts by χ²: at most six standard deviations above its mean, a probability of 1e-9.
 fn assert_counts(what: &str, counts: &[u32], expected: &[f64]) {
     let (mut sum, mut cells, mut rest) = (0.0, 0, [0.0; 2]);
     for (count, expected) in counts.iter().zip(expected) {
@@ -84,7 +84,7 @@ fn the_glossy_lobe_is_drawn_by_its_density_however_narrow() {
 const RINGS: usize = 24;
 const STEPS: usize = 24;
 
-/// The integral of the density over each cell of equal solid angle on the sphere.
+/// The integral of the pdf over each cell of equal solid angle on the sphere.
 fn integrals(lobes: &Lobes) -> Vec<f64> {
     const FINE: usize = 24;
     let cell = |ring: usize, step: usize| {
@@ -132,7 +132,7 @@ fn both_lobes_together_are_drawn_by_their_density() {
     }
 }
 
-/// Mean of f·cos/density over the samples: the albedo.
+/// Mean of f·cos/pdf over the samples: the albedo.
 fn albedo(bsdf: &PhongBsdf, degrees: f32) -> f64 {
     let (mut next, normal) = (random(3), normals()[2]);
     let lobes = bsdf.lobes(normal, at_angle(normal, degrees));
@@ -157,7 +157,7 @@ fn samples_bring_the_known_albedos_and_never_more_than_all() {
             assert!((both - 0.4 - 0.6 * known).abs() < 4e-3, "with a diffuse part: {both}");
         }
     }
-    // In the limit of narrow lobes cosθ: the mirrored direction counts as one of a lamp does.
+    // In the limit of narrow lobes the albedo is cosθ: the mirrored direction counts as that of a lamp does.
     for degrees in [0.0_f32, 45.0, 80.0, 89.0] {
         let found = albedo(&bsdf(0.0, 1.0, 1e5), degrees);
         let known = f64::from(degrees.to_radians().cos());

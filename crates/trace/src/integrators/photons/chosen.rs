@@ -1,5 +1,5 @@
-//! One photon of a kernel stands for all in the question whether a wall is between them and the point: one chosen by what it brings,
-//! so that what is left of the light is right in the mean.
+//! Choice of a photon. One photon of a kernel, chosen by its contribution, answers for all whether a wall is between them and the
+//! point, so that the light is right in the mean.
 
 use super::map::Look;
 use crate::geometry::Ray;
@@ -8,30 +8,30 @@ use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes};
 use crate::world::Geometry;
 
-/// How far above the surface the way to a photon leads, in radii of the kernel: over the bend of the surface itself.
+/// Height of the way to a photon above the surface, in radii of the kernel: over the curvature of the surface itself.
 const ABOVE: f32 = 0.15;
 
-/// The same where something hangs closer above the surface, such as a ball at rest on it.
+/// Height of the way if something hangs closer above the surface, such as a ball at rest on it.
 const BELOW: f32 = 0.02;
 
-/// Shorter ways, in radii, have nothing on them.
+/// Length, in radii, below which a way is free.
 const NEAR: f32 = 1e-3;
 
 /// Largest number below 1.
 const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
-/// Where a photon is, and the normal there.
+/// Position of a photon, and the normal there.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     /// The point.
     pub point: Vec3,
-    /// Unit normal of the facet on the side that it came to.
+    /// Unit normal of the facet on the side at which it arrived.
     pub normal: Vec3,
 }
 
-/// A choice among numbered things that come one after the other, in proportion to weights of which the sum is not known before
-/// (Chao, *A General Purpose Unequal Probability Sampling Plan*, 1982), in each of the lanes; a single random number lasts for all of it,
-/// as what is left of it after each choice is random again.
+/// Reservoir sampling: a choice among numbered items that come one after the other, in proportion to weights whose sum is not known
+/// before (Chao, *A General Purpose Unequal Probability Sampling Plan*, 1982), in each of the lanes. A single random number lasts
+/// for all choices, as its rest after each choice is random again.
 #[derive(Clone, Copy, Debug)]
 pub struct Choices {
     random: Lanes,
@@ -40,7 +40,7 @@ pub struct Choices {
 }
 
 impl Choices {
-    /// By a random number in [0, 1).
+    /// Choices by a random number in [0, 1).
     #[inline(always)]
     pub fn new(random: f32) -> Self {
         let mut randoms = [0.0; LANES];
@@ -51,7 +51,7 @@ impl Choices {
         Self { random: randoms, totals: [0.0; LANES], chosen: [0; LANES] }
     }
 
-    /// Thing `number` comes, with these weights, which are not negative.
+    /// Offers item `number` with these weights, which are not negative.
     #[inline(always)]
     pub fn offer(&mut self, number: u32, weights: &Lanes) {
         for i in 0..LANES {
@@ -61,13 +61,13 @@ impl Choices {
             let left = if takes { self.random[i] } else { self.random[i] - part };
             let of = if takes { part } else { 1.0 - part };
             let random = left / of;
-            // Of a part of next to 1 nothing is left.
+            // For a share next to 1, nothing of the number is left.
             self.random[i] = if random < BELOW_ONE { random } else { BELOW_ONE };
             self.chosen[i] = if takes { number } else { self.chosen[i] };
         }
     }
 
-    /// What was chosen: a lane by the sums of its weights, and the number there; none where all weights are 0.
+    /// The result: a lane by the sums of its weights, and its item. `None` if all weights are 0.
     #[inline(always)]
     pub fn chosen(&self, random: f32) -> Option<(u32, usize)> {
         let mut left = random * self.totals.iter().sum::<f32>();
@@ -85,8 +85,8 @@ impl Choices {
     }
 }
 
-/// Whether something stands between a point and a photon of its kernel: on the way above the surface, or, where one of them has not
-/// that much room above it, on the way close to the surface.
+/// Whether something is between a point and a photon of its kernel: on the way above the surface, or, if one of them lacks that
+/// much room above it, on the way close to the surface.
 pub fn is_apart(geometry: &Geometry, look: &Look, photon: &Place, radius: f32) -> bool {
     if (photon.point - look.point).length_squared() < (NEAR * radius) * (NEAR * radius) {
         return false;

@@ -1,5 +1,5 @@
-//! Closed form of the part p of a kernel that receives photons: of surface with about the middle's normal, to which the way from the middle
-//! is free. Few flat pieces have one; anything else is left to trials.
+//! Closed form of the part p of a kernel that receives photons: the surface with about the middle's normal, to which the way from
+//! the middle is free. It exists for a few flat pieces; all other cases are left to trials.
 
 use arrayvec::ArrayVec;
 
@@ -14,33 +14,33 @@ use crate::world::{Hit, MeshInstance, Object, World};
 /// Part of a kernel that edges and walls leave.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Clip {
-    /// This part of its weight; nothing stands between its points.
+    /// The kernel's weight times this part; nothing is between its points.
     Part(f32),
     /// Unknown: edges or walls are near.
     Cut,
-    /// Unknown, among many triangles, most of which are far from an edge.
+    /// Unknown: the kernel is among many triangles, most of which are far from an edge.
     Crowded,
 }
 
-/// Distances in radii that tell one plane from another.
+/// Distance in radii above which two planes are different.
 const FLAT: f64 = 4e-3;
 
 /// Least cosine between the normals of two pieces of one plane.
 const SAME_PLANE: f64 = 1.0 - 1e-6;
 
-/// Distance in radii between a wall and the border of the piece that it stands on.
+/// Largest distance in radii between a wall and the border of the piece on which it stands.
 const BORDER: f64 = 2e-3;
 
-/// The largest cosine between a wall and the normal of what it stands on.
+/// The largest cosine between a wall and the normal of the piece on which it stands.
 const UPRIGHT: f64 = 0.3;
 
-/// Distance in radii from which on a surface is not in the way: √(1 + REACH²) and some more.
+/// Distance in radii from which surfaces do not matter: √(1 + REACH²) and some more.
 const FAR: f64 = 1.05;
 
-/// Spheres have as large a radius at least, in radii of the kernel, where it follows them all around its middle.
+/// Least radius of a sphere, in radii of the kernel, that the kernel follows all around its middle.
 const WIDE: f64 = 2.0;
 
-/// Smallest part that the closed form gives; below it its rounding counts.
+/// Smallest part that the closed form gives; below it, rounding matters.
 const LEAST_PART: f64 = 1e-3;
 
 /// Room for triangles of a mesh near a kernel, pieces of its plane, and walls.
@@ -48,7 +48,7 @@ const TRIANGLES: usize = 32;
 const PIECES: usize = 8;
 const WALLS: usize = 4;
 
-/// Computes the part of the kernel of a look that receives photons.
+/// Computes the part of a kernel that receives photons.
 pub fn clip(world: &World, look: &Look, radius: f32) -> Clip {
     let mut around = Around::new(look, radius);
     let mut is_crowded = false;
@@ -78,15 +78,15 @@ pub fn receives(material: &Material) -> bool {
     }
 }
 
-/// A wall that stands on the plane of a kernel, before which its middle is: of points before it the product with the normal is at most
-/// the distance.
+/// A wall that stands on the plane of a kernel, with the middle before it: for points before it, the product with the normal is at
+/// most the distance.
 struct Wall {
     normal: DVec2,
     distance: f64,
 }
 
 impl Wall {
-    /// Whether corners are all on the side of the middle.
+    /// Whether all corners are on the side of the middle.
     fn is_beyond(&self, corners: &[DVec2]) -> bool {
         corners
             .iter()
@@ -102,11 +102,11 @@ struct Around {
     point: DVec3,
     normal: DVec3,
     radius: f64,
-    /// Tangents, over the radius.
+    /// Tangents, divided by the radius.
     tangents: [DVec3; 2],
     /// Pieces of its plane that receive photons.
     pieces: ArrayVec<Piece, PIECES>,
-    /// Surfaces that hold all of the kernel.
+    /// Number of surfaces that contain all of the kernel.
     whole: u32,
     walls: ArrayVec<Wall, WALLS>,
 }
@@ -153,7 +153,7 @@ impl Around {
         (LEAST_PART..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
     }
 
-    /// Adds a shape; whether the part still has a closed form.
+    /// Adds a shape; returns whether the part still has a closed form.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
         let point = self.point;
         let is_far = |distance: f64| distance > FAR * self.radius;
@@ -189,7 +189,7 @@ impl Around {
         }
     }
 
-    /// Adds a surface that reaches over the kernel if it has its normal in the middle, at a distance from there.
+    /// Adds a surface that extends over the whole kernel if it has its normal in the middle, at this distance.
     fn add_surface(&mut self, normal: DVec3, distance: f64, receives: impl Fn() -> bool) -> bool {
         let is_own = normal.dot(self.normal).abs() > SAME_PLANE && distance < FLAT * self.radius;
         self.whole += u32::from(is_own && receives());
@@ -223,14 +223,14 @@ impl Around {
         })
     }
 
-    /// Adds a flat piece; whether the part still has a closed form.
+    /// Adds a flat piece; returns whether the part still has a closed form.
     fn add_piece(&mut self, piece: &Piece, receives: impl Fn() -> bool) -> bool {
         let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
         let from = piece[0] - self.point;
         let (size, distance, cosine) = (normal.length_squared(), normal.dot(from), normal.dot(self.normal));
         let is_within =
             |radii: f64| distance * distance < (radii * self.radius) * (radii * self.radius) * size;
-        // What is nowhere near, or nowhere.
+        // The piece is out of reach, or without area.
         if !(size > 0.0 && is_within(FAR)) {
             return true;
         }
@@ -280,7 +280,7 @@ mod tests {
     use crate::geometry::sphere::Sphere;
     use crate::math::Vec3;
 
-    /// Part of a kernel of radius .1 at (x, 0, z), which faces up, among shapes.
+    /// Part of a kernel of radius 0.1 at (x, 0, z), which faces up, among shapes.
     fn told(x: f32, z: f32, shapes: &[Shape]) -> Option<f64> {
         let look = Look { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
         let mut around = Around::new(&look, 0.1);
@@ -316,7 +316,7 @@ mod tests {
         assert_eq!(told(0.35, 0.5, &[floor, sheet]), None);
         let ball = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, radius, 0.5), radius });
         assert_eq!(told(0.45, 0.5, &[floor, ball(0.1)]), None);
-        // On balls, wide and small.
+        // Kernels on balls, wide and small.
         let under = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, -radius, 0.5), radius });
         assert_eq!((told(0.5, 0.5, &[under(1.0)]), told(0.5, 0.5, &[under(0.15)])), (Some(1.0), None));
     }

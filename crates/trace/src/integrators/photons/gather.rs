@@ -1,4 +1,4 @@
-//! What photons bring to vertices.
+//! Gathering of photons at vertices.
 
 use super::super::PACKET;
 use super::super::lit_row::LitRow;
@@ -16,30 +16,31 @@ use crate::math::lanes::{Folds, Lanes3, lane, set_lane};
 use crate::sampling::Decision;
 use crate::world::Loops;
 
-/// The chance of a look-up at a vertex that the eye does not see: a path has many of them, and little of its noise is of what they bring.
+/// Probability of a look-up at a vertex that the camera does not see: a path has many such vertices, and photons there cause little
+/// of its noise.
 const LOOKS_UNSEEN: f32 = 0.25;
 
-/// That of a look-up of photons thrown back from caustics where the eye sees the vertex: they bring little light, and even.
+/// Probability of a look-up of bounced photons at a vertex that the camera sees: they bring little light, and smooth light.
 const LOOKS_BOUNCED: f32 = 0.5;
 
 /// Gathers photons at the vertices of a row.
 pub struct Gathering<'a> {
-    /// What is rendered.
+    /// Context of the tile.
     pub shot: &'a Shot<'a>,
     /// The vertices.
     pub row: &'a LitRow,
     /// The maps of the samples that are rendered.
     pub maps: &'a PhotonMaps,
-    /// Scatterings of the paths before them.
+    /// Scatterings of the paths before the vertices.
     pub depth: u32,
-    /// What is asked for.
+    /// Measure of light to gather.
     pub measure: Measure,
 }
 
 impl Loops for Gathering<'_> {
     type Done = Lanes3;
 
-    /// What arrives there and goes on to the eye, before the throughput of the paths.
+    /// Gathered light that is reflected towards the camera, before the throughput of the paths.
     #[inline(always)]
     fn run(self, folds: impl Folds) -> Lanes3 {
         let Self { shot, row, maps, depth, measure } = self;
@@ -53,7 +54,7 @@ impl Loops for Gathering<'_> {
             let is_seen = row.seen & 1 << i != 0;
             let (point, normal) = row.place_of(i);
             let look = Look { point, normal, most_depth };
-            // At a surface without a glossy lobe photons stand for what comes from a caustic, and the path from there leaves it out.
+            // At a surface without a glossy lobe, photons carry the light from a caustic, and the path from there leaves it out.
             let gathers_bounced = indirect && row.albedos[1][i] == 0.0;
             let gathers_caustic = if is_seen { caustic } else { indirect && row.from_gloss & 1 << i != 0 };
             let chances = if measure == Measure::Work {
@@ -67,7 +68,7 @@ impl Loops for Gathering<'_> {
             let mut sum = Vec3::ZERO;
             for ((gathers, map), chance) in maps.into_iter().zip(chances) {
                 if gathers && looks[i] < chance {
-                    // What is left of the random number is random again.
+                    // The rest of the random number is random again.
                     let random = [choices[i], looks[i] / chance];
                     let (light, photon) = brought((row, i), (map, &look), measure, random, folds);
                     sum += light * (reached(shot, (row, i), &look, photon, map.radius()) / chance);
@@ -79,8 +80,8 @@ impl Loops for Gathering<'_> {
     }
 }
 
-/// Factor on what the photons of a kernel bring, one of which is given: 0 if that is behind a wall, else one over the part of the kernel
-/// that receives photons, or an estimate of it.
+/// Factor on the light of the photons of a kernel, given one of them: 0 if that one is behind a wall, else the inverse of the part
+/// of the kernel that receives photons, or an estimate of it.
 #[inline(never)]
 fn reached(
     shot: &Shot<'_>,
@@ -101,7 +102,7 @@ fn reached(
     }
 }
 
-/// What photons of a map bring to a vertex that goes on to the eye, and one of them.
+/// Light of a map's photons at a vertex that is reflected towards the camera, and one of the photons.
 #[inline(always)]
 fn brought(
     (row, i): (&LitRow, usize),
@@ -121,7 +122,7 @@ fn brought(
     }
 }
 
-/// The same, each by its direction.
+/// [`Gathering::brought`], with each photon weighted by its direction.
 #[inline(always)]
 fn reflected(
     (row, i): (&LitRow, usize),
@@ -141,7 +142,7 @@ fn reflected(
         sum += light;
         let weight = light.element_sum();
         total += weight;
-        // As `Choices` does.
+        // Choose as `Choices` does.
         let part = if weight > 0.0 { weight / total } else { 0.0 };
         if left < part {
             left /= part;

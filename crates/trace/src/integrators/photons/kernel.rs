@@ -5,7 +5,8 @@ use std::f64::consts::FRAC_2_PI;
 use crate::math::elementary::atan2;
 use crate::math::{DVec2, Vec2};
 
-/// The weight of the kernel (2/π)·(1 − ρ²) over a convex polygon, by its corners in order: 1 where the disc is inside.
+/// The weight of the kernel (2/π)·(1 − ρ²) over a convex polygon, given its corners in order: 1 if it contains the
+/// disc.
 pub fn weight_over(corners: &[DVec2]) -> f64 {
     let edges = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(&a, &b)| (a, b));
     let turn = edges().map(|(a, b)| a.perp_dot(b)).sum::<f64>().signum();
@@ -23,12 +24,12 @@ pub fn weight_over(corners: &[DVec2]) -> f64 {
     }
 }
 
-/// The integral of 1 − ρ² over the unit disc's part of the triangle between the middle and an edge, > 0 where the edge goes
+/// The integral of 1 − ρ² over the unit disc's part of the triangle between the middle and an edge, > 0 if the edge goes
 /// counterclockwise.
 ///
-/// In polar coordinates it is ∫ R²/2 − R⁴/4 dφ, R the smaller of 1 and the distance of the edge. Beyond the disc that is a quarter of
-/// the angle. On an edge at the distance d of the middle, by the length s along it, R² = d² + s² and dφ = d/R² ds, so that it is
-/// d·∫ 1/2 − (d² + s²)/4 ds.
+/// In polar coordinates it is ∫ R²/2 − R⁴/4 dφ, with R the smaller of 1 and the distance of the edge. Beyond the disc that is a
+/// quarter of the angle. On an edge at the distance d of the middle, by the length s along it, R² = d² + s² and dφ = d/R² ds, so
+/// that it is d·∫ 1/2 − (d² + s²)/4 ds.
 fn below_edge(a: DVec2, b: DVec2) -> f64 {
     let length = (b - a).length();
     if !(length > 0.0) {
@@ -54,8 +55,8 @@ fn angle(from: DVec2, to: DVec2) -> f64 {
     f64::from(atan2(from.perp_dot(to) as f32, from.dot(to) as f32))
 }
 
-/// The place in the unit disc that two random numbers in [0, 1) choose by the kernel, from one uniform on the disc: of the kernel
-/// within ρ are 2ρ² − ρ⁴, of the disc ρ².
+/// The place in the unit disc that a point uniform on the disc becomes, so that it has the kernel's density: within ρ, the kernel
+/// has 2ρ² − ρ⁴ of its weight, the disc ρ² of its area.
 pub fn sample(on_disk: Vec2) -> Vec2 {
     let squared = on_disk.length_squared().min(1.0);
     // ρ² = 1 − √(1 − u), u the square on the disc, written without a difference of near numbers: ρ²/u = 1/(1 + √(1 − u)).

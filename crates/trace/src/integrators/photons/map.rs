@@ -1,5 +1,5 @@
-//! A photon map: photons by the cells of a grid, of which only a hash is kept, so that the grid may be as fine as the radius asks for
-//! wherever photons are. Look-ups weigh sixteen photons at a time.
+//! A photon map: photons by the cells of a grid. Only a hash of the cells is kept, so that the grid may be as fine as the radius
+//! requires wherever photons are. Look-ups weigh sixteen photons at a time.
 
 use super::chosen::{Choices, Place};
 use super::packed::{self, Packed};
@@ -9,22 +9,22 @@ use crate::geometry::rows::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane};
 
-/// Light that arrived at a surface.
+/// A photon: light that arrived at a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
-    /// Where.
+    /// Position.
     pub point: Vec3,
-    /// Unit direction that it came from.
+    /// Unit direction from which it came.
     pub direction: Vec3,
     /// Basic flux in W, Φ/n².
     pub flux: Vec3,
-    /// Unit normal of the facet on the side that it came to.
+    /// Unit normal of the facet on the side at which it arrived.
     pub normal: Vec3,
     /// Scatterings on its way.
     pub depth: u32,
 }
 
-/// Photons that are put into their places between two looks at the token.
+/// Photons that are sorted in between two polls of the token.
 const POLL_INTERVAL: usize = 1 << 16;
 
 /// Photons side by side: eight cache lines.
@@ -37,7 +37,7 @@ struct Block {
     flux: Lanes3,
 }
 
-/// Lanes without photons are nowhere.
+/// A block without photons, whose lanes are nowhere.
 const EMPTY: Block = Block {
     point: [[f32::INFINITY; LANES]; 3],
     normal: [0; LANES],
@@ -45,15 +45,15 @@ const EMPTY: Block = Block {
     flux: [[0.0; LANES]; 3],
 };
 
-/// Photons and where they are.
+/// Photons with their positions.
 #[derive(Clone, Debug)]
 pub struct PhotonMap {
     radius: f32,
-    /// Cells on a unit of length.
+    /// Number of cells in a unit of length.
     cells: f32,
-    /// Buckets less one; their number is a power of two.
+    /// Number of buckets less one; the number is a power of two.
     mask: u32,
-    /// Where the photons of each bucket start; one more for the end.
+    /// Starts of the photons of each bucket, and one more for the end.
     starts: Vec<u32>,
     count: usize,
     blocks: Vec<Block>,
@@ -62,22 +62,22 @@ pub struct PhotonMap {
     most_depth: u32,
 }
 
-/// Least cosine between the normals of surfaces that a kernel reaches over.
+/// Least cosine between the normals of surfaces that a kernel covers.
 pub(super) const LEAST_COSINE: f32 = 0.7;
 
-/// How far from a tangent plane photons are taken, in radii.
+/// Largest distance of photons from the tangent plane, in radii.
 pub(super) const REACH: f32 = 0.3;
 
-/// The length of a cell in radii: more than that of the box around any kernel, 2·√(1 + REACH²), so that it meets two cells along an
-/// axis at most.
+/// Length of a cell in radii: more than that of the box around any kernel, 2·√(1 + REACH²), so that the kernel overlaps at most two
+/// cells along an axis.
 const CELL: f32 = 2.1;
 
-/// Where photons are asked for, and of which surface.
+/// Query for photons at a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
-    /// A point of it.
+    /// A point of the surface.
     pub point: Vec3,
-    /// The normal of its facet on the side at hand.
+    /// Normal of its facet on the queried side.
     pub normal: Vec3,
     /// Most scatterings of the photons.
     pub most_depth: u32,
@@ -99,14 +99,14 @@ impl Look {
     }
 }
 
-/// Ranges of photons among which those of a kernel are.
+/// Ranges that contain the photons of a kernel.
 struct Ranges {
     of: [[u32; 2]; 8],
     count: usize,
 }
 
 impl Ranges {
-    /// Add one, joined with those that it meets, as columns of other cells may have the same hash.
+    /// Adds a range, joined with those that overlap it, as columns of other cells may have the same hash.
     #[inline(always)]
     fn add(&mut self, mut range: [u32; 2]) {
         if range[0] == range[1] {
@@ -130,7 +130,7 @@ impl Ranges {
 }
 
 impl PhotonMap {
-    /// Of some photons, for a kernel of this radius; those of a cell in the order given.
+    /// A map of photons, for a kernel of this radius; photons of a cell keep the given order.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -184,7 +184,7 @@ impl PhotonMap {
         (0..self.count).map(|number| self.photon(number / LANES, number % LANES))
     }
 
-    /// A photon; its directions as they are kept, to five digits.
+    /// A photon; its directions as they are stored, to five digits.
     #[inline(always)]
     fn photon(&self, block: usize, i: usize) -> Photon {
         let Block { point, normal, direction, flux } = &self.blocks[block];
@@ -197,12 +197,12 @@ impl PhotonMap {
         }
     }
 
-    /// Of how many photons.
+    /// Number of photons.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there is none.
+    /// Whether there are no photons.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
@@ -217,7 +217,7 @@ impl PhotonMap {
         size_of_val(&*self.blocks) + size_of_val(&*self.depths) + size_of_val(&*self.starts)
     }
 
-    /// The sum of what photons around a point bring, W·m⁻², and one of them that two random numbers choose by what it brings.
+    /// The irradiance by photons around a point, W·m⁻², and one of them that two random numbers choose by its contribution.
     #[inline(always)]
     pub fn irradiance(&self, look: &Look, random: [f32; 2], folds: impl Folds) -> (Vec3, Option<Place>) {
         let mut sums = [[0.0; LANES]; 3];
@@ -242,14 +242,14 @@ impl PhotonMap {
         (Vec3::from(sums.map(folded)) * self.peak(), chosen)
     }
 
-    /// Where a photon is.
+    /// Position of a photon, with its normal.
     #[inline(always)]
     fn place(&self, block: usize, i: usize) -> Place {
         let Block { point, normal, .. } = &self.blocks[block];
         Place { point: lane(point, i), normal: packed::unit(normal[i]) }
     }
 
-    /// How many photons are around a point.
+    /// Number of photons around a point.
     #[inline(always)]
     pub fn count_around(&self, look: &Look, folds: impl Folds) -> u32 {
         let mut count = 0;
@@ -263,7 +263,7 @@ impl PhotonMap {
         count
     }
 
-    /// Visit the photons around a point, each with what its flux counts: Epanechnikov's kernel, in m⁻², whose integral over the tangent
+    /// Visits the photons around a point, each with its weight: Epanechnikov's kernel, in m⁻², whose integral over the tangent
     /// plane is 1 (Silverman, *Density Estimation for Statistics and Data Analysis*, 1986).
     #[inline(always)]
     pub fn visit(&self, look: &Look, folds: impl Folds, mut visit: impl FnMut(&Photon, f32)) {
@@ -279,13 +279,13 @@ impl PhotonMap {
         }
     }
 
-    /// The kernel in its middle.
+    /// The kernel's value in its middle.
     #[inline(always)]
     fn peak(&self) -> f32 {
         2.0 / (std::f32::consts::PI * (self.radius * self.radius))
     }
 
-    /// Where photons may be that a kernel reaches.
+    /// Ranges that may contain photons of a kernel.
     #[inline(always)]
     fn ranges(&self, look: &Look) -> Ranges {
         let mut ranges = Ranges { of: [[0; 2]; 8], count: 0 };
@@ -313,7 +313,8 @@ impl PhotonMap {
         ranges
     }
 
-    /// What the photons of a block count that are in a range and in a kernel, by its value in the middle; none where there are none.
+    /// Weights of the photons of a block that are in a range and in a kernel, given its value in the middle. `None` if there are no
+    /// such photons.
     #[inline(always)]
     fn weights(&self, look: &Look, range: [u32; 2], number: usize, folds: impl Folds) -> Option<Lanes> {
         let Look { point, normal, most_depth } = *look;
@@ -346,7 +347,7 @@ impl PhotonMap {
                 & (cosine * cosine > (LEAST_COSINE * LEAST_COSINE) * squared)
                 & (arriving > 0.0);
             near[i] &= if faces { TRUE } else { 0 };
-            // Surface that is inclined has more photons over a part of the plane.
+            // An inclined surface has more photons over a part of the plane.
             weights[i] *= cosine / squared.sqrt();
         }
         if most_depth < self.most_depth {
@@ -363,7 +364,7 @@ impl PhotonMap {
 }
 
 impl Block {
-    /// Put a photon into a lane; its depth.
+    /// Puts a photon into a lane; returns its depth.
     fn put(&mut self, i: usize, photon: &Photon) -> u32 {
         set_lane(&mut self.point, i, photon.point);
         set_lane(&mut self.flux, i, photon.flux);
@@ -404,7 +405,7 @@ fn folded(mut row: Lanes) -> f32 {
 /// The cell of a point.
 #[inline(always)]
 fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
-    // The system's floor is a call; a number that is too large for its cell is in the last one.
+    // The system's floor is a call. A number that is too large for a cell goes into the last one.
     let below = |x: f32| {
         let whole = x as i32;
         whole.wrapping_sub(i32::from(whole as f32 > x))
@@ -412,7 +413,7 @@ fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
     [below(point.x * cells), below(point.y * cells), below(point.z * cells)]
 }
 
-/// The bucket of a cell: those of one column follow each other.
+/// The bucket of a cell; cells of one column are consecutive.
 #[inline(always)]
 fn bucket(x: i32, y: i32, z: i32, mask: u32) -> u32 {
     let hash = (y as u32).wrapping_mul(0x9e37_79b1) ^ (z as u32).wrapping_mul(0x85eb_ca77).rotate_left(16);
@@ -484,7 +485,7 @@ mod tests {
 
     #[test]
     fn the_kernel_sums_to_one_and_leaves_out_what_came_too_late() {
-        // Photons on a fine grid stand for their areas.
+        // Photons on a fine grid represent their areas.
         let step = 0.01_f32;
         let at = |i: i32| (i as f32 + 0.3) * step;
         let place = |i: i32| photon(Vec3::new(at(i % 200 - 100), 0.5, at(i / 200 - 100)), Vec3::Y);

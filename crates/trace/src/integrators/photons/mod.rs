@@ -1,31 +1,32 @@
-//! Photon maps: light that reaches surfaces by mirrors, glass and other surfaces, found by sending it out from the lights
-//! (Jensen, *Global Illumination using Photon Maps*, 1996), in passes whose maps are each right but for the width of a kernel
-//! that shrinks from pass to pass, so that their mean converges (Hachisuka, Ogaki, Jensen, *Progressive Photon Mapping*, 2008; Knaus
-//! and Zwicker, *Progressive Photon Mapping: A Probabilistic Approach*, 2011). Pass i of the photons is sample i of every pixel.
+//! Photon maps: light that reaches surfaces by mirrors, glass and other surfaces, traced from the lights (Jensen, *Global
+//! Illumination using Photon Maps*, 1996). It comes in passes: the maps of each are right but for the width of a kernel that
+//! shrinks from pass to pass, so that their mean converges (Hachisuka, Ogaki, Jensen, *Progressive Photon Mapping*, 2008; Knaus and
+//! Zwicker, *Progressive Photon Mapping: A Probabilistic Approach*, 2011). Pass i of the photons is sample i of every pixel.
 //!
-//! Which estimator carries which paths from lights L by mirrors and glass S and other surfaces D to the eye E; paths from the
-//! eye go on from each D:
+//! Estimators of the paths from lights L by mirrors and glass S and other surfaces D to the eye E; paths from the eye go on
+//! from each D:
 //!
 //! | paths | estimator |
 //! | --- | --- |
 //! | `L S* E` | the path from the eye meets the light |
 //! | `L D … E` | light samples at that D, and the path that meets the light right behind it, weighed against each other |
 //! | `L S+ D S* E` | caustic photons at that D |
-//! | `L S+ D S* D … E`, the second D without a glossy lobe | photons thrown back from a caustic, at the second D |
+//! | `L S+ D S* D … E`, the second D without a glossy lobe | bounced photons, at the second D |
 //! | `L S+ D S* D … E`, the second D with a glossy lobe | caustic photons at the first D |
 //!
-//! So only light that meets mirrors or glass before anything else is sent out. What paths from the eye meet of lights behind
-//! mirrors and glass, after a D, counts nothing. Light that comes from a caustic by one more surface arrives nearly everywhere, from
-//! a small place that paths hardly ever find: hence the photons that are thrown back. Scatterings of the eye's path, the vertex at which photons are
-//! gathered among them, and those of the photon are at most `max_depth` together.
+//! Photons therefore carry only light that meets mirrors or glass before anything else. Lights that a path from the eye hits behind
+//! mirrors and glass, after a D, count nothing. Light from a caustic by one more surface arrives nearly everywhere, from a small
+//! place that paths hardly ever find: hence the bounced photons, which are scattered at the caustic. The scatterings of the eye's
+//! path, with the vertex at which photons are gathered, and those of the photon are at most `max_depth` together.
 //!
-//! Light at a point is what its kernel weighs over the part p of the kernel that receives photons: that on surface with about the point's
-//! normal, to which the way from the point is free. So even light comes out even up to edges, rims and walls. Which estimator tells p:
+//! The light at a point is its kernel's sum, divided by the part p of the kernel that receives photons: surface with about the
+//! point's normal, to which the way from the point is free. Thereby even light stays even up to edges, rims and walls. Estimators
+//! of p:
 //!
 //! | around the kernel | estimator |
 //! | --- | --- |
 //! | flat pieces of its plane, walls at their borders, wide spheres | p in closed form; all of it is reached |
-//! | anything else | one photon of the kernel, chosen by what it brings, tells whether what it holds is reached; trials, places chosen by the kernel, give 1/p |
+//! | anything else | one photon of the kernel, chosen by its contribution, decides whether the kernel's light arrives; trials, at places chosen by the kernel, give 1/p |
 
 mod chosen;
 mod clip;
@@ -58,58 +59,58 @@ pub(super) use map::Look;
 pub use map::{Photon, PhotonMap};
 use shoot::{Shooting, Shots};
 
-/// How photons are sent and gathered.
+/// Settings of photon emission and gathering.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonSettings {
-    /// Photons that a pass sends out.
+    /// Photons emitted in a pass.
     pub count: u32,
-    /// Radius of the first pass's kernels; 0: chosen by how close photons are.
+    /// Radius of the first pass's kernels; 0 to choose it by the density of photons.
     pub radius: f32,
     /// Most scatterings of a photon.
     pub bounces: u32,
 }
 
-/// Photons that are sent out together by one thread.
+/// Photons that one thread emits together.
 const CHUNK: u32 = 2048;
 
-/// α: how many of the photons of a pass the shrinking kernel keeps.
+/// α: fraction of the photons of a pass that the shrinking kernel keeps.
 const KEPT: f64 = 2.0 / 3.0;
 
-/// Photons that the first kernels are to hold, in the middle of the caustic ones and of those thrown back from caustics.
+/// Photons that the first kernels should contain, in the median of the caustic photons and of the bounced ones.
 const WANTED: [f32; 2] = [12.0, 8.0];
 
-/// The part of the photons that are aimed at mirrors and glass, where all of them are in balls, and where some have no bounds.
+/// Fraction of the photons that are aimed at mirrors and glass: if all of these are in balls, and if some have no bounds.
 const AIMED: [f32; 2] = [0.9, 0.5];
 
-/// What all passes of a picture have in common.
+/// Common data of all passes of a picture.
 #[derive(Debug)]
 pub struct Photons {
     settings: PhotonSettings,
     /// Most scatterings of a photon before it is gathered.
     most_depth: u32,
-    /// None where nothing mirrors or refracts light.
+    /// Source of the photons. `None` if nothing mirrors or refracts light.
     emission: Option<PhotonSource>,
     /// The closed shapes of glass that lights may be in.
     glasses: Vec<u32>,
-    /// Of the first pass: of the kernel for caustics, and of that for what is thrown back from them.
+    /// Radii of the first pass: of the kernel for caustic photons, and of that for bounced ones.
     radii: [f32; 2],
 }
 
 /// The photons of a pass.
 #[derive(Debug)]
 pub struct PhotonPass {
-    /// Those that came by mirrors and glass alone.
+    /// Caustic photons, which came by mirrors and glass alone.
     pub caustic: PhotonMap,
-    /// Those that were thrown back from such places and came to others.
+    /// Bounced photons: scattered at a caustic, and arrived elsewhere.
     pub bounced: PhotonMap,
-    /// How many were sent out.
+    /// Number of emitted photons.
     pub emitted: u64,
     /// Texture look-ups.
     pub lookups: u64,
 }
 
 impl PhotonPass {
-    /// How many were stored.
+    /// Number of stored photons.
     pub fn stored(&self) -> u64 {
         (self.caustic.len() + self.bounced.len()) as u64
     }
@@ -130,15 +131,15 @@ pub struct PhotonMaps {
 }
 
 impl PhotonMaps {
-    /// That of a sample, which is one of those that these are of.
+    /// The pass of one of these samples.
     pub fn pass(&self, sample: u32) -> &PhotonPass {
         &self.passes[(sample - self.first) as usize]
     }
 }
 
 impl Photons {
-    /// For a world, and pass 0, by whose photons the radii are chosen; `progress` is told how many of them were sent, and of how
-    /// many.
+    /// Prepares the passes for a world, and traces pass 0, whose photons determine the radii. `progress` gets the number of
+    /// photons so far, and of all.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -149,6 +150,7 @@ impl Photons {
         progress: Progress<'_>,
         token: &CancelToken,
     ) -> Result<(Self, PhotonPass), Cancelled> {
+        // Aim photons at the mirrors and glass.
         let specular = Specular::of(world);
         let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.exists());
         let aimed = AIMED[usize::from(specular.is_unbounded)];
@@ -156,6 +158,7 @@ impl Photons {
         let glasses = glasses_at_lights(world);
         let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
         let mut own = Self { settings: photons, most_depth, emission, glasses, radii: [photons.radius; 2] };
+        // Trace pass 0, and choose the radii by its photons.
         let sent = own.shoot((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
             let kinds = [&sent.caustic, &sent.bounced];
@@ -169,22 +172,22 @@ impl Photons {
         Ok((own, first))
     }
 
-    /// Radii of the first pass's kernels: of that for caustics, and of that for what is thrown back from them.
+    /// Radii of the first pass's kernels: for caustic photons, and for bounced ones.
     pub fn radii(&self) -> [f32; 2] {
         self.radii
     }
 
-    /// Photons that a pass sends out; 0 if none are sent.
+    /// Photons emitted in a pass; 0 if there is no emission.
     pub fn count(&self) -> u64 {
         if self.are_sent() { self.settings.count.into() } else { 0 }
     }
 
-    /// Whether any photons are sent: there are mirrors or glass, and lights that shine on them.
+    /// Whether photons are emitted at all: there are mirrors or glass, and lights that illuminate them.
     pub fn are_sent(&self) -> bool {
         self.emission.is_some() && self.most_depth > 0
     }
 
-    /// A pass. A function of its number, whatever the threads.
+    /// Traces a pass. It depends on its number alone, whatever the threads.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -236,7 +239,7 @@ impl Photons {
         let Some(emission) = self.emission.as_ref().filter(|_| self.are_sent()) else {
             return Ok(Sent::default());
         };
-        // Photons come to the facets, from where they go on in every picture alike.
+        // Photons land on the facets, from which they are scattered in every picture alike.
         let settings =
             RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
         let material = |object| world.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
@@ -278,29 +281,29 @@ impl Photons {
     }
 }
 
-/// What was stored of a pass.
+/// Stored photons of a pass.
 #[derive(Default)]
 struct Sent {
-    /// Those that came by mirrors and glass alone.
+    /// Caustic photons, which came by mirrors and glass alone.
     caustic: Vec<Photon>,
-    /// Those that were thrown back from such places.
+    /// Bounced photons, scattered at a caustic.
     bounced: Vec<Photon>,
     lookups: u64,
 }
 
-/// By how much smaller the radius of a pass is than that of the first: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1).
+/// Radius of a pass relative to that of the first: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1).
 fn shrunk(pass: u32) -> f64 {
     (1..=pass).map(f64::from).map(|i| (i + KEPT) / (i + 1.0)).product::<f64>().sqrt()
 }
 
 /// A radius within which the median photon has so many neighbours; `size` is the radius of a ball around the scene.
 fn radius_to_hold(photons: &[Photon], wanted: f32, size: f32, token: &CancelToken) -> Result<f32, Cancelled> {
-    /// Photons that are looked at, from each of so many of them.
+    /// Most photons that are examined.
     const MOST: usize = 1 << 14;
     const LOOKS: usize = 256;
-    /// Neighbours that are found among them.
+    /// Neighbours that are found among the examined photons.
     const NEAR: f32 = 12.0;
-    /// The largest radius, and that where photons are too few to tell, in radii of the scene.
+    /// Largest radius, and the radius if there are too few photons to decide, in radii of the scene.
     const LARGEST: f32 = 0.05;
     const BY_DEFAULT: f32 = 0.02;
     let step = photons.len().div_ceil(MOST).max(1);
@@ -314,7 +317,7 @@ fn radius_to_hold(photons: &[Photon], wanted: f32, size: f32, token: &CancelToke
     let mut radius = largest.min(0.05 * extent);
     for _ in 0..12 {
         let map = PhotonMap::new(&some, radius, token)?;
-        // Others than itself.
+        // Count others than the photon itself.
         let count = |&Photon { point, normal, .. }: &Photon| {
             map.count_around(&Look { point, normal, most_depth: u32::MAX }, PlainFolds).saturating_sub(1)
         };
@@ -341,7 +344,7 @@ fn glasses_at_lights(world: &World) -> Vec<u32> {
     world.closed_glasses().map(|(object, _)| object).filter(may_hold_light).collect()
 }
 
-/// A box around a light; none where it is beyond the scene.
+/// A box around a light. `None` if the light is beyond the scene.
 fn place(of: LightBounds) -> Option<Aabb> {
     let LightBounds { space, center, radius, .. } = of;
     match space {
@@ -352,7 +355,7 @@ fn place(of: LightBounds) -> Option<Aabb> {
 
 /// Mirrors and glass.
 struct Specular {
-    /// Around those that have bounds.
+    /// Balls around those that have bounds.
     balls: Vec<Ball>,
     /// Whether others exist.
     is_unbounded: bool,
@@ -412,7 +415,7 @@ mod tests {
         assert_eq!(radius(10, 1.0), 0.05);
         assert!((radius(10, 100.0) / 0.195 - 1.0).abs() < 0.2, "{}", radius(10, 100.0));
         assert!((radius(100, 1.0) / 0.0195 - 1.0).abs() < 0.2, "{}", radius(100, 1.0));
-        // Too few to tell.
+        // There are too few photons to decide.
         assert_eq!(radius(3, 1.0), 0.02);
     }
 }

@@ -10,7 +10,7 @@ pub type Packed = [u32; LANES];
 /// Half of the side of the square.
 const SIDE: f32 = 32767.0;
 
-/// The nearest that 32 bits tell, but for their last ones.
+/// The nearest direction of 32 bits, but for its last bits.
 pub fn pack(direction: Vec3) -> u32 {
     let Vec3 { x, y, z } = direction * (SIDE / (direction.x.abs() + direction.y.abs() + direction.z.abs()));
     let (u, v) = if z < 0.0 { ((SIDE - y.abs()).copysign(x), (SIDE - x.abs()).copysign(y)) } else { (x, y) };
@@ -25,7 +25,7 @@ pub fn unit(packed: u32) -> Vec3 {
     Vec3::new(x, y, z).normalize()
 }
 
-/// Vectors of these directions; their lengths are between SIDE/√3 and SIDE.
+/// Vectors in these directions; their lengths are between SIDE/√3 and SIDE.
 #[inline(always)]
 pub fn lanes(packed: &Packed) -> Lanes3 {
     let mut vectors = [[0.0; LANES]; 3];

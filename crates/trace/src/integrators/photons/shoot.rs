@@ -1,9 +1,8 @@
-//! Photons on their way: from the lights over mirrors and glass to the first other surface, and thrown back from there to the next
-//! one, round by round, sixteen at a time, by the surfaces, media and lobes that paths from the eye meet.
+//! Photon tracing: from the lights over mirrors and glass to the first other surface, and from there to the next one, round by
+//! round, sixteen at a time, by the surfaces, media and lobes that camera paths meet.
 //!
-//! What is carried is basic flux, Φ/n². At a surface whose shading normal Nₛ is not that of its facet N₉ what goes on from there is
-//! what the adjoint of its BSDF says: f·|wi·Nₛ|·|wo·N₉|/|wi·N₉| (Veach, *Robust Monte Carlo Methods for Light Transport Simulation*,
-//! 1997, section 5.3).
+//! Photons carry basic flux, Φ/n². At a surface whose shading normal Nₛ is not that of its facet N₉, scattering follows the adjoint
+//! of its BSDF: f·|wi·Nₛ|·|wo·N₉|/|wi·N₉| (Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 5.3).
 
 use super::super::cone::Cone;
 use super::super::crossing::{Crossing, CrossingMemory};
@@ -30,21 +29,21 @@ use crate::math::lanes::{Folds, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
 use crate::world::{Hit, Loops, World};
 
-/// Surfaces where the glass stays the same that a photon passes at once.
+/// Most surfaces without a change of glass that a photon passes at once.
 const MOST_HIDDEN: usize = 64;
 
-/// Directions that differ by no more than rounding, squared.
+/// Squared difference of directions that are equal within rounding.
 const SAME: f32 = 1e-8;
 
-/// What all photons of a part of a pass have in common.
+/// Common data of all photons of a part of a pass.
 pub struct Shooting<'a> {
     /// The world, and the numbers of the photons as the samples of a single pixel; their slots count from 0.
     pub shot: &'a Shot<'a>,
-    /// What the lights send.
+    /// Emission of the lights.
     pub emission: &'a PhotonSource,
     /// The closed shapes of glass that lights may be in, with their materials.
     pub glasses: &'a [Inside],
-    /// One over the number of photons.
+    /// Inverse of the number of photons.
     pub share: f32,
     /// Most scatterings of a photon.
     pub most_depth: u32,
@@ -53,16 +52,16 @@ pub struct Shooting<'a> {
 /// Photons of one part of a pass.
 #[derive(Default)]
 pub struct Shots {
-    /// Those that came by mirrors and glass alone, in the order of their numbers within each round.
+    /// Caustic photons, which came by mirrors and glass alone, in the order of their numbers within each round.
     pub caustic: Vec<Photon>,
-    /// Those that were thrown back from such places, likewise.
+    /// Bounced photons, scattered at a caustic, in the same order.
     pub bounced: Vec<Photon>,
     /// Texture look-ups.
     pub lookups: u64,
 }
 
 impl Shooting<'_> {
-    /// Send the photons.
+    /// Traces the photons.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -79,6 +78,7 @@ impl Shooting<'_> {
             shots: Shots::default(),
             counters: RayCounters::default(),
         };
+        // Emit the photons, then trace them round by round.
         let mut rays = Vec::new();
         flight.start(count, &mut rays);
         let (mut row, mut surfaces) = (LitRow::EMPTY, SurfaceRow::EMPTY);
@@ -87,6 +87,7 @@ impl Shooting<'_> {
                 self.shot.token.check()?;
                 flight.meet(packet, &mut row, &mut surfaces);
             }
+            // Scatter the single vertices, and apply Russian roulette.
             flight.scatter_open();
             flight.media.truncate(1);
             flight.spare();
@@ -98,8 +99,8 @@ impl Shooting<'_> {
         Ok(flight.shots)
     }
 
-    /// The ray of a photon from beyond all that has bounds, started where it meets the planes of glass that are on the way there; none
-    /// where something opaque is.
+    /// The ray of a photon from beyond all finite objects, started at its hit on planes of glass on the way there. `None` if
+    /// something opaque is there.
     fn past_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.shot.world;
         let mut start = ray.origin;
@@ -128,12 +129,12 @@ struct Flight<'a> {
     shooting: &'a Shooting<'a>,
     /// Scatterings so far.
     depth: u32,
-    /// What each had in its largest part when it started, by slot.
+    /// Largest component of each photon at its start, by slot.
     references: Vec<f32>,
     next: Vec<PathRay>,
-    /// Takes single vertices.
+    /// Row for single vertices.
     open: LitRow,
-    /// What they are in; the first is none.
+    /// Media of the photons; the first entry is air.
     media: Vec<Medium>,
     crossing: CrossingMemory,
     shots: Shots,
@@ -141,7 +142,7 @@ struct Flight<'a> {
 }
 
 impl Flight<'_> {
-    /// Photons at the lights.
+    /// Emits photons at the lights.
     fn start(&mut self, count: u32, rays: &mut Vec<PathRay>) {
         let shooting = self.shooting;
         let shot = shooting.shot;
@@ -149,6 +150,7 @@ impl Flight<'_> {
         for begin in (0..count).step_by(PACKET) {
             let numbers = shot.world.geometry.instructions().run(Drawing { shot, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
+                // Emit a photon, and start it behind planes of glass on its way.
                 let Some(emitted) = shooting.emission.emit(numbers) else { continue };
                 let past_planes = is_beyond(&emitted) && has_planes;
                 let ray = emitted.ray();
@@ -176,12 +178,12 @@ impl Flight<'_> {
         self.depth < self.shooting.most_depth
     }
 
-    /// What each photon of a packet meets.
+    /// Traces each photon of a packet to its hit.
     fn meet(&mut self, rays: &[PathRay], row: &mut LitRow, surfaces: &mut SurfaceRow) {
         let shot = self.shooting.shot;
         let met = shot.meet(Rays::Paths(rays, 0), Measure::ALL, true, (row, surfaces));
         self.counters.texture_lookups += met.lookups;
-        // What comes straight is found by light samples.
+        // Light samples find direct light.
         if self.depth > 0 {
             for i in lanes(row.used) {
                 let (point, normal) = row.place_of(i);
@@ -194,6 +196,7 @@ impl Flight<'_> {
             }
             self.scatter(row);
         }
+        // Shade other surfaces one by one.
         for i in lanes(met.any & !met.plain) {
             if let Some(hit) = met.hit(i) {
                 self.shade(rays[i], hit, met.surface(surfaces, i));
@@ -201,7 +204,7 @@ impl Flight<'_> {
         }
     }
 
-    /// Keep a photon where it arrives.
+    /// Stores a photon where it arrives.
     fn store(&mut self, path: &PathRay, point: Vec3, normal: Vec3) {
         let (direction, flux) = (-path.ray.direction, path.throughput);
         let photon = Photon { point, direction, flux, normal, depth: self.depth };
@@ -209,8 +212,8 @@ impl Flight<'_> {
         kept.push(photon);
     }
 
-    /// What a photon does at the first thing that is no mere change between parts of one glass. `surface` is that of the hit, if it
-    /// is known.
+    /// Shades the first surface that is more than a change between parts of one glass. `surface` is that of the hit, if it is
+    /// known.
     fn shade(&mut self, mut path: PathRay, mut hit: Hit, mut surface: Option<SurfacePoint>) {
         let shot = self.shooting.shot;
         let mut lacks_photons = self.depth == 0;
@@ -232,9 +235,11 @@ impl Flight<'_> {
                 let vertex = Vertex::touching(shot, &path, (sides, &touching), hit.shape.t);
                 return self.shade_surface(&path, &vertex, lacks_photons);
             }
+            // Reflect or refract at a change of glass.
             if near.glass() != far.glass() {
                 return self.shade_glass(&path, &vertex.between(sides), far);
             }
+            // Pass on, as nothing changes here.
             (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
             lacks_photons = false;
             match shot.world.geometry.closest(&path.ray) {
@@ -247,7 +252,7 @@ impl Flight<'_> {
     fn shade_surface(&mut self, path: &PathRay, vertex: &Vertex<'_>, lacks_photons: bool) {
         let shot = self.shooting.shot;
         match &vertex.material.bsdf {
-            // What comes straight is found by light samples.
+            // Light samples find direct light.
             Bsdf::Phong(_) if lacks_photons => {}
             Bsdf::Phong(phong) => {
                 let bsdf = phong.at(&vertex.texture_point, &mut self.counters.texture_lookups);
@@ -304,14 +309,14 @@ impl Flight<'_> {
         }
     }
 
-    /// The adjoint of a δ lobe about a shading normal: see the top of this file. `eta` is by how much the index of refraction is
-    /// higher where the ray goes.
+    /// Adds a photon after the adjoint of a δ lobe about a shading normal: see the top of this file. `eta` is the ratio of the
+    /// index of refraction ahead of the ray to that behind it.
     fn push(&mut self, path: &PathRay, vertex: &Vertex<'_>, (shading, eta): (Vec3, f32), mut ray: PathRay) {
         let facet = vertex.normal;
         if shading != facet {
             let (wi, wo) = (vertex.to_eye, ray.ray.direction);
             let along = |direction: Vec3| direction - shading * direction.dot(shading);
-            // Else the facet's own normal took the place of the other.
+            // Otherwise the facet's own normal replaced the shading normal.
             if (along(wi) + along(wo) * eta).length_squared() < SAME {
                 let (over, under) = (wi.dot(shading) * wo.dot(facet), wi.dot(facet) * wo.dot(shading));
                 ray.throughput *= if under == 0.0 { 0.0 } else { (over / under).abs() };
@@ -321,7 +326,7 @@ impl Flight<'_> {
         self.next.push(ray);
     }
 
-    /// Send photons on from the single vertices.
+    /// Scatters photons at the single vertices.
     fn scatter_open(&mut self) {
         let mut open = std::mem::replace(&mut self.open, LitRow::EMPTY);
         self.scatter(&mut open);
@@ -329,7 +334,7 @@ impl Flight<'_> {
         self.open = open;
     }
 
-    /// Send photons on from the vertices of a row: directions are drawn by the cosine with the facet, which is that of the adjoint.
+    /// Scatters photons at the vertices of a row: directions are drawn by the cosine with the facet, as the adjoint has it.
     fn scatter(&mut self, row: &mut LitRow) {
         if !self.goes_on() || row.used == 0 {
             return;
@@ -344,7 +349,7 @@ impl Flight<'_> {
         Scattering { shot: self.shooting.shot, row, used, onward }.scatter(&self.media, &[], &mut self.next);
     }
 
-    /// Roulette by flux: what is left has about the flux that it started with.
+    /// Russian roulette by flux: survivors have about the flux that they started with.
     fn spare(&mut self) {
         let shot = self.shooting.shot;
         let mut kept = 0;
@@ -370,7 +375,7 @@ impl Flight<'_> {
     }
 }
 
-/// The largest part of the flux of a photon, in W: glass with a higher index of refraction changes what is carried, not that.
+/// The largest component of the flux of a photon, in W: a medium of higher index changes the basic flux, but not this.
 fn flux(world: &World, path: &PathRay) -> f32 {
     let index = ior(world, path.medium);
     path.throughput.max_element() * index * index
@@ -383,7 +388,7 @@ fn is_beyond(emitted: &Emitted) -> bool {
     }
 }
 
-/// The numbers that photons start by.
+/// The random numbers of photon emission.
 struct Drawing<'a> {
     shot: &'a Shot<'a>,
     first: u32,
@@ -409,7 +414,7 @@ impl Loops for Drawing<'_> {
     }
 }
 
-/// The numbers that say whether rays go on.
+/// The random numbers of Russian roulette.
 struct Risking<'a> {
     shot: &'a Shot<'a>,
     rays: &'a [PathRay],

@@ -1,4 +1,4 @@
-//! Unbiased estimate of one over the part of a kernel that receives photons, by trials.
+//! Unbiased estimate, by trials, of the inverse of the part of a kernel that receives photons.
 
 use super::chosen::{Place, is_apart};
 use super::clip::{Clip, material, receives};
@@ -11,17 +11,17 @@ use crate::math::{Vec2, Vec3};
 use crate::sampling::warp;
 use crate::world::World;
 
-/// Trials that succeed before the last.
+/// Number of successes that end the trials.
 const SUCCESSES: u32 = 4;
 
-/// Most trials: where less than a tenth of a kernel receives photons, a part of its light that is no more than (1 − p)⁶⁵ is lost.
+/// Most trials: if less than a tenth of a kernel receives photons, a part of its light of at most (1 − p)⁶⁵ is lost.
 const MOST: u32 = 64;
 
-/// Surfaces above each other that are looked at below a place in a kernel.
+/// Most surfaces above each other that are examined below a place in a kernel.
 const LAYERS: usize = 8;
 
-/// A number whose mean is one over the part of the kernel that receives photons, by trials at places that pairs of random numbers
-/// choose, which are independent of each other.
+/// A number whose mean is the inverse of the part of the kernel that receives photons, by trials at places that pairs of
+/// independent random numbers choose.
 #[inline(never)]
 pub fn inverse_part(
     world: &World,
@@ -42,14 +42,16 @@ pub fn inverse_part(
     }
 }
 
-/// One where the first trial succeeds, with the chance p, and else 1 + 1/p in the mean: p + (1 − p)·(1 + 1/p) = 1/p.
+/// One if the first trial succeeds, with the probability p, and otherwise 1 + 1/p in the mean:
+/// p + (1 − p)·(1 + 1/p) = 1/p.
 fn after_first(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     if succeeds(0) { 1.0 } else { 1.0 + mean_trials(|number| succeeds(number + 1)) }
 }
 
-/// Trials for each that succeeds, until some did: 1/p in the mean. Where the trials end before, they are taken to be one more, and so are
-/// those that succeed: the mean is (1 − (1 − p)^(MOST + 1))/p over both ends together, as Σ C(n, m)·pᵐ(1 − p)ⁿ⁻ᵐ over the first and
-/// Σ C(MOST + 1, s + 1)·pˢ(1 − p)^(MOST − s) over the second are the chances of more than, and of 1 to m, that succeed of MOST + 1, over p.
+/// Mean number of trials for each success, until some trials succeeded: 1/p in the mean. If the trials end before, the number of
+/// trials and that of successes each count as one more. The mean is (1 − (1 − p)^(MOST + 1))/p over both ends together: the sums Σ
+/// C(n, m)·pᵐ(1 − p)ⁿ⁻ᵐ over the first and Σ C(MOST + 1, s + 1)·pˢ(1 − p)^(MOST − s) over the second are the probabilities of more
+/// than m, and of 1 to m, successes in MOST + 1 trials, over p, with m = SUCCESSES.
 fn mean_trials(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     let mut successes = 0;
     for number in 0..MOST {
@@ -61,7 +63,7 @@ fn mean_trials(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     (MOST + 1) as f32 / (successes + 1) as f32
 }
 
-/// Whether a place in the tangent plane has surface above or below it that photons of the kernel may be on, and nothing stands between.
+/// Whether a place in the tangent plane has a surface above or below it that may hold photons of the kernel, with nothing between.
 fn is_reached(world: &World, look: &Look, place: Vec3, radius: f32) -> bool {
     let above = REACH * radius * look.normal;
     let end = place - above;

@@ -1,4 +1,4 @@
-//! Which open rims of glass end at something opaque: there no light comes to the other side of the glass but through it.
+//! Open rims of glass that end at something opaque: there, light reaches the other side only through the glass.
 
 use super::pieces::{MeshGlass, Pieces, Rim, glass_of};
 use crate::assets::LoadedMesh;
@@ -8,14 +8,14 @@ use crate::math::DVec3;
 use crate::math::transform::Transform;
 use crate::scene::description::{Lowered, Scene};
 
-/// Most rims that are looked at.
+/// Most rims that are examined.
 const MOST_RIMS: usize = 64;
 
-/// How far beyond a rim a surface is looked for, as a part of the way to it.
+/// Distance beyond a rim within which a surface is searched, relative to the length of the way to the rim.
 const REACH: f64 = 1e-3;
 
-/// The part of some rims, by length, that opaque surfaces cover: they are met on the way from the triangle of the rim, or from the
-/// middle of all rims, to a little beyond the rim.
+/// The part of some rims, by length, that opaque surfaces cover. A way to a rim, from its triangle or from the middle of all rims,
+/// hits such a surface at the rim or a little beyond.
 pub(super) fn covered(
     scene: &Scene,
     meshes: &[&LoadedMesh],
@@ -45,7 +45,7 @@ pub(super) fn covered(
     Ok(own.map(|(rim, _)| length(rim)).sum::<f64>() / total)
 }
 
-/// Whether each of some ways meets anything opaque.
+/// Whether each of these ways hits anything opaque.
 fn met(
     scene: &Scene,
     meshes: &[&LoadedMesh],
@@ -88,7 +88,7 @@ fn met(
     Ok(met)
 }
 
-/// Whether a way meets a triangle (Möller and Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, 1997).
+/// Whether a way hits a triangle (Möller and Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, 1997).
 fn crosses(way: &RayF64, [a, b, c]: [DVec3; 3]) -> bool {
     let (ab, ac) = (b - a, c - a);
     let p = way.direction.cross(ac);

@@ -1,4 +1,4 @@
-//! Which surfaces of glass are one body.
+//! Bodies of glass: which surfaces belong together.
 //!
 //! A ray that goes into glass by one object and out by another is told by both that it was in the same thing only if they are one
 //! body. Objects of glass that enclose nothing by themselves (meshes, quads, triangles, disks, tubes) are one where they close each
@@ -7,8 +7,8 @@
 //! in. A piece whose front looks the other way than its neighbours' is turned, and so is a body whose front looks
 //! inwards. A body has the place of its last object in the order of the file.
 //!
-//! A body with a hole is open, unless something opaque is all around the hole. No ray can know whether it is in such glass: what is
-//! told by its surface holds on the ray that comes there or leaves from there, and no further (`integrators::crossing`).
+//! A body with a hole is open, unless something opaque surrounds the hole. No ray can know whether it is inside such glass: its
+//! surface only determines the medium of a ray that arrives or leaves there (`integrators::crossing`).
 
 mod cover;
 mod pieces;
@@ -24,10 +24,10 @@ use crate::control::{CancelToken, Cancelled};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 
-/// The part of its surface that a body may lack and is still told about as if it were whole.
+/// Largest missing part of a body's surface for which it is reported as if it were whole.
 const SMALL_HOLE: f64 = 1e-3;
 
-/// The part of its surface below which a hole is rounding.
+/// Missing part of a body's surface below which a hole is rounding.
 const NO_HOLE: f64 = 1e-7;
 
 /// The volume of a body below which it encloses nothing, by that of a cube of about its surface.
@@ -39,7 +39,7 @@ const COVERED: f64 = 0.95;
 /// The bodies of a scene's glass.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bodies {
-    /// One for each object; empty where each is a body of its own and none is open.
+    /// One entry for each object; empty if each is a body of its own and none is open.
     parts: Vec<Part>,
     /// The pieces that stay open.
     open: Vec<OpenGlass>,
@@ -47,7 +47,7 @@ pub struct Bodies {
     flat: Vec<u32>,
 }
 
-/// What an object is of a body.
+/// An object's role in a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Part {
     place: u32,
@@ -60,18 +60,18 @@ struct Part {
 pub struct OpenGlass {
     /// The object.
     pub object: u32,
-    /// Edges of it that nothing closes.
+    /// Number of its edges that nothing closes.
     pub edges: usize,
-    /// The part of the body's surface that is missing; at most 1 is sensible, more is possible.
+    /// The missing part of the body's surface; up to 1 is sensible, more is possible.
     pub missing: f64,
-    /// Whether its edges have neighbours, but with the front on the other side.
+    /// Whether its edges have neighbours whose front is on the other side.
     pub disagrees: bool,
-    /// Whether opaque surfaces are around the hole.
+    /// Whether opaque surfaces surround the hole.
     pub is_covered: bool,
 }
 
 impl Bodies {
-    /// The bodies of a scene, whose mesh files are these.
+    /// Finds the bodies of a scene with these mesh files.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -82,7 +82,7 @@ impl Bodies {
         }
         let mut seams = Seams::between(&pieces.list, &pieces.rims, token)?;
         let groups = Groups::of(&pieces, &seams);
-        // Where pieces do not agree with the rest of their border, nothing closes them.
+        // Pieces that disagree with the rest of their border are not closed by it.
         let is_odd = |seam: &&Seam| groups.disagree(seam.pieces()) != seam.disagrees;
         let odd: Vec<OpenRim> = seams.joined.iter().filter(is_odd).flat_map(|seam| seam.rims).collect();
         seams.open.extend(odd);
@@ -145,11 +145,11 @@ impl Bodies {
     }
 }
 
-/// Pieces that are joined.
+/// Joined pieces.
 struct Groups {
-    /// Of each piece, the first of its body.
+    /// First piece of each piece's body.
     roots: Vec<u32>,
-    /// Of each piece, whether its front looks the other way than that of the first.
+    /// Whether each piece's front faces the other way than that of the first.
     flips: Vec<bool>,
 }
 
@@ -174,7 +174,7 @@ impl Groups {
             neighbours[one as usize].push((other, agreed < 0.0));
             neighbours[other as usize].push((one, agreed < 0.0));
         }
-        // Tell each front from that of a neighbour, from the first piece on.
+        // Derive each front from that of a neighbour, from the first piece on.
         let mut flips = vec![None; roots.len()];
         for first in 0..roots.len() {
             if flips[first].is_some() {
@@ -195,7 +195,7 @@ impl Groups {
         Self { roots, flips: flips.into_iter().map(Option::unwrap_or_default).collect() }
     }
 
-    /// Whether the fronts of two pieces of one body look different ways.
+    /// Whether the fronts of two pieces of one body face different ways.
     fn disagree(&self, [one, other]: [u32; 2]) -> bool {
         self.flips[one as usize] != self.flips[other as usize]
     }
@@ -221,8 +221,8 @@ impl Groups {
         members
     }
 
-    /// Whether the front of a body's first piece is on the inside: of a closed body by its volume, of an open one by what most of its
-    /// surface says.
+    /// Whether the front of a body's first piece is on the inside: for a closed body by its volume, for an open one by most of its
+    /// surface.
     fn turns(&self, pieces: &Pieces, members: &[u32], is_closed: bool) -> bool {
         let own = members.iter().map(|&piece| (&pieces.list[piece as usize], self.flips[piece as usize]));
         let sign = |is_flipped: bool| if is_flipped { -1.0 } else { 1.0 };
@@ -236,10 +236,10 @@ impl Groups {
     }
 }
 
-/// What a body lacks.
+/// Missing part of a body.
 struct Hole {
     rims: Vec<Rim>,
-    /// Of each rim, whether another one of its body lies on it that goes the same way.
+    /// Whether each rim has another rim of its body on it, in the same direction.
     disagree: Vec<bool>,
     /// The missing part of the surface.
     part: f64,
@@ -252,7 +252,7 @@ impl Hole {
         if own.is_empty() {
             return Self { rims: Vec::new(), disagree: Vec::new(), part: 0.0 };
         }
-        // The way around each hole, which has the body on the left.
+        // Go around each hole with the body on the left.
         for (rim, sites) in own.iter_mut().filter(|(rim, _)| groups.flips[rim.piece as usize]) {
             rim.ends.reverse();
             sites.reverse();
@@ -262,7 +262,7 @@ impl Hole {
         let disagree =
             own.chunk_by(|a, b| key(a.1) == key(b.1)).flat_map(|same| vec![same.len() > 1; same.len()]);
         let disagree = disagree.collect();
-        // Join rims with a place in common: twice the area that each way around spans is the sum of p × q.
+        // Join rims with a place in common: twice the area that each loop spans is the sum of p × q.
         let mut sites: Vec<u32> = own.iter().flat_map(|&(_, sites)| sites).collect();
         sites.sort_unstable();
         sites.dedup();
@@ -283,7 +283,7 @@ impl Hole {
         Self { rims: own.into_iter().map(|(rim, _)| rim).collect(), disagree, part: missing / area }
     }
 
-    /// What is said about a piece; `None` if it has no part in a hole that is more than rounding.
+    /// Report on a piece. `None` if it has no part in a hole that is more than rounding.
     fn at(&self, piece: u32, object: u32, is_covered: bool) -> Option<OpenGlass> {
         let own = || self.rims.iter().zip(&self.disagree).filter(|(rim, _)| rim.piece == piece);
         let edges = own().count();

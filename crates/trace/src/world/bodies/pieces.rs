@@ -1,4 +1,4 @@
-//! The pieces that glass is made of: objects that enclose nothing by themselves, with the rims that nothing of theirs closes.
+//! The pieces of glass: objects that enclose nothing by themselves, with the rims that their own surface does not close.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use crate::math::DVec3;
 use crate::math::transform::Transform;
 use crate::scene::description::{MaterialKind, Mesh, Object, Scene, Shape};
 
-/// Chords that stand for a circular rim: the same points for every rim on one circle.
+/// Number of chords of a circular rim: they are the same points for every rim on one circle.
 const CHORDS: usize = 32;
 
 /// Relative rounding of the coordinates in a file: single precision, or six digits.
@@ -25,7 +25,7 @@ pub(super) struct Piece {
     pub area: f64,
     /// Integral of x·n/3 over it: the volume, if it is closed and its front looks outwards.
     pub volume: f64,
-    /// What its points may be off.
+    /// Tolerance of its points.
     pub tolerance: f64,
     /// What it is made of.
     pub substance: Substance,
@@ -39,7 +39,7 @@ pub(super) type Substance = Option<[u64; 4]>;
 pub(super) struct Rim {
     /// The piece, by its place in the list.
     pub piece: u32,
-    /// From here to there.
+    /// Start and end.
     pub ends: [DVec3; 2],
     /// A point of the surface beside it.
     pub inner: DVec3,
@@ -50,12 +50,12 @@ pub(super) struct Rim {
 pub(super) struct Pieces {
     pub list: Vec<Piece>,
     pub rims: Vec<Rim>,
-    /// Where the coordinates start.
+    /// Origin of the coordinates.
     pub origin: DVec3,
 }
 
 impl Pieces {
-    /// The pieces of a scene, whose mesh files are these.
+    /// Finds the pieces of a scene with these mesh files.
     pub fn of(scene: &Scene, meshes: &[&LoadedMesh], token: &CancelToken) -> Result<Self, Cancelled> {
         let mut pieces = Self::default();
         let mut open_of_file: HashMap<usize, Vec<[u32; 2]>> = HashMap::new();
@@ -118,7 +118,7 @@ impl Pieces {
         self.list.len() as u32 - 1
     }
 
-    /// A flat shape by its corners, counter-clockwise as seen from the front.
+    /// Adds a flat shape by its corners, counter-clockwise as seen from the front.
     fn add_polygon(&mut self, object: u32, corners: &[DVec3]) {
         let own: Vec<DVec3> = corners.iter().map(|&corner| corner - self.origin).collect();
         let halves = (1..own.len() - 1).map(|i| (own[i] - own[0]).cross(own[i + 1] - own[0]) * 0.5);
@@ -131,10 +131,10 @@ impl Pieces {
         }
     }
 
-    /// A circular rim of the last piece, counter-clockwise about a unit axis.
+    /// Adds a circular rim of the last piece, counter-clockwise about a unit axis.
     fn add_circle(&mut self, center: DVec3, axis: DVec3, radius: f64, inner: DVec3) {
         let piece = self.list.len() as u32 - 1;
-        // Rims on one circle have the same points, whatever way they go round.
+        // Rims on one circle have the same points, whatever their direction.
         let lead = axis.to_array().into_iter().find(|part| part.abs() > 1e-9).unwrap_or(1.0);
         let up = if lead < 0.0 { -axis } else { axis };
         let away = if up.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
@@ -219,16 +219,16 @@ fn start(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
     }
 }
 
-/// Which triangles of a mesh are of glass.
+/// Triangles of a mesh that are glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MeshGlass {
-    /// All, or it is no mesh.
+    /// All triangles, or the object is not a mesh.
     All,
-    /// Those that the file's own materials say.
+    /// The triangles whose material in the file is glass.
     Some,
 }
 
-/// The part of an object that is of glass. `None` if it has none.
+/// The part of an object that is glass. `None` if no part is.
 pub(super) fn glass_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Option<MeshGlass> {
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.is_glass().then_some(MeshGlass::All),
@@ -261,7 +261,7 @@ fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     if open.is_empty() {
         return open;
     }
-    // Along a seam of a texture the same place is there twice.
+    // Along a seam of a texture the same place occurs twice.
     let bits = |vertex: u32| mesh.positions[vertex as usize].to_array().map(|part| (part + 0.0).to_bits());
     let mut order: Vec<u32> =
         open.iter().flat_map(|&[triangle, _]| mesh.triangles[triangle as usize]).collect();
@@ -281,7 +281,7 @@ fn open_edges(mesh: &TriangleMesh) -> Vec<[u32; 2]> {
     unmatched(mesh, open.into_iter(), |vertex| first.get(&vertex).copied().unwrap_or(vertex))
 }
 
-/// Edges that no other one of them closes; `place` tells vertices at one place by one of them.
+/// Edges that no other one of them closes; `place` maps vertices at one place to one of them.
 fn unmatched(
     mesh: &TriangleMesh,
     edges: impl Iterator<Item = [u32; 2]> + Clone,
@@ -309,7 +309,7 @@ fn unmatched(
         sorted[*place as usize] = (a.max(b), a > b, edge);
         *place += 1;
     }
-    // Of those with the same ends, as many close each other as go both ways.
+    // Of edges with the same ends, as many close each other as go both ways.
     let mut open = Vec::new();
     for range in starts.windows(2).filter(|range| range[0] < range[1]) {
         let own = &mut sorted[range[0] as usize..range[1] as usize];

@@ -6,7 +6,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::math::DVec3;
 
-/// Angles in radians by which surfaces at one edge are told apart.
+/// Angle in radians within which surfaces at one edge lie on each other.
 const SAME_ANGLE: f64 = 1e-3;
 
 /// A rim with the places of its ends.
@@ -17,11 +17,11 @@ pub(super) type OpenRim = (Rim, [u32; 2]);
 pub(super) struct Seam {
     /// The rims, with the places of their ends.
     pub rims: [OpenRim; 2],
-    /// Whether the front of one is on the side of the back of the other.
+    /// Whether their fronts are on opposite sides.
     pub disagrees: bool,
 }
 
-/// Rims that are joined, and those that are not.
+/// Joined rims, and rims that nothing closes.
 #[derive(Debug, Default)]
 pub(super) struct Seams {
     pub joined: Vec<Seam>,
@@ -55,7 +55,7 @@ impl Seam {
 }
 
 impl Seams {
-    /// Join rims. Of more than two along one edge those close each other that have nothing between their backs.
+    /// Joins rims. Of more than two along one edge, those close each other that have nothing between their backs.
     pub fn between(pieces: &[Piece], rims: &[Rim], token: &CancelToken) -> Result<Self, Cancelled> {
         let mut seams = Self::default();
         let sites = Sites::of(pieces, rims, token)?;
@@ -63,7 +63,7 @@ impl Seams {
         let halves = rims.iter().enumerate().map(|(i, rim)| (*rim, sites.of_rim(i)));
         let open = seams.join(pieces, halves.collect());
         token.check()?;
-        // Cut what is left where it meets the ends of others, and join the parts.
+        // Cut the rest at the ends of others, and join the parts.
         let parts = sites.cut(pieces, &open, token)?;
         seams.open = seams.join(pieces, parts);
         Ok(seams)
@@ -103,8 +103,8 @@ impl Seams {
     }
 }
 
-/// Pairs of rims along one edge that have a body between them: around the edge, one whose back looks ahead and next after it one
-/// whose back looks behind.
+/// Pairs of rims along one edge with a body between them: around the edge, one whose back faces ahead, and next after it one
+/// whose back faces behind.
 fn around(same: &[Half]) -> impl Iterator<Item = [usize; 2]> {
     let ends = |half: &Half| if half.is_back { [half.rim.ends[1], half.rim.ends[0]] } else { half.rim.ends };
     let [from, to] = ends(&same[0]);
@@ -119,12 +119,12 @@ fn around(same: &[Half]) -> impl Iterator<Item = [usize; 2]> {
         let inner = beside(half);
         let angle = libm::atan2(inner.dot(second), inner.dot(first));
         let angle = if angle < 0.0 { angle + std::f64::consts::TAU } else { angle };
-        // The cut of the circle is not between surfaces that lie on each other.
+        // The start of the circle of angles must not be between surfaces that lie on each other.
         if angle > std::f64::consts::TAU - SAME_ANGLE { 0.0 } else { angle }
     };
     let mut order: Vec<(f64, usize)> = same.iter().enumerate().map(|(i, half)| (angle(half), i)).collect();
     order.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
-    // Where surfaces lie on each other, one body ends before the next begins.
+    // If surfaces lie on each other, one body ends before the next begins.
     for together in order.chunk_by_mut(|one, other| other.0 - one.0 < SAME_ANGLE) {
         together.sort_by_key(|&(_, i)| (same[i].is_back, i));
     }
@@ -135,7 +135,7 @@ fn around(same: &[Half]) -> impl Iterator<Item = [usize; 2]> {
         .filter(move |&[begin, end]| is_back[begin] && !is_back[end])
 }
 
-/// The places where rims end: ends that are the same but for rounding are one.
+/// The places at which rims end: ends that are equal within rounding are one place.
 struct Sites {
     points: Vec<DVec3>,
     tolerances: Vec<f64>,
@@ -187,7 +187,7 @@ impl Sites {
         self.ends[rim]
     }
 
-    /// Rims, cut at the ends of others that lie on them.
+    /// Cuts rims at the ends of others that lie on them.
     fn cut(
         &self,
         pieces: &[Piece],
@@ -238,7 +238,7 @@ fn around_point(point: DVec3, tolerance: f64) -> Aabb {
     Aabb::around_f64([point - tolerance, point + tolerance])
 }
 
-/// The lowest of what is one.
+/// The lowest number of a set of joined items.
 pub(super) fn root(same: &mut [u32], of: u32) -> u32 {
     let mut at = of;
     while same[at as usize] != at {

@@ -91,7 +91,7 @@ fn the_first_layer_with_colours_counts() {
     ]);
     let expected: Vec<_> = RAMP.iter().map(|&red| Vec3::new(red, 2.0, 3.0)).collect();
     assert_eq!(texels(&file), expected);
-    // What has no layer's name before what has one.
+    // Channels without a layer's name come before those with one.
     let file = one(vec![
         ("a.R", floats(OTHER)),
         ("a.G", floats(OTHER)),
@@ -149,7 +149,7 @@ fn what_cannot_be_read_is_said() {
         let _ = load_bytes("a.exr", &whole[..length], ImageEncoding::Color);
     }
     assert!(says("a.exr", &whole[..whole.len() - 3]).contains("a.exr: "));
-    // The channel is said to be sampled at every second pixel only.
+    // The header claims that the channel is sampled at every second pixel only.
     let mut sampled = whole;
     let at = sampled.windows(8).position(|sampling| sampling == [1, 0, 0, 0, 1, 0, 0, 0]).expect("a channel");
     sampled[at] = 2;

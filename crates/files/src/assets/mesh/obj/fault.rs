@@ -1,9 +1,9 @@
-//! Where an OBJ is wrong.
+//! The place of a fault in an OBJ.
 
 use super::super::text::{Cursor, shown};
 use super::super::{AssetError, Source};
 
-/// `tobj` knows that something is wrong, but not where: look for the first line that it refuses.
+/// `tobj` finds that something is wrong, but not where: look for the first line that it refuses.
 pub(super) fn first_fault(source: &Source<'_>) -> Option<AssetError> {
     let mut counts = [0_i64; 3];
     let mut cursor = Cursor::new(source.bytes, 0);
@@ -43,14 +43,14 @@ fn counted(cursor: &mut Cursor<'_>, count: &mut i64, wanted: usize, what: &str) 
         5 if what == "coordinates" => {
             Some("coordinates are followed by one weight or three colours".to_owned())
         }
-        // v is 0 then.
+        // A single coordinate is allowed; v is then 0.
         1 if what == "texture coordinates" => None,
         _ if found < wanted => Some(format!("expected {wanted} {what}, found {found}")),
         _ => None,
     }
 }
 
-/// To the next word of this statement, which goes on behind a backslash at the end of a line.
+/// Goes to the next word of this statement, which continues behind a backslash at the end of a line.
 fn skip_in_statement(cursor: &mut Cursor<'_>) -> bool {
     while cursor.skip_in_line() {
         let mut ahead = *cursor;
@@ -63,7 +63,7 @@ fn skip_in_statement(cursor: &mut Cursor<'_>) -> bool {
     false
 }
 
-/// The corner that ends with this slash.
+/// An error for the corner that ends with this slash.
 pub(super) fn open_corner(source: &Source<'_>, slash: usize) -> AssetError {
     let until = &source.bytes[..=slash];
     let corner = until.rsplit(u8::is_ascii_whitespace).next().unwrap_or(until);

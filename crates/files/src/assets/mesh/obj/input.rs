@@ -9,21 +9,22 @@ use std::ops::Range;
 use super::super::Source;
 use crate::control::{CancelToken, Cancelled};
 
-/// The text as `tobj` may read it, and what it does not tell.
+/// The text in a form that `tobj` reads, and facts that `tobj` does not report.
 pub(super) struct Survey<'a> {
     pub(super) text: Cow<'a, [u8]>,
     pub(super) used_materials: BTreeSet<String>,
-    /// Where the first corner of a face ends with a slash, behind which a number is missing; `tobj` takes it for one without.
+    /// Place of a slash that ends the first such corner of a face, with its number missing; `tobj` takes the corner for one
+    /// without a slash.
     pub(super) open_corner: Option<usize>,
 }
 
 impl<'a> Survey<'a> {
-    /// Comments behind numbers, colours of vertices and lines that `tobj` mistakes for faces (`l`, `p`) are blanked,
-    /// lines that go on behind a backslash joined, keywords before names brought to the start of their line, bytes
-    /// beyond UTF-8 replaced, a second texture coordinate of 0 put where there is one alone.
+    /// Prepares the text of an OBJ. It blanks comments behind numbers, colours of vertices, and lines that `tobj`
+    /// mistakes for faces (`l`, `p`). It joins lines that continue behind a backslash, moves keywords before names to
+    /// the start of their line, replaces bytes beyond UTF-8, and adds a second texture coordinate of 0 to single ones.
     ///
     /// # Errors
-    /// [`Cancelled`] when the token was told so.
+    /// [`Cancelled`] if the token is cancelled.
     pub(super) fn of(bytes: &'a [u8], token: &CancelToken) -> Result<Self, Cancelled> {
         let mut survey =
             Self { text: Cow::Borrowed(bytes), used_materials: BTreeSet::new(), open_corner: None };
@@ -57,7 +58,7 @@ impl<'a> Survey<'a> {
         Ok(survey)
     }
 
-    /// Puts a second coordinate at these places.
+    /// Adds a second coordinate at these places.
     fn complete(&mut self, places: &[usize]) {
         if places.is_empty() {
             return;
@@ -74,7 +75,7 @@ impl<'a> Survey<'a> {
         self.text = Cow::Owned(text);
     }
 
-    /// A line at this byte, of this statement.
+    /// Reads a line of this statement at this byte.
     fn line<'l>(&mut self, start: usize, line: &'l [u8], statement: Statement) -> Line<'l> {
         let content = match statement {
             Statement::Comment => return Line { goes_on: false, content: line },
@@ -113,7 +114,7 @@ impl<'a> Survey<'a> {
         Line { goes_on: true, content: unfinished }
     }
 
-    /// `tobj` takes what stands behind the first space of the line for the name.
+    /// Moves the keyword: `tobj` takes everything behind the first space of the line for the name.
     fn named(&mut self, start: usize, line: &[u8]) {
         let statement = line.trim_ascii();
         let keyword = statement.iter().position(u8::is_ascii_whitespace).unwrap_or(statement.len());
@@ -135,22 +136,22 @@ impl<'a> Survey<'a> {
     }
 }
 
-/// What there is of a statement in a line.
+/// Part of a statement in one line.
 struct Line<'l> {
     /// Whether the next line belongs to it.
     goes_on: bool,
-    /// Without comments and what leads to the next line.
+    /// Text without comments and the mark of continuation.
     content: &'l [u8],
 }
 
-/// Words of a `vt` with one coordinate: v is 0 then (Wavefront, Object Files, 1995), which `tobj` does not know.
+/// Words of a `vt` with one coordinate: v is then 0 (Wavefront, Object Files, 1995), which `tobj` does not know.
 const LONE_TEXTURE_WORDS: usize = 2;
 
 fn words_of(content: &[u8]) -> impl Iterator<Item = &[u8]> {
     content.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// What a line is, as far as it is read differently.
+/// Kind of a line, as far as kinds are read differently.
 #[derive(Clone, Copy)]
 enum Statement {
     Comment,
@@ -209,18 +210,18 @@ impl Statement {
     }
 }
 
-/// The first slash that ends a word.
+/// Finds the first slash that ends a word.
 fn open_corner(content: &[u8]) -> Option<usize> {
     let ends_word = |slash: &usize| content.get(slash + 1).is_none_or(u8::is_ascii_whitespace);
     memchr::memchr_iter(b'/', content).find(ends_word)
 }
 
-/// Where the three colours of a vertex stand; `tobj` wants all vertices to have them, or none.
+/// Place of the three colours of a vertex; `tobj` requires them of all vertices or of none.
 fn colours(line: &[u8]) -> Option<usize> {
     let mut ends = line.windows(2).enumerate().filter_map(|(at, pair)| {
         (!pair[0].is_ascii_whitespace() && pair[1].is_ascii_whitespace()).then_some(at + 1)
     });
-    // Behind the keyword and three coordinates.
+    // The colours follow the keyword and three coordinates.
     let colours = ends.nth(3)?;
     (words_of(&line[colours..]).count() == 3).then_some(colours)
 }

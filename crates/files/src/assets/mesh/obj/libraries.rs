@@ -8,10 +8,10 @@ use super::super::mtl::{self, cut_at_comments};
 use super::super::{AssetError, Source};
 use crate::assets::FileMaterial;
 
-/// The material files that an OBJ names, as they are met.
+/// The material files that an OBJ names, in the order in which they occur.
 pub(super) struct Libraries<'a> {
     pub(super) source: &'a Source<'a>,
-    /// Names that the OBJ asks for.
+    /// Names of materials that the OBJ uses.
     pub(super) used: &'a BTreeSet<String>,
     pub(super) found: RefCell<Found>,
     pub(super) failed: RefCell<Option<AssetError>>,
@@ -20,7 +20,7 @@ pub(super) struct Libraries<'a> {
 #[derive(Default)]
 pub(super) struct Found {
     pub(super) materials: HashMap<String, FileMaterial>,
-    /// Names asked for that lead to a material.
+    /// Used names that lead to a material.
     pub(super) resolved: BTreeSet<String>,
     pub(super) warnings: Vec<String>,
     pub(super) missing: bool,
@@ -31,7 +31,7 @@ pub(super) struct Found {
 }
 
 impl Libraries<'_> {
-    /// One file, or several in one statement. A missing one is a warning; a malformed one is the mesh's error.
+    /// Loads one file, or several in one statement. A missing file is a warning; a malformed one is the mesh's error.
     pub(super) fn load(&self, statement: &Path) -> tobj::MTLLoadResult {
         let folder = self.source.path.parent().unwrap_or(Path::new(""));
         let text = statement.to_string_lossy();
@@ -53,8 +53,8 @@ impl Libraries<'_> {
         Ok((materials, places))
     }
 
-    /// Which of these materials each name asked for means. On both sides a comment may follow the name, and a name may
-    /// look as if one did (`Material #25`): what agrees in most of its length counts.
+    /// Index of the material for each used name. On both sides a comment may follow the name, and a name may look as if
+    /// one did (`Material #25`): the longest agreement counts.
     fn places(&self, materials: &[tobj::Material]) -> HashMap<String, usize> {
         let whole = materials.iter().enumerate().map(|(index, found)| (found.name.as_str(), index));
         let mut known: HashMap<&str, usize> = whole.clone().collect();

@@ -1,5 +1,5 @@
-//! OBJ by `tobj`, which makes one index of the three that a corner has; what it accepts and must not, or cannot
-//! say, is checked here.
+//! OBJ by `tobj`, which makes one index of the three that a corner has. Faults that it accepts or cannot report are
+//! checked here.
 
 mod fault;
 mod input;
@@ -17,7 +17,7 @@ use fault::{first_fault, open_corner};
 use input::{Chunks, Survey};
 use libraries::{Found, Libraries};
 
-/// Faces stay as they are: polygons are cut by our own hands, and points and lines among them counted.
+/// Options that leave faces as they are: this program cuts polygons, and counts points and lines among the faces.
 const OPTIONS: tobj::LoadOptions =
     tobj::LoadOptions { single_index: true, triangulate: false, ignore_points: false, ignore_lines: false };
 
@@ -61,7 +61,7 @@ fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     assemble(source, parsed)
 }
 
-/// The models (one for each object, group and material) as one mesh.
+/// Joins the models (one for each object, group and material) into one mesh.
 fn join(models: &[tobj::Model], parsed: &mut Parsed) {
     let vertices = |model: &tobj::Model| model.mesh.positions.len() / 3;
     let any_uvs = models.iter().any(|model| !model.mesh.texcoords.is_empty());
@@ -89,7 +89,7 @@ fn join(models: &[tobj::Model], parsed: &mut Parsed) {
     }
 }
 
-/// Whether every corner of a model has the attribute; `tobj` leaves gaps out, so that a part cannot be told apart.
+/// Whether every corner of a model has the attribute; `tobj` drops gaps, so that a part cannot be assigned.
 fn whole(found: usize, wanted: usize, model: &tobj::Model, what: &str, parsed: &mut Parsed) -> bool {
     if found != wanted && found > 0 {
         let name = &model.name;

@@ -124,7 +124,7 @@ fn comments_may_stand_behind_a_statement() {
     for text in [
         "v 0 0 0 # a\nv 1 0 0#\nv 1 1 0 # 1 2 3\nv 0 1 0\nvt 0 0 # x\nvn 0 0 1# y\nf 1/1/1 2/1/1 3/1/1 4/1/1 # x\n",
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 \\\n3/1/1 4/1/1# C:\\\n# D:\\\n",
-        // A comment does not go on behind its end, whatever it ends with.
+        // A comment ends with its line, whatever its last character.
         "# C:\\models\\\nv 0 0 0 # \\\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nl 1 2 # x\n",
     ] {
         assert_eq!(read(text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh, plain, "{text}");
@@ -223,7 +223,7 @@ fn a_corner_that_ends_with_a_slash_lacks_a_number() {
         "g here/\nf 1 2 3",
         "# f 1/\nf 1 2 3",
         "mtllib f/ 1/\nf 1 2 3",
-        // The empty line belongs to the face, what follows it does not.
+        // The empty line belongs to the face; the line after it does not.
         "f 1 2 3 \\\n\ng here/ there",
     ] {
         assert!(read(&format!("{head}{whole}\n")).is_ok(), "{whole}");

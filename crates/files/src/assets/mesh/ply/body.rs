@@ -12,7 +12,7 @@ pub(super) trait Numbers {
     /// Byte of the file.
     fn at(&self) -> usize;
 
-    /// Whether so many numbers can follow.
+    /// Whether the rest of the file can hold so many numbers.
     fn can_hold(&self, scalar: Scalar, count: u64) -> bool;
 }
 

@@ -1,4 +1,4 @@
-//! The header of a PLY file: what elements there are, and how each is laid out.
+//! The header of a PLY file: its elements and their layout.
 
 use super::super::text::shown;
 use super::super::{AssetError, Source};
@@ -75,7 +75,7 @@ pub(super) struct Element {
 }
 
 impl Element {
-    /// Bytes that one of them takes at least; in text a digit and a blank for each number.
+    /// Fewest bytes of one such element; in text, a digit and a blank for each number.
     pub(super) fn least_bytes(&self, encoding: Encoding) -> u64 {
         let least = |property: &Property| match (encoding, property.kind) {
             (Encoding::Ascii, _) => 2,
@@ -93,7 +93,7 @@ pub(super) struct Header {
     pub(super) body: usize,
 }
 
-/// Read the header.
+/// Reads the header.
 pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
     let bytes = &source.bytes[..source.bytes.len().min(HEADER_LIMIT)];
     let mut at = 0;

@@ -26,14 +26,14 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     assemble(source, parsed)
 }
 
-/// Where in the file something is wrong.
+/// Place of a fault in the file.
 struct Place<'a> {
     source: &'a Source<'a>,
     encoding: Encoding,
 }
 
 impl Place<'_> {
-    /// Text has lines, bytes have numbered elements.
+    /// An error at a place: text has lines, binary files have numbered elements.
     fn wrong(&self, at: usize, element: &Element, index: u64, reason: &str) -> AssetError {
         let reason = format!("{} {}: {reason}", element.name, index + 1);
         match self.encoding {
@@ -69,7 +69,7 @@ fn read(source: &Source<'_>, header: &Header, mut numbers: impl Numbers) -> Resu
     Ok(parsed)
 }
 
-/// A header that claims more than the file can hold is refused before anything is allocated.
+/// Refuses a header that claims more than the file can hold, before anything is allocated.
 fn plausible(
     source: &Source<'_>,
     element: &Element,
@@ -86,7 +86,7 @@ fn plausible(
     Ok(())
 }
 
-/// Read all of an element.
+/// Reads all items of an element.
 fn each<N: Numbers>(
     place: &Place<'_>,
     element: &Element,
@@ -121,7 +121,7 @@ fn list_length(numbers: &mut impl Numbers, count: Scalar, item: Scalar) -> Resul
     }
 }
 
-/// Where the values of a vertex go: position, normal, texture coordinates.
+/// Slot of a vertex value: position, normal, texture coordinates. `None` for other properties.
 fn slot(name: &str) -> Option<usize> {
     Some(match name {
         "x" => 0,

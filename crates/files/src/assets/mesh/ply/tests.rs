@@ -162,7 +162,7 @@ fn a_header_that_is_too_long_names_the_limit() {
     );
     let line = format!("ply\ncomment {}", "x".repeat(2 << 20));
     assert!(says(line.as_bytes()).contains("no end_header in its first 1 MiB"));
-    // One just short enough, cut within a statement.
+    // Take a header just below the limit, cut within a statement.
     let comments = format!("comment {}\n", "x".repeat(100)).repeat(9_000);
     let fits = format!("ply\nformat ascii 1.0\n{comments}{VERTEX}{FACE}{SQUARE}4 0 1 2 3\n");
     assert!(read_bytes(fits.as_bytes()).is_ok());

@@ -1,6 +1,6 @@
-//! Large cells: planes at equal distances on all three axes, each box counted where it starts and where it ends
-//! (Shevtsov, Soupikov, Kapustin, *Highly Parallel Fast KD-tree Construction for Interactive Ray Tracing of Dynamic
-//! Scenes*, 2007), and the two faces of the box around all, beyond which space is empty.
+//! Splits of large cells: planes at equal distances on all three axes, where each box is counted in the bins of its
+//! start and its end (Shevtsov, Soupikov, Kapustin, *Highly Parallel Fast KD-tree Construction for Interactive Ray
+//! Tracing of Dynamic Scenes*, 2007); and the two faces of the box around all, beyond which space is empty.
 
 use std::array;
 
@@ -10,28 +10,28 @@ use super::cost::{Plane, Planes, Search};
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec4;
 
-/// Bins along an axis.
+/// Number of bins along an axis.
 const BINS: usize = 31;
 
-/// Planes between them, and those before the first and behind the last.
+/// Number of planes: between bins, before the first and behind the last.
 const PLANES: usize = BINS + 1;
 
-/// More references are counted in parallel.
+/// Number of references above which they are counted in parallel.
 const PARALLEL_SIZE: usize = 1 << 16;
 
-/// How many boxes start and end in each bin of each axis.
+/// Number of boxes that start and end in each bin of each axis.
 struct Histogram {
     starts: [[u32; PLANES]; 3],
     ends: [[u32; PLANES]; 3],
 }
 
-/// Added to a number from −½ to 2²², it leaves the nearest integer in the low bits.
+/// Constant that, added to a number from −½ to 2²², leaves the nearest integer in the low bits.
 const ROUND: f32 = 12_582_912.0;
 
 impl Histogram {
     fn of(references: &[Reference], start: Vec4, per_length: Vec4) -> Self {
         let mut own = Self { starts: [[0; PLANES]; 3], ends: [[0; PLANES]; 3] };
-        // A half less, so that the nearest integer is the one below.
+        // Subtract a half, so that the nearest integer is the one below.
         let bins = |at: Vec4| {
             let place = (at - start) * per_length - Vec4::splat(0.5);
             place.clamp(Vec4::ZERO, Vec4::splat((BINS - 1) as f32)) + Vec4::splat(ROUND)
@@ -56,7 +56,7 @@ impl Histogram {
     }
 }
 
-/// The cheapest plane; none where a leaf is as cheap.
+/// The cheapest plane. `None` if a leaf is as cheap.
 pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
     let around = Bounds::around(references);
     let extent = around.extent();
@@ -86,6 +86,6 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
         let counts = |counts: [u32; PLANES]| four(counts.map(|count| count as f32));
         search.offer(axis, false, &Planes { at: four(at), left: counts(left), right: counts(right) });
     }
-    // What lies in the plane must not go where space is to be empty.
+    // References in the plane must not go to the side that is to be empty.
     search.cheapest().map(|plane| Plane { planar_right: plane.at <= around.min[plane.axis], ..plane })
 }

@@ -1,31 +1,32 @@
-//! What a split is expected to cost, by surface areas (MacDonald, Booth, *Heuristics for ray tracing using space
-//! subdivision*, 1990). Planes are weighed four at a time.
+//! Expected cost of a split, by surface areas (MacDonald, Booth, *Heuristics for ray tracing using space subdivision*,
+//! 1990). Four planes are weighed at a time.
 
 use crate::accel::reference::Bounds;
 use crate::math::{Vec3, Vec4};
 
-/// What one step of traversal costs, in tests of a triangle.
+/// Cost of one step of traversal, in tests of a triangle.
 const TRAVERSAL_COST: f32 = 1.0;
 
 /// Factor on the cost of a split that cuts empty space off.
 const EMPTY_FACTOR: f32 = 0.8;
 
-/// Instead of an axis.
+/// Tag of a leaf, in place of an axis.
 const LEAF: usize = 3;
 
-/// Above the axis in a tag: triangles in the plane go to the right.
+/// Bit above the axis in a tag: triangles in the plane go to the right.
 const PLANAR_RIGHT: usize = 4;
 
-/// A plane.
+/// A splitting plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     pub axis: usize,
     pub at: f32,
-    /// Triangles in the plane go to the right.
+    /// Whether triangles in the plane go to the right.
     pub planar_right: bool,
 }
 
-/// 4·`N` planes across one axis, and how many triangles are on either side of each; those on both sides count on both.
+/// 4·`N` planes across one axis, with the number of triangles on either side of each; a triangle on both sides counts
+/// on both.
 #[derive(Clone, Copy)]
 pub struct Planes<const N: usize> {
     pub at: [Vec4; N],
@@ -33,21 +34,21 @@ pub struct Planes<const N: usize> {
     pub right: [Vec4; N],
 }
 
-/// Takes planes of one cell, 4·`N` at a time, and keeps the cheapest of each lane.
+/// Search among the planes of one cell, 4·`N` at a time; keeps the cheapest of each lane.
 pub struct Search<const N: usize> {
     min: [f32; 4],
     max: [f32; 4],
-    /// Extents, flat ones taken as a little thick, so that cells without area are split as well.
+    /// Extents of the cell; flat ones are taken as a little thick, so that cells without area are split as well.
     extent: [f32; 3],
     inverse_area: f32,
     cost: [Vec4; N],
     at: [Vec4; N],
-    /// Axis or [`LEAF`], and [`PLANAR_RIGHT`]; as floats, as all is selected by floats.
+    /// Axis or [`LEAF`], and [`PLANAR_RIGHT`]; as floats, because all selection is by floats.
     tag: [Vec4; N],
 }
 
 impl<const N: usize> Search<N> {
-    /// Only planes that make `count` triangles cheaper than a leaf of them count.
+    /// A search in which only planes count that make `count` triangles cheaper than a leaf of them.
     #[inline(always)]
     pub fn new(cell: &Bounds, count: usize) -> Self {
         let extent = cell.extent().truncate();
@@ -64,7 +65,7 @@ impl<const N: usize> Search<N> {
         }
     }
 
-    /// Offer planes; those outside of the cell do not count.
+    /// Offers planes; those outside of the cell do not count.
     #[inline(always)]
     pub fn offer(&mut self, axis: usize, planar_right: bool, planes: &Planes<N>) {
         let (u, v) = (self.extent[(axis + 1) % 3], self.extent[(axis + 2) % 3]);
@@ -84,7 +85,7 @@ impl<const N: usize> Search<N> {
         }
     }
 
-    /// Take what is cheaper than what is there.
+    /// Takes the lanes whose cost is less than the best so far.
     #[inline(always)]
     fn take(&mut self, i: usize, cost: Vec4, at: Vec4, tag: Vec4) {
         let is_cheaper = cost.cmplt(self.cost[i]);
@@ -93,7 +94,7 @@ impl<const N: usize> Search<N> {
         self.tag[i] = Vec4::select(is_cheaper, tag, self.tag[i]);
     }
 
-    /// The cheapest; none where a leaf is as cheap.
+    /// The cheapest plane. `None` if a leaf is as cheap.
     #[inline(always)]
     pub fn cheapest(mut self) -> Option<Plane> {
         for i in 1..N {

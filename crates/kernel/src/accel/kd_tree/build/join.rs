@@ -1,4 +1,4 @@
-//! Putting the parts of a tree together, in parallel.
+//! Joins the parts of a tree, in parallel.
 
 use rayon::prelude::*;
 
@@ -9,13 +9,13 @@ use crate::accel::wide_bvh::pages;
 
 /// A part of the tree above the subtrees.
 pub enum Part {
-    /// A plane and what is below and above it.
+    /// A plane, and the parts below and above it.
     Halves { plane: Plane, size: Size, halves: Box<[Part; 2]> },
-    /// Built by one thread.
+    /// A subtree that one thread built.
     Built(Subtree),
 }
 
-/// Nodes and numbers of triangles.
+/// Number of nodes and of references to triangles.
 #[derive(Clone, Copy)]
 pub struct Size {
     nodes: usize,
@@ -23,7 +23,7 @@ pub struct Size {
 }
 
 impl Part {
-    /// Of a plane and both parts.
+    /// Size of a plane and both parts.
     pub fn halves(plane: Plane, halves: [Self; 2]) -> Self {
         let [left, right] = halves.each_ref().map(Self::size);
         let size = Size { nodes: 1 + left.nodes + right.nodes, ids: left.ids + right.ids };
@@ -37,7 +37,7 @@ impl Part {
         }
     }
 
-    /// All in one: node before children, left before right.
+    /// Joins all parts into one subtree: node before children, left before right.
     pub fn join(self) -> Subtree {
         let size = self.size();
         let mut all = Subtree { nodes: pages::large(size.nodes), ids: pages::large(size.ids) };
@@ -50,7 +50,7 @@ impl Part {
         all
     }
 
-    /// Write to where so much stands before.
+    /// Writes the part behind so many nodes and references.
     fn write(self, nodes: &mut [Node], ids: &mut [u32], before: Size) {
         match self {
             Self::Built(subtree) => {

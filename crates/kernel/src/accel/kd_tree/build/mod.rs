@@ -1,5 +1,5 @@
-//! Building: from the top, each cell by the plane of least expected cost; large cells by bins, small ones by perfect splits,
-//! until a leaf is as cheap. Triangles on both sides of a plane go to both, each with the box of its piece.
+//! Building from the top: each cell is split by the plane of least expected cost, large cells by bins, small ones by perfect
+//! splits, until a leaf is as cheap. Triangles on both sides of a plane go to both, each with the box of its piece.
 //!
 //! The tree is a function of the triangles alone, not of the threads.
 
@@ -25,40 +25,40 @@ use join::Part;
 use partition::Scratch;
 use subtree::Subtree;
 
-/// Cells of at most this many references are built by one thread; the token is polled between them.
+/// Most references of a cell that one thread builds; the token is polled between such cells.
 const TASK_SIZE: usize = 4096;
 
-/// Most leaves and references in all, of a tree whose nodes, less than two for each leaf, have numbers that fit.
+/// Most leaves and references in all: a tree has less than two nodes for each leaf, and their numbers must fit.
 const MOST_ROOM: u64 = node::MOST as u64 / 2;
 
 /// One leaf with all triangles is always possible.
 const _: () = assert!((TriangleMesh::MOST_TRIANGLES as u64) < MOST_ROOM);
 
-/// Leaves and references for each triangle at most: several times what meshes need, a small part of what triangles that
-/// share a vertex would take.
+/// Most leaves and references for each triangle: several times what meshes need, but a small part of what triangles
+/// around one vertex could take.
 const MOST_PER_TRIANGLE: u64 = 24;
 
-/// A tree of fewer triangles than this has the room of so many.
+/// Fewest triangles that count for that limit; smaller trees get the room of so many.
 const FEW: u64 = 64;
 
-/// No triangle yet.
+/// Index of a triangle that has no place yet.
 const NOWHERE: u32 = u32::MAX;
 
-/// What building made.
+/// Result of building.
 pub struct Built {
     pub nodes: Vec<Node>,
-    /// Places of `triangles`, leaf by leaf.
+    /// Indices into `triangles`, leaf by leaf.
     pub references: Vec<u32>,
     pub triangles: Vec<Triangle>,
     pub bounds: Aabb,
 }
 
-/// Planes above a leaf at most, for so many triangles (Havran's 8 + 1.3·log₂ n).
+/// Most planes above a leaf, for so many triangles (Havran's 8 + 1.3·log₂ n).
 pub fn depth_limit(count: usize) -> u32 {
     8 + (1.3 * log2(count.max(1) as f32)) as u32
 }
 
-/// Build over `count` triangles; those whose box has no finite size are in no leaf.
+/// Builds over `count` triangles; triangles whose box has no finite size are in no leaf.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -71,7 +71,7 @@ pub fn build(
     build_within(room, count, corners, token)
 }
 
-/// [`build`] with so much room for leaves and references together.
+/// [`build`] with this room for leaves and references together.
 fn build_within(
     room: u64,
     count: u32,
@@ -93,7 +93,7 @@ fn build_within(
     Ok(Built { nodes: all.nodes, references, triangles, bounds: bounds.aabb() })
 }
 
-/// Triangles in the order in which leaves first name them, and their places there instead of their numbers.
+/// Triangles in the order in which leaves first name them, and `ids` as indices into that order.
 fn by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
     let mut places = vec![NOWHERE; count as usize];
     let mut order = Vec::with_capacity(count as usize);
@@ -112,16 +112,16 @@ fn by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
 #[derive(Clone, Copy)]
 struct Cell {
     bounds: Bounds,
-    /// How many planes may yet follow.
+    /// Number of planes that may yet follow.
     levels: u32,
-    /// How many leaves and references together may come of it.
+    /// Number of leaves and references that may come of the cell.
     room: u64,
 }
 
 impl Cell {
-    /// The plane to split it by; none for a leaf.
+    /// The plane to split it by. `None` for a leaf.
     fn plane(&self, references: &[Reference]) -> Option<Plane> {
-        // A plane through all triangles makes two of each.
+        // A plane through all triangles doubles them.
         let has_room = 2 * leaf_room(references.len()) <= self.room;
         if self.levels == 0 || references.is_empty() || !has_room {
             None
@@ -132,10 +132,10 @@ impl Cell {
         }
     }
 
-    /// Its halves, with so many references in each.
+    /// The cell's halves, with so many references in each.
     fn halves(&self, plane: &Plane, counts: [usize; 2]) -> [Self; 2] {
         let [left, right] = counts.map(leaf_room);
-        // In proportion: as the room is enough for both, so is the share of each.
+        // Share the room in proportion: as the whole suffices for both, each share does.
         let room = self.room * left / (left + right);
         let levels = self.levels - 1;
         let [below, above] = self.bounds.halves(plane.axis, plane.at);
@@ -148,7 +148,7 @@ fn leaf_room(count: usize) -> u64 {
     count as u64 + 1
 }
 
-/// Split until one thread can take over.
+/// Splits until one thread can take over.
 fn part(
     cell: &Cell,
     mut references: Vec<Reference>,

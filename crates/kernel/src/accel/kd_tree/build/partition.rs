@@ -1,24 +1,24 @@
-//! Which references go to which side of a plane.
+//! Partition of the references of a cell by a plane.
 
 use super::cost::Plane;
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec3;
 
-/// Memory that partitioning works in, to be used again.
+/// Memory for partitioning, to be used again.
 #[derive(Default)]
 pub struct Scratch {
-    /// Those on the left, behind them anything.
+    /// References on the left, with undefined ones behind them.
     left: Vec<Reference>,
-    /// Places on the left and on the right of those on both sides.
+    /// Indices, on the left and on the right, of the references on both sides.
     on_both: Vec<[u32; 2]>,
 }
 
 impl Scratch {
-    /// Partition the references from place `first` on: those on the right stay, each with the box of what of it is there; those
-    /// on the left are returned. What only touches the plane goes to the side that it is on. The order is kept.
+    /// Partitions the references from index `first` on. References on the right stay, each with the box of its part there;
+    /// those on the left are returned. A reference that only touches the plane goes to its own side. The order is kept.
     ///
-    /// Nothing depends on a branch that could be guessed wrongly: every reference is written to both sides, whose ends
-    /// then move on or not.
+    /// No branch depends on the data, as it would often be mispredicted: every reference is written to both sides, and each
+    /// side's end then moves on or not.
     pub fn partition(
         &mut self,
         references: &mut Vec<Reference>,

@@ -1,4 +1,4 @@
-//! What one thread builds.
+//! Subtree that one thread builds.
 
 use super::Cell;
 use super::partition::Scratch;
@@ -7,7 +7,7 @@ use crate::accel::reference::Reference;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// Nodes and numbers of triangles, counted from its own first.
+/// Nodes and references, counted from the subtree's own first.
 #[derive(Default)]
 pub struct Subtree {
     pub nodes: Vec<Node>,
@@ -15,7 +15,7 @@ pub struct Subtree {
 }
 
 impl Subtree {
-    /// Of a cell and all in it.
+    /// Builds the subtree of a cell and its references.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -35,7 +35,7 @@ impl Subtree {
 /// Builds a subtree in memory that is allocated once.
 struct Builder<'a, C> {
     built: Subtree,
-    /// Those of all cells that are yet to be built, the next one's last.
+    /// References of all cells that are yet to be built, the next cell's last.
     references: Vec<Reference>,
     scratch: Scratch,
     corners: &'a C,
@@ -43,7 +43,7 @@ struct Builder<'a, C> {
 }
 
 impl<C: Fn(u32) -> [Vec3; 3]> Builder<'_, C> {
-    /// Add a cell whose references begin at `first`, and take them away. Recursion is as deep as the tree, which is limited.
+    /// Adds a cell whose references begin at `first`, and removes them. Recursion is as deep as the tree, which is limited.
     fn add(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
         let place = self.built.nodes.len();
         let own = &self.references[first..];
@@ -68,5 +68,5 @@ impl<C: Fn(u32) -> [Vec3; 3]> Builder<'_, C> {
     }
 }
 
-/// The token is polled where a cell with more references is split.
+/// Number of references above which splitting a cell polls the token.
 const POLLED: usize = 256;

@@ -1,15 +1,15 @@
-//! Small cells: every plane through a face of a clipped triangle's box is tried ("perfect splits": Wald, Havran, *On
-//! building fast kd-trees for ray tracing, and on doing that in O(N log N)*, 2006). For so few triangles it is quicker to
-//! count again what is on either side, of all planes side by side, than to keep them in order.
+//! Splits of small cells: tries every plane through a face of a clipped triangle's box ("perfect splits": Wald, Havran,
+//! *On building fast kd-trees for ray tracing, and on doing that in O(N log N)*, 2006). For so few triangles, counting
+//! both sides of all planes anew, side by side, is quicker than keeping them in order.
 
 use super::cost::{Plane, Planes, Search};
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec4;
 
-/// Cells of at most this many references are swept.
+/// Most references of a cell that is swept.
 pub const SWEPT: usize = 24;
 
-/// The cheapest plane; none where a leaf is as cheap.
+/// The cheapest plane. `None` if a leaf is as cheap.
 pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
     match references.len() {
         0..=4 => cheapest_of::<1>(references, cell),
@@ -19,13 +19,13 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
     }
 }
 
-/// A number of each of 4·`N` references.
+/// One number for each of 4·`N` references.
 type Row<const N: usize> = [[f32; 4]; N];
 
-/// Of at most 4·`N` references.
+/// [`cheapest`] for at most 4·`N` references.
 fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Option<Plane> {
     let mut search = Search::<N>::new(cell, references.len());
-    // Where the boxes start and end along each axis; lanes without one start above every plane and end below.
+    // Starts and ends of the boxes along each axis; lanes without a box start above every plane and end below.
     let (mut starts, mut ends) = ([[[f32::INFINITY; 4]; N]; 3], [[[f32::NEG_INFINITY; 4]; N]; 3]);
     for (place, reference) in references.iter().take(4 * N).enumerate() {
         let (min, max) = (reference.bounds.min.to_array(), reference.bounds.max().to_array());
@@ -44,7 +44,7 @@ fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Optio
     search.cheapest()
 }
 
-/// Offer planes across an axis on which so many boxes start and end.
+/// Offers the planes across an axis, with the boxes that start and end there.
 #[inline(always)]
 fn offer<const N: usize>(
     axis: usize,
@@ -85,7 +85,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::signed as random;
 
-    /// The cost of a plane by the definition; more than any where it does not go through the cell.
+    /// The cost of a plane by the definition; infinite if the plane does not go through the cell.
     fn cost(references: &[Reference], cell: &Bounds, plane: &Plane) -> f32 {
         let Plane { axis, at, planar_right } = *plane;
         if !(at > cell.min[axis] && at < cell.max()[axis]) {
@@ -108,7 +108,7 @@ mod tests {
         let (mut planes, mut leaves) = (0, 0);
         for round in 0..3000 {
             let count = 1 + round % SWEPT;
-            // On a grid, so that boxes touch and lie in planes; in a cell that some of them reach to the end of.
+            // Boxes lie on a grid, so that they touch and lie in planes, in a cell whose end some of them reach.
             let mut step = |size: f32| Vec3::new(next(), next(), next()).map(|x| (x * size).round() / 8.0);
             let references: Vec<Reference> = (0..count as u32)
                 .map(|id| {

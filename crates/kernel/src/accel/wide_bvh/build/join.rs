@@ -1,4 +1,4 @@
-//! Putting the parts of a tree together.
+//! Joins the parts of a tree.
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::accel::reference::Bounds;
 use crate::accel::wide_bvh::node::{Child, Node, WIDTH};
 use crate::accel::wide_bvh::simd::pages;
 
-/// All nodes, the root first, and what all packs hold.
+/// All nodes, the root first, and the contents of all packs.
 pub fn join(root: Part) -> (Vec<Node>, Vec<Pack>) {
     let mut top = Top::default();
     match root {
@@ -49,7 +49,7 @@ struct Top {
 }
 
 impl Top {
-    /// Make the node over a part and all below; returns its place.
+    /// Makes the node over a part and everything below; returns its index.
     fn node(&mut self, bounds: Bounds, part: Part) -> usize {
         let place = self.nodes.len();
         self.nodes.push(Vec::new());
@@ -93,7 +93,7 @@ impl Top {
         (nodes, self.subtrees.iter().flat_map(|subtree| subtree.packs.iter().copied()).collect())
     }
 
-    /// Where each subtree starts, and where the last ends.
+    /// Starts of all subtrees, and the end of the last one.
     fn starts(&self) -> Vec<Start> {
         let mut start = Start { node: self.nodes.len() as u32, pack: 0 };
         let mut starts = vec![start];
@@ -118,7 +118,7 @@ impl Top {
     }
 }
 
-/// The place of a subtree's first node and pack.
+/// Indices of a subtree's first node and pack.
 #[derive(Clone, Copy)]
 struct Start {
     node: u32,

@@ -1,5 +1,5 @@
-//! Building: large parts split in two by binned surface area, in parallel, until each is small enough for one thread to
-//! make its nodes, eight children at once; then all are put together.
+//! Building: large parts are split in two by binned surface area, in parallel, until each is small enough for one
+//! thread. That thread makes its nodes, eight children at once; then all parts are joined.
 //!
 //! The tree is a function of the triangles alone, not of the threads.
 
@@ -20,17 +20,17 @@ use crate::math::Vec3;
 use split::{Segment, partition};
 use subtree::Subtree;
 
-/// Parts of at most this many triangles are built by one thread; the token is polled between them.
+/// Most triangles of a part that one thread builds; the token is polled between such parts.
 const TASK_SIZE: usize = 8192;
 
-/// What building made.
+/// Result of building.
 pub struct Built {
     pub nodes: Vec<Node>,
     pub packs: Vec<TrianglePack>,
     pub bounds: Aabb,
 }
 
-/// Build over `count` triangles; those whose box has no finite size are in no leaf.
+/// Builds over `count` triangles; triangles whose box has no finite size are in no leaf.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -66,11 +66,11 @@ pub fn build(
 enum Part {
     /// Two halves, to be collapsed.
     Halves(Box<[(Bounds, Part); 2]>),
-    /// Built by one thread.
+    /// A subtree that one thread built.
     Built(Subtree),
 }
 
-/// Split until one thread can take over. `start` is the place of the first reference among all.
+/// Splits until one thread can take over. `start` is the index of the first reference among all.
 fn part(
     references: &mut [Reference],
     start: usize,

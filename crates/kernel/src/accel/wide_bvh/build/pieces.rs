@@ -1,6 +1,6 @@
-//! Large triangles in several small boxes before a tree is built over them (Karras, Aila, *Fast Parallel Construction of
-//! High-Quality Bounding Volume Hierarchies*, 2013, section 4): those first whose box is much larger than they are, at
-//! the planes that halve the whole again and again.
+//! Large triangles are cut into several small boxes before a tree is built over them (Karras, Aila, *Fast Parallel
+//! Construction of High-Quality Bounding Volume Hierarchies*, 2013, section 4): first those whose box is much larger
+//! than the triangle, at the planes that halve the whole again and again.
 
 use rayon::prelude::*;
 
@@ -9,16 +9,16 @@ use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
 
-/// Pieces beyond one for each triangle, as a share of the triangles.
+/// Most pieces beyond one for each triangle, as a share of the triangles.
 const MOST_MORE: f64 = 0.3;
 
-/// The planes lie on a grid of 2 to this many cells along each axis.
+/// Levels of the grid of planes, which has 2 to this many cells along each axis.
 const LEVELS: u32 = 20;
 
 /// References that are cut between two looks at the token.
 const CHUNK: usize = 4096;
 
-/// The references with some of them in pieces; the order and the pieces are a function of the triangles alone.
+/// The references with some of them in pieces. The order and the pieces are a function of the triangles alone.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -43,12 +43,12 @@ pub fn in_pieces(
     Ok(chunks.map(of_chunk).collect::<Result<Vec<_>, _>>()?.concat())
 }
 
-/// How often a triangle is cut.
+/// Number of cuts of a triangle.
 fn cuts(priority: f32, factor: f32) -> u32 {
     (priority * factor) as u32
 }
 
-/// By bisection the factor with which all are cut at most so often.
+/// The largest factor with which all triangles together are cut at most `most` times, by bisection.
 fn largest_factor(priorities: &[f32], most: u64) -> f32 {
     let total =
         |factor: f32| priorities.par_iter().map(|&priority| u64::from(cuts(priority, factor))).sum::<u64>();
@@ -56,7 +56,7 @@ fn largest_factor(priorities: &[f32], most: u64) -> f32 {
     if !(sum > 0.0 && sum.is_finite()) {
         return 0.0;
     }
-    // Rounding down takes less than one from each.
+    // Rounding down removes less than one cut from each.
     let (mut low, mut high) =
         ((most as f64 / sum) as f32, ((most as f64 + priorities.len() as f64) / sum) as f32);
     for _ in 0..12 {
@@ -76,7 +76,7 @@ struct Grid {
 struct Plane {
     axis: usize,
     at: f32,
-    /// 0 halves a cell of the finest level, more a larger one.
+    /// Level: 0 halves a cell of the finest grid, more a larger one.
     level: u32,
 }
 
@@ -86,7 +86,7 @@ impl Grid {
         Self { start: all.min.truncate(), extent: all.extent().truncate() }
     }
 
-    /// The coarsest plane that goes through a box, if any does.
+    /// The coarsest plane that goes through a box. `None` if no plane does.
     fn plane(&self, bounds: &Bounds) -> Option<Plane> {
         let cells = (1_u32 << LEVELS) as f32;
         let on_axis = |axis: usize| {
@@ -102,7 +102,7 @@ impl Grid {
         (0..3).filter_map(on_axis).max_by(|a, b| a.level.cmp(&b.level).then(length(a).total_cmp(&length(b))))
     }
 
-    /// How much there is to win by cutting a triangle: the area that its box has too much, less for finer planes.
+    /// Priority of cutting a triangle: the excess area of its box, less for finer planes.
     fn priority(&self, reference: &Reference, [a, b, c]: [Vec3; 3]) -> f32 {
         let Some(plane) = self.plane(&reference.bounds) else { return 0.0 };
         let normal = (b - a).cross(c - a).abs();
@@ -112,7 +112,7 @@ impl Grid {
         if priority.is_finite() { priority } else { 0.0 }
     }
 
-    /// Cut so often, the longer pieces more often.
+    /// Cuts a triangle so often, longer pieces more often.
     fn cut(&self, reference: Reference, cuts: u32, corners: [Vec3; 3], pieces: &mut Vec<Reference>) {
         let plane = if cuts == 0 { None } else { self.plane(&reference.bounds) };
         let Some(Plane { axis, at, .. }) = plane else { return pieces.push(reference) };

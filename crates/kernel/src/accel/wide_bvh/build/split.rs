@@ -1,5 +1,5 @@
-//! Where to split: the cheapest plane between bins by surface area (Wald, *On fast Construction of SAH-based Bounding
-//! Volume Hierarchies*, 2007).
+//! Choice of a split: the cheapest plane between bins by surface area (Wald, *On fast Construction of SAH-based
+//! Bounding Volume Hierarchies*, 2007).
 
 use rayon::prelude::*;
 
@@ -16,39 +16,40 @@ const FEW_BINS: usize = 8;
 
 const FEW: usize = 32;
 
-/// Segments with more references are binned in parallel.
+/// Number of references above which a segment is binned in parallel.
 const PARALLEL_SIZE: usize = 1 << 16;
 
-/// What one step of traversal costs, in tests of a pack.
+/// Cost of one step of traversal, in tests of a pack.
 const TRAVERSAL_COST: f32 = 1.0;
 
-/// Levels of halving below which a segment is split in the middle of its references, so that no input makes a deep tree.
+/// Halvings that the surface area heuristic makes. Deeper segments are halved by number, so that no input makes a deep
+/// tree.
 const SURFACE_AREA_LEVELS: u32 = 56;
 
-/// Some references that stand together, and how they are to be split.
+/// A range of references, and the way to split them.
 #[derive(Clone, Debug)]
 pub struct Segment {
     pub count: usize,
     pub bounds: Bounds,
-    /// Halvings above.
+    /// Number of halvings above.
     level: u32,
-    /// None where a leaf is as cheap, even if the boxes of its parts had a place in the node that it is in.
+    /// The split. `None` if a leaf is as cheap, even if the node above had room for the boxes of its parts.
     pub split: Option<Split>,
-    /// Whether it is worth a node of its own.
+    /// Whether the segment is worth a node of its own.
     pub is_node: bool,
 }
 
-/// How to split.
+/// Way to split a segment.
 #[derive(Clone, Copy, Debug)]
 pub enum Split {
-    /// Those below a bin of an axis to the left; with the boxes around both sides.
+    /// At a plane: references below a bin of an axis go to the left; with the boxes around both sides.
     Plane { axis: usize, bin: usize, bins: Bins, sides: [Bounds; 2] },
-    /// Half of them, as they stand.
+    /// In the middle of the references, in their order.
     Middle,
 }
 
 impl Segment {
-    /// All of the references.
+    /// The segment of all references.
     pub fn whole(references: &[Reference]) -> Self {
         let chunks = references.par_chunks(PARALLEL_SIZE / 4).map(Boxes::around);
         Self::new(references, chunks.reduce(|| Boxes::EMPTY, Boxes::union), 0)
@@ -92,7 +93,7 @@ impl Boxes {
     }
 }
 
-/// How a segment is split best, and whether that is worth a node.
+/// The best split of a segment, and whether the segment is worth a node.
 fn choose(references: &[Reference], boxes: &Boxes, level: u32) -> (Option<Split>, bool) {
     let count = references.len();
     let must = count > PACK * MOST_PACKS as usize;
@@ -118,23 +119,23 @@ fn choose(references: &[Reference], boxes: &Boxes, level: u32) -> (Option<Split>
     }
 }
 
-/// Packs that so many triangles take.
+/// Number of packs for so many triangles.
 #[inline(always)]
 fn blocks(count: u32) -> u32 {
     count.div_ceil(PACK as u32)
 }
 
-/// Which bin a centroid is in.
+/// Map from centroids to bins.
 #[derive(Clone, Copy, Debug)]
 pub struct Bins {
-    /// Where the first begins.
+    /// Start of the first bin.
     pub start: Vec4,
     /// Bins for each unit of length; 0 along axes without extent.
     pub per_length: Vec4,
     count: usize,
 }
 
-/// Added to a number from −½ to 2²², it leaves the nearest integer in the low bits.
+/// Constant that, added to a number from −½ to 2²², leaves the nearest integer in the low bits.
 pub const ROUND: f32 = 12_582_912.0;
 
 impl Bins {
@@ -142,7 +143,7 @@ impl Bins {
         let count = BINS.min(4 + references / 8).max(if references > FEW { FEW_BINS } else { 0 });
         let extent = centroids.extent();
         let scale = |length: f32| {
-            // A little less, so that the last centroid is in the last bin.
+            // Take a little less, so that the last centroid is in the last bin.
             let per_length = count as f32 * 0.999_99 / length;
             if length > 0.0 && per_length.is_finite() { per_length } else { 0.0 }
         };
@@ -172,7 +173,7 @@ pub struct Histogram<const N: usize> {
 /// The cheapest split.
 struct Cheapest {
     axis: usize,
-    /// The first bin on the right.
+    /// First bin on the right.
     bin: usize,
     /// Area-weighted packs of both sides.
     cost: f32,
@@ -214,7 +215,7 @@ impl<const N: usize> Histogram<N> {
         self
     }
 
-    /// Sweep over the planes between bins, from both ends.
+    /// Sweeps over the planes between bins, from both ends.
     fn cheapest(&self, bins: &Bins) -> Option<Cheapest> {
         let mut best: Option<(usize, usize, f32)> = None;
         let count = bins.count.min(N);
@@ -252,7 +253,7 @@ impl<const N: usize> Histogram<N> {
     }
 }
 
-/// Reorder the references by the split; the two segments, neither of them empty.
+/// Reorders the references by the split and returns the two segments, neither of them empty.
 pub fn partition(references: &mut [Reference], segment: &Segment, split: &Split) -> (Segment, Segment) {
     let (middle, left, right) = match split {
         Split::Plane { axis, bin, bins, sides } => {
@@ -287,9 +288,9 @@ fn partitioned<const AXIS: usize>(
     }
 }
 
-/// Those below a bin first: how many they are, and the boxes around the centroids of both sides. Nothing depends on a branch
-/// that could be guessed wrongly: every reference changes places with the first on the right, which then counts to
-/// the left or not.
+/// Moves the references below a bin to the front and returns their number, with the boxes around the centroids of both
+/// sides. No branch depends on the data, as it would often be mispredicted: every reference changes places with the first on
+/// the right, which then counts to the left or not.
 #[allow(clippy::manual_swap)] // `swap` goes through memory, where the next round stalls: half the speed of all building
 fn partition_by_plane<const AXIS: usize>(
     references: &mut [Reference],
@@ -339,7 +340,7 @@ mod tests {
 
     type Partition = fn(&mut [Reference], usize, &Bins) -> (usize, [Bounds; 2]);
 
-    /// By vectors and by plain code, along each axis.
+    /// Partitions by vectors and by plain code, along each axis.
     const PARTITIONS: [[Partition; 2]; 3] = [
         [partitioned::<0>, partition_by_plane::<0>],
         [partitioned::<1>, partition_by_plane::<1>],
@@ -356,7 +357,7 @@ mod tests {
             for axis in 0..3 {
                 let counted: u32 = own.counts[..bins.count].iter().map(|counts| counts[axis]).sum();
                 assert_eq!(counted as usize, references.len(), "all are in the bins that there are");
-                // Each bin has those that are in it, and no others.
+                // Each bin has its own references, and no others.
                 for (bin, (bounds, counts)) in own.bounds.iter().zip(&own.counts).enumerate() {
                     let inside = |one: &&Reference| bins.of(one)[axis] == bin;
                     let inside: Vec<Reference> = references.iter().filter(inside).copied().collect();

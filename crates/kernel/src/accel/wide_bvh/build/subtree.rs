@@ -1,15 +1,15 @@
-//! The part of a tree that one thread makes.
+//! Subtree that one thread builds.
 
 use super::split::{Segment, partition};
 use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::node::{Child, Node, PACK, WIDTH};
 
-/// Which references a pack of triangles holds.
+/// Range of references that a pack of triangles holds.
 #[derive(Clone, Copy, Debug)]
 pub struct Pack {
-    /// Place of the first among all references.
+    /// Index of the first reference among all.
     pub first: u32,
-    /// One to four.
+    /// Number of references: one to four.
     pub count: u32,
 }
 
@@ -23,7 +23,7 @@ pub struct Subtree {
 }
 
 impl Subtree {
-    /// Build over references, the first of which has the place `start` among all.
+    /// Builds over references, the first of which has the index `start` among all.
     pub fn build(references: &mut [Reference], start: usize, segment: Segment) -> Self {
         let mut own = Self {
             nodes: Vec::with_capacity(references.len() / 6),
@@ -51,7 +51,8 @@ impl Subtree {
         Child::Leaf { first, count: self.packs.len() as u32 - first }
     }
 
-    /// Split the child with the largest box until there are eight (Wald, Benthin, Boulos, *Getting Rid of Packets*, 2008).
+    /// Splits the child with the largest box until there are eight (Wald, Benthin, Boulos, *Getting Rid of Packets*,
+    /// 2008).
     fn node(&mut self, references: &mut [Reference], start: usize, segment: Segment) -> u32 {
         let place = self.nodes.len();
         self.nodes.push(Node::EMPTY);

@@ -1,10 +1,12 @@
-//! The inner loops of building, a whole box in a register: what plain code does in `build::split`, to the same numbers.
+//! The inner loops of building, with a whole box in a register: they do the work of the plain code in `build::split`,
+//! with the same numbers.
 
 use super::Instructions;
 use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::build::split::{Bins, Histogram};
 
-/// Put references into the bins of a histogram; false where the processor lacks the instructions and nothing was done.
+/// Puts references into the bins of a histogram. Returns false, and does nothing, if the processor lacks the
+/// instructions.
 pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut Histogram<N>) -> bool {
     #[cfg(target_arch = "x86_64")]
     if Instructions::best() >= Instructions::Avx2 {
@@ -16,7 +18,8 @@ pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut H
     false
 }
 
-/// Those below a bin first: how many they are, and the boxes around the centroids of both sides; none where nothing was done.
+/// Moves the references below a bin to the front and returns their number, with the boxes around the centroids of both sides.
+/// `None`, with nothing done, if the processor lacks the instructions.
 pub fn partition<const AXIS: usize>(
     references: &mut [Reference],
     bin: usize,
@@ -90,8 +93,8 @@ mod avx2 {
         }
     }
 
-    /// Without a branch that could be guessed wrongly: every reference changes places with the first on the right, which then
-    /// counts to the left or not.
+    /// The partition without a branch on the data, which would often be mispredicted: every reference changes places with the
+    /// first on the right, which then counts to the left or not.
     #[target_feature(enable = "avx2")]
     pub fn partition<const AXIS: usize>(
         references: &mut [Reference],

@@ -12,15 +12,15 @@ use crate::math::lanes::{LANES, Truths};
 /// Work in loops without branches over rows. What it calls in its loops must be inlined, and no closure, or it is compiled
 /// without the instructions.
 pub trait Loops {
-    /// What it gives.
+    /// Result of the work.
     type Done;
 
-    /// Do it, folding rows by these.
+    /// Does the work, folding rows by these instructions.
     fn run(self, folds: impl Folds) -> Self::Done;
 }
 
 impl Instructions {
-    /// Do it by these instructions, or the best that the processor has where it has not got them.
+    /// Does the work by these instructions, or by the best that the processor has.
     #[inline]
     pub fn run<L: Loops>(self, work: L) -> L::Done {
         match self.available() {
@@ -49,7 +49,7 @@ fn avx512<L: Loops>(work: L) -> L::Done {
     work.run(Avx512Folds(()))
 }
 
-/// Made where the processor has AVX2.
+/// Proof that the processor has AVX2.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 struct Avx2Folds(());
@@ -63,7 +63,7 @@ impl Folds for Avx2Folds {
     }
 }
 
-/// Made where the processor has AVX-512F, VL, DQ and BW.
+/// Proof that the processor has AVX-512F, VL, DQ and BW.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 struct Avx512Folds(());

@@ -1,6 +1,6 @@
 //! Traversal by vector instructions, chosen at run time: the one place with `unsafe` code.
 //!
-//! Every way gives the bits of [`portable`], which is plain Rust.
+//! All instruction sets give the bits of [`portable`], which is plain Rust.
 
 #[allow(unsafe_code)]
 pub mod binning;
@@ -47,10 +47,11 @@ pub enum Instructions {
 }
 
 impl Instructions {
-    /// All, slowest first.
+    /// All of them, slowest first.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
-    /// The fastest that this processor has. `GLIMT_SIMD=portable` or `avx2` in the environment asks for less, to compare.
+    /// The fastest that this processor has. `GLIMT_SIMD=portable` or `avx2` in the environment lowers the choice, to
+    /// compare.
     pub fn best() -> Self {
         static BEST: LazyLock<Instructions> =
             LazyLock::new(|| match std::env::var("GLIMT_SIMD").as_deref() {
@@ -61,7 +62,7 @@ impl Instructions {
         *BEST
     }
 
-    /// These, or the best that the processor has where it has not got them.
+    /// These instructions, or the best that the processor has if it lacks them.
     pub fn available(self) -> Self {
         static AVAILABLE: LazyLock<Instructions> = LazyLock::new(available);
         self.min(*AVAILABLE)
@@ -111,7 +112,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     }
 }
 
-/// See [`WideBvh::closest_packet`]; the tree is not empty. Says whether it was done.
+/// See [`WideBvh::closest_packet`]; the tree is not empty. Returns whether it did the work.
 #[allow(unsafe_code)]
 pub fn closest_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
     match tree.instructions {
@@ -125,7 +126,7 @@ pub fn closest_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Opt
     }
 }
 
-/// See [`WideBvh::any_packet`]; the tree is not empty. A bit for each ray that hits; none where it was not done.
+/// See [`WideBvh::any_packet`]; the tree is not empty. A bit for each ray that hits. `None` if it did not do the work.
 #[allow(unsafe_code)]
 pub fn any_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
     match tree.instructions {

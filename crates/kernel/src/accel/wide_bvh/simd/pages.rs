@@ -1,6 +1,6 @@
-//! Memory for large arrays that rays jump about in: by large pages, where the system has them for the asking.
+//! Memory for large arrays with random access: by large pages, if the system offers them.
 
-/// From this many bytes on it pays to ask.
+/// Number of bytes from which it pays to ask.
 const LARGE: usize = 1 << 21;
 
 /// An empty vector with room for `count`.
@@ -20,8 +20,8 @@ fn ask(start: usize, bytes: usize) {
     let first = start.next_multiple_of(PAGE);
     let length = (start + bytes).saturating_sub(first) / PAGE * PAGE;
     if let Some(address) = std::ptr::NonNull::new(first as *mut std::ffi::c_void) {
-        // SAFETY: the pages lie inside the allocation, and the advice changes none of what they hold. Where it is not
-        // taken nothing is lost, which is why the answer does not matter.
+        // SAFETY: the pages lie inside the allocation, and the advice changes nothing that they hold. A refusal loses
+        // nothing, so the result is ignored.
         let _ = unsafe { madvise(address, length, MmapAdvise::MADV_HUGEPAGE) };
     }
 }

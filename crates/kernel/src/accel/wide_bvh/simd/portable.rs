@@ -1,4 +1,4 @@
-//! The twin that every other way must equal.
+//! Plain Rust: the twin that all instruction sets must equal.
 
 use super::super::WideBvh;
 use super::super::node::{Child, Node, PACK, TrianglePack, WIDTH};
@@ -7,12 +7,13 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 
-/// A ray that is not finite, or goes nowhere, hits nothing; to the box tests it would be in every box.
+/// Whether a ray can hit anything: a ray that is not finite, or has no direction, hits nothing, although the box tests
+/// would find it in every box.
 fn may_hit(ray: &Ray) -> bool {
     ray.origin.is_finite() && ray.direction.is_finite() && ray.direction != Vec3::ZERO
 }
 
-/// Nearest first, by a stack in memory of its own.
+/// The nearest hit. Visits children nearest first, by a stack in memory of its own.
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     if !may_hit(ray) {
         return None;
@@ -47,7 +48,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     best
 }
 
-/// In any order, until one is hit.
+/// Whether any triangle is hit. Visits children in any order, until one is hit.
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     if !may_hit(ray) {
         return false;
@@ -77,7 +78,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     false
 }
 
-/// The children that a ray meets, with where it enters them.
+/// Children that a ray meets, with the distances at which it enters them.
 fn met(node: &Node, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, Child)> {
     (0..WIDTH).filter_map(move |slot| {
         let corner = |side: usize| {
@@ -87,7 +88,7 @@ fn met(node: &Node, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, C
     })
 }
 
-/// Take a lane's hit if it is nearer, or as near with a lower number.
+/// Takes a lane's hit if it is nearer, or as near with a lower number.
 #[inline]
 pub fn nearer(pack: &TrianglePack, lane: usize, ray: &ShearedRay, t_max: f32, best: &mut Option<ShapeHit>) {
     if let Some(hit) = ray.intersect(&pack.corners(lane), t_max) {

@@ -1,4 +1,4 @@
-//! A ray in all lanes of vectors, made ready without a branch: random rays have random signs.
+//! A ray in all lanes of vectors, prepared without a branch, as the signs of random rays are random.
 
 use std::arch::x86_64::*;
 
@@ -8,28 +8,28 @@ use crate::accel::wide_bvh::node::{Node, TrianglePack};
 use crate::geometry::aabb::{FAR_PAD, TRIANGLE_ERROR};
 use crate::geometry::{Aabb, Ray};
 
-/// Least speed along an axis, as a part of the greatest.
+/// Least speed along an axis, as a fraction of the greatest.
 const LEAST_PART: f32 = 1.0 / (1_u64 << 40) as f32;
 
-/// A ray ready for the boxes of nodes and the triangles of packs.
+/// A ray prepared for the boxes of nodes and the triangles of packs.
 pub struct Lines {
     /// t for each unit along an axis.
     to_near: [F8; 3],
-    /// The same, padded: a far plane is never met too early.
+    /// t for each unit along an axis, padded so that a far plane is never met too early.
     to_far: [F8; 3],
     /// Origins for near and far planes, a margin apart, in units of t.
     from_near: [F8; 3],
     from_far: [F8; 3],
     /// Rows of a node that are near along each axis.
     near: [usize; 3],
-    /// Along the axes of the sheared ray.
+    /// Origin along the axes of the sheared ray.
     origin: [F4; 3],
     shear: [F4; 3],
     axes: [usize; 3],
 }
 
-/// The axes of a sheared ray by which of x > y, x > z, y > z hold for the sizes of its direction, and which of x, y, z
-/// go down: see `ShearedRay::new`.
+/// Axes of a sheared ray, indexed by the truth of x > y, x > z and y > z for the sizes of its direction, and by which
+/// of x, y, z go down: see `ShearedRay::new`.
 const AXES: [[i32; 4]; 64] = {
     let mut table = [[0; 4]; 64];
     let mut case = 0;
@@ -49,7 +49,7 @@ const AXES: [[i32; 4]; 64] = {
     table
 };
 
-/// Origin and direction, each with what lies behind it in the last lane.
+/// Origin and direction; the last lane of each holds the float that follows in memory.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
@@ -74,7 +74,7 @@ pub fn may_hit(ray: &Ray) -> bool {
     _mm_movemask_ps(finite) & 0b111 == 0b111 && _mm_movemask_ps(goes) & 0b111 != 0
 }
 
-/// Both corners, each with something in the last lane.
+/// Both corners; the last lane of each holds another float.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn corners(bounds: &Aabb) -> (__m128, __m128) {
@@ -85,7 +85,7 @@ fn corners(bounds: &Aabb) -> (__m128, __m128) {
     (min, _mm_permute_ps::<0b00_11_10_01>(max))
 }
 
-/// Where numbers are ∞ or −∞.
+/// Mask of the lanes that are ∞ or −∞.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn overflows(v: __m128) -> __m128 {
@@ -101,7 +101,7 @@ fn greatest(v: __m128) -> __m128 {
     _mm_permute_ps::<0>(_mm_max_ps(v, _mm_permute_ps::<0b01>(v)))
 }
 
-/// Each of three lanes in all of eight.
+/// Three lanes, each spread over eight.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn in_eight(v: __m128) -> [F8; 3] {
@@ -109,7 +109,7 @@ fn in_eight(v: __m128) -> [F8; 3] {
     [F8(_mm256_broadcastss_ps(x.0)), F8(_mm256_broadcastss_ps(y.0)), F8(_mm256_broadcastss_ps(z.0))]
 }
 
-/// Each of three lanes in all of four.
+/// Three lanes, each spread over four.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn in_four(v: __m128) -> [F4; 3] {
@@ -117,21 +117,21 @@ fn in_four(v: __m128) -> [F4; 3] {
 }
 
 impl Lines {
-    /// Make it ready for triangles in `whole`.
+    /// Prepares a ray for triangles in `whole`.
     #[target_feature(enable = "avx2,fma")]
     #[inline]
     pub fn new(ray: &Ray, whole: &Aabb) -> Self {
         let (origin, direction) = origin_and_direction(ray);
         let (min, max) = corners(whole);
         let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
-        // How far the boxes must reach beyond their triangles, `triangle_margin`, and what fused products may be off more.
+        // Margin of the boxes beyond their triangles: `triangle_margin`, and the additional error of fused products.
         let below = _mm_and_ps(_mm_sub_ps(min, origin), unsigned);
         let above = _mm_and_ps(_mm_sub_ps(max, origin), unsigned);
         let farthest = greatest(_mm_max_ps(below, above));
         let margin = _mm_mul_ps(farthest, _mm_set1_ps(TRIANGLE_ERROR));
         let reach = _mm_add_ps(margin, _mm_mul_ps(_mm_and_ps(origin, unsigned), _mm_set1_ps(f32::EPSILON)));
-        // Boxes. Where the ray hardly moves along an axis it may as well move a little more: less than a margin all the way
-        // through the boxes. The inverse of all but the slowest rays stays finite so.
+        // Boxes. If the ray hardly moves along an axis, it may as well move a little more: less than a margin all the way
+        // through the boxes. Thereby the inverse of all but the slowest rays stays finite.
         let size = _mm_and_ps(direction, unsigned);
         let least = _mm_mul_ps(greatest(size), _mm_set1_ps(LEAST_PART));
         let moving = _mm_or_ps(_mm_max_ps(size, least), _mm_andnot_ps(unsigned, direction));
@@ -165,8 +165,8 @@ impl Lines {
         }
     }
 
-    /// Where the ray enters the eight boxes, and a bit for each that it meets before `end`. A distance that is NaN leaves the
-    /// interval as it is, which is what `SlabRay::enter` does.
+    /// Distances at which the ray enters the eight boxes, and a bit for each box that it meets before `end`. A distance that
+    /// is NaN leaves the interval as it is, as in `SlabRay::enter`.
     #[inline(always)]
     pub fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
         let (mut near, mut far) = (end.like(0.0), end);
@@ -186,14 +186,14 @@ impl Lines {
         (near, F8::bits(near.le(far)))
     }
 
-    /// Test the triangles of a pack.
+    /// Tests the triangles of a pack.
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<F4> {
         let corners = [self.corner(pack, 0), self.corner(pack, 3), self.corner(pack, 6)];
         triangle::hits(&corners, self.shear[2], self.shear[2].like(t_max), true)
     }
 
-    /// The corners of which `row` is the first.
+    /// The corners whose first row is `row`.
     #[inline(always)]
     fn corner(&self, pack: &TrianglePack, row: usize) -> [F4; 3] {
         let z = self.row(pack, row, 2);

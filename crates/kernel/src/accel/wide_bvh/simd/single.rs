@@ -58,7 +58,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     }
 }
 
-/// Take the nearest of a pack's hits.
+/// Takes the nearest of a pack's hits.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn nearest(pack: &TrianglePack, hits: &Hits<F4>, ray: &Ray, best: &mut Option<ShapeHit>, t_max: f32) {
@@ -84,14 +84,14 @@ fn nearest(pack: &TrianglePack, hits: &Hits<F4>, ray: &Ray, best: &mut Option<Sh
     }
 }
 
-/// See [`nearer`]; out of the way of what is common.
+/// See [`nearer`]; a call of its own, out of the common path.
 #[cold]
 #[inline(never)]
 fn nearer_of(pack: &TrianglePack, lane: usize, ray: &Ray, t_max: f32, best: &mut Option<ShapeHit>) {
     nearer(pack, lane, &ShearedRay::new(ray.origin, ray.direction), t_max, best);
 }
 
-/// Push the children that are met, farthest first, but for the nearest, which is returned.
+/// Pushes the children that the ray meets, farthest first, but the nearest, which is returned.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn push_ordered(tree: &WideBvh, node: &Node, near: F8, met: u32, stack: &mut Stack<u64>) -> Option<u32> {
@@ -122,7 +122,7 @@ fn push_ordered(tree: &WideBvh, node: &Node, near: F8, met: u32, stack: &mut Sta
     }
 }
 
-/// Ask for the beginning of a child's memory before it is needed; asking for all of it is slower.
+/// Prefetches the beginning of a child's memory; prefetching all of it is slower.
 #[inline(always)]
 pub fn prefetch(tree: &WideBvh, code: u32) {
     let index = (code & !LEAF_BITS) as usize;

@@ -1,8 +1,8 @@
-//! Entries to come back to, in memory that is not cleared for every ray.
+//! Traversal stack in memory that is not cleared for every ray.
 
 use std::mem::MaybeUninit;
 
-/// Levels of the binary tree are fewer than 96, each at most seven children to come back to.
+/// Size of the stack: fewer than 96 levels of the binary tree, each with at most seven children to come back to.
 const STACK_SIZE: usize = 96 * 7;
 
 /// A stack that no tree fills.
@@ -12,27 +12,27 @@ pub struct Stack<T> {
 }
 
 impl<T: Copy> Stack<T> {
-    /// An empty one.
+    /// An empty stack.
     #[inline(always)]
     pub fn new() -> Self {
         Self { entries: [const { MaybeUninit::uninit() }; STACK_SIZE], size: 0 }
     }
 
-    /// Put one on top.
+    /// Pushes an entry.
     #[inline(always)]
     pub fn push(&mut self, entry: T) {
         self.entries[self.size].write(entry);
         self.size += 1;
     }
 
-    /// Put one on top if it is wanted, without a branch.
+    /// Pushes an entry if it is wanted, without a branch.
     #[inline(always)]
     pub fn push_if(&mut self, entry: T, is_wanted: bool) {
         self.entries[self.size].write(entry);
         self.size += usize::from(is_wanted);
     }
 
-    /// Take the top one.
+    /// Pops the top entry.
     #[inline(always)]
     pub fn pop(&mut self) -> Option<T> {
         self.size = self.size.checked_sub(1)?;
@@ -40,7 +40,7 @@ impl<T: Copy> Stack<T> {
         Some(unsafe { self.entries[self.size].assume_init() })
     }
 
-    /// The entry `back` places below the top; it was pushed before.
+    /// The entry `back` places below the top, which was pushed before.
     #[inline(always)]
     fn below(&mut self, back: usize) -> &mut T {
         debug_assert!(back < self.size);
@@ -49,21 +49,21 @@ impl<T: Copy> Stack<T> {
     }
 }
 
-/// What is to be visited as a number that is greater the farther it is: where the ray enters it, which is not less than 0, so
-/// that its bits are ordered as it is, above the code of the child.
+/// Key of a child, greater the farther the child is: the bits of its entry distance above its code. Distances are at least 0,
+/// so that their bits have their order.
 #[inline(always)]
 pub fn key(entry: f32, code: u32) -> u64 {
     u64::from(entry.to_bits()) << 32 | u64::from(code)
 }
 
-/// Where the ray enters what a key is of.
+/// Entry distance of a key's child.
 #[inline(always)]
 pub fn entry(key: u64) -> f32 {
     f32::from_bits((key >> 32) as u32)
 }
 
 impl Stack<u64> {
-    /// Put a key among the topmost `count`, which get nearer towards the top.
+    /// Inserts a key among the topmost `count`, which get nearer towards the top.
     #[inline(always)]
     pub fn insert(&mut self, key: u64, count: usize) {
         self.push(key);

@@ -5,23 +5,23 @@ use super::lanes::Lanes;
 use crate::geometry::watertight::ILL_CONDITIONED;
 use crate::math::float::gamma;
 
-/// Corners as seen from the ray: sheared x and y, and z.
+/// Corners in the ray's coordinates: sheared x and y, and z.
 pub type Corners<V> = [[V; 3]; 3];
 
-/// What a ray hits.
+/// Hits of a ray.
 pub struct Hits<V: Lanes> {
     /// A bit for each lane that is hit.
     pub hit: u32,
-    /// A bit for each lane that must be tested again with more digits: an edge function is exactly 0, the triangle is too thin
-    /// to tell t, or t is too near 0.
+    /// A bit for each lane that must be tested again in higher precision: an edge function is exactly 0, the triangle is too
+    /// thin for t, or t is too near 0.
     pub doubtful: u32,
     pub t: V,
     pub u: V,
     pub v: V,
 }
 
-/// Test all lanes; `shear_z` is t for each unit of z. Where most packs have a lane that the ray goes through, but behind its
-/// start, as around the origin of a bounce, `is_single` saves the error bound for those.
+/// Tests all lanes; `shear_z` is t for each unit of z. `is_single` saves the error bound for triangles behind the ray's
+/// start, which most packs have if the ray starts near them, as after a bounce.
 #[inline(always)]
 pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: bool) -> Hits<V> {
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *corners;
@@ -47,12 +47,12 @@ pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: boo
     Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
-/// Unit of rounding, by the part of the reach that makes a needle, and a little more for the rounding of [`may_count`] itself.
+/// Unit of rounding, divided by the ratio that makes a needle, and a little more for the rounding of [`may_count`] itself.
 const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
-/// False only where the triangle is no needle, and t below 0 by more than its error. With s the sum of the greatest x and y, of
-/// which the product is at most s²/4, and d the greatest z, [`distance_error`] is at most 30·s·(s + d) units of rounding of
-/// the reach, by the determinant. A determinant of which the inverse may be infinite counts as a needle's.
+/// False only if the triangle is no needle and t is below 0 by more than its error. Let s be the sum of the greatest x and y,
+/// whose product is at most s²/4, and d the greatest z. Then [`distance_error`] is at most 30·s·(s + d) units of rounding of
+/// the reach, divided by the determinant. A determinant whose inverse may be infinite counts as a needle's.
 #[inline(always)]
 fn may_count<V: Lanes>(corners: &Corners<V>, determinant: V, shear_z: V, t: V) -> V::Mask {
     let (sum, deepest) = (greatest(corners, 0) + greatest(corners, 1), greatest(corners, 2));
@@ -74,7 +74,7 @@ fn distance_error<V: Lanes>(corners: &Corners<V>, shear_z: V, inverse_determinan
     (shear_z.like(3.0) * sum * inverse_determinant.abs(), z)
 }
 
-/// The greatest size of a coordinate.
+/// Greatest absolute value of a coordinate.
 #[inline(always)]
 fn greatest<V: Lanes>(corners: &Corners<V>, axis: usize) -> V {
     corners[0][axis].abs().max(corners[1][axis].abs()).max(corners[2][axis].abs())
@@ -87,7 +87,7 @@ mod tests {
     use crate::accel::wide_bvh::simd::lanes::F4;
     use crate::math::random::signed as random;
 
-    /// Triangles as thin, and as near to the start, as the filter is told to let pass, and a little more.
+    /// Tests triangles at the limits of the filter, in thinness and in distance from the start, and a little beyond.
     #[test]
     fn the_filter_lets_pass_whatever_is_doubtful_and_hardly_anything_else() {
         // SAFETY: four floats are in every processor of this architecture.
@@ -95,7 +95,7 @@ mod tests {
         let mut next = random(31);
         let (mut needles, mut starts, mut passed, mut clear) = (0, 0, 0, 0);
         for round in 0..400_000 {
-            // Needles of all widths, sizes and distances, as those in whose corners |x| = |y| are the worst.
+            // Take needles of all widths, sizes and distances; those whose corners have |x| = |y| are the worst.
             let size = 2.0_f32.powf(next() * 12.0);
             let depth = if round % 2 == 0 { 0.0 } else { size * 2.0_f32.powf(next() * 10.0) };
             let is_thin = round % 4 < 2;

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Something irregular with black parts and a bright spot.
+/// An irregular texture with black parts and a bright spot.
 fn patchy(width: u32, height: u32) -> Arc<Texels> {
     let color = |(x, y): (u32, u32)| {
         let random = (x.wrapping_mul(7919).wrapping_add(y.wrapping_mul(104_729)) >> 3) % 97;
@@ -70,7 +70,7 @@ fn sheet(side: u32) -> Vec<Patch> {
         let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
         [[a, b, c], [a, c, d]]
     });
-    // Every second number is of another light.
+    // Every second number belongs to another light.
     let patch = |(number, corners): (u32, [(DVec3, Vec2); 3])| Patch {
         primitive: number * 2 + 1,
         corners: corners.map(|(point, _)| point),

@@ -1,8 +1,8 @@
 //! Vectors of floats as one type for every width, so that a kernel is written once.
 //!
-//! A value can be made by unsafe functions alone, whose caller answers for the instructions, or in this folder from a
-//! register of a function that has them; where there is a value the instructions are there, which is why its operators are
-//! safe.
+//! Only unsafe functions make a value, whose caller answers for the instructions, or functions of this folder from a
+//! register of a function that has the instructions. A value therefore proves that the processor has them, and its
+//! operators are safe.
 
 mod eight;
 mod four;
@@ -16,20 +16,20 @@ pub use four::F4;
 pub use pair::Pair;
 pub use sixteen::F16;
 
-/// Floats side by side. Comparisons with NaN are false; `min` and `max` return their argument where either is NaN.
+/// Floats side by side. Comparisons with NaN are false; `min` and `max` return their argument if either is NaN.
 pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// How many.
+    /// Number of lanes.
     const COUNT: usize;
-    /// A truth value for each.
+    /// A truth value for each lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
 
-    /// The same in all.
+    /// The same number in all lanes.
     ///
     /// # Safety
     /// The processor has the instructions of this type.
     unsafe fn splat(x: f32) -> Self;
 
-    /// From memory.
+    /// Loads floats from memory.
     ///
     /// # Safety
     /// The processor has the instructions of this type, and `from` points to [`Lanes::COUNT`] floats.
@@ -42,7 +42,7 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
         unsafe { Self::splat(x) }
     }
 
-    /// From an array of at least as many.
+    /// Loads from an array of at least as many floats.
     #[inline(always)]
     fn gather(self, from: &[f32]) -> Self {
         assert!(from.len() >= Self::COUNT);
@@ -50,15 +50,15 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
         unsafe { Self::load(from.as_ptr()) }
     }
 
-    /// Into an array of at least as many.
+    /// Stores into an array of at least as many floats.
     fn store(self, to: &mut [f32]);
     /// Quotients.
     fn over(self, divisor: Self) -> Self;
-    /// The lesser ones.
+    /// Lesser of the two numbers in each lane.
     fn min(self, other: Self) -> Self;
-    /// The greater ones.
+    /// Greater of the two numbers in each lane.
     fn max(self, other: Self) -> Self;
-    /// Without sign.
+    /// Absolute values.
     fn abs(self) -> Self;
     /// self < other.
     fn lt(self, other: Self) -> Self::Mask;
@@ -68,15 +68,15 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
     fn eq(self, other: Self) -> Self::Mask;
     /// `self` where the mask holds, else `other`, bit for bit.
     fn or_else(self, mask: Self::Mask, other: Self) -> Self;
-    /// Where `mask` holds and `but` does not.
+    /// Lanes in which `mask` holds and `but` does not.
     fn without(mask: Self::Mask, but: Self::Mask) -> Self::Mask;
-    /// A bit for each lane.
+    /// A bit for each lane in which the mask holds.
     fn bits(mask: Self::Mask) -> u32;
-    /// The other way round; `like` says that the instructions are there.
+    /// The mask of these bits; `like` proves that the processor has the instructions.
     fn mask(bits: u32, like: Self) -> Self::Mask;
-    /// The greatest of all.
+    /// Greatest of all lanes.
     fn greatest(self) -> f32;
-    /// The least of all.
+    /// Least of all lanes.
     fn least(self) -> f32;
 }
 

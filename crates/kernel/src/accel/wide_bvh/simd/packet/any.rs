@@ -1,4 +1,4 @@
-//! Whether each ray hits anything, children in any order.
+//! Any hit of each ray; children are visited in any order.
 
 use super::frustum::Frustum;
 use super::rays::Packet;
@@ -13,7 +13,7 @@ use crate::geometry::Ray;
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::watertight::ShearedRay;
 
-/// See [`WideBvh::any_packet`]; none where the rays do not go the same way.
+/// See [`WideBvh::any_packet`]. `None` if the rays do not go the same way.
 #[inline(always)]
 pub fn any<V: Lanes>(
     tree: &WideBvh,

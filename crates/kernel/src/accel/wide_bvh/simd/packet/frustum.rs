@@ -5,10 +5,10 @@ use crate::accel::wide_bvh::node::Node;
 use crate::accel::wide_bvh::simd::lanes::{F8, Lanes};
 use crate::geometry::aabb::SLAB_PAD;
 
-/// What holds for every ray of a packet, against eight boxes at a time. Subtraction and multiplication round monotonously, so
-/// that no ray enters a box before the frustum does, or leaves it later.
+/// Bounds that hold for every ray of a packet, against eight boxes at a time. Subtraction and multiplication round
+/// monotonically, so that no ray enters a box before the frustum does, or leaves it later.
 pub struct Frustum {
-    /// Greatest origin where the rays go up, least where they go down: the one that is nearest to the near plane.
+    /// Greatest origin if the rays go up, least if they go down: the origin that is nearest to the near plane.
     near_origin: [F8; 3],
     far_origin: [F8; 3],
     inverse: [[F8; 2]; 3],
@@ -32,7 +32,8 @@ impl Frustum {
         Self { near_origin, far_origin, inverse, near: packet.near }
     }
 
-    /// A bound on where the first ray enters each box, and a bit for each box that a ray may meet before `end`.
+    /// A lower bound on the distance at which a ray enters each box, and a bit for each box that a ray may meet before
+    /// `end`.
     #[inline(always)]
     pub fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
         let pad = end.like(SLAB_PAD);

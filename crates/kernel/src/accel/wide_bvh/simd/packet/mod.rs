@@ -1,6 +1,6 @@
-//! Sixteen rays at a time that go much the same way: what all of them miss is left out by one test of a frustum around them
-//! (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005), what is left is tested for sixteen rays
-//! side by side.
+//! Sixteen rays at a time that go in much the same direction. One test of a frustum around the rays skips what all of them
+//! miss (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005); the rest is tested for sixteen rays side
+//! by side.
 
 mod any;
 mod closest;

@@ -19,13 +19,13 @@ pub struct Nearest<V: Lanes> {
 }
 
 impl<V: Lanes> Nearest<V> {
-    /// Nothing yet, before these ends.
+    /// No hits yet, before these ends.
     #[inline(always)]
     pub fn new(ends: V) -> Self {
         Self { t: ends, u: ends, v: ends, id: ends.like(f32::from_bits(u32::MAX)), found: 0 }
     }
 
-    /// Take what is nearer, or as near with a lower number; a bit for each ray that took it.
+    /// Takes each hit that is nearer, or as near with a lower number; returns a bit for each ray that took it.
     #[inline(always)]
     pub fn take(&mut self, packet: &Packet<V>, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
         let hits = packet.hits(pack, lane, self.t);
@@ -57,7 +57,7 @@ impl<V: Lanes> Nearest<V> {
         taken
     }
 
-    /// The same for one ray, by the scalar test.
+    /// [`Nearest::take`] for one ray, by the scalar test.
     #[cold]
     #[inline(never)]
     fn keep_one(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {

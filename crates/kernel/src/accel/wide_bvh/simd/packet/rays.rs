@@ -9,7 +9,7 @@ use crate::geometry::aabb::{SLAB_PAD, triangle_margin};
 use crate::geometry::watertight::ShearedRay;
 use crate::math::Vec3;
 
-/// The rows in registers, ready for boxes and triangles.
+/// Rays in registers, prepared for boxes and triangles.
 pub struct Packet<V: Lanes> {
     /// Origins for near and far planes, a margin apart.
     near_origin: [V; 3],
@@ -18,18 +18,19 @@ pub struct Packet<V: Lanes> {
     /// Origins along the axes of the sheared rays.
     sheared_origin: [V; 3],
     shear: [V; 3],
-    /// The axes of the world that are x, y and z of every sheared ray.
+    /// World axes that are the x, y and z axes of every sheared ray.
     axes: [usize; 3],
-    /// Rows of a node that are near.
+    /// Rows of a node that hold the near planes.
     pub near: [usize; 3],
-    /// The least and the greatest origins along each axis.
+    /// Least and greatest origins along each axis.
     pub origins: [[f32; 2]; 3],
-    /// The greatest margin that boxes need for any of the rays.
+    /// Greatest margin that boxes need for any of the rays.
     pub margin: f32,
 }
 
 impl<V: Lanes> Packet<V> {
-    /// None where the rays do not go the same way: along each axis to the same side, the longest the same for all.
+    /// The packet of these rows. `None` if the rays do not go the same way: to the same side along each axis, with the
+    /// same longest axis.
     #[inline(always)]
     pub fn new(rows: &Rows, whole: &Aabb, like: V) -> Option<Self> {
         let axes = ShearedRay::new(rows.first.origin, rows.first.direction).axes();
@@ -70,7 +71,7 @@ impl<V: Lanes> Packet<V> {
             own.far_origin[axis] = if down == all { after } else { before };
             own.near[axis] = 2 * axis + usize::from(down == all);
         }
-        // `ShearedRay::new`, side by side: which axis is the longest, and the shears.
+        // Find the longest axis and the shears, as `ShearedRay::new` does, side by side.
         let x_over_y = V::bits(size[1].lt(size[0]));
         let longest = match axes[2] {
             0 => x_over_y & V::bits(size[2].lt(size[0])),
@@ -100,14 +101,14 @@ impl<V: Lanes> Packet<V> {
         V::bits(near.le(far)) != 0
     }
 
-    /// Test the triangle in a lane of a pack against all rays.
+    /// Tests the triangle in a lane of a pack against all rays.
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
         let (a, b, c) = (self.corner(pack, 0, lane), self.corner(pack, 3, lane), self.corner(pack, 6, lane));
         triangle::hits(&[a, b, c], self.shear[2], t_max, false)
     }
 
-    /// A corner as each ray sees it; `row` is its first.
+    /// A corner in each ray's sheared coordinates; `row` is the corner's first row.
     #[inline(always)]
     fn corner(&self, pack: &TrianglePack, row: usize, lane: usize) -> [V; 3] {
         let z = self.coordinate(pack, row, 2, lane);

@@ -13,7 +13,7 @@ pub struct Rows {
     pub ends: Ends,
     /// A bit for each ray that is traced.
     pub traced: u32,
-    /// The first of them.
+    /// First traced ray.
     pub first: Ray,
 }
 
@@ -29,7 +29,8 @@ impl Rows {
         }
     }
 
-    /// Lanes without a ray, or with one that ends below 0, repeat the first; none where there is no ray.
+    /// Rows of these rays. Lanes without a ray, or with one that ends below 0, repeat the first. `None` if there is no
+    /// ray.
     #[inline(always)]
     pub fn new(rays: &[Ray], ends: &Ends) -> Option<Self> {
         let count = rays.len().min(SIZE);
