@@ -1,0 +1,117 @@
+#!/usr/bin/env python3
+"""Microseconds of processor time per path, stage by stage: where the time of a scene goes.
+
+    cargo build --profile profiling
+    python3 benches/rooms/stages.py SCENE... [--glimt target/profiling/glimt] [--samples N] [--side PIXELS]
+
+Each scene is rendered once by `path` on one thread under `perf record` (Linux), and each sample of the profile counts to a stage: that
+of the innermost function which stands in STAGES, inlined ones included (by addr2line, hence the profile with line tables).
+"""
+
+import argparse
+import collections
+import subprocess
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+RATE = 2000  # samples a second
+
+# Words in the names of functions, from the innermost frame outwards; the first stage that has one of them counts.
+STAGES = [
+    ("glass", ["crossing", "contact", "lonely", "meeting", "touch_error", "specular", "near_shape", "encloses"]),
+    ("lamps: picks", ["pick_flat", "pick_by_cuts", "picks", "flat_shares", "go_to", "samples_at"]),
+    ("lamps: samples", ["sample_row", "sample_each", "sample_density", "inverse_densit"]),
+    ("shadow rays", ["occluded", "any_packet", "any_rows", "any_avx", "any_of_few", "single::any", "packet::any", "pool", "is_hit", "doubtful_hit", "add_seen"]),
+    ("closest hits", ["closest", "single::nearest", "packet::nearest", "intersect_at_start", "in_f64", "alone", "nearer", "packet::Closest", "merged::rays"]),
+    ("surfaces", ["fill_surfaces", "fill_others", "surface", "facet", "place", "set_bsdf", "packet::Meeting"]),
+    ("textures", ["lookup", "texture"]),
+    ("light of lamps", ["add_all", "add_pick", "Lighting", "Picking", "values", "response"]),
+    ("directions", ["scatter", "sample_diffuse", "lobes"]),
+    ("random numbers", ["sampler", "scrambled", "pairs", "sobol"]),
+    ("camera", ["camera"]),
+    ("queues and film", ["render_tile", "wave", "queues", "film", "lit_queue", "lit_row", "memmove", "memcpy", "memset"]),
+]
+# Not the render: reading, trees, writing.
+SETUP = ["glimt_files", "glimt_scene", "build", "png", "deflate", "miniz", "blake3", "ld-linux", "dl_", "page", "clap"]
+
+
+def run(command):
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def symbols(program):
+    """Addresses of functions by their mangled names."""
+    rows = (line.split() for line in run(["nm", program]).splitlines())
+    return {row[2]: int(row[0], 16) for row in rows if len(row) == 3}
+
+
+def samples(profile, program):
+    """How often each place was met: an address of the program, or the name of another function."""
+    known, found = symbols(program), collections.Counter()
+    for line in run(["perf", "script", "-i", profile, "-F", "ip,sym,symoff", "--no-demangle"]).splitlines():
+        parts = line.split()
+        if len(parts) >= 2:
+            name, _, offset = parts[1].partition("+")
+            found[known[name] + int(offset or "0", 16) if name in known else name] += 1
+    return found
+
+
+def frames(program, addresses):
+    """Names of the functions at each address, the innermost first."""
+    command = ["addr2line", "-e", program, "-i", "-f", "-C", "-a", *(hex(address) for address in addresses)]
+    names, own = {}, None
+    lines = iter(run(command).splitlines())
+    for line in lines:
+        if line.startswith("0x"):
+            own = names.setdefault(int(line, 16), [])
+        else:
+            own.append(line + " " + next(lines))
+    return names
+
+
+def stage(names):
+    """The stage of a place, by its frames from the innermost outwards."""
+    if any(word in name for name in names for word in SETUP):
+        return "reading, trees, writing"
+    for name in names:
+        for title, words in STAGES:
+            if any(word in name for word in words):
+                return title
+    return "other"
+
+
+def measure(scene, asked):
+    """Print the stages of a scene."""
+    with tempfile.TemporaryDirectory() as folder:
+        profile = f"{folder}/profile"
+        render = [asked.glimt, scene, "--once", "--integrator", "path", "--threads", "1", "--progress", "none"]
+        size = ["--samples", asked.samples, "--width", asked.side, "--height", asked.side, "-o", f"{folder}/out.exr"]
+        run([str(part) for part in ["perf", "record", "-q", "-e", "cpu-clock", "-F", RATE, "-o", profile, *render, *size]])
+        found = samples(profile, asked.glimt)
+    names = frames(asked.glimt, [place for place in found if isinstance(place, int)])
+    totals = collections.Counter()
+    for place, count in found.items():
+        totals[stage(names[place] if isinstance(place, int) else [place])] += count
+    paths = asked.samples * asked.side**2
+    microseconds = lambda count: 1e6 * count / RATE / paths
+    setup = totals.pop("reading, trees, writing", 0)
+    whole = sum(totals.values())
+    print(f"{Path(scene).parent.name}/{Path(scene).name}: {microseconds(whole):.3f} us/path, before and after it {setup / RATE:.2f} s")
+    for title, count in totals.most_common():
+        print(f"  {title:18}{microseconds(count):8.3f} us {count / whole:6.1%}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="+", metavar="SCENE")
+    parser.add_argument("--glimt", default=str(ROOT / "target/profiling/glimt"))
+    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--side", type=int, default=128, help="pixels of a side of the picture")
+    asked = parser.parse_args()
+    for scene in asked.scenes:
+        measure(scene, asked)
+
+
+if __name__ == "__main__":
+    main()
