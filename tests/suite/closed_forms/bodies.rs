@@ -306,7 +306,7 @@ fn seams_of_textures_are_no_holes() {
     let triangles = (0..whole.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let loose = TriangleMesh { positions, triangles, ..TriangleMesh::default() };
     let of = |mesh: TriangleMesh| bodies(&scene().mesh(mesh, AS_IT_IS, glass(1.5)));
-    assert_eq!(of(loose.clone()), Bodies::default());
+    assert_eq!(of(loose), Bodies::default());
     assert_eq!(of(whole.clone()), Bodies::default());
     // Its front looks inwards.
     assert!(of(turned(&whole)).is_turned(0) && of(turned(&whole)).open().is_empty());

@@ -243,7 +243,6 @@ fn assert_even(what: &str, build: &Build, (photons, radius): (u64, f64), exact: 
     };
     let (mean, error) = mean_and_error(&(0..SEEDS).into_par_iter().map(one).collect::<Vec<_>>());
     let (off, error) = (mean / exact - 1.0, error / exact);
-    eprintln!("{what}: {:+.3} ± {:.3} %", 100.0 * off, 100.0 * error);
     assert!(error < 1e-3, "{what}: {mean} ± {error} says nothing");
     assert!(off.abs() < AT_EDGES + 4.0 * error, "{what}: {mean} is not {exact}, by {off} ± {error}");
 }
