@@ -50,7 +50,7 @@ fn signs(more: &str, camera: &str, rest: &str) -> Picture {
     Picture::new(format!("{render}{camera}{SIGNS}{rest}"))
 }
 
-/// Light 1 from all around, by path tracing: if no light is lost, every pixel has the radiance 1.
+/// Light 1 from all around, by path tracing: every pixel has the radiance 1, unless light is lost.
 fn furnace(samples: u32, camera: &str, rest: &str) -> Picture {
     let render = head(samples, "integrator = \"path\"\nmax_depth = 64");
     Picture::new(format!("{render}{camera}[environment]\ncolor = [1, 1, 1]\n{rest}"))

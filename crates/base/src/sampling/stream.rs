@@ -158,7 +158,7 @@ fn unit(bits: u32) -> f32 {
 }
 
 /// The second coordinate with its bits reversed. Bit j is the sum of those bits k of the index for which C(k, j) is odd,
-/// that is of the k that have every bit of j. The first coordinate, reversed, is the index itself.
+/// which holds if k has every bit of j. The first coordinate, reversed, is the index itself.
 #[inline(always)]
 fn pascal(mut bits: u32) -> u32 {
     for (shift, lacking) in

@@ -197,17 +197,7 @@ impl Shape {
     /// Whether a point is inside, or behind a plane. `None` if the shape has no inside.
     #[inline]
     pub fn encloses(&self, point: DVec3) -> Option<bool> {
-        match self {
-            Self::Plane(plane) => Some(plane.is_behind(point)),
-            Self::Sphere(_)
-            | Self::Box(_)
-            | Self::Torus(_)
-            | Self::Cylinder(_)
-            | Self::Cone(_)
-            | Self::Quad(_)
-            | Self::Triangle(_)
-            | Self::Disk(_) => self.is_closed().then(|| self.contains(point)),
-        }
+        self.encloses_each([point]).map(|[is_inside]| is_inside)
     }
 
     /// [`Shape::encloses`] of several points.

@@ -44,7 +44,7 @@ fn shapes(scene: &Scene, of: &Referents<'_>) -> Key {
     key.finish()
 }
 
-/// Which surfaces there are, and what those of glass are made of.
+/// Key of the scene's surfaces, and of what those of glass are made of.
 pub(in crate::pipeline) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
     let mut key = Fingerprint::new("glass");
     key.key(&shapes(scene, of));

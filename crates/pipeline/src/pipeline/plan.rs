@@ -94,7 +94,7 @@ pub(super) const MOST_PHOTONS: u64 = 4_000_000;
 /// error than they save time, and more take time in which another pass brings more; the first picture waits for the first pass.
 const PHOTONS_BY_PIXELS: RangeInclusive<u64> = 8192..=200_000;
 
-/// How photons are sent and gathered for a picture of a size.
+/// Returns the photon settings for a picture of a size, in pixels.
 fn photons(requested: &Photons, (width, height): (u32, u32)) -> PhotonSettings {
     let Photons { enabled: _, count, radius, bounces } = *requested;
     let by_pixels = || {

@@ -103,7 +103,7 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
     }
 }
 
-/// Files of all maps of a material, also of those that nothing looks up.
+/// Files of all maps of a material, also of unused maps.
 pub(super) fn pictures(found: &tobj::Material, folder: &Path) -> Vec<PathBuf> {
     let known = [
         &found.ambient_texture,

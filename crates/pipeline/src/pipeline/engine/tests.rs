@@ -61,7 +61,7 @@ impl Desk {
         Made { geometry, mesh, lights, world: self.engine.world.latest().expect("it was made").clone() }
     }
 
-    /// Which of geometry, mesh, lights and world survive an edit as the same value, not as an equal one.
+    /// Returns whether geometry, mesh, lights and world survive an edit as the same value, not as an equal one.
     fn kept(&mut self, from: &str, to: &str) -> [bool; 4] {
         let before = self.request();
         assert!(self.text.contains(from), "{from}");
