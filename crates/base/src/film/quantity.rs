@@ -1,8 +1,9 @@
 //! Quantities that a picture can show: the samples' mean, or numbers about the samples.
 
-use super::noise::{Convergence, pixel_variance};
-use super::sums::Tile;
-use crate::math::DVec3;
+use super::steps::{Convergence, pixel_variance};
+use super::sums::{Tile, tile_grid, tile_rect};
+use super::{Film, RadianceImage, Rect, TILE_SIZE};
+use crate::math::{DVec3, Vec3};
 
 /// A quantity that a film shows of its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,6 +19,47 @@ pub enum Quantity {
 
 /// Half width, in pixels, of the window over which squared steps are averaged: one pixel's step is a single noisy value.
 const REACH: usize = 2;
+
+impl Film {
+    /// The picture so far: the mean of every pixel's samples; black outside the crop and in pixels without samples.
+    pub fn radiance(&self) -> RadianceImage {
+        self.image(Quantity::Radiance)
+    }
+
+    /// The picture of this quantity.
+    pub fn image(&self, quantity: Quantity) -> RadianceImage {
+        let mut image = RadianceImage::black(self.width(), self.height());
+        for i in 0..self.tile_count() {
+            let rect = tile_rect(self.crop(), i);
+            let tile = self.tile(i);
+            for row in 0..rect.height {
+                let start = (rect.y + row) as usize * self.width() as usize + rect.x as usize;
+                let line = &mut image.pixels[start..][..rect.width as usize];
+                for (x, pixel) in line.iter_mut().enumerate() {
+                    let columns = rect.width as usize;
+                    let value = tile.value(quantity, (row as usize * columns + x, columns));
+                    *pixel = value.map_or(Vec3::ZERO, DVec3::as_vec3);
+                }
+            }
+        }
+        image
+    }
+
+    /// One pixel of [`Film::image`]. `None` if it has no sample or lies outside the crop.
+    pub fn pixel(&self, quantity: Quantity, x: u32, y: u32) -> Option<Vec3> {
+        let Rect { x: left, y: top, width, height } = self.crop();
+        let (right, down) = (x.checked_sub(left)?, y.checked_sub(top)?);
+        if right >= width || down >= height {
+            return None;
+        }
+        let index = (down / TILE_SIZE) as usize * tile_grid(self.crop()).0 + (right / TILE_SIZE) as usize;
+        let place = (down % TILE_SIZE, right % TILE_SIZE);
+        let columns = tile_rect(self.crop(), index).width as usize;
+        let index_in_tile = place.0 as usize * columns + place.1 as usize;
+        let value = self.tile(index).value(quantity, (index_in_tile, columns));
+        value.map(DVec3::as_vec3)
+    }
+}
 
 impl Tile {
     /// Value of a quantity for the pixel of an index, in a tile of so many columns. `None` if the pixel has no sample.
@@ -57,8 +99,7 @@ impl Tile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{Film, Rect, TileSamples};
-    use crate::math::Vec3;
+    use crate::film::TileSamples;
     use crate::math::random::unit;
 
     /// 20 × 20 pixels with so many grey samples each.

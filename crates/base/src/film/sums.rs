@@ -3,22 +3,10 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::noise::{Convergence, Steps, luminance};
 use super::part::Part;
-use super::{Quantity, RadianceImage, Rect, TileSamples};
+use super::steps::{Convergence, Steps, luminance};
+use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
-
-/// Pixels along a tile's side: 1024 pixels of 40 bytes stay in a core's second-level cache.
-pub const TILE_SIZE: u32 = 32;
-
-/// Pixels along the side of a cell of a tile. Each cell gets the samples that its own noise needs. The smaller the cells, the fewer
-/// pixels share the samples of an edge.
-pub const CELL_SIZE: u32 = 16;
-
-const CELLS_ACROSS: usize = (TILE_SIZE / CELL_SIZE) as usize;
-
-/// Cells of a tile, in rows.
-pub const CELLS: usize = CELLS_ACROSS * CELLS_ACROSS;
 
 /// Reasons for which a film cannot be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -313,45 +301,6 @@ impl Film {
         self.non_finite_samples.fetch_add(non_finite, Ordering::Relaxed);
     }
 
-    /// The picture so far: the mean of every pixel's samples; black outside the crop and in pixels without samples.
-    pub fn radiance(&self) -> RadianceImage {
-        self.image(Quantity::Radiance)
-    }
-
-    /// The picture of this quantity.
-    pub fn image(&self, quantity: Quantity) -> RadianceImage {
-        let mut image = RadianceImage::black(self.width, self.height);
-        for (i, tile) in self.tiles.iter().enumerate() {
-            let rect = tile_rect(self.crop, i);
-            let tile = lock(tile);
-            for row in 0..rect.height {
-                let start = (rect.y + row) as usize * self.width as usize + rect.x as usize;
-                let line = &mut image.pixels[start..][..rect.width as usize];
-                for (x, pixel) in line.iter_mut().enumerate() {
-                    let columns = rect.width as usize;
-                    let value = tile.value(quantity, (row as usize * columns + x, columns));
-                    *pixel = value.map_or(Vec3::ZERO, DVec3::as_vec3);
-                }
-            }
-        }
-        image
-    }
-
-    /// One pixel of [`Film::image`]. `None` if it has no sample or lies outside the crop.
-    pub fn pixel(&self, quantity: Quantity, x: u32, y: u32) -> Option<Vec3> {
-        let Rect { x: left, y: top, .. } = self.crop;
-        let (right, down) = (x.checked_sub(left)?, y.checked_sub(top)?);
-        if right >= self.crop.width || down >= self.crop.height {
-            return None;
-        }
-        let index = (down / TILE_SIZE) as usize * tile_grid(self.crop).0 + (right / TILE_SIZE) as usize;
-        let place = (down % TILE_SIZE, right % TILE_SIZE);
-        let columns = tile_rect(self.crop, index).width as usize;
-        let index_in_tile = place.0 as usize * columns + place.1 as usize;
-        let value = lock(&self.tiles[index]).value(quantity, (index_in_tile, columns));
-        value.map(DVec3::as_vec3)
-    }
-
     /// Statistics of the samples of the crop's pixels.
     pub fn samples(&self) -> SampleStats {
         let (mut min, mut max, mut total) = (u32::MAX, 0, 0_u64);
@@ -407,11 +356,11 @@ fn cell_rect(tile: Rect, cell: usize) -> Option<Rect> {
     Rect { x, y, width: CELL_SIZE, height: CELL_SIZE }.intersection(&tile)
 }
 
-fn tile_grid(crop: Rect) -> (usize, usize) {
+pub(super) fn tile_grid(crop: Rect) -> (usize, usize) {
     (crop.width.div_ceil(TILE_SIZE) as usize, crop.height.div_ceil(TILE_SIZE) as usize)
 }
 
-fn tile_rect(crop: Rect, tile: usize) -> Rect {
+pub(super) fn tile_rect(crop: Rect, tile: usize) -> Rect {
     let columns = tile_grid(crop).0;
     let (x, y) = ((tile % columns) as u32 * TILE_SIZE, (tile / columns) as u32 * TILE_SIZE);
     let side = |start: u32, length: u32| TILE_SIZE.min(length - start);

@@ -1,3 +1,4 @@
+use crate::film::RadianceImage;
 use std::collections::HashSet;
 use std::sync::atomic::AtomicBool;
 

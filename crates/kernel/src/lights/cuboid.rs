@@ -1,7 +1,7 @@
 //! Box lights, sampled by the solid angles of the visible faces.
 
 use super::Met;
-use super::emitter::Arrival;
+use super::arrival::Arrival;
 use super::rectangle::SphericalRectangle;
 use crate::geometry::cuboid::Cuboid;
 use crate::math::{DVec3, Vec3};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::emitter::Arrival;
+use super::arrival::Arrival;
 use crate::geometry::disk::Disk;
 use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec3};

@@ -1,6 +1,7 @@
 //! Samples of lights for a row of points, each of which picked its own light.
 
-use super::emitter::{Arrival, Emitter};
+use super::arrival::Arrival;
+use super::emitter::Emitter;
 use super::mesh::{Facets, Sampling};
 use super::rectangle::QuadEmitter;
 use super::row::{row_of, row_of_facets};

@@ -1,7 +1,7 @@
 //! Emissive triangles of a mesh: two that form a parallelogram are sampled as a quad, a few others by area, many by a
 //! light tree.
 
-use super::emitter::Arrival;
+use super::arrival::Arrival;
 use super::rectangle::QuadEmitter;
 use super::tree::{LightBounds, LightTree, MOST_WITHOUT, Receiver};
 use super::triangle::TriangleEmitter;

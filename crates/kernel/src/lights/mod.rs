@@ -1,5 +1,6 @@
 //! Lights, and the sampling of their light at a point.
 
+mod arrival;
 pub mod cuboid;
 pub mod directional;
 pub mod disk;

@@ -1,7 +1,7 @@
 //! Textured quad lights, sampled by their emission texture as well as by solid angle.
 
 use super::Met;
-use super::emitter::Arrival;
+use super::arrival::Arrival;
 use super::rectangle::QuadEmitter;
 use super::tree::bounds::strength;
 use crate::math::{DVec3, Vec3};

@@ -3,7 +3,7 @@
 use std::f32::consts::PI;
 
 use super::Met;
-use super::emitter::Arrival;
+use super::arrival::Arrival;
 use crate::math::elementary::{acos, sin_cos};
 use crate::math::{DVec3, Vec3};
 

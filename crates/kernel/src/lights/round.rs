@@ -1,8 +1,8 @@
 //! Lights with a round side and caps: cylinders and cones.
 
 use super::Met;
+use super::arrival::Arrival;
 use super::disk::{DiskEmitter, perpendicular};
-use super::emitter::Arrival;
 use super::meridians::{Meridians, Pole, Turn};
 use crate::geometry::cone::Cone;
 use crate::geometry::cylinder::Cylinder;

@@ -1,6 +1,7 @@
 //! Samples of one light for a row of points.
 
-use super::emitter::{Arrival, Emitter};
+use super::arrival::Arrival;
+use super::emitter::Emitter;
 use super::environment::SkyRow;
 use super::mesh::Sampling;
 use super::{End, Light, LightSample, Source};

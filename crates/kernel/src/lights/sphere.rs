@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use super::emitter::Arrival;
+use super::arrival::Arrival;
 use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;

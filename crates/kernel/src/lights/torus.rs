@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use super::Met;
+use super::arrival::Arrival;
 use super::disk::perpendicular;
-use super::emitter::Arrival;
 use super::linear::Linear;
 use super::meridians::Turn;
 use crate::geometry::RayF64;

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::Met;
-use super::emitter::Arrival;
+use super::arrival::Arrival;
 use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::warp;

@@ -1,0 +1,19 @@
+//! Samples of points on lights.
+
+use crate::math::Vec3;
+
+/// A sample of a point on a light, computed without branches.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrival {
+    /// Unit direction to the sampled point.
+    pub direction: Vec3,
+    /// Sampled point.
+    pub target: Vec3,
+    /// Inverse pdf of the direction, in sr; 0 from behind or from inside the light.
+    pub factor: f32,
+}
+
+impl Arrival {
+    /// No sample: the light is not visible.
+    pub const NOTHING: Self = Self { direction: Vec3::ZERO, target: Vec3::ZERO, factor: 0.0 };
+}
