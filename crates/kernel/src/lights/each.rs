@@ -1,12 +1,14 @@
 //! Samples of lights for a row of points, each of which picked its own light.
 
-use super::arrival::Arrival;
-use super::emitter::Emitter;
-use super::mesh::{Facets, Sampling};
-use super::rectangle::QuadEmitter;
-use super::row::{row_of, row_of_facets};
-use super::sphere::SphereEmitter;
-use super::{AreaLight, Light, LightRow, Lights, PointLight, Source};
+use super::area::mesh::{Facets, MeshEmitter};
+use super::area::quad::QuadEmitter;
+use super::area::row::row_of_facets;
+use super::area::sphere::SphereEmitter;
+use super::area::{AreaLight, Arrival, ShapeEmitter};
+use super::delta::DeltaLight;
+use super::row::{LightRow, row_of};
+use super::sample::Source;
+use super::{Light, Lights};
 use crate::geometry::rows::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
@@ -48,8 +50,8 @@ impl Lights {
         while left != 0 {
             let first = left.trailing_zeros() as usize % LANES;
             let mut of = 0;
-            let found = if let Some(filler) = point(lights[first]) {
-                let lights = alike((&lights, left), &mut of, point, filler);
+            let found = if let Some(filler) = lights[first].as_point() {
+                let lights = alike((&lights, left), &mut of, Light::as_point, filler);
                 row_of!(Source::Nothing, i => {
                     let (direction, weight) = lights[i].arriving(lane(points, i));
                     (direction, lights[i].position.as_vec3(), weight)
@@ -61,7 +63,7 @@ impl Lights {
                 let quads = alike((&lights, left), &mut of, quad, filler);
                 let mut row = row_of_wholes!(i => quads, points, u);
                 for i in 0..LANES {
-                    if let Some((_, Some(two))) = quads[i].1.quad() {
+                    if let Some((_, Some(two))) = quads[i].1.shape.as_quad() {
                         row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));
                     }
                 }
@@ -97,53 +99,21 @@ impl Lights {
 }
 
 #[inline(always)]
-fn point(light: &Light) -> Option<&PointLight> {
-    match light {
-        Light::Point(light) => Some(light),
-        Light::Spot(_) | Light::Directional(_) | Light::Environment(_) | Light::Area(_) => None,
-    }
-}
-
-#[inline(always)]
 fn ball(light: &Light) -> Option<(&SphereEmitter, &AreaLight)> {
-    let light = area(light)?;
-    if let Emitter::Sphere(ball) = &light.shape { Some((ball, light)) } else { None }
+    let light = light.as_area()?;
+    light.shape.as_sphere().map(|ball| (ball, light))
 }
 
 #[inline(always)]
 fn quad(light: &Light) -> Option<(&QuadEmitter, &AreaLight)> {
-    let light = area(light)?;
-    light.quad().map(|(quad, _)| (quad, light))
+    let light = light.as_area()?;
+    light.shape.as_quad().map(|(quad, _)| (quad, light))
 }
 
 #[inline(always)]
 fn facets(light: &Light) -> Option<(&Facets, &AreaLight)> {
-    let light = area(light)?;
-    if let Some(Sampling::Area(facets)) = sampling(light) { Some((facets, light)) } else { None }
-}
-
-#[inline(always)]
-fn area(light: &Light) -> Option<&AreaLight> {
-    match light {
-        Light::Area(light) => Some(light),
-        Light::Point(_) | Light::Spot(_) | Light::Directional(_) | Light::Environment(_) => None,
-    }
-}
-
-#[inline(always)]
-fn sampling(light: &AreaLight) -> Option<&Sampling> {
-    match &light.shape {
-        Emitter::Mesh(mesh) => Some(mesh.sampling()),
-        Emitter::Sphere(_)
-        | Emitter::Quad(_)
-        | Emitter::Picture(_)
-        | Emitter::Box(_)
-        | Emitter::Triangle(_)
-        | Emitter::Disk(_)
-        | Emitter::Cylinder(_)
-        | Emitter::Cone(_)
-        | Emitter::Torus(_) => None,
-    }
+    let light = light.as_area()?;
+    light.shape.as_mesh().and_then(MeshEmitter::facets).map(|facets| (facets, light))
 }
 
 /// Lights of one kind, and a bit of `left` for each lane that has one; the other lanes get the filler.
@@ -162,17 +132,4 @@ fn alike<'a, T: Copy>(
         }
     }
     all
-}
-
-impl Light {
-    /// Inverse pdf as [`Light::inverse_densities`], from the direction and the weight of a sample.
-    #[inline(always)]
-    fn inverse_density(&self, direction: Vec3, weight: Vec3) -> f32 {
-        match self {
-            Self::Point(_) | Self::Spot(_) => 0.0,
-            Self::Directional(light) => light.inverse_density(),
-            Self::Environment(light) => light.inverse_density(direction),
-            Self::Area(light) => weight.max_element() / light.radiance.max_element(),
-        }
-    }
 }

@@ -1,10 +1,6 @@
 //! Samples of one light for a row of points.
 
-use super::arrival::Arrival;
-use super::emitter::Emitter;
-use super::environment::SkyRow;
-use super::mesh::Sampling;
-use super::{End, Light, LightSample, Source};
+use super::sample::{End, LightSample, Source};
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane, take, take_u32, truths};
 
@@ -22,7 +18,7 @@ pub struct LightRow {
     /// A bit for each sample whose light comes from beyond everything.
     pub beyond: u32,
     /// Inverse pdfs in sr, for an environment alone; those of other lights are computed on request.
-    of_sky: Lanes,
+    pub(super) of_sky: Lanes,
 }
 
 /// [`Source`]s side by side.
@@ -85,12 +81,12 @@ fn numbers(source: Source) -> (u32, u32) {
 /// would not always be compiled as part of its caller, with the caller's instructions.
 macro_rules! row_of {
     ($source:expr, $i:ident => $sample:expr) => {{
-        let mut row = LightRow::dark($source);
-        for $i in 0..LANES {
+        let mut row = $crate::lights::row::LightRow::dark($source);
+        for $i in 0..$crate::math::lanes::LANES {
             let (direction, target, weight) = $sample;
-            set_lane(&mut row.directions, $i, direction);
-            set_lane(&mut row.targets, $i, target);
-            set_lane(&mut row.weights, $i, weight);
+            $crate::math::lanes::set_lane(&mut row.directions, $i, direction);
+            $crate::math::lanes::set_lane(&mut row.targets, $i, target);
+            $crate::math::lanes::set_lane(&mut row.weights, $i, weight);
         }
         row
     }};
@@ -101,39 +97,15 @@ pub(super) use row_of;
 /// [`row_of`] for directions and weights of light from beyond everything.
 macro_rules! row_beyond {
     ($i:ident => $sample:expr) => {{
-        let row = row_of!(Source::Nothing, $i => {
+        let row = $crate::lights::row::row_of!($crate::lights::sample::Source::Nothing, $i => {
             let (direction, weight) = $sample;
-            (direction, Vec3::ZERO, weight)
+            (direction, $crate::math::Vec3::ZERO, weight)
         });
-        LightRow { beyond: u32::MAX, ..row }
+        $crate::lights::row::LightRow { beyond: u32::MAX, ..row }
     }};
 }
 
-/// Makes the row of samples of facets, with a light for each lane.
-macro_rules! row_of_facets {
-    ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
-        let mut row = row_of!(Source::Nothing, $i => {
-            let sample: Arrival = $facets.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
-            (sample.direction, sample.target, $light.radiance * sample.factor)
-        });
-        for $i in 0..LANES {
-            let source = Source::Primitive($light.object, $facets.part($u[0][$i]));
-            row.sources.set($i, source);
-        }
-        row
-    }};
-}
-
-pub(super) use row_of_facets;
-
-/// Makes the row of samples of one light if its shape has no loop.
-macro_rules! one_by_one {
-    ($light:expr, $points:expr, $normals:expr, $used:expr, $u:expr) => {
-        LightRow::one_by_one($points, $used, |i, point| {
-            $light.plain_sample(point, lane($normals, i), [$u[0][i], $u[1][i]])
-        })
-    };
-}
+pub(super) use row_beyond;
 
 impl LightRow {
     /// Takes the samples of another row in the lanes whose bits are set.
@@ -186,92 +158,5 @@ impl LightRow {
             }
         }
         row
-    }
-}
-
-impl Light {
-    /// [`Light::sample`] for the points whose bits are set, each by its own numbers; without an emission texture.
-    #[inline(always)]
-    pub fn sample_row(&self, points: &Lanes3, normals: &Lanes3, used: u32, u: &[Lanes; 2]) -> LightRow {
-        let light = match self {
-            Self::Point(light) => {
-                let target = light.position.as_vec3();
-                return row_of!(Source::Nothing, i => {
-                    let (direction, weight) = light.arriving(lane(points, i));
-                    (direction, target, weight)
-                });
-            }
-            Self::Spot(light) => {
-                let target = light.point.position.as_vec3();
-                return row_of!(Source::Nothing, i => {
-                    let (direction, weight) = light.arriving(lane(points, i));
-                    (direction, target, weight)
-                });
-            }
-            Self::Directional(light) => return row_beyond!(i => light.arriving([u[0][i], u[1][i]])),
-            Self::Environment(light) => {
-                let SkyRow { directions, weights, inverse_densities } = light.sample_row(normals, u);
-                let dark = LightRow::dark(Source::Nothing);
-                return LightRow { directions, weights, beyond: u32::MAX, of_sky: inverse_densities, ..dark };
-            }
-            Self::Area(light) => light,
-        };
-        let source = Source::Object(light.object);
-        macro_rules! row_by {
-            ($emitter:expr) => {
-                row_of!(source, i => {
-                    let sample: Arrival = $emitter.sample(lane(points, i), [u[0][i], u[1][i]]);
-                    (sample.direction, sample.target, light.radiance * sample.factor)
-                })
-            };
-        }
-        // One loop serves all quads: compilers make no vector instructions of a second one.
-        if let Some((quad, of_two)) = light.quad() {
-            let mut row = row_by!(quad);
-            if let Some(two) = of_two {
-                for i in 0..LANES {
-                    row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));
-                }
-            }
-            return row;
-        }
-        match &light.shape {
-            Emitter::Picture(picture) => row_by!(picture),
-            Emitter::Sphere(sphere) => row_by!(sphere),
-            Emitter::Disk(disk) => row_by!(disk),
-            Emitter::Box(cuboid) => row_by!(cuboid),
-            Emitter::Mesh(mesh) => match mesh.sampling() {
-                Sampling::Area(facets) => row_of_facets!(i => (facets, light), points, u),
-                Sampling::Quad(_) | Sampling::Tree(_) => one_by_one!(light, points, normals, used, u),
-            },
-            Emitter::Quad(_)
-            | Emitter::Triangle(_)
-            | Emitter::Cylinder(_)
-            | Emitter::Cone(_)
-            | Emitter::Torus(_) => {
-                one_by_one!(light, points, normals, used, u)
-            }
-        }
-    }
-}
-
-impl Light {
-    /// Inverse pdfs in sr of samples of this light. 0 if nothing arrives, and for a light without extent, which no other
-    /// technique finds.
-    #[inline(always)]
-    pub fn inverse_densities(&self, samples: &LightRow) -> Lanes {
-        let mut inverse = [0.0; LANES];
-        match self {
-            Self::Point(_) | Self::Spot(_) => {}
-            Self::Directional(light) => inverse = [light.inverse_density(); LANES],
-            Self::Environment(_) => inverse = samples.of_sky,
-            Self::Area(light) => {
-                let of_radiance = 1.0 / light.radiance.max_element();
-                for i in 0..LANES {
-                    inverse[i] = lane(&samples.weights, i).max_element() * of_radiance;
-                }
-            }
-        }
-        inverse
     }
 }

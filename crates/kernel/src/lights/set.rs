@@ -3,9 +3,10 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use super::emitter::{Emitter, Part};
+use super::area::{AreaLight, MeshEmitter, Part};
+use super::infinite::{DirectionalLight, Environment, InfiniteLight};
+use super::light::Light;
 use super::tree::{Cut, LightTree, MOST_WITHOUT, Receiver};
-use super::{AreaLight, DirectionalLight, Environment, Light};
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
@@ -102,12 +103,12 @@ impl Lights {
     pub fn new(all: Vec<Light>, token: &CancelToken) -> Result<Self, Cancelled> {
         let mut lights = Self::default();
         for (number, light) in (0_u32..).zip(&all) {
-            match light {
-                Light::Point(_) | Light::Spot(_) => {}
-                Light::Directional(sun) if sun.is_sharp() => {}
-                Light::Directional(sun) => lights.suns.push((number, *sun)),
-                Light::Environment(light) => lights.environment = Some((number, light.clone())),
-                Light::Area(light) => lights.note(number, light),
+            if let Some(light) = light.as_area() {
+                lights.note(number, light);
+            } else if let Some(sun) = light.as_directional().filter(|sun| !sun.is_sharp()) {
+                lights.suns.push((number, *sun));
+            } else if let Some(light) = light.as_environment() {
+                lights.environment = Some((number, light.clone()));
             }
         }
         let tree_over = |taken: &dyn Fn(&&Light) -> bool, most| -> Result<_, Cancelled> {
@@ -155,15 +156,9 @@ impl Lights {
 
     /// Bytes of the trees over lights and over the triangles of lights.
     pub fn memory_bytes(&self) -> usize {
-        let of_mesh = |light: &Light| match light {
-            Light::Area(AreaLight { shape: Emitter::Mesh(mesh), .. }) => {
-                mesh.tree().map_or(0, LightTree::memory_bytes)
-            }
-            Light::Point(_)
-            | Light::Spot(_)
-            | Light::Directional(_)
-            | Light::Environment(_)
-            | Light::Area(_) => 0,
+        let of_mesh = |light: &Light| {
+            let mesh = light.as_area().and_then(|light| light.shape.as_mesh());
+            mesh.and_then(MeshEmitter::tree).map_or(0, LightTree::memory_bytes)
         };
         let mut trees: Vec<_> = [&self.tree, &self.tree_of_lamps].into_iter().flatten().collect();
         trees.dedup_by(|a, b| Arc::ptr_eq(a, b));
@@ -181,23 +176,13 @@ impl Lights {
                 }
             }
         };
-        match (light.part, &light.shape) {
-            (Part::Whole, _) => {
+        match light.part {
+            Part::Whole => {
                 self.by_object.insert(light.object, OfObject::Whole(number));
             }
-            (Part::Listed, Emitter::Mesh(mesh)) => mesh.primitives().for_each(note),
-            (
-                Part::Listed,
-                Emitter::Sphere(_)
-                | Emitter::Quad(_)
-                | Emitter::Picture(_)
-                | Emitter::Box(_)
-                | Emitter::Triangle(_)
-                | Emitter::Disk(_)
-                | Emitter::Cylinder(_)
-                | Emitter::Cone(_)
-                | Emitter::Torus(_),
-            ) => {}
+            Part::Listed => {
+                light.shape.as_mesh().into_iter().flat_map(MeshEmitter::primitives).for_each(note)
+            }
         }
     }
 
@@ -280,10 +265,7 @@ impl Lights {
 
 /// Number of these lights; all lights of one object count as one.
 fn count<'a>(lights: impl Iterator<Item = &'a Light> + Clone) -> usize {
-    let object = |light: &Light| match light {
-        Light::Area(light) => Some(light.object),
-        Light::Point(_) | Light::Spot(_) | Light::Directional(_) | Light::Environment(_) => None,
-    };
+    let object = |light: &Light| light.as_area().map(|light| light.object);
     let objects: HashSet<u32> = lights.clone().filter_map(object).collect();
     objects.len() + lights.filter(|light| object(light).is_none()).count()
 }

@@ -1,8 +1,7 @@
 //! Scatter and distribution of the samples of a light: compared with a ball of the same solid angle, and with their pdfs.
 
-use super::emitter::Emitter;
-use super::picture::PictureEmitter;
-use super::rectangle::QuadEmitter;
+use super::area::picture::PictureEmitter;
+use super::area::quad::QuadEmitter;
 use super::tests::met;
 use super::*;
 use crate::geometry::Shape;
@@ -14,8 +13,8 @@ use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
-use crate::math::DVec3;
 use crate::math::frame::Frame;
+use crate::math::{DVec3, Vec3};
 
 const OBJECT: u32 = 7;
 

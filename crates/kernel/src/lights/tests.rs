@@ -1,7 +1,5 @@
 //! Pdfs of samples, and the map from a hit back to its light.
 
-use super::emitter::Emitter;
-use super::mesh::MeshEmitter;
 use super::*;
 use crate::control::CancelToken;
 use crate::geometry::cone::Cone;
@@ -14,8 +12,8 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
 use crate::geometry::{Ray, Shape, ShapeHit};
-use crate::math::DVec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
+use crate::math::{DVec3, Vec3};
 use crate::sampling::{Decision, PixelSampler};
 
 /// Shapes for every sampling method: rectangles by solid angle, other parallelograms and distant ones by area.
@@ -44,7 +42,7 @@ fn lights_of(shape: &Shape) -> Lights {
 }
 
 const POINT: PointLight =
-    PointLight { position: DVec3::ZERO, intensity: Vec3::ONE, falloff: point::Falloff::Square };
+    PointLight { position: DVec3::ZERO, intensity: Vec3::ONE, falloff: Falloff::Square };
 
 /// The hit of a ray from a point on a shape.
 pub fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(Met, ShapeHit)> {
@@ -283,7 +281,7 @@ fn two_triangles_that_make_a_parallelogram_are_sampled_as_a_quad_is() {
         ([p + v, p, p + u], [p + v, p + u, far]),
     ] {
         let light = mesh_light(&[first, second]);
-        assert!(light.quad().is_some());
+        assert!(light.shape.as_quad().is_some());
         for sample in 0..400 {
             let at = |decision| PixelSampler::new(9, 2, 3, sample).pair(1, decision);
             let (a, b) = (at(Decision::Pick), at(Decision::Picked));
@@ -332,11 +330,11 @@ fn what_makes_no_parallelogram_is_sampled_by_area() {
         ([x + y, y + x * 1e-3, x], "no common edge"),
         ([x + y, x * 2.0, y * 2.0], "one common corner at most"),
     ] {
-        assert!(mesh_light(&[first, second]).quad().is_none(), "{what}");
+        assert!(mesh_light(&[first, second]).shape.as_quad().is_none(), "{what}");
     }
-    assert!(mesh_light(&[first]).quad().is_none());
-    assert!(mesh_light(&[first, [x + y, y, x]]).quad().is_some());
-    assert!(mesh_light(&[first, [x + y, y, x], first.map(|p| p + x * 3.0)]).quad().is_none());
+    assert!(mesh_light(&[first]).shape.as_quad().is_none());
+    assert!(mesh_light(&[first, [x + y, y, x]]).shape.as_quad().is_some());
+    assert!(mesh_light(&[first, [x + y, y, x], first.map(|p| p + x * 3.0)]).shape.as_quad().is_none());
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::settings::{Overrides, View};
 use crate::choice::Choice;
 use crate::integrators::RenderSettings;
 use crate::scene::Loaded;
-use crate::scene::description::{Falloff, Integrator, Light, MaterialKind, Scene};
+use crate::scene::description::{Integrator, Light, MaterialKind, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// The setting that a warning comes of.
@@ -87,7 +87,7 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
                        surface: what they would throw on it stays dark";
         warnings.push((Cause::Integrator, message.to_owned()));
     }
-    if photons.is_some() && specular() && scene.lights.iter().any(|light| light.sends() && is_steady(light)) {
+    if photons.is_some() && specular() && scene.lights.iter().any(|light| light.sends() && light.is_steady()) {
         let message =
             "photons carry no light of `falloff = \"none\"`: mirrors and glass throw none of it on surfaces";
         warnings.push((Cause::Photons, message.to_owned()));
@@ -107,13 +107,4 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
         warnings.push((Cause::Clamp, message));
     }
     warnings
-}
-
-/// Whether distance does not weaken a light.
-fn is_steady(light: &Light) -> bool {
-    match light {
-        Light::Point(light) => light.falloff == Falloff::None,
-        Light::Spot(light) => light.point.falloff == Falloff::None,
-        Light::Directional(_) => false,
-    }
 }

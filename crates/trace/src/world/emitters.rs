@@ -6,12 +6,12 @@ use super::lower::{emission, file_emission};
 use super::{Geometry, Images, MeshInstance, Object};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
-use crate::lights::emitter::{Emitter, Part};
-use crate::lights::mesh::MeshEmitter;
+use crate::lights::MeshEmitter;
 use crate::lights::{
     AreaLight, Ball, Chart, DirectionalLight, Environment, Light, LightBounds, Lights, Patch, Pattern,
     PhotonSource, PointLight, SkyMap, SpotLight, area_light,
 };
+use crate::lights::{Emitter, Part};
 use crate::materials::Emission;
 use crate::materials::texels::Texels;
 use crate::math::DVec3;

@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 use arrayvec::ArrayVec;
 
 use super::Ball;
-use crate::lights::SpotLight;
-use crate::lights::sphere::one_minus_cos;
+use crate::lights::area::sphere::one_minus_cos;
+use crate::lights::delta::DeltaLight;
 use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::distribution::Discrete;
@@ -26,13 +26,11 @@ pub const MOST_TARGETS: usize = 32;
 
 /// Directional distribution of the light that a point emits.
 pub enum Sends<'a> {
-    /// The same in all directions.
-    Everywhere,
-    /// The cone of a spotlight.
-    Cone {
-        /// The spotlight.
-        light: &'a SpotLight,
-        /// Its power over its intensity on the axis, in sr.
+    /// That of a light without extent.
+    Light {
+        /// The light.
+        light: &'a dyn DeltaLight,
+        /// [`DeltaLight::solid_angle`], which takes long to compute for some.
         spread: f64,
     },
     /// The cosine with this unit normal, before a surface.
@@ -43,8 +41,7 @@ impl Sends<'_> {
     /// Power over the radiant intensity in the brightest direction, in sr.
     pub fn spread(&self) -> f64 {
         match self {
-            Self::Everywhere => 4.0 * PI,
-            Self::Cone { spread, .. } => *spread,
+            Self::Light { spread, .. } => *spread,
             Self::Front(_) => PI,
         }
     }
@@ -52,8 +49,7 @@ impl Sends<'_> {
     /// Intensity in a direction, relative to the brightest direction.
     pub fn share(&self, direction: Vec3) -> f64 {
         match self {
-            Self::Everywhere => 1.0,
-            Self::Cone { light, .. } => f64::from(light.share(direction)),
+            Self::Light { light, .. } => f64::from(light.share(direction)),
             Self::Front(normal) => direction.as_dvec3().dot(*normal).max(0.0),
         }
     }
@@ -68,9 +64,9 @@ impl Sends<'_> {
             if along >= cos { 1.0 } else { along * cos + across * sin }
         };
         match self {
-            Self::Everywhere => 1.0,
-            Self::Cone { light, .. } => {
-                let is_met = nearest(light.axis.as_dvec3()) >= libm::cos(f64::from(light.half_angle)) - 1e-9;
+            Self::Light { light, .. } => {
+                let cone = light.bounds().cone;
+                let is_met = nearest(cone.axis) >= cone.cos - 1e-9;
                 f64::from(u8::from(is_met))
             }
             Self::Front(normal) => nearest(*normal).max(0.0),

@@ -15,9 +15,10 @@ mod surface;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-use super::point::Falloff;
+use super::delta::{Falloff, PointLight};
+use super::light::{Family, Light};
+use super::set::Lights;
 use super::tree::bounds::strength;
-use super::{Light, Lights};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Ray, Shape};
 use crate::math::frame::Frame;
@@ -224,31 +225,20 @@ impl PhotonSource {
     /// A photon of one light, aimed at a target or not.
     fn made(&self, number: usize, targets: Option<&Targets>, u: &Numbers) -> Option<Made> {
         let source = &self.sources[number];
-        match self.lights.get(number as u32) {
-            Light::Point(light) => {
-                let anywhere = || warp::cone(u.direction, 2.0);
-                let (from, sends) = (light.position, Sends::Everywhere);
-                let (direction, ratio) = self.directed(from, &sends, targets, u, anywhere);
-                let flux = light.intensity * source.spread as f32;
-                Some(Made { start: Start::Point(from.as_vec3()), direction, flux, ratio })
-            }
-            Light::Spot(light) => {
-                let sends = Sends::Cone { light, spread: source.spread };
-                let from = light.point.position;
+        match self.lights.get(number as u32).family() {
+            Family::Delta(light) => {
+                let sends = Sends::Light { light, spread: source.spread };
+                let PointLight { position, intensity, .. } = *light.brightest();
                 let (direction, ratio) =
-                    self.directed(from, &sends, targets, u, || light.direction(u.direction));
-                let flux = light.point.intensity * source.spread as f32;
-                Some(Made { start: Start::Point(from.as_vec3()), direction, flux, ratio })
+                    self.directed(position, &sends, targets, u, || light.direction(u.direction));
+                let flux = intensity * source.spread as f32;
+                Some(Made { start: Start::Point(position.as_vec3()), direction, flux, ratio })
             }
-            Light::Directional(light) => {
-                let (to_light, irradiance) = light.arriving(u.direction);
-                self.arriving_beyond(to_light, irradiance, targets, u)
-            }
-            Light::Environment(light) => {
+            Family::Infinite(light) => {
                 let (to_light, irradiance) = light.arriving_anywhere(u.direction);
                 self.arriving_beyond(to_light, irradiance, targets, u)
             }
-            Light::Area(light) => {
+            Family::Area(light) => {
                 let place = source.surface.as_ref()?.place(light, u.light[1], Vec2::from_array(u.position));
                 let normal = place.normal.as_vec3();
                 let by_cosine = || Frame::from_normal(normal).to_world(warp::cosine(u.direction));
@@ -336,16 +326,13 @@ impl PhotonSource {
             return 0.0;
         }
         let disc = PI * self.around.radius * self.around.radius;
-        let part = match light {
-            Light::Point(light) => {
-                targets.seen_from(light.position, &Sends::Everywhere).total() / source.spread
+        let part = match light.family() {
+            Family::Delta(light) => {
+                let sends = Sends::Light { light, spread: source.spread };
+                targets.seen_from(light.brightest().position, &sends).total() / source.spread
             }
-            Light::Spot(spot) => {
-                let sends = Sends::Cone { light: spot, spread: source.spread };
-                targets.seen_from(spot.point.position, &sends).total() / source.spread
-            }
-            Light::Directional(_) | Light::Environment(_) => targets.discs() / disc,
-            Light::Area(light) => source.surface.as_ref().map_or(0.0, |surface| {
+            Family::Infinite(_) => targets.discs() / disc,
+            Family::Area(light) => source.surface.as_ref().map_or(0.0, |surface| {
                 let of = |i: u32| {
                     let (u, piece) = (places(i), (i as f32 + 0.5) / PLACES as f32);
                     let place = surface.place(light, piece, u);
@@ -371,26 +358,18 @@ fn places(i: u32) -> Vec2 {
 impl OfLight {
     fn new(light: &Light, outline: &impl Fn(u32) -> Option<Outline>, around: Ball) -> Self {
         let disc = PI * around.radius * around.radius;
-        let of = |factor: f64, color: Vec3| (color.as_dvec3() * factor).as_vec3();
-        let without_extent = |falloff: Falloff, spread: f64, intensity: Vec3| {
-            let power = match falloff {
-                Falloff::Square => of(spread, intensity),
-                Falloff::None => Vec3::ZERO,
-            };
-            Self { power, spread, surface: None }
-        };
-        match light {
-            Light::Point(light) => without_extent(light.falloff, 4.0 * PI, light.intensity),
-            Light::Spot(light) => {
-                without_extent(light.point.falloff, light.solid_angle(), light.point.intensity)
+        match light.family() {
+            Family::Delta(light) => {
+                let spread = light.solid_angle();
+                let PointLight { intensity, falloff, .. } = light.brightest();
+                let power = match falloff {
+                    Falloff::Square => (intensity.as_dvec3() * spread).as_vec3(),
+                    Falloff::None => Vec3::ZERO,
+                };
+                Self { power, spread, surface: None }
             }
-            Light::Directional(light) => {
-                Self { power: of(disc, light.arriving([0.5; 2]).1), spread: 0.0, surface: None }
-            }
-            Light::Environment(light) => {
-                Self { power: of(4.0 * PI * disc, light.mean()), spread: 0.0, surface: None }
-            }
-            Light::Area(light) => {
+            Family::Infinite(light) => Self { power: light.power_over(disc), spread: 0.0, surface: None },
+            Family::Area(light) => {
                 let surface = outline(light.object).and_then(|outline| Surface::new(light, &outline));
                 let power = surface.as_ref().map_or(Vec3::ZERO, Surface::power);
                 Self { power, spread: 0.0, surface }

@@ -5,8 +5,7 @@ use std::f64::consts::PI;
 use super::Outline;
 use crate::geometry::surface::error;
 use crate::geometry::{AreaPoint, Shape};
-use crate::lights::AreaLight;
-use crate::lights::emitter::Emitter;
+use crate::lights::area::AreaLight;
 use crate::lights::tree::bounds::strength;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
@@ -72,29 +71,18 @@ const BY_AREA: f64 = 0.05;
 impl Surface {
     /// The surface of a light. `None` if it has no area, or emits nothing.
     pub fn new(light: &AreaLight, outline: &Outline) -> Option<Self> {
-        let (on, count) = match (outline, &light.shape) {
-            (Outline::Shape(shape), _) => {
+        let (on, count) = match outline {
+            Outline::Shape(shape) => {
                 let areas = shape.areas();
                 let most = if light.pattern.is_some() { PIECES / areas.len().max(1) } else { 1 };
                 let side = most.isqrt().max(1);
                 let count = areas.len() * side * side;
                 (On::Shape { shape: *shape, side: side as u32, areas, reach: reach(shape)? }, count)
             }
-            (Outline::Mesh { rounding }, Emitter::Mesh(mesh)) => {
+            Outline::Mesh { rounding } => {
+                let mesh = light.shape.as_mesh()?;
                 (On::Mesh { rounding: *rounding }, mesh.primitives().count())
             }
-            (
-                Outline::Mesh { .. },
-                Emitter::Sphere(_)
-                | Emitter::Quad(_)
-                | Emitter::Picture(_)
-                | Emitter::Box(_)
-                | Emitter::Triangle(_)
-                | Emitter::Disk(_)
-                | Emitter::Cylinder(_)
-                | Emitter::Cone(_)
-                | Emitter::Torus(_),
-            ) => return None,
         };
         let asked = if light.pattern.is_some() { ASKED } else { 1 };
         let of = |index: usize| {
@@ -143,7 +131,7 @@ impl Surface {
 impl On {
     /// A place of a piece, uniform over it.
     fn at(&self, light: &AreaLight, index: usize, u: Vec2) -> OnPiece {
-        match (self, &light.shape) {
+        match (self, light.shape.as_mesh()) {
             (Self::Shape { shape, side, areas, .. }, _) => {
                 let all = *side as usize;
                 let (part, cell) = (index / (all * all), index % (all * all));
@@ -152,22 +140,13 @@ impl On {
                 let AreaPoint { point, normal } = shape.place(part as u32, u);
                 OnPiece { point, normal, area: areas[part] / (all * all) as f64, primitive: part as u32 }
             }
-            (Self::Mesh { .. }, Emitter::Mesh(mesh)) => {
+            (Self::Mesh { .. }, Some(mesh)) => {
                 let (place, area, primitive) = mesh.place(index, u);
                 OnPiece { point: place.point, normal: place.normal, area, primitive }
             }
-            (
-                Self::Mesh { .. },
-                Emitter::Sphere(_)
-                | Emitter::Quad(_)
-                | Emitter::Picture(_)
-                | Emitter::Box(_)
-                | Emitter::Triangle(_)
-                | Emitter::Disk(_)
-                | Emitter::Cylinder(_)
-                | Emitter::Cone(_)
-                | Emitter::Torus(_),
-            ) => OnPiece { point: DVec3::ZERO, normal: DVec3::Y, area: 0.0, primitive: 0 },
+            (Self::Mesh { .. }, None) => {
+                OnPiece { point: DVec3::ZERO, normal: DVec3::Y, area: 0.0, primitive: 0 }
+            }
         }
     }
 }

@@ -10,11 +10,10 @@ use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
-use crate::lights::emitter::Emitter;
-use crate::lights::mesh::MeshEmitter;
+use crate::lights::delta::DeltaLight;
 use crate::lights::{
-    AreaLight, Chart, DirectionalLight, Environment, Part, Patch, Pattern, PointLight, SkyMap, SpotLight,
-    area_light,
+    AreaLight, Chart, DirectionalLight, Emitter, Environment, MeshEmitter, Part, Patch, Pattern, SkyMap,
+    SpotLight, area_light,
 };
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Texture, TextureFilter, Wrap};
@@ -358,11 +357,9 @@ fn places_of_light_from_beyond_are_even_over_the_disc() {
 fn densities_of_aimed_directions_make_a_whole() {
     let (spot, from) = (spot(100.0, 0.5), point(Falloff::Square).position);
     let all = targets();
-    let sends = [
-        Sends::Everywhere,
-        Sends::Cone { light: &spot, spread: spot.solid_angle() },
-        Sends::Front(DVec3::new(0.0, 0.6, 0.8)),
-    ];
+    let lights: [&dyn DeltaLight; 2] = [&point(Falloff::Square), &spot];
+    let [everywhere, cone] = lights.map(|light| Sends::Light { light, spread: light.solid_angle() });
+    let sends = [everywhere, cone, Sends::Front(DVec3::new(0.0, 0.6, 0.8))];
     for sends in sends {
         for balls in [&all[..3], &all[..], &all[..1]] {
             let targets = Targets::new(balls).expect("targets");

@@ -10,10 +10,10 @@ use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
-use crate::lights::emitter::{AreaLight, Emitter, Part, area_light};
-use crate::lights::mesh::MeshEmitter;
-use crate::lights::point::Falloff;
-use crate::lights::{DirectionalLight, Environment, Light, Lights, PointLight, SpotLight};
+use crate::lights::{
+    AreaLight, DirectionalLight, Emitter, Environment, Falloff, Light, Lights, MeshEmitter, Part, PointLight,
+    SpotLight, area_light,
+};
 use crate::math::{DVec3, Vec3, random};
 
 /// A light of a random kind, size and position.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use super::Located;
-pub use crate::lights::point::Falloff;
+pub use crate::lights::Falloff;
 use crate::math::{DVec3, Vec3};
 
 /// A light that is no shape.
@@ -73,6 +73,15 @@ impl Light {
             Self::Directional(light) => light.irradiance,
         };
         color != Vec3::ZERO
+    }
+
+    /// Whether distance does not weaken it.
+    pub fn is_steady(&self) -> bool {
+        match self {
+            Self::Point(light) => light.falloff == Falloff::None,
+            Self::Spot(light) => light.point.falloff == Falloff::None,
+            Self::Directional(_) => false,
+        }
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::f32::consts::PI;
 
-use super::Met;
 use super::arrival::Arrival;
+use super::{Met, ShapeEmitter};
 use crate::math::elementary::{acos, sin_cos};
 use crate::math::{DVec3, Vec3};
 
@@ -32,6 +32,43 @@ struct Rectangle {
     height: f32,
 }
 
+impl ShapeEmitter for QuadEmitter {
+    /// Samples a rectangle by solid angle, another parallelogram by area.
+    #[inline(always)]
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+        let to_corner = self.corner_from(point);
+        let by_area = self.by_area(to_corner, u);
+        let (offset, factor) = match &self.rectangle {
+            Some(rectangle) => {
+                let spherical = rectangle.seen_from(to_corner, self.normal);
+                let [x, y] = spherical.sample(u);
+                let offset = rectangle.x * x + rectangle.y * y + self.normal * spherical.z;
+                let is_told = spherical.is_told();
+                let x = if is_told { offset.x } else { by_area.0.x };
+                let y = if is_told { offset.y } else { by_area.0.y };
+                let z = if is_told { offset.z } else { by_area.0.z };
+                (Vec3::new(x, y, z), if is_told { spherical.solid_angle } else { by_area.1 })
+            }
+            None => by_area,
+        };
+        let direction = offset * (1.0 / offset.length_squared().sqrt());
+        let is_front = to_corner.dot(self.normal) < 0.0;
+        Arrival { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
+    }
+
+    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        let to_corner = self.corner_from(from);
+        if !(to_corner.dot(self.normal) < 0.0) {
+            return 0.0;
+        }
+        self.density(to_corner).unwrap_or_else(|| met.pdf_by_area(f64::from(self.area)))
+    }
+
+    fn middle(&self) -> DVec3 {
+        self.corner + ((self.u + self.v) * 0.5).as_dvec3()
+    }
+}
+
 impl QuadEmitter {
     /// A quad from a corner and two edges that are not parallel.
     pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
@@ -51,29 +88,6 @@ impl QuadEmitter {
             area: normal.length() as f32,
             rectangle,
         }
-    }
-
-    /// Samples a rectangle by solid angle, another parallelogram by area.
-    #[inline(always)]
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
-        let to_corner = self.corner_from(point);
-        let by_area = self.by_area(to_corner, u);
-        let (offset, factor) = match &self.rectangle {
-            Some(rectangle) => {
-                let spherical = rectangle.seen_from(to_corner, self.normal);
-                let [x, y] = spherical.sample(u);
-                let offset = rectangle.x * x + rectangle.y * y + self.normal * spherical.z;
-                let is_told = spherical.is_told();
-                let x = if is_told { offset.x } else { by_area.0.x };
-                let y = if is_told { offset.y } else { by_area.0.y };
-                let z = if is_told { offset.z } else { by_area.0.z };
-                (Vec3::new(x, y, z), if is_told { spherical.solid_angle } else { by_area.1 })
-            }
-            None => by_area,
-        };
-        let direction = offset * (1.0 / offset.length_squared().sqrt());
-        let is_front = to_corner.dot(self.normal) < 0.0;
-        Arrival { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
     }
 
     /// Offset from a point to the corner.
@@ -109,20 +123,6 @@ impl QuadEmitter {
         let (u, v, n) = (self.u.as_dvec3(), self.v.as_dvec3(), self.normal.as_dvec3());
         let (across_v, across_u) = (v.cross(n), n.cross(u));
         [(across_v / across_v.dot(u)).as_vec3(), (across_u / across_u.dot(v)).as_vec3()]
-    }
-
-    /// Centre of area.
-    pub fn middle(&self) -> DVec3 {
-        self.corner + ((self.u + self.v) * 0.5).as_dvec3()
-    }
-
-    /// [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
-        let to_corner = self.corner_from(from);
-        if !(to_corner.dot(self.normal) < 0.0) {
-            return 0.0;
-        }
-        self.density(to_corner).unwrap_or_else(|| met.pdf_by_area(f64::from(self.area)))
     }
 }
 

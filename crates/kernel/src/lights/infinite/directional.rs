@@ -2,10 +2,13 @@
 
 use std::f32::consts::PI;
 
-use super::tree::bounds::{EmissionCone, LightBounds, Space, strength};
-use super::{End, LightSample, Source};
+use super::InfiniteLight;
+use crate::lights::row::{LightRow, row_beyond};
+use crate::lights::sample::{End, LightSample, Source};
+use crate::lights::tree::bounds::{EmissionCone, LightBounds, Space, strength};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
+use crate::math::lanes::Lanes;
 use crate::sampling::warp;
 
 /// Light that comes from one direction everywhere, or from a disc of directions of the same radiance.
@@ -33,11 +36,6 @@ impl DirectionalLight {
         Self { to_light, irradiance, one_minus_cos: (2.0 * quarter * quarter) as f32, radiance }
     }
 
-    /// Whether it has no extent.
-    pub fn is_sharp(&self) -> bool {
-        self.one_minus_cos == 0.0
-    }
-
     /// Samples the light as it arrives anywhere, uniform over the solid angle of the disc.
     pub fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
         let (direction, weight) = self.arriving(u);
@@ -49,6 +47,12 @@ impl DirectionalLight {
         })
     }
 
+    /// [`DirectionalLight::sample`] side by side.
+    #[inline(always)]
+    pub fn sample_row(&self, u: &[Lanes; 2]) -> LightRow {
+        row_beyond!(i => self.arriving([u[0][i], u[1][i]]))
+    }
+
     /// A unit direction to the light, and radiance over its pdf; for a light without extent, irradiance.
     #[inline(always)]
     pub fn arriving(&self, u: [f32; 2]) -> (Vec3, Vec3) {
@@ -57,18 +61,6 @@ impl DirectionalLight {
         }
         let direction = Frame::from_normal(self.to_light).to_world(warp::cone(u, self.one_minus_cos));
         (direction, self.radiance * self.inverse_density())
-    }
-
-    /// Directions of the light, and its irradiance.
-    pub fn bounds(&self) -> LightBounds {
-        LightBounds {
-            space: Space::Beyond,
-            center: self.to_light.as_dvec3(),
-            // Take the chord from the middle to the edge.
-            radius: (2.0 * f64::from(self.one_minus_cos)).sqrt(),
-            power: strength(self.irradiance),
-            cone: EmissionCone::ALL,
-        }
     }
 
     /// Radiance from a direction; 0 for a light without extent.
@@ -90,6 +82,36 @@ impl DirectionalLight {
     /// Whether a unit direction is in the disc. Compares chords, which is exact for small discs too.
     fn holds(&self, direction: Vec3) -> bool {
         !self.is_sharp() && (direction - self.to_light).length_squared() <= 2.0 * self.one_minus_cos
+    }
+}
+
+impl InfiniteLight for DirectionalLight {
+    fn arriving_anywhere(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+        self.arriving(u)
+    }
+
+    fn power_over(&self, area: f64) -> Vec3 {
+        (self.arriving([0.5; 2]).1.as_dvec3() * area).as_vec3()
+    }
+
+    fn bounds(&self) -> LightBounds {
+        LightBounds {
+            space: Space::Beyond,
+            center: self.to_light.as_dvec3(),
+            // Take the chord from the middle to the edge.
+            radius: (2.0 * f64::from(self.one_minus_cos)).sqrt(),
+            power: strength(self.irradiance),
+            cone: EmissionCone::ALL,
+        }
+    }
+
+    fn middle(&self) -> Option<Vec3> {
+        Some(self.to_light)
+    }
+
+    #[inline]
+    fn is_sharp(&self) -> bool {
+        self.one_minus_cos == 0.0
     }
 }
 

@@ -3,9 +3,11 @@
 use std::f32::consts::PI;
 use std::sync::Arc;
 
+use super::InfiniteLight;
 use super::sky::SkyMap;
-use super::tree::bounds::{EmissionCone, LightBounds, Space, strength};
-use super::{End, LightSample, Source};
+use crate::lights::row::LightRow;
+use crate::lights::sample::{End, LightSample, Source};
+use crate::lights::tree::bounds::{EmissionCone, LightBounds, Space, strength};
 use crate::math::frame::Frame;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::math::{DVec3, Vec3};
@@ -27,16 +29,6 @@ pub enum Environment {
     },
 }
 
-/// Samples of an environment, side by side.
-pub struct SkyRow {
-    /// Unit directions to the light.
-    pub directions: Lanes3,
-    /// [`LightSample::weight`].
-    pub weights: Lanes3,
-    /// Inverse pdfs in sr; 0 if nothing arrives.
-    pub inverse_densities: Lanes,
-}
-
 /// Pdf of samples of a constant radiance: uniform over the hemisphere before the surface.
 const HEMISPHERE: f32 = 1.0 / (2.0 * PI);
 
@@ -44,16 +36,6 @@ impl Environment {
     /// A map whose white is times a factor, turned by an angle in degrees.
     pub fn map(sky: Arc<SkyMap>, factor: Vec3, degrees: f64) -> Self {
         Self::Map { sky, factor, turn: (degrees / 360.0).rem_euclid(1.0) as f32 }
-    }
-
-    /// Bounds: all directions, and the irradiance of a surface by the mean radiance.
-    pub fn bounds(&self) -> LightBounds {
-        let mean = match self {
-            Self::Constant(radiance) => strength(*radiance),
-            Self::Map { sky, factor, .. } => sky.mean_luminance() * strength(*factor),
-        };
-        let power = std::f64::consts::PI * mean;
-        LightBounds { space: Space::Beyond, center: DVec3::ZERO, radius: 1.0, power, cone: EmissionCone::ALL }
     }
 
     /// Radiance from a unit direction, and the pdf in sr⁻¹ of [`Environment::sample`], on the side of the surface that the
@@ -89,7 +71,7 @@ impl Environment {
 
     /// Samples of the environment for surfaces of these normals, side by side.
     #[inline(always)]
-    pub fn sample_row(&self, normals: &Lanes3, u: &[Lanes; 2]) -> SkyRow {
+    pub fn sample_row(&self, normals: &Lanes3, u: &[Lanes; 2]) -> LightRow {
         let (directions, mut weights, densities) = match self {
             Self::Constant(_) => {
                 let mut directions = [[0.0; LANES]; 3];
@@ -116,7 +98,8 @@ impl Environment {
             let weight = lane(&weights, i) * inverse_densities[i];
             set_lane(&mut weights, i, weight);
         }
-        SkyRow { directions, weights, inverse_densities }
+        let dark = LightRow::dark(Source::Nothing);
+        LightRow { directions, weights, beyond: u32::MAX, of_sky: inverse_densities, ..dark }
     }
 
     /// Inverse pdf of its samples at a direction, in sr.
@@ -124,19 +107,6 @@ impl Environment {
     pub fn inverse_density(&self, direction: Vec3) -> f32 {
         let (_, density) = self.arriving(direction);
         if density > 0.0 { 1.0 / density } else { 0.0 }
-    }
-
-    /// A unit direction to its light, and radiance over its pdf; over all directions, not only those that a surface
-    /// sees.
-    pub fn arriving_anywhere(&self, u: [f32; 2]) -> (Vec3, Vec3) {
-        match self {
-            Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
-            Self::Map { sky, factor, turn } => {
-                let (direction, color, density) = sky.sample(u, *turn);
-                // The pdf is 0 in the corner of a cell that is dark but for its neighbours.
-                (direction, color * *factor * if density > 0.0 { 1.0 / density } else { 0.0 })
-            }
-        }
     }
 
     /// The mean of the radiance over all directions.
@@ -161,6 +131,41 @@ impl Environment {
         let weight = radiance * if density > 0.0 { 1.0 / density } else { 0.0 };
         let is_light = weight != Vec3::ZERO;
         is_light.then_some(LightSample { end: End::Beyond, direction, weight, source: Source::Nothing })
+    }
+}
+
+impl InfiniteLight for Environment {
+    fn arriving_anywhere(&self, u: [f32; 2]) -> (Vec3, Vec3) {
+        match self {
+            Self::Constant(radiance) => (warp::cone(u, 2.0), *radiance * (4.0 * PI)),
+            Self::Map { sky, factor, turn } => {
+                let (direction, color, density) = sky.sample(u, *turn);
+                // The pdf is 0 in the corner of a cell that is dark but for its neighbours.
+                (direction, color * *factor * if density > 0.0 { 1.0 / density } else { 0.0 })
+            }
+        }
+    }
+
+    fn power_over(&self, area: f64) -> Vec3 {
+        (self.mean().as_dvec3() * (4.0 * std::f64::consts::PI * area)).as_vec3()
+    }
+
+    /// All directions, and the irradiance of a surface by the mean radiance.
+    fn bounds(&self) -> LightBounds {
+        let mean = match self {
+            Self::Constant(radiance) => strength(*radiance),
+            Self::Map { sky, factor, .. } => sky.mean_luminance() * strength(*factor),
+        };
+        let power = std::f64::consts::PI * mean;
+        LightBounds { space: Space::Beyond, center: DVec3::ZERO, radius: 1.0, power, cone: EmissionCone::ALL }
+    }
+
+    fn middle(&self) -> Option<Vec3> {
+        None
+    }
+
+    fn is_sharp(&self) -> bool {
+        false
     }
 }
 

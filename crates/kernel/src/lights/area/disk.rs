@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::arrival::Arrival;
+use super::{Met, ShapeEmitter};
 use crate::geometry::disk::Disk;
 use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec3};
@@ -30,6 +31,30 @@ pub struct DiskView {
     height: f64,
     /// Distance to the farthest point.
     farthest: f64,
+}
+
+impl ShapeEmitter for DiskEmitter {
+    /// Samples the disk, uniformly within 20 % over the solid angle.
+    #[inline(always)]
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+        let view = self.seen_from(point);
+        let (direction, distance, factor) = view.sample(self.normal, u);
+        let direction = direction.as_vec3();
+        Arrival {
+            direction,
+            target: point + direction * distance as f32,
+            factor: if view.height > 0.0 { factor as f32 } else { 0.0 },
+        }
+    }
+
+    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        let view = self.seen_from(from);
+        if view.is_front() { view.pdf(met.direction) as f32 } else { 0.0 }
+    }
+
+    fn middle(&self) -> DVec3 {
+        self.center
+    }
 }
 
 impl DiskEmitter {
@@ -82,30 +107,6 @@ impl DiskEmitter {
             height,
             farthest: l1,
         }
-    }
-
-    /// Samples the disk, uniformly within 20 % over the solid angle.
-    #[inline(always)]
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
-        let view = self.seen_from(point);
-        let (direction, distance, factor) = view.sample(self.normal, u);
-        let direction = direction.as_vec3();
-        Arrival {
-            direction,
-            target: point + direction * distance as f32,
-            factor: if view.height > 0.0 { factor as f32 } else { 0.0 },
-        }
-    }
-
-    /// Pdf in sr⁻¹ of a direction that hits the front.
-    pub fn pdf(&self, from: Vec3, direction: Vec3) -> f64 {
-        let view = self.seen_from(from);
-        if view.is_front() { view.pdf(direction) } else { 0.0 }
-    }
-
-    /// Centre of area.
-    pub fn middle(&self) -> DVec3 {
-        self.center
     }
 
     /// Unit normal of the front.

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::Met;
 use super::arrival::Arrival;
+use super::{Met, ShapeEmitter};
 use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::warp;
@@ -30,6 +30,41 @@ struct Spherical {
     solid_angle: f64,
 }
 
+impl ShapeEmitter for TriangleEmitter {
+    /// Samples uniformly over the solid angle, or over the area.
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+        let Some((offsets, spherical)) = self.seen_from(point.as_dvec3()) else { return Arrival::NOTHING };
+        let (direction, distance, factor) = if spherical.is_told() {
+            let direction = spherical.sample(u.map(f64::from));
+            let distance = offsets[0].dot(self.normal) / direction.dot(self.normal);
+            let farthest = offsets.iter().map(|offset| offset.length()).fold(0.0, f64::max);
+            let is_near = distance > 0.0 && distance < farthest;
+            (direction, if is_near { distance } else { farthest }, spherical.solid_angle)
+        } else {
+            let weights = warp::triangle(Vec2::from_array(u)).as_dvec3();
+            let offset = offsets[0] * weights.x + offsets[1] * weights.y + offsets[2] * weights.z;
+            let distance = offset.length();
+            let direction = offset / distance;
+            (direction, distance, -direction.dot(self.normal) * self.area / (distance * distance))
+        };
+        let direction = direction.as_vec3();
+        Arrival { direction, target: point + direction * distance as f32, factor: factor as f32 }
+    }
+
+    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        match self.seen_from(from.as_dvec3()) {
+            Some((_, spherical)) if spherical.is_told() => (1.0 / spherical.solid_angle) as f32,
+            Some(_) => met.pdf_by_area(self.area),
+            None => 0.0,
+        }
+    }
+
+    fn middle(&self) -> DVec3 {
+        let [a, b, c] = self.corners;
+        (a + b + c) / 3.0
+    }
+}
+
 impl TriangleEmitter {
     /// The emitter of a whole triangle. `None` without an area.
     pub fn new(triangle: &Triangle) -> Option<Self> {
@@ -53,41 +88,6 @@ impl TriangleEmitter {
         let volume = a.dot(b.cross(c)).abs();
         let solid_angle = 2.0 * libm::atan2(volume, 1.0 + a.dot(b) + b.dot(c) + c.dot(a));
         is_front.then_some((offsets, Spherical { corners, solid_angle }))
-    }
-
-    /// Samples uniformly over the solid angle, or over the area.
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
-        let Some((offsets, spherical)) = self.seen_from(point.as_dvec3()) else { return Arrival::NOTHING };
-        let (direction, distance, factor) = if spherical.is_told() {
-            let direction = spherical.sample(u.map(f64::from));
-            let distance = offsets[0].dot(self.normal) / direction.dot(self.normal);
-            let farthest = offsets.iter().map(|offset| offset.length()).fold(0.0, f64::max);
-            let is_near = distance > 0.0 && distance < farthest;
-            (direction, if is_near { distance } else { farthest }, spherical.solid_angle)
-        } else {
-            let weights = warp::triangle(Vec2::from_array(u)).as_dvec3();
-            let offset = offsets[0] * weights.x + offsets[1] * weights.y + offsets[2] * weights.z;
-            let distance = offset.length();
-            let direction = offset / distance;
-            (direction, distance, -direction.dot(self.normal) * self.area / (distance * distance))
-        };
-        let direction = direction.as_vec3();
-        Arrival { direction, target: point + direction * distance as f32, factor: factor as f32 }
-    }
-
-    /// [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
-        match self.seen_from(from.as_dvec3()) {
-            Some((_, spherical)) if spherical.is_told() => (1.0 / spherical.solid_angle) as f32,
-            Some(_) => met.pdf_by_area(self.area),
-            None => 0.0,
-        }
-    }
-
-    /// Centre of area.
-    pub fn middle(&self) -> DVec3 {
-        let [a, b, c] = self.corners;
-        (a + b + c) / 3.0
     }
 }
 

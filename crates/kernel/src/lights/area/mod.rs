@@ -1,23 +1,56 @@
-//! Shapes that emit.
+//! Shapes that emit, one file each.
+//!
+//! [`ShapeEmitter`] is all that a shape tells as a light. To add one: its file, its variant of [`Emitter`] with the arm of
+//! `of_any` and of [`area_light`], and the bounds of its emission, if it is flat. A shape without a loop of its own in `row` is
+//! sampled point by point.
 
-use super::arrival::Arrival;
-use super::cuboid::BoxEmitter;
-use super::disk::DiskEmitter;
-use super::mesh::{MeshEmitter, QuadOfTwo, Sampling};
-use super::pattern::Pattern;
-use super::picture::PictureEmitter;
-use super::rectangle::QuadEmitter;
-use super::round::{ConeSide, CylinderSide, RoundEmitter};
-use super::sphere::SphereEmitter;
-use super::torus::TorusEmitter;
+mod arrival;
+pub mod cuboid;
+pub mod disk;
+mod linear;
+mod meridians;
+pub mod mesh;
+pub mod pattern;
+pub mod picture;
+pub mod quad;
+pub mod round;
+pub(super) mod row;
+pub mod sphere;
+pub mod torus;
+pub mod triangle;
+
+pub use arrival::Arrival;
+pub use mesh::MeshEmitter;
+pub use pattern::{Chart, Patch, Pattern};
+
+use super::sample::{End, LightSample, Met, Source};
 use super::tree::bounds::{EmissionCone, LightBounds, strength};
-use super::triangle::TriangleEmitter;
-use super::{End, LightSample, Met, Source};
 use crate::geometry::Shape;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::materials::TexturePoint;
 use crate::math::{DVec2, DVec3, Vec3};
+use cuboid::BoxEmitter;
+use disk::DiskEmitter;
+use mesh::QuadOfTwo;
+use picture::PictureEmitter;
+use quad::QuadEmitter;
+use round::{ConeSide, CylinderSide, RoundEmitter};
+use sphere::SphereEmitter;
+use torus::TorusEmitter;
+use triangle::TriangleEmitter;
+
+/// A shape whose front emits the same radiance in every direction.
+pub trait ShapeEmitter {
+    /// Samples a point of the front that is visible from `point`, by numbers in [0, 1).
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival;
+
+    /// Pdf in sr⁻¹ of [`ShapeEmitter::sample`] at a point of the front that a ray from `from` hits.
+    fn pdf(&self, from: Vec3, met: &Met) -> f32;
+
+    /// Centre of area.
+    fn middle(&self) -> DVec3;
+}
 
 /// A shape that emits from its front side, with the same radiance in every direction.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,6 +101,47 @@ pub enum Emitter {
     Torus(TorusEmitter),
     /// Triangles of a mesh.
     Mesh(MeshEmitter),
+}
+
+/// Calls the same method of an emitter of any shape; a mesh has an arm of its own, as its triangles may have lights of their own.
+macro_rules! of_any {
+    ($emitter:expr, $it:ident => $asked:expr, $mesh:ident => $of_mesh:expr) => {
+        match $emitter {
+            Emitter::Sphere($it) => $asked,
+            Emitter::Quad($it) => $asked,
+            Emitter::Picture($it) => $asked,
+            Emitter::Box($it) => $asked,
+            Emitter::Triangle($it) => $asked,
+            Emitter::Disk($it) => $asked,
+            Emitter::Cylinder($it) => $asked,
+            Emitter::Cone($it) => $asked,
+            Emitter::Torus($it) => $asked,
+            Emitter::Mesh($mesh) => $of_mesh,
+        }
+    };
+}
+
+impl Emitter {
+    /// The sphere. `None` for other shapes.
+    #[inline(always)]
+    pub fn as_sphere(&self) -> Option<&SphereEmitter> {
+        if let Self::Sphere(sphere) = self { Some(sphere) } else { None }
+    }
+
+    /// The triangles of a mesh. `None` for other shapes.
+    #[inline(always)]
+    pub fn as_mesh(&self) -> Option<&MeshEmitter> {
+        if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
+    }
+
+    /// The quad on which its points are sampled, and the pair of triangles that forms the quad, if it is one.
+    #[inline(always)]
+    pub fn as_quad(&self) -> Option<(&QuadEmitter, Option<&QuadOfTwo>)> {
+        if let Self::Quad(quad) = self {
+            return Some((quad, None));
+        }
+        self.as_mesh().and_then(MeshEmitter::quad_of_two).map(|two| (two.quad(), Some(two)))
+    }
 }
 
 /// The light of a shape that emits all over. `None` if the shape is infinite, or has no area.
@@ -125,26 +199,6 @@ impl AreaLight {
         Self { pattern: Some(Box::new(pattern)), ..self }
     }
 
-    /// The quad on which its points are sampled, and the pair of triangles that forms the quad, if it is one.
-    #[inline(always)]
-    pub fn quad(&self) -> Option<(&QuadEmitter, Option<&QuadOfTwo>)> {
-        match &self.shape {
-            Emitter::Quad(quad) => Some((quad, None)),
-            Emitter::Mesh(mesh) => match mesh.sampling() {
-                Sampling::Quad(two) => Some((two.quad(), Some(two))),
-                Sampling::Area(_) | Sampling::Tree(_) => None,
-            },
-            Emitter::Sphere(_)
-            | Emitter::Picture(_)
-            | Emitter::Box(_)
-            | Emitter::Triangle(_)
-            | Emitter::Disk(_)
-            | Emitter::Cylinder(_)
-            | Emitter::Cone(_)
-            | Emitter::Torus(_) => None,
-        }
-    }
-
     /// [`Light::sample`](super::Light::sample).
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let sample = self.plain_sample(point, normal, u)?;
@@ -164,18 +218,9 @@ impl AreaLight {
             let (end, source) = (End::At(target), Source::Object(self.object));
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
-        match &self.shape {
-            Emitter::Sphere(sphere) => own(sphere.sample(point, u)),
-            Emitter::Quad(quad) => own(quad.sample(point, u)),
-            Emitter::Picture(picture) => own(picture.sample(point, u)),
-            Emitter::Box(cuboid) => own(cuboid.sample(point, u)),
-            Emitter::Triangle(triangle) => own(triangle.sample(point, u)),
-            Emitter::Disk(disk) => own(disk.sample(point, u)),
-            Emitter::Cylinder(cylinder) => own(cylinder.sample(point, u)),
-            Emitter::Cone(cone) => own(cone.sample(point, u)),
-            Emitter::Torus(torus) => own(torus.sample(point, u)),
-            Emitter::Mesh(mesh) => mesh.sample(point, normal, u, (self.radiance, self.object)),
-        }
+        of_any!(&self.shape,
+            it => own(it.sample(point, u)),
+            mesh => mesh.sample(point, normal, u, (self.radiance, self.object)))
     }
 
     /// [`Light::pdf`](super::Light::pdf).
@@ -183,33 +228,11 @@ impl AreaLight {
         if !(met.normal.dot(met.direction) < 0.0) {
             return 0.0;
         }
-        match &self.shape {
-            Emitter::Sphere(sphere) => sphere.pdf(from),
-            Emitter::Quad(quad) => quad.pdf(from, met),
-            Emitter::Picture(picture) => picture.pdf(from, met),
-            Emitter::Box(cuboid) => cuboid.pdf(from, met),
-            Emitter::Triangle(triangle) => triangle.pdf(from, met),
-            Emitter::Disk(disk) => disk.pdf(from, met.direction) as f32,
-            Emitter::Cylinder(cylinder) => cylinder.pdf(from, met),
-            Emitter::Cone(cone) => cone.pdf(from, met),
-            Emitter::Torus(torus) => torus.pdf(from, met),
-            Emitter::Mesh(mesh) => mesh.pdf(from, normal, met),
-        }
+        of_any!(&self.shape, it => it.pdf(from, met), mesh => mesh.pdf(from, normal, met))
     }
 
     /// Centre of area.
     pub fn middle(&self) -> DVec3 {
-        match &self.shape {
-            Emitter::Sphere(sphere) => sphere.center,
-            Emitter::Quad(quad) => quad.middle(),
-            Emitter::Picture(picture) => picture.middle(),
-            Emitter::Box(cuboid) => cuboid.middle(),
-            Emitter::Triangle(triangle) => triangle.middle(),
-            Emitter::Disk(disk) => disk.middle(),
-            Emitter::Cylinder(cylinder) => cylinder.middle(),
-            Emitter::Cone(cone) => cone.middle(),
-            Emitter::Torus(torus) => torus.middle(),
-            Emitter::Mesh(mesh) => mesh.middle(),
-        }
+        of_any!(&self.shape, it => it.middle(), mesh => mesh.middle())
     }
 }

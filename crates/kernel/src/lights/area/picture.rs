@@ -1,9 +1,9 @@
 //! Textured quad lights, sampled by their emission texture as well as by solid angle.
 
-use super::Met;
 use super::arrival::Arrival;
-use super::rectangle::QuadEmitter;
-use super::tree::bounds::strength;
+use super::quad::QuadEmitter;
+use super::{Met, ShapeEmitter};
+use crate::lights::tree::bounds::strength;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::grid::{Grid, InGrid};
 
@@ -31,6 +31,47 @@ const LOOKUPS: (usize, usize) = (2, 4);
 
 /// Largest fraction of the samples that a texture chooses: the texture ignores distances.
 const MOST_BY_PICTURE: f64 = 0.9;
+
+impl ShapeEmitter for PictureEmitter {
+    /// Samples by the texture or by the solid angle.
+    #[inline(always)]
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+        let by_picture = u[0] < self.share;
+        let (before, share) = if by_picture { (0.0, self.share) } else { (self.share, 1.0 - self.share) };
+        let rest = (u[0] - before) / share;
+        const LAST: f32 = 1.0_f32.next_down();
+        let u = [if rest < LAST { rest } else { LAST }, u[1]];
+        let to_corner = self.quad.corner_from(point);
+        let InGrid { column, row, rest } = self.cells.sample(u);
+        let at =
+            [(column as f32 + rest[0]) / self.size[0] as f32, (row as f32 + rest[1]) / self.size[1] as f32];
+        let (offset, by_area) = self.quad.by_area(to_corner, at);
+        let of_cell = self.cell_density(column, row);
+        let own = self.quad.sample(point, u);
+        if by_picture {
+            let direction = offset * (1.0 / offset.length_squared().sqrt());
+            let of_quad = self.quad.density(to_corner).unwrap_or(1.0 / by_area);
+            let density = self.share * of_cell / by_area + (1.0 - self.share) * of_quad;
+            let factor = if by_area > 0.0 { 1.0 / density } else { 0.0 };
+            return Arrival { direction, target: point + offset, factor };
+        }
+        if !(own.factor > 0.0) {
+            return Arrival { factor: 0.0, ..own };
+        }
+        let density = self.density(own.target - point, to_corner, 1.0 / own.factor);
+        Arrival { factor: 1.0 / density, ..own }
+    }
+
+    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+        let to_corner = self.quad.corner_from(from);
+        let of_quad = self.quad.pdf(from, met);
+        if of_quad > 0.0 { self.density(met.direction * met.distance, to_corner, of_quad) } else { 0.0 }
+    }
+
+    fn middle(&self) -> DVec3 {
+        self.quad.middle()
+    }
+}
 
 impl PictureEmitter {
     /// An emitter from the colours at places along both edges, in [0, 1], with so many texels along the edges. `None` if
@@ -61,42 +102,6 @@ impl PictureEmitter {
         Some(Self { along: quad.along(), quad, size, cells, share })
     }
 
-    /// Samples by the texture or by the solid angle.
-    #[inline(always)]
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
-        let by_picture = u[0] < self.share;
-        let (before, share) = if by_picture { (0.0, self.share) } else { (self.share, 1.0 - self.share) };
-        let rest = (u[0] - before) / share;
-        const LAST: f32 = 1.0_f32.next_down();
-        let u = [if rest < LAST { rest } else { LAST }, u[1]];
-        let to_corner = self.quad.corner_from(point);
-        let InGrid { column, row, rest } = self.cells.sample(u);
-        let at =
-            [(column as f32 + rest[0]) / self.size[0] as f32, (row as f32 + rest[1]) / self.size[1] as f32];
-        let (offset, by_area) = self.quad.by_area(to_corner, at);
-        let of_cell = self.cell_density(column, row);
-        let own = self.quad.sample(point, u);
-        if by_picture {
-            let direction = offset * (1.0 / offset.length_squared().sqrt());
-            let of_quad = self.quad.density(to_corner).unwrap_or(1.0 / by_area);
-            let density = self.share * of_cell / by_area + (1.0 - self.share) * of_quad;
-            let factor = if by_area > 0.0 { 1.0 / density } else { 0.0 };
-            return Arrival { direction, target: point + offset, factor };
-        }
-        if !(own.factor > 0.0) {
-            return Arrival { factor: 0.0, ..own };
-        }
-        let density = self.density(own.target - point, to_corner, 1.0 / own.factor);
-        Arrival { factor: 1.0 / density, ..own }
-    }
-
-    /// [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
-        let to_corner = self.quad.corner_from(from);
-        let of_quad = self.quad.pdf(from, met);
-        if of_quad > 0.0 { self.density(met.direction * met.distance, to_corner, of_quad) } else { 0.0 }
-    }
-
     /// Pdf in sr⁻¹ at an offset from the point, given the pdf of the quad alone.
     #[inline(always)]
     fn density(&self, offset: Vec3, to_corner: Vec3, of_quad: f32) -> f32 {
@@ -114,11 +119,6 @@ impl PictureEmitter {
     fn cell_density(&self, column: usize, row: usize) -> f32 {
         let probability = self.cells.row_probability(row) * self.cells.column_probability(row, column);
         probability * (self.size[0] * self.size[1]) as f32
-    }
-
-    /// Centre of area.
-    pub fn middle(&self) -> DVec3 {
-        self.quad.middle()
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use super::tree::bounds::{EmissionCone, LightBounds};
-use super::{End, LightSample, PointLight, Source};
+use super::{DeltaLight, PointLight};
+use crate::lights::tree::bounds::{EmissionCone, LightBounds};
 use crate::math::Vec3;
 use crate::math::elementary::{acos, sin_cos};
 use crate::math::frame::Frame;
@@ -22,30 +22,13 @@ pub struct SpotLight {
     pub blend: f32,
 }
 
-impl SpotLight {
-    /// Samples it by the only direction.
-    pub fn sample(&self, point: Vec3) -> Option<LightSample> {
-        let (direction, weight) = self.arriving(point);
-        let end = End::At(self.point.position.as_vec3());
-        (weight != Vec3::ZERO).then_some(LightSample { end, direction, weight, source: Source::Nothing })
+impl DeltaLight for SpotLight {
+    fn brightest(&self) -> &PointLight {
+        &self.point
     }
 
-    /// Bounds of its position and emission.
-    pub fn bounds(&self) -> LightBounds {
-        let cone = EmissionCone::within(self.axis.as_dvec3(), f64::from(self.half_angle));
-        LightBounds { cone, ..self.point.bounds() }
-    }
-
-    /// [`PointLight::arriving`].
     #[inline(always)]
-    pub fn arriving(&self, point: Vec3) -> (Vec3, Vec3) {
-        let (direction, weight) = self.point.arriving(point);
-        (direction, weight * self.share(-direction))
-    }
-
-    /// Intensity in a direction, relative to that on the axis.
-    #[inline(always)]
-    pub fn share(&self, away: Vec3) -> f32 {
+    fn share(&self, away: Vec3) -> f32 {
         // Take the sine of half the angle, which is exact even if the cosine of a small angle is not.
         let half_sine = (away - self.axis).length() * 0.5;
         let half_sine = if half_sine < 1.0 { half_sine } else { 1.0 };
@@ -56,16 +39,14 @@ impl SpotLight {
         if inside > 0.0 || self.half_angle >= PI { share } else { 0.0 }
     }
 
-    /// Power over the intensity on the axis, in sr: the inner cone of the half angle (1 − blend)·H, and the integral of
-    /// (H − θ)/(blend·H) over the directions around it.
+    /// The inner cone of the half angle (1 − blend)·H, and the integral of (H − θ)/(blend·H) over the directions around it.
     #[inline]
-    pub fn solid_angle(&self) -> f64 {
+    fn solid_angle(&self) -> f64 {
         let Cones { inner, faded, .. } = self.cones();
         inner + faded
     }
 
-    /// Samples an emitted direction by numbers in [0, 1), in proportion to its intensity.
-    pub fn direction(&self, u: [f32; 2]) -> Vec3 {
+    fn direction(&self, u: [f32; 2]) -> Vec3 {
         let Cones { half, width, inner, faded } = self.cones();
         let goal = f64::from(u[0]) * (inner + faded);
         let local = if goal < inner {
@@ -81,6 +62,13 @@ impl SpotLight {
         Frame::from_normal(self.axis).to_world(local)
     }
 
+    fn bounds(&self) -> LightBounds {
+        let cone = EmissionCone::within(self.axis.as_dvec3(), f64::from(self.half_angle));
+        LightBounds { cone, ..self.point.bounds() }
+    }
+}
+
+impl SpotLight {
     fn cones(&self) -> Cones {
         let half = f64::from(self.half_angle);
         let width = f64::from(self.blend) * half;
@@ -138,8 +126,8 @@ fn from_edge(half: f64, width: f64, part: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::point::Falloff;
     use super::*;
+    use crate::lights::Falloff;
     use crate::math::DVec3;
 
     /// Relative intensity of a cone with a half angle in degrees, in a direction at an angle in degrees from its axis.

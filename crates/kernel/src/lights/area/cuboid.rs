@@ -1,8 +1,8 @@
 //! Box lights, sampled by the solid angles of the visible faces.
 
-use super::Met;
 use super::arrival::Arrival;
-use super::rectangle::SphericalRectangle;
+use super::quad::SphericalRectangle;
+use super::{Met, ShapeEmitter};
 use crate::geometry::cuboid::Cuboid;
 use crate::math::{DVec3, Vec3};
 
@@ -32,31 +32,10 @@ struct Face {
     solid_angle: f32,
 }
 
-impl BoxEmitter {
-    /// The emitter of a whole box.
-    pub fn new(cuboid: &Cuboid) -> Self {
-        let axes = cuboid.axes();
-        Self {
-            center: cuboid.middle(),
-            half: cuboid.half().as_vec3().to_array(),
-            axes: [axes.x_axis, axes.y_axis, axes.z_axis].map(DVec3::as_vec3),
-        }
-    }
-
-    #[inline(always)]
-    fn seen_from(&self, point: Vec3) -> View {
-        let from_center = (point.as_dvec3() - self.center).as_vec3();
-        let local = self.axes.map(|axis| from_center.dot(axis));
-        let face = |k: usize| {
-            let side = |i: usize| [-self.half[i] - local[i].abs(), self.half[i] - local[i].abs()];
-            Face::new(side((k + 1) % 3), side((k + 2) % 3), self.half[k] - local[k].abs())
-        };
-        View { signs: local.map(|x| 1.0_f32.copysign(x)), faces: [face(0), face(1), face(2)] }
-    }
-
+impl ShapeEmitter for BoxEmitter {
     /// Samples a face by its solid angle, then a point of it by solid angle.
     #[inline(always)]
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let View { signs, faces } = self.seen_from(point);
         let [a, b, c] = faces.map(|face| face.solid_angle);
         let total = a + b + c;
@@ -85,8 +64,7 @@ impl BoxEmitter {
         }
     }
 
-    /// [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
         let View { faces, .. } = self.seen_from(from);
         let total: f32 = faces.iter().map(|face| face.solid_angle).sum();
         let own = faces.iter().zip(self.axes).enumerate();
@@ -102,9 +80,31 @@ impl BoxEmitter {
         }
     }
 
-    /// Centre of area.
-    pub fn middle(&self) -> DVec3 {
+    fn middle(&self) -> DVec3 {
         self.center
+    }
+}
+
+impl BoxEmitter {
+    /// The emitter of a whole box.
+    pub fn new(cuboid: &Cuboid) -> Self {
+        let axes = cuboid.axes();
+        Self {
+            center: cuboid.middle(),
+            half: cuboid.half().as_vec3().to_array(),
+            axes: [axes.x_axis, axes.y_axis, axes.z_axis].map(DVec3::as_vec3),
+        }
+    }
+
+    #[inline(always)]
+    fn seen_from(&self, point: Vec3) -> View {
+        let from_center = (point.as_dvec3() - self.center).as_vec3();
+        let local = self.axes.map(|axis| from_center.dot(axis));
+        let face = |k: usize| {
+            let side = |i: usize| [-self.half[i] - local[i].abs(), self.half[i] - local[i].abs()];
+            Face::new(side((k + 1) % 3), side((k + 2) % 3), self.half[k] - local[k].abs())
+        };
+        View { signs: local.map(|x| 1.0_f32.copysign(x)), faces: [face(0), face(1), face(2)] }
     }
 }
 

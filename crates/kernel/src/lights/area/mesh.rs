@@ -2,13 +2,14 @@
 //! light tree.
 
 use super::arrival::Arrival;
-use super::rectangle::QuadEmitter;
-use super::tree::{LightBounds, LightTree, MOST_WITHOUT, Receiver};
+use super::quad::QuadEmitter;
 use super::triangle::TriangleEmitter;
-use super::{End, LightSample, Met, Source};
+use super::{Met, ShapeEmitter};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::AreaPoint;
 use crate::geometry::triangle::Triangle;
+use crate::lights::sample::{End, LightSample, Source};
+use crate::lights::tree::{LightBounds, LightTree, MOST_WITHOUT, Receiver};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
 use crate::sampling::warp;
@@ -117,12 +118,21 @@ impl MeshEmitter {
         &self.sampling
     }
 
-    /// The tree over its triangles, if they are many.
+    /// Triangles that are sampled by area. `None` if it is sampled otherwise.
+    #[inline(always)]
+    pub fn facets(&self) -> Option<&Facets> {
+        if let Sampling::Area(facets) = &self.sampling { Some(facets) } else { None }
+    }
+
+    /// The parallelogram that two triangles form. `None` if it is sampled otherwise.
+    #[inline(always)]
+    pub fn quad_of_two(&self) -> Option<&QuadOfTwo> {
+        if let Sampling::Quad(two) = &self.sampling { Some(two) } else { None }
+    }
+
+    /// The tree over its triangles. `None` if they are few.
     pub fn tree(&self) -> Option<&LightTree> {
-        match &self.sampling {
-            Sampling::Tree(tree) => Some(tree),
-            Sampling::Quad(_) | Sampling::Area(_) => None,
-        }
+        if let Sampling::Tree(tree) = &self.sampling { Some(tree) } else { None }
     }
 
     /// Samples its light at a point of a surface with this normal.
@@ -159,7 +169,7 @@ impl MeshEmitter {
         })
     }
 
-    /// [`Light::pdf`](super::Light::pdf).
+    /// [`Light::pdf`](crate::lights::Light::pdf).
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &Met) -> f32 {
         let tree = match &self.sampling {
             Sampling::Quad(quad) => return quad.quad.pdf(from, met),
@@ -174,7 +184,7 @@ impl MeshEmitter {
     }
 
     #[cfg(test)]
-    pub(super) fn normal_of(&self, primitive: u32) -> Option<DVec3> {
+    pub(in crate::lights) fn normal_of(&self, primitive: u32) -> Option<DVec3> {
         let ([a, b, c], _) = self.triangles.iter().find(|(_, other)| *other == primitive)?;
         Some((*b - *a).cross(*c - *a).normalize())
     }

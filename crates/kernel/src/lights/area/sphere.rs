@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 
 use super::arrival::Arrival;
+use super::{Met, ShapeEmitter};
 use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
@@ -16,11 +17,11 @@ pub struct SphereEmitter {
     pub radius: f64,
 }
 
-impl SphereEmitter {
+impl ShapeEmitter for SphereEmitter {
     /// Samples uniformly over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exactly for
     /// narrow cones too.
     #[inline(always)]
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let (axis, distance, sin2_max) = self.cone_around(point);
         let is_outside = sin2_max < 1.0;
         let sin2_max = if is_outside { sin2_max } else { 0.0 };
@@ -38,11 +39,17 @@ impl SphereEmitter {
         }
     }
 
-    /// [`Light::pdf`](super::Light::pdf): the same in all directions that hit the sphere.
-    pub fn pdf(&self, from: Vec3) -> f32 {
+    /// The same in all directions that hit the sphere.
+    fn pdf(&self, from: Vec3, _: &Met) -> f32 {
         self.cone(from).map_or(0.0, |(_, _, sin2_max)| 1.0 / (2.0 * PI * one_minus_cos(sin2_max)))
     }
 
+    fn middle(&self) -> DVec3 {
+        self.center
+    }
+}
+
+impl SphereEmitter {
     /// Unit direction to the centre, distance, and sin² of the half angle. `None` from inside.
     fn cone(&self, point: Vec3) -> Option<(Vec3, f32, f32)> {
         Some(self.cone_around(point)).filter(|(_, _, sin2)| *sin2 < 1.0)
@@ -60,6 +67,6 @@ impl SphereEmitter {
 
 /// 1 − cos of an angle up to 90°, from its sin².
 #[inline(always)]
-pub(super) fn one_minus_cos(sin2: f32) -> f32 {
+pub(in crate::lights) fn one_minus_cos(sin2: f32) -> f32 {
     sin2 / (1.0 + (1.0 - sin2).sqrt())
 }

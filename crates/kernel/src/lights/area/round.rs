@@ -1,9 +1,9 @@
 //! Lights with a round side and caps: cylinders and cones.
 
-use super::Met;
 use super::arrival::Arrival;
 use super::disk::{DiskEmitter, perpendicular};
 use super::meridians::{Meridians, Pole, Turn};
+use super::{Met, ShapeEmitter};
 use crate::geometry::cone::Cone;
 use crate::geometry::cylinder::Cylinder;
 use crate::math::{DVec3, Vec3};
@@ -49,23 +49,9 @@ struct View<V> {
     share: f64,
 }
 
-impl<S: Side> RoundEmitter<S> {
-    fn view(&self, point: Vec3) -> View<S::View> {
-        let side = self.side.seen_from(point).map(|view| {
-            let meridians = Meridians::new(view.reach(), |turn| view.stretch(turn));
-            (view, meridians)
-        });
-        let side = side.filter(|(_, meridians)| meridians.total() > 0.0);
-        let caps = self.caps.iter().flatten().map(|cap| (cap.seen_from(point), cap.normal()));
-        let cap = caps.into_iter().find(|(cap, _)| cap.is_front());
-        let solid_angle = side.as_ref().map_or(0.0, |(_, meridians)| meridians.total());
-        let of_cap = cap.as_ref().map_or(0.0, |(cap, _)| cap.solid_angle());
-        let share = if side.is_none() { 0.0 } else { solid_angle / (solid_angle + of_cap) };
-        View { side, cap, share }
-    }
-
+impl<S: Side> ShapeEmitter for RoundEmitter<S> {
     /// Samples by solid angle: uniform but for its change from one meridian to the next, and for the 20 % of a cap.
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let view = self.view(point);
         let share = view.share as f32;
         let (direction, distance, factor) = match (view.side, view.cap) {
@@ -87,8 +73,7 @@ impl<S: Side> RoundEmitter<S> {
         Arrival { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    /// [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
         let view = self.view(from);
         let share = f64::from(view.share as f32);
         let is_cap = |normal: DVec3| met.normal.as_dvec3().dot(normal) > 1.0 - 1e-5;
@@ -103,9 +88,24 @@ impl<S: Side> RoundEmitter<S> {
         density as f32
     }
 
-    /// Centre of area.
-    pub fn middle(&self) -> DVec3 {
+    fn middle(&self) -> DVec3 {
         self.middle
+    }
+}
+
+impl<S: Side> RoundEmitter<S> {
+    fn view(&self, point: Vec3) -> View<S::View> {
+        let side = self.side.seen_from(point).map(|view| {
+            let meridians = Meridians::new(view.reach(), |turn| view.stretch(turn));
+            (view, meridians)
+        });
+        let side = side.filter(|(_, meridians)| meridians.total() > 0.0);
+        let caps = self.caps.iter().flatten().map(|cap| (cap.seen_from(point), cap.normal()));
+        let cap = caps.into_iter().find(|(cap, _)| cap.is_front());
+        let solid_angle = side.as_ref().map_or(0.0, |(_, meridians)| meridians.total());
+        let of_cap = cap.as_ref().map_or(0.0, |(cap, _)| cap.solid_angle());
+        let share = if side.is_none() { 0.0 } else { solid_angle / (solid_angle + of_cap) };
+        View { side, cap, share }
     }
 }
 

@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use super::Met;
 use super::arrival::Arrival;
 use super::disk::perpendicular;
 use super::linear::Linear;
 use super::meridians::Turn;
+use super::{Met, ShapeEmitter};
 use crate::geometry::RayF64;
 use crate::geometry::torus::Torus;
 use crate::math::elementary::sin_cos;
@@ -76,20 +76,10 @@ struct Place {
     factor: f64,
 }
 
-impl TorusEmitter {
-    /// The emitter of a whole torus.
-    pub fn new(torus: Torus) -> Self {
-        Self { torus }
-    }
-
-    /// Centre of area.
-    pub fn middle(&self) -> DVec3 {
-        self.torus.middle()
-    }
-
+impl ShapeEmitter for TorusEmitter {
     /// Samples a direction whose first hit on the torus faces the point. If a direction hits it twice, both hits count for its
     /// pdf, so that no sample is occluded.
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
         let Some(view) = View::new(&self.torus, point) else { return Arrival::NOTHING };
         let slices = view.slices();
         let side = 2.0 * f64::from(u[0]) - 1.0;
@@ -113,12 +103,22 @@ impl TorusEmitter {
         Arrival { direction, target: point + direction * distance as f32, factor: (1.0 / density) as f32 }
     }
 
-    /// [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
         View::new(&self.torus, from).map_or(0.0, |view| {
             let slices = view.slices();
             view.densities(&self.torus, &slices, met.direction.as_dvec3()).0 as f32
         })
+    }
+
+    fn middle(&self) -> DVec3 {
+        self.torus.middle()
+    }
+}
+
+impl TorusEmitter {
+    /// The emitter of a whole torus.
+    pub fn new(torus: Torus) -> Self {
+        Self { torus }
     }
 }
 

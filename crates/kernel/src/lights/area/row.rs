@@ -1,0 +1,70 @@
+//! Samples of one light that is a shape, for a row of points.
+
+use super::arrival::Arrival;
+use super::{AreaLight, Emitter, ShapeEmitter};
+use crate::lights::row::{LightRow, row_of};
+use crate::lights::sample::Source;
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
+
+/// Makes the row of samples of facets, with a light for each lane.
+macro_rules! row_of_facets {
+    ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
+        let mut row = row_of!(Source::Nothing, $i => {
+            let sample: Arrival = $facets.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
+            (sample.direction, sample.target, $light.radiance * sample.factor)
+        });
+        for $i in 0..LANES {
+            let source = Source::Primitive($light.object, $facets.part($u[0][$i]));
+            row.sources.set($i, source);
+        }
+        row
+    }};
+}
+
+pub(in crate::lights) use row_of_facets;
+
+impl AreaLight {
+    /// [`AreaLight::plain_sample`] for the points whose bits are set, each by its own numbers.
+    #[inline(always)]
+    pub fn sample_row(&self, points: &Lanes3, normals: &Lanes3, used: u32, u: &[Lanes; 2]) -> LightRow {
+        let source = Source::Object(self.object);
+        macro_rules! row_by {
+            ($emitter:expr) => {
+                row_of!(source, i => {
+                    let sample: Arrival = $emitter.sample(lane(points, i), [u[0][i], u[1][i]]);
+                    (sample.direction, sample.target, self.radiance * sample.factor)
+                })
+            };
+        }
+        // One loop serves all quads: compilers make no vector instructions of a second one.
+        if let Some((quad, of_two)) = self.shape.as_quad() {
+            let mut row = row_by!(quad);
+            if let Some(two) = of_two {
+                for i in 0..LANES {
+                    row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));
+                }
+            }
+            return row;
+        }
+        match &self.shape {
+            Emitter::Picture(picture) => return row_by!(picture),
+            Emitter::Sphere(sphere) => return row_by!(sphere),
+            Emitter::Disk(disk) => return row_by!(disk),
+            Emitter::Box(cuboid) => return row_by!(cuboid),
+            Emitter::Mesh(mesh) => {
+                if let Some(facets) = mesh.facets() {
+                    return row_of_facets!(i => (facets, self), points, u);
+                }
+            }
+            Emitter::Quad(_)
+            | Emitter::Triangle(_)
+            | Emitter::Cylinder(_)
+            | Emitter::Cone(_)
+            | Emitter::Torus(_) => {}
+        }
+        // The others have no loop.
+        LightRow::one_by_one(points, used, |i, point| {
+            self.plain_sample(point, lane(normals, i), [u[0][i], u[1][i]])
+        })
+    }
+}

@@ -1,0 +1,77 @@
+//! Point lights.
+
+use std::f64::consts::PI;
+
+use super::DeltaLight;
+use crate::choice;
+use crate::lights::tree::bounds::{EmissionCone, LightBounds, Space, strength};
+use crate::math::{DVec3, Vec3};
+use crate::sampling::warp;
+
+/// A light without extent, with the same intensity in every direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointLight {
+    /// Position.
+    pub position: DVec3,
+    /// Intensity in W·sr⁻¹; without fall-off, irradiance at normal incidence.
+    pub intensity: Vec3,
+    /// Fall-off with distance.
+    pub falloff: Falloff,
+}
+
+choice! {
+    /// Fall-off of a point light with distance.
+    pub enum Falloff {
+        /// With the square of the distance.
+        Square = "square",
+        /// Not at all.
+        None = "none",
+    }
+}
+
+impl PointLight {
+    /// Unit direction to the light, and irradiance at normal incidence; 0 at the light itself.
+    #[inline(always)]
+    pub(super) fn irradiance(&self, point: Vec3) -> (Vec3, Vec3) {
+        let to_light = self.position - point.as_dvec3();
+        let distance_squared = to_light.length_squared();
+        let direction = (to_light * (1.0 / distance_squared.sqrt())).as_vec3();
+        let weight = match self.falloff {
+            Falloff::Square => self.intensity * (1.0 / distance_squared as f32),
+            Falloff::None => self.intensity,
+        };
+        (direction, if distance_squared > 0.0 { weight } else { Vec3::ZERO })
+    }
+}
+
+impl DeltaLight for PointLight {
+    fn brightest(&self) -> &PointLight {
+        self
+    }
+
+    fn share(&self, _: Vec3) -> f32 {
+        1.0
+    }
+
+    fn solid_angle(&self) -> f64 {
+        4.0 * PI
+    }
+
+    fn direction(&self, u: [f32; 2]) -> Vec3 {
+        warp::cone(u, 2.0)
+    }
+
+    fn bounds(&self) -> LightBounds {
+        let space = match self.falloff {
+            Falloff::Square => Space::Weakening,
+            Falloff::None => Space::Steady,
+        };
+        let power = strength(self.intensity);
+        LightBounds { space, center: self.position, radius: 0.0, power, cone: EmissionCone::ALL }
+    }
+
+    #[inline(always)]
+    fn arriving(&self, point: Vec3) -> (Vec3, Vec3) {
+        self.irradiance(point)
+    }
+}
