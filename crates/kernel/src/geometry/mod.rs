@@ -36,6 +36,7 @@ use parallelogram::Parallelogram;
 use plane::Plane;
 use rows::{Ends, HitRows, RayRows};
 use sphere::Sphere;
+use surface_rows::SurfaceRow;
 use torus::Torus;
 use triangle::Triangle;
 
@@ -115,6 +116,37 @@ impl Shape {
                 found.put(lane, &hit);
             }
         }
+    }
+
+    /// [`SurfaceRow::fill`]: returns whether the shape has a loop for it.
+    #[inline(always)]
+    fn fill_surfaces(&self, row: &mut SurfaceRow, rays: &RayRows, hits: &HitRows, of: u32) -> bool {
+        match self {
+            Self::Sphere(sphere) => row.fill_from(sphere, rays, hits, of),
+            Self::Quad(quad) => row.fill_from(quad, rays, hits, of),
+            Self::Plane(plane) => row.fill_from(plane, rays, hits, of),
+            Self::Box(cuboid) => row.fill_from(cuboid, rays, hits, of),
+            Self::Triangle(triangle) => row.fill_from(triangle, rays, hits, of),
+            Self::Disk(_) | Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => return false,
+        }
+        true
+    }
+
+    /// [`SurfaceRow::fill_uv`]: returns whether the shape has a loop for it.
+    #[inline(always)]
+    fn fill_uvs(&self, row: &mut SurfaceRow, rays: &RayRows, hits: &HitRows, of: u32) -> bool {
+        match self {
+            Self::Quad(quad) => row.uv_from(quad, rays, hits, of),
+            Self::Plane(plane) => row.uv_from(plane, rays, hits, of),
+            Self::Sphere(_)
+            | Self::Box(_)
+            | Self::Triangle(_)
+            | Self::Disk(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Torus(_) => return false,
+        }
+        true
     }
 
     /// The surface at a hit.

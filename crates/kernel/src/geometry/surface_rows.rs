@@ -69,41 +69,25 @@ impl SurfaceRow {
     /// has a loop for it.
     #[inline(always)]
     pub fn fill(&mut self, shape: &Shape, rays: &RayRows, hits: &HitRows, of: u32) -> bool {
-        match shape {
-            Shape::Sphere(sphere) => self.fill_from(sphere, rays, hits, of),
-            Shape::Quad(quad) => self.fill_from(quad, rays, hits, of),
-            Shape::Plane(plane) => self.fill_from(plane, rays, hits, of),
-            Shape::Box(cuboid) => self.fill_from(cuboid, rays, hits, of),
-            Shape::Triangle(triangle) => self.fill_from(triangle, rays, hits, of),
-            Shape::Disk(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) => return false,
-        }
-        true
+        shape.fill_surfaces(self, rays, hits, of)
     }
 
     /// Computes the texture coordinates of the hits of a packet whose bits are set, all of one shape.
     #[inline(always)]
     pub fn fill_uv(&mut self, shape: &Shape, rays: &RayRows, hits: &HitRows, of: u32) {
-        match shape {
-            Shape::Quad(quad) => self.uv_from(quad, rays, hits, of),
-            Shape::Plane(plane) => self.uv_from(plane, rays, hits, of),
-            Shape::Sphere(_)
-            | Shape::Box(_)
-            | Shape::Triangle(_)
-            | Shape::Disk(_)
-            | Shape::Cylinder(_)
-            | Shape::Cone(_)
-            | Shape::Torus(_) => {
-                for lane in lanes(of) {
-                    let Some(hit) = hits.get(lane) else { continue };
-                    let uv = shape.surface(&rays.line(lane), &hit).uv;
-                    (self.uv[0][lane], self.uv[1][lane]) = (uv.x, uv.y);
-                }
-            }
+        if shape.fill_uvs(self, rays, hits, of) {
+            return;
+        }
+        for lane in lanes(of) {
+            let Some(hit) = hits.get(lane) else { continue };
+            let uv = shape.surface(&rays.line(lane), &hit).uv;
+            (self.uv[0][lane], self.uv[1][lane]) = (uv.x, uv.y);
         }
     }
 
+    /// [`SurfaceRow::fill_uv`] for a shape with a loop.
     #[inline(always)]
-    fn uv_from(&mut self, shape: &impl Mapped, rays: &RayRows, hits: &HitRows, of: u32) {
+    pub(super) fn uv_from(&mut self, shape: &impl Mapped, rays: &RayRows, hits: &HitRows, of: u32) {
         for lane in 0..PACKET {
             let uv = shape.uv(&rays.line(lane), &ShapeHit::at(hits.t[lane]));
             let is_own = of & 1 << lane != 0;
@@ -112,8 +96,9 @@ impl SurfaceRow {
         }
     }
 
+    /// [`SurfaceRow::fill`] for a shape with a loop.
     #[inline(always)]
-    fn fill_from(&mut self, shape: &impl Exact, rays: &RayRows, hits: &HitRows, of: u32) {
+    pub(super) fn fill_from(&mut self, shape: &impl Exact, rays: &RayRows, hits: &HitRows, of: u32) {
         let mut found = Self::EMPTY;
         for lane in 0..PACKET {
             let hit = ShapeHit {

@@ -87,7 +87,8 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
                        surface: what they would throw on it stays dark";
         warnings.push((Cause::Integrator, message.to_owned()));
     }
-    if photons.is_some() && specular() && scene.lights.iter().any(|light| light.sends() && light.is_steady()) {
+    if photons.is_some() && specular() && scene.lights.iter().any(|light| light.sends() && light.is_steady())
+    {
         let message =
             "photons carry no light of `falloff = \"none\"`: mirrors and glass throw none of it on surfaces";
         warnings.push((Cause::Photons, message.to_owned()));

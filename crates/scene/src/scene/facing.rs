@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::description::{Camera, Mesh, Object, Scene, Shape};
+use super::description::{Camera, Mesh, Object, Scene, Shape, greatest};
 use crate::math::DVec3;
 use crate::math::transform::Transform;
 
@@ -59,35 +59,10 @@ fn sees(camera: &Camera, corner: DVec3, front: DVec3) -> bool {
 
 /// Reach of a shape in a direction of length 1, or a little more.
 fn furthest(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
-    let along = |place: DVec3| direction.dot(place);
-    let most = |places: &[DVec3]| places.iter().copied().map(along).fold(f64::NEG_INFINITY, f64::max);
-    // The part of a circle's radius around an axis that lies along the direction.
-    let round = |axis: DVec3, radius: f64| {
-        let cosine = axis.try_normalize().map_or(0.0, along);
-        radius * (1.0 - cosine * cosine).max(0.0).sqrt()
-    };
-    match *shape {
-        Shape::Sphere { center, radius } => along(center) + radius,
-        Shape::Quad { corner, u, v } => most(&[corner, corner + u, corner + v, corner + u + v]),
-        Shape::Triangle { a, b, c } => most(&[a, b, c]),
-        // A plane is bounded only in the direction of its normal.
-        Shape::Plane { point, normal } => {
-            let is_parallel = normal.try_normalize().is_some_and(|normal| along(normal).abs() > 1.0 - 1e-9);
-            if is_parallel { along(point) } else { f64::INFINITY }
-        }
-        Shape::Box { center, size, rotate: DVec3::ZERO } => along(center) + 0.5 * direction.abs().dot(size),
-        Shape::Box { center, size, rotate: _ } => along(center) + 0.5 * size.length(),
-        Shape::Disk { center, normal, radius } => along(center) + round(normal, radius),
-        Shape::Cylinder { a, b, radius, caps: _ } => most(&[a, b]) + round(b - a, radius),
-        Shape::Cone { base, tip, radius, cap: _ } => {
-            most(&[base + direction * round(tip - base, radius), tip])
-        }
-        Shape::Torus { center, axis, radius, tube } => along(center) + round(axis, radius) + tube,
-        Shape::Mesh(ref mesh) => {
-            let bounds = bounds.get(mesh.file).copied().flatten();
-            bounds.map_or(f64::NEG_INFINITY, |bounds| most(&corners(mesh, bounds)))
-        }
-    }
+    shape.reach(direction).unwrap_or_else(|| {
+        let of = |mesh: &Mesh| Some(corners(mesh, bounds.get(mesh.file).copied().flatten()?));
+        shape.mesh().and_then(of).map_or(f64::NEG_INFINITY, |corners| greatest(direction, &corners))
+    })
 }
 
 /// The corners of a mesh's box where the scene has it.

@@ -102,20 +102,10 @@ impl World {
 
     /// Whether an object is a sphere whose other side is far from the surfaces near a point of it.
     fn is_large_ball(&self, object: u32, margin: Vec3) -> bool {
-        match &self.geometry.objects()[object as usize] {
-            Object::Shape(Shape::Sphere(sphere)) => sphere.radius > 8.0 * f64::from(margin.max_element()),
-            Object::Shape(
-                Shape::Plane(_)
-                | Shape::Quad(_)
-                | Shape::Box(_)
-                | Shape::Triangle(_)
-                | Shape::Disk(_)
-                | Shape::Cylinder(_)
-                | Shape::Cone(_)
-                | Shape::Torus(_),
-            )
-            | Object::Mesh(_) => false,
-        }
+        let Object::Shape(Shape::Sphere(sphere)) = &self.geometry.objects()[object as usize] else {
+            return false;
+        };
+        sphere.radius > 8.0 * f64::from(margin.max_element())
     }
 
     /// [`World::contact_of`] for a large ball of glass with nothing else near: the side from which the ray comes decides

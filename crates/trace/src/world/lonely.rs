@@ -200,22 +200,25 @@ fn shape_is_near(shape: &Shape, around: &Aabb, region: &Region) -> bool {
     if shape.bounds().is_some_and(|bounds| !bounds.meets(around)) {
         return false;
     }
-    match shape {
-        Shape::Plane(plane) => (0..8).any(|i| {
+    if let Shape::Plane(plane) = shape {
+        return (0..8).any(|i| {
             let pick = |axis: usize| if i & (1 << axis) == 0 { around.min[axis] } else { around.max[axis] };
             plane.is_behind(Vec3::new(pick(0), pick(1), pick(2)).as_dvec3())
-        }),
-        Shape::Sphere(sphere) => {
-            let nearest = sphere.center.clamp(around.min.as_dvec3(), around.max.as_dvec3());
-            nearest.distance(sphere.center) <= sphere.radius * (1.0 + 1e-6)
-        }
-        Shape::Quad(quad) => {
-            let (a, c) = (quad.corner, quad.corner + quad.u + quad.v);
-            region.is_near([a, a + quad.u, c], around) || region.is_near([a, c, a + quad.v], around)
-        }
-        Shape::Triangle(own) => region.is_near([own.a, own.b, own.c], around),
-        Shape::Box(_) | Shape::Disk(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) => true,
+        });
     }
+    if let Shape::Sphere(sphere) = shape {
+        let nearest = sphere.center.clamp(around.min.as_dvec3(), around.max.as_dvec3());
+        return nearest.distance(sphere.center) <= sphere.radius * (1.0 + 1e-6);
+    }
+    if let Shape::Quad(quad) = shape {
+        let (a, c) = (quad.corner, quad.corner + quad.u + quad.v);
+        return region.is_near([a, a + quad.u, c], around) || region.is_near([a, c, a + quad.v], around);
+    }
+    if let Shape::Triangle(own) = shape {
+        return region.is_near([own.a, own.b, own.c], around);
+    }
+    // The boxes around the others meet.
+    true
 }
 
 impl Region {

@@ -1,7 +1,7 @@
 //! Samples of one light that is a shape, for a row of points.
 
 use super::arrival::Arrival;
-use super::{AreaLight, Emitter, ShapeEmitter};
+use super::{AreaLight, Emitter, MeshEmitter, ShapeEmitter};
 use crate::lights::row::{LightRow, row_of};
 use crate::lights::sample::Source;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
@@ -46,21 +46,20 @@ impl AreaLight {
             }
             return row;
         }
-        match &self.shape {
-            Emitter::Picture(picture) => return row_by!(picture),
-            Emitter::Sphere(sphere) => return row_by!(sphere),
-            Emitter::Disk(disk) => return row_by!(disk),
-            Emitter::Box(cuboid) => return row_by!(cuboid),
-            Emitter::Mesh(mesh) => {
-                if let Some(facets) = mesh.facets() {
-                    return row_of_facets!(i => (facets, self), points, u);
-                }
-            }
-            Emitter::Quad(_)
-            | Emitter::Triangle(_)
-            | Emitter::Cylinder(_)
-            | Emitter::Cone(_)
-            | Emitter::Torus(_) => {}
+        if let Some(facets) = self.shape.as_mesh().and_then(MeshEmitter::facets) {
+            return row_of_facets!(i => (facets, self), points, u);
+        }
+        if let Emitter::Picture(picture) = &self.shape {
+            return row_by!(picture);
+        }
+        if let Emitter::Sphere(sphere) = &self.shape {
+            return row_by!(sphere);
+        }
+        if let Emitter::Disk(disk) = &self.shape {
+            return row_by!(disk);
+        }
+        if let Emitter::Box(cuboid) = &self.shape {
+            return row_by!(cuboid);
         }
         // The others have no loop.
         LightRow::one_by_one(points, used, |i, point| {

@@ -22,7 +22,7 @@ pub use render::{
     Accel, Integrator, KeyRange, MOST_SCATTERINGS, PixelFilter, Render, RenderKey, Shadows, Tonemap,
     render_keys,
 };
-pub use shape::{Lowered, Mesh, Object, Shape};
+pub use shape::{Lowered, Mesh, Object, Shape, Sheet, greatest};
 
 /// A whole scene.
 #[derive(Clone, Debug, PartialEq)]

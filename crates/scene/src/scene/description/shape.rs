@@ -118,6 +118,42 @@ pub enum Shape {
     Mesh(Mesh),
 }
 
+/// A shape with a border: by itself it encloses nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sheet {
+    /// A parallelogram, by its corners in turn, counterclockwise seen from the front.
+    Quad([DVec3; 4]),
+    /// A triangle, by its corners in turn.
+    Triangle([DVec3; 3]),
+    /// A disk.
+    Disk {
+        /// Centre.
+        center: DVec3,
+        /// Normal of the front, of any length.
+        normal: DVec3,
+        /// Radius.
+        radius: f64,
+    },
+    /// The side of a cylinder.
+    Cylinder {
+        /// Middle of an end.
+        a: DVec3,
+        /// Middle of the other end.
+        b: DVec3,
+        /// Radius.
+        radius: f64,
+    },
+    /// The side of a cone.
+    Cone {
+        /// Middle of its base.
+        base: DVec3,
+        /// Its tip.
+        tip: DVec3,
+        /// Radius of the base.
+        radius: f64,
+    },
+}
+
 /// An instance of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mesh {
@@ -186,21 +222,84 @@ impl Shape {
         }
     }
 
-    /// The instance of a mesh file that it is, if it is one.
+    /// The instance of a mesh file. `None` for other shapes.
     pub fn mesh(&self) -> Option<&Mesh> {
-        match self {
-            Self::Mesh(mesh) => Some(mesh),
+        if let Self::Mesh(mesh) = self { Some(mesh) } else { None }
+    }
+
+    /// The sheet that it is. `None` for shapes that have an inside, for planes, and for meshes.
+    pub fn sheet(&self) -> Option<Sheet> {
+        match *self {
+            Self::Quad { corner, u, v } => {
+                Some(Sheet::Quad([corner, corner + u, corner + u + v, corner + v]))
+            }
+            Self::Triangle { a, b, c } => Some(Sheet::Triangle([a, b, c])),
+            Self::Disk { center, normal, radius } => Some(Sheet::Disk { center, normal, radius }),
+            Self::Cylinder { a, b, radius, caps: false } => Some(Sheet::Cylinder { a, b, radius }),
+            Self::Cone { base, tip, radius, cap: false } => Some(Sheet::Cone { base, tip, radius }),
             Self::Sphere { .. }
-            | Self::Quad { .. }
             | Self::Plane { .. }
             | Self::Box { .. }
-            | Self::Triangle { .. }
-            | Self::Disk { .. }
-            | Self::Cylinder { .. }
-            | Self::Cone { .. }
-            | Self::Torus { .. } => None,
+            | Self::Torus { .. }
+            | Self::Cylinder { caps: true, .. }
+            | Self::Cone { cap: true, .. }
+            | Self::Mesh(_) => None,
         }
     }
+
+    /// A point of it, or inside. `None` for a mesh.
+    pub fn point(&self) -> Option<DVec3> {
+        match *self {
+            Self::Sphere { center, .. }
+            | Self::Box { center, .. }
+            | Self::Disk { center, .. }
+            | Self::Torus { center, .. } => Some(center),
+            Self::Quad { corner, .. } => Some(corner),
+            Self::Plane { point, .. } => Some(point),
+            Self::Triangle { a, .. } | Self::Cylinder { a, .. } => Some(a),
+            Self::Cone { base, .. } => Some(base),
+            Self::Mesh(_) => None,
+        }
+    }
+
+    /// The greatest coordinate along a unit direction, or a little more; infinite for a plane that is not across it. `None` for a
+    /// mesh.
+    pub fn reach(&self, direction: DVec3) -> Option<f64> {
+        let along = |place: DVec3| direction.dot(place);
+        // The part of a circle's radius around an axis that lies along the direction.
+        let round = |axis: DVec3, radius: f64| {
+            let cosine = axis.try_normalize().map_or(0.0, along);
+            radius * (1.0 - cosine * cosine).max(0.0).sqrt()
+        };
+        Some(match *self {
+            Self::Sphere { center, radius } => along(center) + radius,
+            Self::Quad { corner, u, v } => {
+                greatest(direction, &[corner, corner + u, corner + v, corner + u + v])
+            }
+            Self::Triangle { a, b, c } => greatest(direction, &[a, b, c]),
+            Self::Plane { point, normal } => {
+                let is_parallel =
+                    normal.try_normalize().is_some_and(|normal| along(normal).abs() > 1.0 - 1e-9);
+                if is_parallel { along(point) } else { f64::INFINITY }
+            }
+            Self::Box { center, size, rotate: DVec3::ZERO } => {
+                along(center) + 0.5 * direction.abs().dot(size)
+            }
+            Self::Box { center, size, rotate: _ } => along(center) + 0.5 * size.length(),
+            Self::Disk { center, normal, radius } => along(center) + round(normal, radius),
+            Self::Cylinder { a, b, radius, caps: _ } => greatest(direction, &[a, b]) + round(b - a, radius),
+            Self::Cone { base, tip, radius, cap: _ } => {
+                greatest(direction, &[base + direction * round(tip - base, radius), tip])
+            }
+            Self::Torus { center, axis, radius, tube } => along(center) + round(axis, radius) + tube,
+            Self::Mesh(_) => return None,
+        })
+    }
+}
+
+/// The greatest coordinate of points along a unit direction.
+pub fn greatest(direction: DVec3, points: &[DVec3]) -> f64 {
+    points.iter().map(|point| direction.dot(*point)).fold(f64::NEG_INFINITY, f64::max)
 }
 
 impl Fingerprinted for Shape {

@@ -8,7 +8,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
 use crate::math::transform::Transform;
-use crate::scene::description::{MaterialKind, Mesh, Object, Scene, Shape};
+use crate::scene::description::{MaterialKind, Mesh, Object, Scene, Shape, Sheet};
 
 /// Number of chords of a circular rim: they are the same points for every rim on one circle.
 const CHORDS: usize = 32;
@@ -66,51 +66,49 @@ impl Pieces {
                 pieces.origin = start(&object.shape, meshes);
             }
             let first = pieces.list.len();
-            match object.shape {
-                Shape::Mesh(mesh) => {
-                    let loaded = meshes[mesh.file];
-                    let open = open_of_file.entry(mesh.file).or_insert_with(|| open_edges(&loaded.mesh));
-                    pieces.add_mesh(number, &mesh, loaded, glass, open);
-                }
-                Shape::Quad { corner, u, v } => {
-                    pieces.add_polygon(number, &[corner, corner + u, corner + u + v, corner + v]);
-                }
-                Shape::Triangle { a, b, c } => pieces.add_polygon(number, &[a, b, c]),
-                Shape::Disk { center, normal, radius } => {
-                    let normal = normal.normalize();
-                    let area = std::f64::consts::PI * radius * radius;
-                    let volume = area * (center - pieces.origin).dot(normal) / 3.0;
-                    pieces.begin(number, (area, volume), radius);
-                    pieces.add_circle(center, normal, radius, center);
-                }
-                Shape::Cylinder { a, b, radius, caps: false } => {
-                    let axis = (b - a).normalize();
-                    let area = std::f64::consts::TAU * radius * a.distance(b);
-                    pieces.begin(number, (area, area * radius / 3.0), radius.max(a.distance(b)));
-                    pieces.add_circle(b, -axis, radius, a);
-                    pieces.add_circle(a, axis, radius, b);
-                }
-                Shape::Cone { base, tip, radius, cap: false } => {
-                    let axis = (tip - base).normalize();
-                    let area =
-                        std::f64::consts::PI * radius * (radius * radius + tip.distance_squared(base)).sqrt();
-                    let shown = axis * (std::f64::consts::PI * radius * radius);
-                    let volume = (tip - pieces.origin).dot(shown) / 3.0;
-                    pieces.begin(number, (area, volume), radius.max(tip.distance(base)));
-                    pieces.add_circle(base, axis, radius, tip);
-                }
-                Shape::Sphere { .. }
-                | Shape::Plane { .. }
-                | Shape::Box { .. }
-                | Shape::Torus { .. }
-                | Shape::Cylinder { caps: true, .. }
-                | Shape::Cone { cap: true, .. } => {}
+            if let Some(mesh) = object.shape.mesh() {
+                let loaded = meshes[mesh.file];
+                let open = open_of_file.entry(mesh.file).or_insert_with(|| open_edges(&loaded.mesh));
+                pieces.add_mesh(number, mesh, loaded, glass, open);
+            } else if let Some(sheet) = object.shape.sheet() {
+                pieces.add_sheet(number, &sheet);
             }
             for piece in &mut pieces.list[first..] {
                 piece.substance = substance_of(scene, meshes, object);
             }
         }
         Ok(pieces)
+    }
+
+    /// Adds a shape with a border.
+    fn add_sheet(&mut self, number: u32, sheet: &Sheet) {
+        match *sheet {
+            Sheet::Quad(corners) => self.add_polygon(number, &corners),
+            Sheet::Triangle(corners) => self.add_polygon(number, &corners),
+            Sheet::Disk { center, normal, radius } => {
+                let normal = normal.normalize();
+                let area = std::f64::consts::PI * radius * radius;
+                let volume = area * (center - self.origin).dot(normal) / 3.0;
+                self.begin(number, (area, volume), radius);
+                self.add_circle(center, normal, radius, center);
+            }
+            Sheet::Cylinder { a, b, radius } => {
+                let axis = (b - a).normalize();
+                let area = std::f64::consts::TAU * radius * a.distance(b);
+                self.begin(number, (area, area * radius / 3.0), radius.max(a.distance(b)));
+                self.add_circle(b, -axis, radius, a);
+                self.add_circle(a, axis, radius, b);
+            }
+            Sheet::Cone { base, tip, radius } => {
+                let axis = (tip - base).normalize();
+                let area =
+                    std::f64::consts::PI * radius * (radius * radius + tip.distance_squared(base)).sqrt();
+                let shown = axis * (std::f64::consts::PI * radius * radius);
+                let volume = (tip - self.origin).dot(shown) / 3.0;
+                self.begin(number, (area, volume), radius.max(tip.distance(base)));
+                self.add_circle(base, axis, radius, tip);
+            }
+        }
     }
 
     fn begin(&mut self, object: u32, (area, volume): (f64, f64), reach: f64) -> u32 {
@@ -202,21 +200,12 @@ impl Pieces {
 
 /// A point of a shape.
 fn start(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
-    match *shape {
-        Shape::Sphere { center, .. }
-        | Shape::Box { center, .. }
-        | Shape::Disk { center, .. }
-        | Shape::Torus { center, .. } => center,
-        Shape::Quad { corner, .. } => corner,
-        Shape::Plane { point, .. } => point,
-        Shape::Triangle { a, .. } | Shape::Cylinder { a, .. } => a,
-        Shape::Cone { base, .. } => base,
-        Shape::Mesh(Mesh { file, scale, rotate, translate, .. }) => {
-            let mesh = &meshes[file].mesh;
-            let first = mesh.positions.first().map_or(DVec3::ZERO, |first| first.as_dvec3());
-            Transform::scale_rotate_translate(scale, rotate, translate).point(mesh.origin + first)
-        }
-    }
+    let of_mesh = |&Mesh { file, scale, rotate, translate, .. }: &Mesh| {
+        let mesh = &meshes[file].mesh;
+        let first = mesh.positions.first().map_or(DVec3::ZERO, |first| first.as_dvec3());
+        Transform::scale_rotate_translate(scale, rotate, translate).point(mesh.origin + first)
+    };
+    shape.point().or_else(|| shape.mesh().map(of_mesh)).unwrap_or(DVec3::ZERO)
 }
 
 /// Triangles of a mesh that are glass.
