@@ -9,7 +9,7 @@ use super::{Findings, Stop};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::scene::Loaded;
-use crate::scene::description::Shape;
+use crate::scene::description::Sheet;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Key;
 use crate::world::{Bodies, OpenGlass};
@@ -39,46 +39,113 @@ pub(in crate::pipeline) fn glass(
         Arc::new(Bodies::find(scene, &files, token)?)
     };
     memo.set(key, Arc::clone(&bodies));
-    findings.warnings.extend(bodies.open().iter().filter_map(|open| warning(loaded, open)));
+    findings.warnings.extend(warnings_of_open(loaded, bodies.open()));
     findings.warnings.extend(bodies.flat().iter().map(|&object| warning_of_flat(loaded, object)));
     Ok(bodies)
 }
 
-/// The warning about glass with a hole. `None` if opaque surfaces are around the hole.
-fn warning(loaded: &Loaded, open: &OpenGlass) -> Option<Diagnostic> {
-    if open.is_covered {
-        return None;
+/// A flaw that several objects may share: one warning is about all of them.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Flaw {
+    /// A shape that has no inside.
+    Sheet { one: &'static str, several: &'static str, help: &'static str },
+    /// A mesh of which a part is missing.
+    Hole,
+    /// A mesh whose faces disagree about the front.
+    Fronts,
+}
+
+/// Most objects that a warning names.
+const MOST_NAMES: usize = 5;
+
+/// Warnings about glass with holes, one for each flaw, at its first object. Glass whose holes opaque surfaces surround is fine.
+fn warnings_of_open(loaded: &Loaded, open: &[OpenGlass]) -> Vec<Diagnostic> {
+    let mut groups: Vec<(Flaw, Vec<&OpenGlass>)> = Vec::new();
+    for open in open.iter().filter(|open| !open.is_covered) {
+        let Some(flaw) = flaw(loaded, open) else { continue };
+        match groups.iter_mut().find(|(other, _)| *other == flaw) {
+            Some((_, members)) => members.push(open),
+            None => groups.push((flaw, vec![open])),
+        }
     }
-    let object = &loaded.scene.objects[open.object as usize];
-    let edges = if open.edges == 1 { "1 edge".to_owned() } else { format!("{} edges", open.edges) };
-    let (what, help) = match object.shape {
-        Shape::Quad { .. } => ("a quad", "use a thin [[box]] for a pane, or close it by other glass"),
-        Shape::Triangle { .. } => ("a triangle", "use a [[box]], or a closed [[mesh]]"),
-        Shape::Disk { .. } => ("a disk", "use a flat [[cylinder]] for a round pane"),
-        Shape::Cylinder { .. } => ("an open cylinder", "close it by `caps = true`"),
-        Shape::Cone { .. } => ("an open cone", "close it by `cap = true`"),
-        Shape::Sphere { .. } | Shape::Plane { .. } | Shape::Box { .. } | Shape::Torus { .. } => return None,
-        Shape::Mesh(_) => ("", "close the mesh in the program that made it, or give a pane a thickness"),
+    groups.iter().map(|(flaw, members)| warning(loaded, *flaw, members)).collect()
+}
+
+/// The flaw of an open object.
+fn flaw(loaded: &Loaded, open: &OpenGlass) -> Option<Flaw> {
+    let shape = &loaded.scene.objects[open.object as usize].shape;
+    if shape.mesh().is_some() {
+        return Some(if open.disagrees { Flaw::Fronts } else { Flaw::Hole });
+    }
+    let sheet = |one, several, help| Flaw::Sheet { one, several, help };
+    Some(match shape.sheet()? {
+        Sheet::Quad(_) => {
+            sheet("a quad", "quads", "use a thin [[box]] for a pane, or close it by other glass")
+        }
+        Sheet::Triangle(_) => sheet("a triangle", "triangles", "use a [[box]], or a closed [[mesh]]"),
+        Sheet::Disk { .. } => sheet("a disk", "disks", "use a flat [[cylinder]] for a round pane"),
+        Sheet::Cylinder { .. } => sheet("an open cylinder", "open cylinders", "close it by `caps = true`"),
+        Sheet::Cone { .. } => sheet("an open cone", "open cones", "close it by `cap = true`"),
+    })
+}
+
+/// The warning about objects with this flaw; there is at least one.
+fn warning(loaded: &Loaded, flaw: Flaw, members: &[&OpenGlass]) -> Diagnostic {
+    let first = &loaded.scene.objects[members[0].object as usize];
+    let edges: usize = members.iter().map(|open| open.edges).sum();
+    let edges = if edges == 1 { "1 edge".to_owned() } else { format!("{edges} edges") };
+    let part = percent(members.iter().map(|open| open.missing).fold(0.0, f64::max));
+    let (count, names) = (members.len(), names(loaded, members));
+    let mesh = match (count, &first.name) {
+        (1, Some(name)) => format!("mesh \"{name}\" of glass is"),
+        (1, None) => "mesh of glass is".to_owned(),
+        (_, _) => format!("{count} meshes of glass are"),
     };
-    let (mut message, mut help) = (format!("{what} of glass has no inside"), help);
-    if object.shape.mesh().is_some() {
-        let name = object.name.as_deref().map(|name| format!(" \"{name}\"")).unwrap_or_default();
-        message = if open.disagrees {
-            help = "let its normals be recalculated, all outwards, in the program that made it";
-            format!("mesh{name} of glass is inside out in parts: {edges} between two fronts and backs")
-        } else {
-            let part = percent(open.missing);
-            format!(
-                "mesh{name} of glass is not closed: {edges} without a neighbour of the same glass, {part} of its surface missing"
-            )
-        };
-    }
-    let help = Some(help.to_owned());
-    let mut diagnostic = loaded.diagnostic_at(object.span.clone(), Severity::Warning, message, help);
+    let list = if count == 1 { String::new() } else { format!(": {names}") };
+    let (message, help) = match flaw {
+        Flaw::Sheet { one, help, .. } if count == 1 => (format!("{one} of glass has no inside"), help),
+        Flaw::Sheet { several, help, .. } => {
+            (format!("{count} {several} of glass have no inside{list}"), help)
+        }
+        Flaw::Hole => {
+            let of = if count == 1 { "of its surface" } else { "of a surface" };
+            let message = format!(
+                "{mesh} not closed: {edges} without a neighbour of the same glass, {part} {of} missing{list}"
+            );
+            (message, "close the mesh in the program that made it, or give a pane a thickness")
+        }
+        Flaw::Fronts => {
+            let message = format!("{mesh} inside out in parts: {edges} between two fronts and backs{list}");
+            (message, "let its normals be recalculated, all outwards, in the program that made it")
+        }
+    };
+    let mut diagnostic =
+        loaded.diagnostic_at(first.span.clone(), Severity::Warning, message, Some(help.to_owned()));
     if let Some(place) = &mut diagnostic.place {
         place.label = LACKS.to_owned();
     }
-    Some(diagnostic)
+    diagnostic
+}
+
+/// Names of the first few objects, or else their lines in the file: `"pane", line 12 and 3 more`.
+fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
+    let name = |open: &&OpenGlass| {
+        let object = &loaded.scene.objects[open.object as usize];
+        let line = || {
+            let place = loaded.diagnostic_at(object.span.clone(), Severity::Warning, "", None).place;
+            let before = place.map_or(0, |place| place.source[..place.span.start].matches('\n').count());
+            format!("line {}", before + 1)
+        };
+        object.name.as_deref().map_or_else(line, |name| format!("\"{name}\""))
+    };
+    // One more takes no more room than the words about it.
+    let most = if members.len() == MOST_NAMES + 1 { MOST_NAMES + 1 } else { MOST_NAMES };
+    let mut shown: Vec<String> = members.iter().take(most).map(name).collect();
+    let last = match members.len() - shown.len() {
+        0 => shown.pop().unwrap_or_default(),
+        more => format!("{more} more"),
+    };
+    if shown.is_empty() { last } else { format!("{} and {last}", shown.join(", ")) }
 }
 
 /// The warning about a closed body that encloses nothing.
@@ -202,6 +269,24 @@ mod tests {
     }
 
     #[test]
+    fn open_parts_of_one_kind_share_a_warning_that_names_a_few() {
+        let pane = |i: usize| {
+            let name = if i == 1 { String::new() } else { format!("name = 'pane {i}'\n") };
+            format!("[[quad]]\n{name}corner = [0, {i}, 0]\nu = [1, 0, 0]\nv = [0, 0, 1]\nmaterial = 'a'\n")
+        };
+        let panes = |count: usize| (0..count).map(pane).collect::<String>();
+        let of = |count: usize| messages(&panes(count), "glass", None);
+        let five = "\"pane 0\", line 9, \"pane 2\", \"pane 3\"";
+        assert_eq!(of(2), ["2 quads of glass have no inside: \"pane 0\" and line 9"]);
+        assert_eq!(of(5), [format!("5 quads of glass have no inside: {five} and \"pane 4\"")]);
+        assert_eq!(of(6), [format!("6 quads of glass have no inside: {five}, \"pane 4\" and \"pane 5\"")]);
+        assert_eq!(of(30), [format!("30 quads of glass have no inside: {five}, \"pane 4\" and 25 more")]);
+        // Other kinds have warnings of their own.
+        let mixed = format!("[[disk]]\nmaterial = 'a'\n{}", panes(2));
+        assert_eq!(messages(&mixed, "glass", None).len(), 2);
+    }
+
+    #[test]
     fn parts_of_different_glass_do_not_close_each_other() {
         let side = |corner: &str, u: &str, v: &str, material: &str| {
             format!("[[quad]]\ncorner = {corner}\nu = {u}\nv = {v}\nmaterial = '{material}'\n")
@@ -222,11 +307,10 @@ mod tests {
         assert_eq!(messages(&cube("a"), "glass", None), [""; 0]);
         assert_eq!(messages(&other("ior = 1.5\ntint = [1, 1, 1]"), "glass", None), [""; 0], "the same glass");
         for glass in ["ior = 1.33", "tint = [0.5, 1, 1]"] {
-            assert_eq!(
-                messages(&other(glass), "glass", None).len(),
-                5,
-                "{glass}: the lid and its four neighbours"
-            );
+            let found = messages(&other(glass), "glass", None);
+            // The lid and its four neighbours.
+            let expected = "5 quads of glass have no inside: ";
+            assert!(found.len() == 1 && found[0].starts_with(expected), "{glass}: {found:?}");
         }
     }
 }
