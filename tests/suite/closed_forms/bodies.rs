@@ -381,6 +381,127 @@ fn a_sheet_between_opaque_walls_closes_with_them() {
 }
 
 #[test]
+fn an_opaque_surface_that_is_curved_closes_what_ends_on_it() {
+    // A label in a ball of glass: where it is, the ball has no triangles.
+    let ball = lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9));
+    let middle = |i: usize| ball.corners(i as u32).iter().sum::<Vec3>() / 3.0;
+    let is_label = |i: usize| middle(i).x > 0.4;
+    let (bare, label) = (part(&ball, |i| !is_label(i)), part(&ball, is_label));
+    let with = |label: TriangleMesh| {
+        scene().mesh(bare.clone(), AS_IT_IS, glass(1.5)).mesh(label, AS_IT_IS, matte(0.5))
+    };
+    let fits = bodies(&with(label.clone()));
+    assert!(!fits.has_open() && fits.open().iter().all(|open| open.is_covered), "{:?}", fits.open());
+    // It has come off.
+    let off =
+        TriangleMesh { positions: label.positions.iter().map(|p| p + Vec3::X * 0.02).collect(), ..label };
+    assert!(bodies(&with(off)).has_open());
+    // Two panes close a tube that is not of glass. The chords of their rims are 2 % of its radius off.
+    let pane = |radius: f64, height: f64, faces_up: bool| {
+        let mut mesh =
+            TriangleMesh { positions: vec![v(0.0, 0.0, height).as_vec3()], ..TriangleMesh::default() };
+        for i in 0..16 {
+            let angle = f64::from(i) / 16.0 * std::f64::consts::TAU;
+            mesh.positions.push(v(radius * angle.cos(), radius * angle.sin(), height).as_vec3());
+            let (one, next) = (i as u32 + 1, (i as u32 + 1) % 16 + 1);
+            mesh.triangles.push(if faces_up { [0, one, next] } else { [0, next, one] });
+        }
+        mesh
+    };
+    let tube = Shape::Cylinder { a: v(0.0, 0.0, -1.0), b: v(0.0, 0.0, 1.0), radius: 1.0, caps: false };
+    for (radius, is_open) in [(1.0, false), (0.95, true)] {
+        let plug = scene()
+            .shape(tube.clone(), matte(0.5))
+            .mesh(pane(radius, 0.4, true), AS_IT_IS, glass(1.5))
+            .mesh(pane(radius, -0.4, false), AS_IT_IS, glass(1.5));
+        assert_eq!(bodies(&plug).has_open(), is_open, "{radius}");
+    }
+}
+
+#[test]
+fn holes_are_covered_each_by_itself() {
+    // Five sides of a box on a table, one beside it in the air, one with its hole upwards, one on a mesh.
+    let (low, high) = (v(0.0, 0.0, 0.0), v(1.0, 1.0, 0.5));
+    let five = |at: DVec3, lost: usize| {
+        let all = quads(low + at, high + at, 0).into_iter().enumerate();
+        all.filter(move |(i, _)| *i != lost).map(|(_, quad)| quad)
+    };
+    let bottom = (0..6).find(|&i| {
+        let Shape::Quad { corner, u, v } = quads(low, high, 0)[i] else { return false };
+        [corner, corner + u, corner + v].iter().all(|place| place.z == 0.0)
+    });
+    let (bottom, x) = (bottom.expect("a side"), |i: f64| v(3.0 * i, 0.0, 0.0));
+    let top = (0..6).find(|&i| {
+        let Shape::Quad { corner, u, v } = quads(low, high, 0)[i] else { return false };
+        [corner, corner + u, corner + v].iter().all(|place| place.z == 0.5)
+    });
+    let top = top.expect("a side");
+    let table = v(-1.0, -1.0, 0.0);
+    let mut board = prism(
+        &[v(8.0, -1.0, 0.0), v(11.0, -1.0, 0.0), v(11.0, 2.0, 0.0), v(8.0, 2.0, 0.0)],
+        &[[0, 1, 2], [0, 2, 3]],
+        0.1,
+        1,
+    );
+    board.positions.iter_mut().for_each(|place| place.z -= 0.1);
+    let parts = [
+        five(x(0.0), bottom),
+        five(x(1.0) + v(0.0, 0.0, 0.2), bottom),
+        five(x(2.0), top),
+        five(x(3.0), bottom),
+    ];
+    let build =
+        scene().quad(table, v(3.0, 0.0, 0.0), v(0.0, 3.0, 0.0), matte(0.5)).mesh(board, AS_IT_IS, matte(0.5));
+    let build = parts.into_iter().flatten().fold(build, |build, quad| build.shape(quad, glass(1.5)));
+    let found = bodies(&build);
+    let is_open = [0, 1, 2, 3].map(|part| found.is_open(found.place(2 + 5 * part)));
+    assert_eq!(is_open, [false, true, true, false], "{:?}", found.open());
+}
+
+#[test]
+fn a_mesh_that_looks_inwards_in_a_mesh_of_its_glass_is_a_cavity() {
+    let tint = v(0.5, 0.9, 0.25);
+    // Without reflection and refraction: what comes straight through is tinted by the way in glass.
+    let material = tinted(1.0, tint);
+    let seen = |parts: &[TriangleMesh], x: f64| {
+        let build = scene().background(1.0).depth(20).seen(v(x, 0.013, 5.0), v(x, 0.013, 0.0));
+        parts.iter().fold(build, |build, part| build.mesh(part.clone(), AS_IT_IS, material.clone())).color()
+    };
+    let ball = |radius: f64| lat_long_sphere(96, 192, radius, DVec3::ZERO);
+    let chord = |radius: f64, x: f64| 2.0 * (radius * radius - x * x - 0.013 * 0.013).max(0.0).sqrt();
+    let check = |what: &str, parts: &[TriangleMesh], x: f64, way: f64| {
+        let color = seen(parts, x);
+        for channel in 0..3 {
+            let exact = tint[channel].powf(way);
+            assert!((color[channel] - exact).abs() < 2e-3, "{what}, {x}: {color} for a way of {way}");
+        }
+    };
+    let (outer, inner) = (ball(1.0), ball(0.8));
+    for x in [0.0, 0.3, 0.7, 0.9] {
+        let shell = chord(1.0, x) - chord(0.8, x);
+        check("hollow", &[outer.clone(), turned(&inner)], x, shell);
+        check("in any order", &[turned(&inner), outer.clone()], x, shell);
+        check("solid", &[outer.clone(), inner.clone()], x, chord(1.0, x));
+        check("alone", &[turned(&inner)], x, chord(0.8, x));
+        let onion = [outer.clone(), turned(&ball(0.2)), turned(&inner), ball(0.5)];
+        check("a ball in it", &onion, x, shell + chord(0.5, x) - chord(0.2, x));
+        let lost = [outer.clone(), turned(&inner), turned(&ball(0.5))];
+        check("a ball in it that is inside out", &lost, x, shell + chord(0.5, x));
+    }
+    // Two cavities, each in its own place; and one that is partly outside is none.
+    let at = |radius: f64, x: f64| lat_long_sphere(24, 48, radius, v(x, 0.0, 0.0));
+    let two = scene().mesh(at(1.0, 0.0), AS_IT_IS, material.clone());
+    let two = two.mesh(turned(&at(0.3, -0.5)), AS_IT_IS, material.clone());
+    let two = bodies(&two.mesh(turned(&at(0.3, 0.5)), AS_IT_IS, material.clone()));
+    assert_eq!([0, 1, 2].map(|object| (two.place(object), two.is_turned(object))), [(2, false); 3]);
+    for (other, x) in [(material.clone(), 0.9), (tinted(1.0, v(0.4, 0.9, 0.25)), 0.5)] {
+        let build = scene().mesh(at(1.0, 0.0), AS_IT_IS, material.clone());
+        let own = bodies(&build.mesh(turned(&at(0.3, x)), AS_IT_IS, other));
+        assert_eq!([0, 1].map(|object| (own.place(object), own.is_turned(object))), [(0, false), (1, true)]);
+    }
+}
+
+#[test]
 fn open_glass_is_the_same_by_paths_and_photons() {
     let material = tinted(1.8, v(0.5, 0.9, 0.7));
     let sphere = lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9));

@@ -1,91 +1,167 @@
 //! Open rims of glass that end at something opaque: there, light reaches the other side only through the glass.
 
 use super::pieces::{MeshGlass, Pieces, Rim, glass_of};
+use crate::accel::Bvh;
 use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::{Aabb, RayF64};
+use crate::geometry::{Aabb, RayF64, Shape};
 use crate::math::DVec3;
 use crate::math::transform::Transform;
-use crate::scene::description::{Lowered, Scene};
+use crate::scene::description::{Lowered, Mesh, Scene};
 
-/// Most rims that are examined.
+/// Most rims of a hole that are examined.
 const MOST_RIMS: usize = 64;
 
-/// Distance beyond a rim within which a surface is searched, relative to the length of the way to the rim.
+/// Distance from a rim within which a surface is searched, relative to the length of the way to the rim.
 const REACH: f64 = 1e-3;
 
-/// The part of some rims, by length, that opaque surfaces cover. A way to a rim, from its triangle or from the middle of all rims,
-/// hits such a surface at the rim or a little beyond.
+/// Number of queries about a rim: two ways and two ends.
+const QUERIES: usize = 4;
+
+/// A query about opaque surfaces.
+#[derive(Clone, Copy)]
+enum Query {
+    /// Whether this way hits one.
+    Way(RayF64),
+    /// Whether one is within a distance of a point.
+    Point(DVec3, f64),
+}
+
+/// For each hole, the part of its rims, by length, that opaque surfaces cover.
+///
+/// A rim is covered if a way to its middle, from its triangle or from the middle of all rims, hits such a surface there or a little
+/// beyond. It is also covered if both of its ends are on such surfaces, from which the chord between them deviates if they are
+/// curved.
 pub(super) fn covered(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     pieces: &Pieces,
-    rims: &[Rim],
+    holes: &[&[Rim]],
     token: &CancelToken,
-) -> Result<f64, Cancelled> {
-    let step = rims.len().div_ceil(MOST_RIMS).max(1);
-    let some: Vec<&Rim> = rims.iter().step_by(step).collect();
-    let middle_of = |rim: &Rim| (rim.ends[0] + rim.ends[1]) * 0.5;
-    let center = some.iter().map(|rim| middle_of(rim)).sum::<DVec3>() / some.len().max(1) as f64;
-    let ways: Vec<RayF64> = some
-        .iter()
-        .flat_map(|rim| {
-            let end = middle_of(rim);
-            [rim.inner, center].map(|origin| {
-                let direction = end - origin;
-                let reach = 1.0 + REACH + pieces.list[rim.piece as usize].tolerance / direction.length();
-                RayF64 { origin, direction, t_max: reach }
-            })
-        })
-        .collect();
-    let met = met(scene, meshes, pieces.origin, &ways, token)?;
-    let length = |rim: &Rim| rim.ends[0].distance(rim.ends[1]);
-    let total: f64 = some.iter().map(|rim| length(rim)).sum();
-    let own = some.iter().zip(met.chunks(2)).filter(|(_, met)| met[0] || met[1]);
-    Ok(own.map(|(rim, _)| length(rim)).sum::<f64>() / total)
+) -> Result<Vec<f64>, Cancelled> {
+    let examined: Vec<Vec<&Rim>> = holes.iter().map(|rims| examined(rims)).collect();
+    let queries: Vec<Query> = examined.iter().flat_map(|rims| queries(pieces, rims)).collect();
+    if queries.is_empty() {
+        return Ok(vec![0.0; holes.len()]);
+    }
+    let met = met(scene, meshes, pieces.origin, &queries, token)?;
+    let mut met = met.chunks(QUERIES);
+    let part = |rims: Vec<&Rim>| {
+        let (mut covered, mut total) = (0.0, 0.0);
+        for (rim, met) in rims.into_iter().zip(&mut met) {
+            let length = rim.ends[0].distance(rim.ends[1]);
+            total += length;
+            covered += if met[0] || met[1] || met[2] && met[3] { length } else { 0.0 };
+        }
+        covered / total
+    };
+    Ok(examined.into_iter().map(part).collect())
 }
 
-/// Whether each of these ways hits anything opaque.
+/// Rims of a hole, evenly chosen.
+fn examined(rims: &[Rim]) -> Vec<&Rim> {
+    let step = rims.len().div_ceil(MOST_RIMS).max(1);
+    rims.iter().step_by(step).collect()
+}
+
+/// The queries about the rims of a hole, [`QUERIES`] for each.
+fn queries<'a>(pieces: &'a Pieces, rims: &'a [&Rim]) -> impl Iterator<Item = Query> + 'a {
+    let middle_of = |rim: &Rim| (rim.ends[0] + rim.ends[1]) * 0.5;
+    let center = rims.iter().map(|rim| middle_of(rim)).sum::<DVec3>() / rims.len().max(1) as f64;
+    rims.iter().flat_map(move |rim| {
+        let (end, tolerance) = (middle_of(rim), pieces.list[rim.piece as usize].tolerance);
+        let [inner, middle] = [rim.inner, center].map(|origin| {
+            let direction = end - origin;
+            Query::Way(RayF64 { origin, direction, t_max: 1.0 + REACH + tolerance / direction.length() })
+        });
+        let [from, to] = rim.ends.map(|end| Query::Point(end, REACH * end.distance(rim.inner) + tolerance));
+        [inner, middle, from, to]
+    })
+}
+
+impl Query {
+    fn bounds(&self) -> Aabb {
+        match *self {
+            Self::Way(way) => Aabb::around_f64([way.origin, way.at(way.t_max)]),
+            Self::Point(point, reach) => Aabb::around_f64([point - reach, point + reach]),
+        }
+    }
+
+    /// Whether a triangle is there.
+    fn meets_triangle(&self, corners: [DVec3; 3]) -> bool {
+        match *self {
+            Self::Way(way) => crosses(&way, corners),
+            Self::Point(point, reach) => distance_squared(point, corners) <= reach * reach,
+        }
+    }
+
+    /// Whether a surface of a shape is there. Of three lines across each other, one makes an angle of at least 35° with the surface:
+    /// within √3 of its distance the line hits it.
+    fn meets_shape(&self, shape: &Shape) -> bool {
+        match *self {
+            Self::Way(way) => shape.intersect(&way).is_some(),
+            Self::Point(point, reach) => DVec3::AXES.into_iter().any(|axis| {
+                let half = axis * (3.0_f64.sqrt() * reach);
+                let line = RayF64 { origin: point - half, direction: half, t_max: 2.0 };
+                shape.intersect(&line).is_some()
+            }),
+        }
+    }
+}
+
+/// Whether the opaque surfaces of a scene are where each query asks for them.
 fn met(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     origin: DVec3,
-    ways: &[RayF64],
+    queries: &[Query],
     token: &CancelToken,
 ) -> Result<Vec<bool>, Cancelled> {
-    let mut met = vec![false; ways.len()];
-    let bounds: Vec<Aabb> =
-        ways.iter().map(|way| Aabb::around_f64([way.origin, way.at(way.t_max)])).collect();
+    let bounds: Vec<Aabb> = queries.iter().map(Query::bounds).collect();
     let all = bounds.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
+    // Visit the queries near each surface: both are many.
+    let tree = Bvh::build(&bounds, token)?;
+    let mut met = vec![false; queries.len()];
     for object in &scene.objects {
         if glass_of(scene, meshes, object) == Some(MeshGlass::All) {
             continue;
         }
         token.check()?;
-        let mesh = match object.shape.lowered(origin) {
+        match object.shape.lowered(origin) {
             Lowered::Shape(shape) => {
-                for (met, way) in met.iter_mut().zip(ways) {
-                    *met |= shape.intersect(way).is_some();
+                let around = shape.bounds().unwrap_or(all);
+                tree.meeting(&around, |id| {
+                    let id = id as usize;
+                    met[id] = met[id] || queries[id].meets_shape(&shape);
+                });
+            }
+            Lowered::Mesh(placed) => {
+                for corners in triangles(placed, meshes[placed.file], origin) {
+                    let around = Aabb::around_f64(corners);
+                    if around.meets(&all) {
+                        tree.meeting(&around, |id| {
+                            let id = id as usize;
+                            met[id] = met[id] || queries[id].meets_triangle(corners);
+                        });
+                    }
                 }
-                continue;
-            }
-            Lowered::Mesh(mesh) => mesh,
-        };
-        let own = &meshes[mesh.file].mesh;
-        let placed = Transform::scale_rotate_translate(mesh.scale, mesh.rotate, mesh.translate);
-        let place = placed.between(own.origin, origin);
-        for triangle in 0..own.triangles.len() as u32 {
-            let corners = own.corners(triangle).map(|corner| place.point(corner.as_dvec3()));
-            let around = Aabb::around_f64(corners);
-            if !around.meets(&all) {
-                continue;
-            }
-            for ((met, way), bounds) in met.iter_mut().zip(ways).zip(&bounds) {
-                *met |= around.meets(bounds) && crosses(way, corners);
             }
         }
     }
     Ok(met)
+}
+
+/// The triangles of a mesh, in coordinates that start at `origin`.
+pub(super) fn triangles<'a>(
+    placed: &Mesh,
+    loaded: &'a LoadedMesh,
+    origin: DVec3,
+) -> impl Iterator<Item = [DVec3; 3]> + 'a {
+    let own = &loaded.mesh;
+    let to_scene = Transform::scale_rotate_translate(placed.scale, placed.rotate, placed.translate);
+    let place = to_scene.between(own.origin, origin);
+    let corners = move |number: u32| own.corners(number).map(|corner| place.point(corner.as_dvec3()));
+    (0..own.triangles.len() as u32).map(corners)
 }
 
 /// Whether a way hits a triangle (Möller and Trumbore, *Fast, Minimum Storage Ray/Triangle Intersection*, 1997).
@@ -98,4 +174,51 @@ fn crosses(way: &RayF64, [a, b, c]: [DVec3; 3]) -> bool {
     let (u, v) = (from.dot(p) / determinant, way.direction.dot(q) / determinant);
     let t = ac.dot(q) / determinant;
     u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && t <= way.t_max
+}
+
+/// Square of the distance of a point from a triangle.
+fn distance_squared(point: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let normal = (b - a).cross(c - a);
+    let sides = [[a, b], [b, c], [c, a]];
+    let is_over = |[from, to]: [DVec3; 2]| (to - from).cross(point - from).dot(normal) >= 0.0;
+    if normal != DVec3::ZERO && sides.into_iter().all(is_over) {
+        let height = (point - a).dot(normal);
+        return height * height / normal.length_squared();
+    }
+    let from_side = |[from, to]: [DVec3; 2]| {
+        let along = to - from;
+        let part = (point - from).dot(along) / along.length_squared();
+        let nearest = if part > 0.0 { from + along * part.min(1.0) } else { from };
+        point.distance_squared(nearest)
+    };
+    sides.map(from_side).into_iter().fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::unit;
+
+    #[test]
+    fn the_distance_of_a_triangle_is_that_of_its_nearest_place() {
+        let mut next = unit(3);
+        let mut place = || DVec3::from_array(std::array::from_fn(|_| f64::from(next()) * 2.0 - 1.0));
+        for _ in 0..300 {
+            let (corners, point) = ([place(), place(), place()], place() * 1.5);
+            let [a, b, c] = corners;
+            let steps = 200;
+            let mut least = f64::INFINITY;
+            for i in 0..=steps {
+                for j in 0..=steps - i {
+                    let [u, v] = [i, j].map(|k| f64::from(k) / f64::from(steps));
+                    least = least.min(point.distance(a + (b - a) * u + (c - a) * v));
+                }
+            }
+            let distance = distance_squared(point, corners).sqrt();
+            assert!(
+                (distance - 1e-9..distance + 0.02).contains(&least),
+                "{corners:?} {point}: {distance} {least}"
+            );
+        }
+    }
 }

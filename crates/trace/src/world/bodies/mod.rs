@@ -7,15 +7,20 @@
 //! the other way than its neighbours' is turned, and so is a body whose front faces inwards. A body has the place of its last object
 //! in the order of the file.
 //!
+//! A closed mesh whose front faces inwards is a cavity if it is wholly inside another body of the same glass: a hollow ball of
+//! two meshes is one body, as it is if both are in one file.
+//!
 //! A body with a hole is open, unless something opaque surrounds the hole. No ray can know whether it is inside such glass: its
 //! surface only determines the medium of a ray that arrives or leaves there (`integrators::crossing`).
 
 mod cover;
+mod hollow;
 mod pieces;
 mod seams;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
+use hollow::{Closed, cavities};
 use pieces::{Piece, Pieces, Rim};
 use seams::{OpenRim, Seam, Seams, root};
 
@@ -89,22 +94,28 @@ impl Bodies {
         let mut bodies = Self::default();
         let alone = |place| Part { place, is_turned: false, is_open: false };
         bodies.parts = (0..scene.objects.len() as u32).map(alone).collect();
-        for members in groups.members() {
-            let hole = Hole::of(&pieces, &groups, &members, &seams);
-            let is_covered = hole.part > SMALL_HOLE
-                && cover::covered(scene, meshes, &pieces, &hole.rims, token)? >= COVERED;
+        let all = groups.members();
+        let holes = Hole::of_all(&pieces, &groups, &all, &seams);
+        let covered = covered(scene, meshes, &pieces, &holes, token)?;
+        let mut closed: Vec<Closed> = Vec::new();
+        for ((members, hole), &is_covered) in all.iter().zip(&holes).zip(&covered) {
             let is_open = hole.part > SMALL_HOLE && !is_covered;
-            let turns = groups.turns(&pieces, &members, hole.part <= SMALL_HOLE);
+            let turns = groups.turns(&pieces, members, hole.part <= SMALL_HOLE);
             let place = members.iter().map(|&piece| pieces.list[piece as usize].object).max();
-            for &piece in &members {
+            for &piece in members {
                 let object = pieces.list[piece as usize].object;
                 let is_turned = turns != groups.flips[piece as usize];
                 bodies.parts[object as usize] = Part { place: place.unwrap_or(object), is_turned, is_open };
                 bodies.open.extend(hole.at(piece, object, is_covered));
             }
-            if hole.part <= NO_HOLE && groups.are_flat(&pieces, &members) {
+            if hole.part <= NO_HOLE && groups.are_flat(&pieces, members) {
                 bodies.flat.extend(members.first().map(|&piece| pieces.list[piece as usize].object));
+            } else if hole.part <= SMALL_HOLE {
+                closed.extend(groups.closed(scene, &pieces, members));
             }
+        }
+        for (cavity, around) in cavities(scene, meshes, pieces.origin, &closed, token)? {
+            bodies.join(&closed[cavity].objects, &closed[around].objects);
         }
         bodies.open.sort_by_key(|open| open.object);
         let is_plain = |(object, part): (u32, &Part)| *part == alone(object);
@@ -112,6 +123,21 @@ impl Bodies {
             bodies.parts.clear();
         }
         Ok(bodies)
+    }
+
+    /// Makes a cavity of a body, by its objects, part of the body around it. Its front is where it is: on the side of the glass's
+    /// outside.
+    fn join(&mut self, cavity: &[u32], around: &[u32]) {
+        let objects = || cavity.iter().chain(around).map(|&object| object as usize);
+        let place = objects().map(|object| self.parts[object].place).max().unwrap_or_default();
+        // Cavities that joined before have the place of the body.
+        let body = around.first().map(|&object| self.parts[object as usize].place);
+        for part in self.parts.iter_mut().filter(|part| Some(part.place) == body) {
+            part.place = place;
+        }
+        for &object in cavity {
+            self.parts[object as usize] = Part { place, is_turned: false, is_open: false };
+        }
     }
 
     /// The place of an object's body in the order of the file.
@@ -143,6 +169,21 @@ impl Bodies {
     pub fn open(&self) -> &[OpenGlass] {
         &self.open
     }
+}
+
+/// Whether opaque surfaces surround each hole.
+fn covered(
+    scene: &Scene,
+    meshes: &[&LoadedMesh],
+    pieces: &Pieces,
+    holes: &[Hole],
+    token: &CancelToken,
+) -> Result<Vec<bool>, Cancelled> {
+    let is_large = |hole: &&Hole| hole.part > SMALL_HOLE;
+    let rims: Vec<&[Rim]> = holes.iter().filter(is_large).map(|hole| &*hole.rims).collect();
+    let mut parts = cover::covered(scene, meshes, pieces, &rims, token)?.into_iter();
+    let is_covered = |hole: &Hole| is_large(&hole) && parts.next().is_some_and(|part| part >= COVERED);
+    Ok(holes.iter().map(is_covered).collect())
 }
 
 /// Joined pieces.
@@ -200,15 +241,31 @@ impl Groups {
         self.flips[one as usize] != self.flips[other as usize]
     }
 
-    /// Whether the pieces of a closed body enclose nothing.
-    fn are_flat(&self, pieces: &Pieces, members: &[u32]) -> bool {
+    /// Volume and area of a body, with the fronts of its pieces as that of the first.
+    fn volume(&self, pieces: &Pieces, members: &[u32]) -> (f64, f64) {
         let (mut volume, mut area) = (0.0, 0.0);
         for &piece in members {
             let Piece { volume: own, area: surface, .. } = &pieces.list[piece as usize];
             volume += if self.flips[piece as usize] { -own } else { *own };
             area += surface;
         }
+        (volume, area)
+    }
+
+    /// Whether the pieces of a closed body enclose nothing.
+    fn are_flat(&self, pieces: &Pieces, members: &[u32]) -> bool {
+        let (volume, area) = self.volume(pieces, members);
         volume.abs() <= NO_VOLUME * area * area.sqrt()
+    }
+
+    /// A closed body, if all of it are meshes whose fronts agree.
+    fn closed(&self, scene: &Scene, pieces: &Pieces, members: &[u32]) -> Option<Closed> {
+        let objects: Vec<u32> = members.iter().map(|&piece| pieces.list[piece as usize].object).collect();
+        let are_meshes = objects.iter().all(|&object| scene.objects[object as usize].shape.mesh().is_some());
+        let do_agree = members.iter().all(|&piece| !self.flips[piece as usize]);
+        let substance = pieces.list[members[0] as usize].substance;
+        let (volume, _) = self.volume(pieces, members);
+        (are_meshes && do_agree).then_some(Closed { objects, volume, substance })
     }
 
     /// The pieces of each body.
@@ -224,14 +281,13 @@ impl Groups {
     /// Whether the front of a body's first piece is on the inside: for a closed body by its volume, for an open one by most of its
     /// surface.
     fn turns(&self, pieces: &Pieces, members: &[u32], is_closed: bool) -> bool {
-        let own = members.iter().map(|&piece| (&pieces.list[piece as usize], self.flips[piece as usize]));
-        let sign = |is_flipped: bool| if is_flipped { -1.0 } else { 1.0 };
-        let area: f64 = own.clone().map(|(piece, _)| piece.area).sum();
-        let volume: f64 = own.clone().map(|(piece, is_flipped)| sign(is_flipped) * piece.volume).sum();
         if is_closed {
             // Less than that is rounding.
+            let (volume, area) = self.volume(pieces, members);
             return volume < -1e-9 * area * area.sqrt();
         }
+        let own = members.iter().map(|&piece| (&pieces.list[piece as usize], self.flips[piece as usize]));
+        let sign = |is_flipped: bool| if is_flipped { -1.0 } else { 1.0 };
         own.map(|(piece, is_flipped)| sign(is_flipped) * piece.area).sum::<f64>() < 0.0
     }
 }
@@ -246,9 +302,20 @@ struct Hole {
 }
 
 impl Hole {
-    fn of(pieces: &Pieces, groups: &Groups, members: &[u32], seams: &Seams) -> Self {
-        let is_own = |rim: &Rim| groups.roots[rim.piece as usize] == members[0];
-        let mut own: Vec<OpenRim> = seams.open.iter().filter(|(rim, _)| is_own(rim)).copied().collect();
+    /// The holes of all bodies.
+    fn of_all(pieces: &Pieces, groups: &Groups, all: &[Vec<u32>], seams: &Seams) -> Vec<Self> {
+        let mut own: HashMap<u32, Vec<OpenRim>> = HashMap::new();
+        for open in &seams.open {
+            own.entry(groups.roots[open.0.piece as usize]).or_default().push(*open);
+        }
+        let hole = |members: &Vec<u32>| {
+            Self::of(pieces, groups, members, own.remove(&members[0]).unwrap_or_default())
+        };
+        all.iter().map(hole).collect()
+    }
+
+    /// The hole of a body with these open rims.
+    fn of(pieces: &Pieces, groups: &Groups, members: &[u32], mut own: Vec<OpenRim>) -> Self {
         if own.is_empty() {
             return Self { rims: Vec::new(), disagree: Vec::new(), part: 0.0 };
         }
