@@ -171,7 +171,7 @@ impl Cone {
     }
 
     /// Projected area: the area that faces a unit direction, times the cosines.
-    pub fn shown(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap] = self.areas();
         // The side's normals have these components across the axis and towards the tip.

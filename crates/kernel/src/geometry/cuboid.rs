@@ -183,7 +183,7 @@ impl Cuboid {
     }
 
     /// Projected area: the area that faces a unit direction, times the cosines.
-    pub fn shown(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = (self.axes.transpose() * direction).abs();
         let [x, _, y, _, z, _] = self.areas();
         DVec3::new(x, y, z).dot(along)

@@ -152,7 +152,7 @@ impl Cylinder {
     }
 
     /// Projected area: the area that faces a unit direction, times the cosines.
-    pub fn shown(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap, _] = self.areas();
         ring_shown(side, across(along), 0.0) + cap * along.abs()

@@ -125,7 +125,7 @@ impl Disk {
     }
 
     /// Projected area: the area that faces a unit direction, times the cosine.
-    pub fn shown(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         let [area] = self.areas();
         area * self.normal().dot(direction).max(0.0)
     }

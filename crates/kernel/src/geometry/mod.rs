@@ -269,8 +269,8 @@ impl Shape {
 
     /// Projected area: the area whose front faces a unit direction, times the cosines; for a torus, the mean over all
     /// directions.
-    pub fn shown(&self, direction: DVec3) -> f64 {
-        of_any!(self, it => it.shown(direction))
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
+        of_any!(self, it => it.projected_area(direction))
     }
 }
 
@@ -349,9 +349,9 @@ mod tests {
             for direction in directions {
                 if matches!(shape, Shape::Torus(_)) {
                     // The mean over the directions of a closed surface (Cauchy).
-                    assert_eq!(shape.shown(direction), area / 4.0);
+                    assert_eq!(shape.projected_area(direction), area / 4.0);
                 } else {
-                    let off = shape.shown(direction) - shown(direction);
+                    let off = shape.projected_area(direction) - shown(direction);
                     assert!(off.abs() < 2e-3 * area, "{shape:?}: {off}");
                 }
             }

@@ -131,7 +131,7 @@ impl Parallelogram {
     }
 
     /// Projected area: the area that faces a unit direction, times the cosine.
-    pub fn shown(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         self.normal.dot(direction).max(0.0)
     }
 }

@@ -112,7 +112,7 @@ impl Plane {
     }
 
     /// Projected area: the area that faces a unit direction, times the cosine.
-    pub fn shown(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         if self.normal.dot(direction) > 0.0 { f64::INFINITY } else { 0.0 }
     }
 }

@@ -131,7 +131,7 @@ impl Sphere {
     }
 
     /// Projected area: for every direction, that of the great circle.
-    pub fn shown(&self, _: DVec3) -> f64 {
+    pub fn projected_area(&self, _: DVec3) -> f64 {
         PI * self.radius * self.radius
     }
 }

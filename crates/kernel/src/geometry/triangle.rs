@@ -96,7 +96,7 @@ impl Triangle {
     }
 
     /// Projected area: the area that faces a unit direction, times the cosine.
-    pub fn shown(&self, direction: DVec3) -> f64 {
+    pub fn projected_area(&self, direction: DVec3) -> f64 {
         (0.5 * self.normal().dot(direction)).max(0.0)
     }
 }

@@ -4,7 +4,7 @@ use super::area::mesh::{Facets, MeshEmitter};
 use super::area::quad::QuadEmitter;
 use super::area::row::row_of_facets;
 use super::area::sphere::SphereEmitter;
-use super::area::{AreaLight, Arrival, ShapeEmitter};
+use super::area::{AreaLight, LightSamplePoint, ShapeEmitter};
 use super::delta::DeltaLight;
 use super::row::{LightRow, row_of};
 use super::sample::Source;
@@ -18,7 +18,7 @@ macro_rules! row_of_wholes {
     ($i:ident => $all:expr, $points:expr, $u:expr) => {{
         let mut row = row_of!(Source::Nothing, $i => {
             let (emitter, light) = $all[$i];
-            let Arrival { direction, target, factor } =
+            let LightSamplePoint { direction, target, factor } =
                 emitter.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
             (direction, target, light.radiance * factor)
         });
@@ -88,8 +88,8 @@ impl Lights {
         let mut lookups = 0;
         for i in lanes(used) {
             let weight = lane(&row.weights, i);
-            if let Some(pattern) = lights[i].pattern().filter(|_| weight != Vec3::ZERO) {
-                let weight = weight * pattern.at(lane(&row.targets, i), row.sources.part[i]);
+            if let Some(texture) = lights[i].emission_texture().filter(|_| weight != Vec3::ZERO) {
+                let weight = weight * texture.at(lane(&row.targets, i), row.sources.part[i]);
                 set_lane(&mut row.weights, i, weight);
                 lookups += 1;
             }

@@ -1,10 +1,10 @@
 //! The lights side by side: each kind is a variant of [`Light`], and [`Light::family`] tells its trait.
 
-use super::area::{AreaLight, Pattern};
+use super::area::{AreaLight, EmissionTexture};
 use super::delta::{DeltaLight, PointLight, SpotLight};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::row::LightRow;
-use super::sample::{LightSample, Met, Middle, Source};
+use super::sample::{LightHit, LightSample, Middle, Source};
 use super::tree::LightBounds;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
@@ -117,7 +117,7 @@ impl Light {
     /// Light-sampling pdf in sr⁻¹ of a hit's direction, for the point `from` of a surface with this normal; 0 if the light is
     /// never sampled there, or no ray can hit it.
     #[inline]
-    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &Met) -> f32 {
+    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
         self.as_area().map_or(0.0, |light| light.pdf(from, normal, met))
     }
 
@@ -133,8 +133,8 @@ impl Light {
 
     /// Emission texture, by which its radiance is multiplied from point to point. `None` if it has none.
     #[inline(always)]
-    pub fn pattern(&self) -> Option<&Pattern> {
-        self.as_area().and_then(|light| light.pattern.as_deref())
+    pub fn emission_texture(&self) -> Option<&EmissionTexture> {
+        self.as_area().and_then(|light| light.texture.as_deref())
     }
 
     /// Whether it comes from beyond the scene.

@@ -42,13 +42,13 @@ mod sample;
 mod set;
 pub mod tree;
 
-pub use area::{AreaLight, Chart, Emitter, MeshEmitter, Part, Patch, Pattern, area_light};
+pub use area::{AreaLight, Chart, EmissionTexture, Emitter, MeshEmitter, Part, Patch, area_light};
 pub use delta::{Falloff, PointLight, SpotLight};
 pub use emission::{Ball, Emitted, Numbers, Outline, PhotonSource, Start};
 pub use infinite::{DirectionalLight, Environment, SkyMap};
 pub use light::{Family, Light};
 pub use row::{LightRow, SourceRow};
-pub use sample::{End, LightSample, Met, Middle, Source};
+pub use sample::{End, LightHit, LightSample, Middle, Source};
 pub use set::{Lights, Picks, Receivers, Samples, Selection};
 pub use tree::{Cut, LightBounds, LightTree, Lobe, Pick, Receiver, ReceiverRow};
 

@@ -47,7 +47,7 @@ pub enum Source {
 
 /// A point of a light that a ray from elsewhere hits.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Met {
+pub struct LightHit {
     /// Unit direction of the ray.
     pub direction: Vec3,
     /// Distance to the point.
@@ -58,7 +58,7 @@ pub struct Met {
     pub primitive: u32,
 }
 
-impl Met {
+impl LightHit {
     /// Pdf in sr⁻¹ of directions to points that are uniform over an area; 0 from behind.
     pub(super) fn pdf_by_area(&self, area: f64) -> f32 {
         let cosine = -self.normal.dot(self.direction);

@@ -1,7 +1,7 @@
 //! Scatter and distribution of the samples of a light: compared with a ball of the same solid angle, and with their pdfs.
 
-use super::area::picture::PictureEmitter;
 use super::area::quad::QuadEmitter;
+use super::area::textured_quad::TexturedQuadEmitter;
 use super::tests::met;
 use super::*;
 use crate::geometry::Shape;
@@ -186,10 +186,10 @@ fn pictures(gap: f64) -> Vec<(&'static str, Shape, AreaLight)> {
     let far = Parallelogram::new(at(-0.3, 9.0), DVec3::new(-0.2, 0.2, 0.3), DVec3::new(0.5, 0.5, 0.0));
     let pictured = |name, quad: Parallelogram, texels, color: &dyn Fn([f64; 2]) -> Vec3| {
         let emitter = QuadEmitter::new(quad.corner, quad.u, quad.v);
-        let picture = PictureEmitter::new(emitter, texels, color).expect("a picture");
+        let picture = TexturedQuadEmitter::new(emitter, texels, color).expect("a picture");
         let shape = Shape::Quad(quad);
         let light = light_of(&shape);
-        (name, shape, AreaLight { shape: Emitter::Picture(Box::new(picture)), ..light })
+        (name, shape, AreaLight { shape: Emitter::TexturedQuad(Box::new(picture)), ..light })
     };
     vec![
         pictured("spot", square, [4.0, 5.0], &spot),
@@ -227,9 +227,9 @@ fn a_lamp_with_a_small_bright_part_scatters_little() {
         let quad = Parallelogram::new(DVec3::new(-0.5, gap, -0.5), DVec3::X, DVec3::Z);
         let emitter = QuadEmitter::new(quad.corner, quad.u, quad.v);
         let color = |at: [f64; 2]| Vec3::splat(bright(at));
-        let picture = PictureEmitter::new(emitter, [10.0, 10.0], color).expect("a picture");
+        let picture = TexturedQuadEmitter::new(emitter, [10.0, 10.0], color).expect("a picture");
         let plain = light_of(&Shape::Quad(quad));
-        let pictured = AreaLight { shape: Emitter::Picture(Box::new(picture)), ..plain.clone() };
+        let pictured = AreaLight { shape: Emitter::TexturedQuad(Box::new(picture)), ..plain.clone() };
         let small = Parallelogram::new(DVec3::new(-0.2, gap, 0.1), DVec3::X * 0.1, DVec3::Z * 0.1);
         let exact = spread(&irradiance(&light_of(&Shape::Quad(small)), Vec3::ZERO, 40_000)).0;
         let scatter = [&plain, &pictured].map(|light| {

@@ -45,11 +45,11 @@ const POINT: PointLight =
     PointLight { position: DVec3::ZERO, intensity: Vec3::ONE, falloff: Falloff::Square };
 
 /// The hit of a ray from a point on a shape.
-pub fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(Met, ShapeHit)> {
+pub fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit, ShapeHit)> {
     let ray = Ray::new(from, direction).to_f64();
     let hit = shape.intersect(&ray)?;
     let normal = shape.surface(&ray, &hit).normal;
-    Some((Met { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
+    Some((LightHit { direction, distance: hit.t, normal, primitive: hit.primitive }, hit))
 }
 
 /// Samples of a light for a point: directions, their ends, and inverse pdfs.
@@ -237,7 +237,7 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
             bounds,
             shape: Emitter::Mesh(mesh),
             radiance: Vec3::splat(radiance),
-            pattern: None,
+            texture: None,
             object: 3,
             part: Part::Listed,
         })
@@ -251,11 +251,11 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
         [Some(0), None, Some(2), None, Some(0), None]
     );
     assert_eq!(of_hit(4, 0), None);
-    let met = Met { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z, primitive: 2 };
+    let met = LightHit { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z, primitive: 2 };
     let (_, light) = lights.of_hit(3, 2).expect("a light");
     // d²/(A·cos) = 4/½.
     assert!((light.pdf(Vec3::ZERO, Vec3::Z, &met) - 8.0).abs() < 1e-5);
-    assert_eq!(light.pdf(Vec3::ZERO, Vec3::Z, &Met { normal: Vec3::NEG_Z, ..met }), 0.0, "from behind");
+    assert_eq!(light.pdf(Vec3::ZERO, Vec3::Z, &LightHit { normal: Vec3::NEG_Z, ..met }), 0.0, "from behind");
     assert_eq!(Light::Point(POINT).pdf(Vec3::ONE, Vec3::Z, &met), 0.0);
 }
 
@@ -265,7 +265,7 @@ fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("nobody cancels").expect("an area");
     let bounds = mesh.bounds();
     let (shape, radiance) = (Emitter::Mesh(mesh), Vec3::ONE);
-    AreaLight { shape, radiance, bounds, pattern: None, object: OBJECT, part: Part::Listed }
+    AreaLight { shape, radiance, bounds, texture: None, object: OBJECT, part: Part::Listed }
 }
 
 #[test]
@@ -307,7 +307,7 @@ fn two_triangles_that_make_a_parallelogram_are_sampled_as_a_quad_is() {
             assert!(inside || (on_edge - 1.0).abs() < 0.3, "{target} is on triangle {part}");
             seen += u32::from(inside);
             parts[(part - 5) as usize] += 1;
-            let met = Met {
+            let met = LightHit {
                 direction: own.direction,
                 distance: way.length(),
                 normal: u.cross(v).as_vec3(),

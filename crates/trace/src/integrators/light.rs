@@ -7,7 +7,7 @@ use super::shot::Shot;
 use super::view::Measure;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
-use crate::lights::{Light, LightRow, Middle, Pattern, Source, SourceRow};
+use crate::lights::{EmissionTexture, Light, LightRow, Middle, Source, SourceRow};
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
@@ -134,7 +134,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                     let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
                     let (mut values, active) = self.values(&samples, 1.0 / count as f32, folds);
                     // Multiply by the emission texture.
-                    if let Some(pattern) = light.pattern() {
+                    if let Some(pattern) = light.emission_texture() {
                         values = self.tinted(pattern, &samples, active, values);
                         sums.rays.lookups += u64::from(active.count_ones());
                     }
@@ -178,7 +178,13 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// Multiplies values by the emission texture at the sampled points.
     #[cold]
     #[inline(never)]
-    fn tinted(&self, pattern: &Pattern, samples: &LightRow, active: u32, mut values: Lanes3) -> Lanes3 {
+    fn tinted(
+        &self,
+        pattern: &EmissionTexture,
+        samples: &LightRow,
+        active: u32,
+        mut values: Lanes3,
+    ) -> Lanes3 {
         for i in lanes(active) {
             let color = pattern.at(lane(&samples.targets, i), samples.sources.part[i]);
             let color = match self.measure {

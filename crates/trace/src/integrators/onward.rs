@@ -10,7 +10,7 @@ use super::shot::Shot;
 use super::specular::SCATTERED;
 use crate::geometry::rows::lanes;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::lights::{Met, Source};
+use crate::lights::{LightHit, Source};
 use crate::materials::TexturePoint;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
@@ -231,7 +231,7 @@ impl Shot<'_> {
     /// is not on a light.
     fn sample_density(&self, ray: &Ray, normal: Vec3, (hit, of_light): (&Hit, Vec3)) -> f32 {
         let (direction, distance, primitive) = (ray.direction, hit.shape.t, hit.shape.primitive);
-        let met = Met { direction, distance, normal: of_light, primitive };
+        let met = LightHit { direction, distance, normal: of_light, primitive };
         let lights = &self.world.lights;
         lights.of_hit(hit.object, primitive).map_or(0.0, |(number, light)| {
             light.pdf(ray.origin, normal, &met)

@@ -8,8 +8,8 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
 use crate::lights::{
-    AreaLight, Ball, Chart, DirectionalLight, Environment, Light, LightBounds, Lights, Patch, Pattern,
-    PhotonSource, PointLight, SkyMap, SpotLight, area_light,
+    AreaLight, Ball, Chart, DirectionalLight, EmissionTexture, Environment, Light, LightBounds, Lights,
+    Patch, PhotonSource, PointLight, SkyMap, SpotLight, area_light,
 };
 use crate::lights::{Emitter, Part};
 use crate::materials::Emission;
@@ -108,7 +108,7 @@ fn shape_light(shape: &Shape, emission: &Emission, object: u32) -> Option<AreaLi
     let light = area_light(shape, emission.scale, object).filter(|_| emission.shines())?;
     let light = AreaLight { bounds: of_mean(light.bounds, emission), ..light };
     Some(match &emission.texture {
-        Some(texture) => light.with_pattern(Pattern::new(texture, Chart::Shape(*shape))),
+        Some(texture) => light.with_texture(EmissionTexture::new(texture, Chart::Shape(*shape))),
         None => light,
     })
 }
@@ -138,16 +138,16 @@ fn mesh_lights(
         let triangles = triangles_of(mesh, own).map(|id| (mesh.world_corners(id), id)).collect();
         let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
         let bounds = of_mean(emitter.bounds().times(emission.scale), &emission);
-        let pattern = emission.texture.as_ref().map(|texture| {
+        let texture = emission.texture.as_ref().map(|texture| {
             let patch =
                 |id| Patch { primitive: id, corners: mesh.world_corners(id), uvs: mesh.corner_uvs(id) };
             let patches = triangles_of(mesh, own).map(patch).collect();
-            Box::new(Pattern::new(texture, Chart::Triangles(patches)))
+            Box::new(EmissionTexture::new(texture, Chart::Triangles(patches)))
         });
         Ok(Some(AreaLight {
             shape: Emitter::Mesh(emitter),
             radiance: emission.scale,
-            pattern,
+            texture,
             object,
             part: Part::Listed,
             bounds,

@@ -162,7 +162,7 @@ impl Torus {
     }
 
     /// Projected area on average over all directions: a quarter of the area.
-    pub fn shown(&self, _: DVec3) -> f64 {
+    pub fn projected_area(&self, _: DVec3) -> f64 {
         let [area] = self.areas();
         area / 4.0
     }

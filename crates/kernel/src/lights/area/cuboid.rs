@@ -1,8 +1,8 @@
 //! Box lights, sampled by the solid angles of the visible faces.
 
-use super::arrival::Arrival;
 use super::quad::SphericalRectangle;
-use super::{Met, ShapeEmitter};
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter};
 use crate::geometry::cuboid::Cuboid;
 use crate::math::{DVec3, Vec3};
 
@@ -35,7 +35,7 @@ struct Face {
 impl ShapeEmitter for BoxEmitter {
     /// Samples a face by its solid angle, then a point of it by solid angle.
     #[inline(always)]
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let View { signs, faces } = self.seen_from(point);
         let [a, b, c] = faces.map(|face| face.solid_angle);
         let total = a + b + c;
@@ -57,21 +57,21 @@ impl ShapeEmitter for BoxEmitter {
         let local = [of([z, y, x]) * signs[0], of([x, z, y]) * signs[1], of([y, x, z]) * signs[2]];
         let offset = self.axes[0] * local[0] + self.axes[1] * local[1] + self.axes[2] * local[2];
         let factor = own * (total / face.solid_angle);
-        Arrival {
+        LightSamplePoint {
             direction: offset * (1.0 / offset.length_squared().sqrt()),
             target: point + offset,
             factor: if total > 0.0 { factor } else { 0.0 },
         }
     }
 
-    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         let View { faces, .. } = self.seen_from(from);
         let total: f32 = faces.iter().map(|face| face.solid_angle).sum();
         let own = faces.iter().zip(self.axes).enumerate();
         let own = own.into_iter().find(|(_, (_, axis))| axis.dot(met.normal).abs() > 0.9);
         match own {
             Some((_, (face, _))) if !(face.solid_angle > 0.0) => 0.0,
-            Some((_, (face, _))) if face.rectangle.is_told() => 1.0 / total,
+            Some((_, (face, _))) if face.rectangle.is_accurate() => 1.0 / total,
             Some((k, (face, _))) => {
                 let area = 4.0 * self.half[(k + 1) % 3] * self.half[(k + 2) % 3];
                 met.pdf_by_area(f64::from(area)) * (face.solid_angle / total)
@@ -114,7 +114,7 @@ impl Face {
     fn new(x: [f32; 2], y: [f32; 2], z: f32) -> Self {
         let rectangle = SphericalRectangle::new(x, y, z);
         let (_, _, by_area) = rectangle.by_area([0.5; 2]);
-        let solid_angle = if rectangle.is_told() { rectangle.solid_angle() } else { by_area };
+        let solid_angle = if rectangle.is_accurate() { rectangle.solid_angle() } else { by_area };
         Self { rectangle, solid_angle: if z < 0.0 { solid_angle } else { 0.0 } }
     }
 
@@ -123,11 +123,11 @@ impl Face {
     fn sample(&self, u: [f32; 2]) -> (f32, f32, f32) {
         let rectangle = &self.rectangle;
         let (by_area, [x, y]) = (rectangle.by_area(u), rectangle.sample(u));
-        let is_told = rectangle.is_told();
+        let is_accurate = rectangle.is_accurate();
         (
-            if is_told { x } else { by_area.0 },
-            if is_told { y } else { by_area.1 },
-            if is_told { rectangle.solid_angle() } else { by_area.2 },
+            if is_accurate { x } else { by_area.0 },
+            if is_accurate { y } else { by_area.1 },
+            if is_accurate { rectangle.solid_angle() } else { by_area.2 },
         )
     }
 }

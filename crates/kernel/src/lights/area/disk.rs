@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::arrival::Arrival;
-use super::{Met, ShapeEmitter};
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter};
 use crate::geometry::disk::Disk;
 use crate::math::elementary::sin_cos;
 use crate::math::{DVec3, Vec3};
@@ -36,18 +36,18 @@ pub struct DiskView {
 impl ShapeEmitter for DiskEmitter {
     /// Samples the disk, uniformly within 20 % over the solid angle.
     #[inline(always)]
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let view = self.seen_from(point);
         let (direction, distance, factor) = view.sample(self.normal, u);
         let direction = direction.as_vec3();
-        Arrival {
+        LightSamplePoint {
             direction,
             target: point + direction * distance as f32,
             factor: if view.height > 0.0 { factor as f32 } else { 0.0 },
         }
     }
 
-    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         let view = self.seen_from(from);
         if view.is_front() { view.pdf(met.direction) as f32 } else { 0.0 }
     }

@@ -1,10 +1,10 @@
 //! Emissive triangles of a mesh: two that form a parallelogram are sampled as a quad, a few others by area, many by a
 //! light tree.
 
-use super::arrival::Arrival;
 use super::quad::QuadEmitter;
+use super::sample_point::LightSamplePoint;
 use super::triangle::TriangleEmitter;
-use super::{Met, ShapeEmitter};
+use super::{LightHit, ShapeEmitter};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::AreaPoint;
 use crate::geometry::triangle::Triangle;
@@ -157,8 +157,9 @@ impl MeshEmitter {
                 let pick = tree.pick(&Receiver::plain(point, normal), f64::from(u[0]))?;
                 let (corners, primitive) = &self.triangles[pick.light as usize];
                 let rest = (pick.rest as f32).min(1.0_f32.next_down());
-                let Arrival { direction, target, factor } = emitter(corners)?.sample(point, [rest, u[1]]);
-                (Arrival { direction, target, factor: factor / pick.probability }, *primitive)
+                let LightSamplePoint { direction, target, factor } =
+                    emitter(corners)?.sample(point, [rest, u[1]]);
+                (LightSamplePoint { direction, target, factor: factor / pick.probability }, *primitive)
             }
         };
         (arrival.factor > 0.0).then(|| LightSample {
@@ -170,7 +171,7 @@ impl MeshEmitter {
     }
 
     /// [`Light::pdf`](crate::lights::Light::pdf).
-    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &Met) -> f32 {
+    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
         let tree = match &self.sampling {
             Sampling::Quad(quad) => return quad.quad.pdf(from, met),
             Sampling::Area(_) => return met.pdf_by_area(self.by_area.total()),
@@ -248,7 +249,7 @@ impl Facets {
 
     /// Samples their light at a point.
     #[inline(always)]
-    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    pub fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (index, rest) = self.by_area.sample(u[0]);
         let Facet { corner, ab, ac, normal, .. } = &self.all[index];
         let weights = warp::triangle(Vec2::new(rest, u[1]));
@@ -257,7 +258,7 @@ impl Facets {
         let direction = offset * nearness;
         let factor = -normal.dot(direction) * self.area * (nearness * nearness);
         let factor = if factor > 0.0 { factor } else { 0.0 };
-        Arrival { direction, target: point + offset, factor }
+        LightSamplePoint { direction, target: point + offset, factor }
     }
 
     /// Number of the triangle of a sample, by its first random number.

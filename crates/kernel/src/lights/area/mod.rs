@@ -4,26 +4,26 @@
 //! `of_any` and of [`area_light`], and the bounds of its emission, if it is flat. A shape without a loop of its own in `row` is
 //! sampled point by point.
 
-mod arrival;
 pub mod cuboid;
 pub mod disk;
+pub mod emission_texture;
 mod linear;
 mod meridians;
 pub mod mesh;
-pub mod pattern;
-pub mod picture;
 pub mod quad;
 pub mod round;
 pub(super) mod row;
+mod sample_point;
 pub mod sphere;
+pub mod textured_quad;
 pub mod torus;
 pub mod triangle;
 
-pub use arrival::Arrival;
+pub use emission_texture::{Chart, EmissionTexture, Patch};
 pub use mesh::MeshEmitter;
-pub use pattern::{Chart, Patch, Pattern};
+pub use sample_point::LightSamplePoint;
 
-use super::sample::{End, LightSample, Met, Source};
+use super::sample::{End, LightHit, LightSample, Source};
 use super::tree::bounds::{EmissionCone, LightBounds, strength};
 use crate::geometry::Shape;
 use crate::geometry::sphere::Sphere;
@@ -33,20 +33,20 @@ use crate::math::{DVec2, DVec3, Vec3};
 use cuboid::BoxEmitter;
 use disk::DiskEmitter;
 use mesh::QuadOfTwo;
-use picture::PictureEmitter;
 use quad::QuadEmitter;
 use round::{ConeSide, CylinderSide, RoundEmitter};
 use sphere::SphereEmitter;
+use textured_quad::TexturedQuadEmitter;
 use torus::TorusEmitter;
 use triangle::TriangleEmitter;
 
 /// A shape whose front emits the same radiance in every direction.
 pub trait ShapeEmitter {
     /// Samples a point of the front that is visible from `point`, by numbers in [0, 1).
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival;
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint;
 
     /// Pdf in sr⁻¹ of [`ShapeEmitter::sample`] at a point of the front that a ray from `from` hits.
-    fn pdf(&self, from: Vec3, met: &Met) -> f32;
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32;
 
     /// Centre of area.
     fn middle(&self) -> DVec3;
@@ -57,10 +57,10 @@ pub trait ShapeEmitter {
 pub struct AreaLight {
     /// Emitting shape.
     pub shape: Emitter,
-    /// Radiance; with a pattern, the factor on it.
+    /// Radiance; with a texture, the factor on it.
     pub radiance: Vec3,
     /// Emission texture, by which the radiance is multiplied from point to point.
-    pub pattern: Option<Box<Pattern>>,
+    pub texture: Option<Box<EmissionTexture>>,
     /// Number of the object.
     pub object: u32,
     /// Part of the object.
@@ -86,7 +86,7 @@ pub enum Emitter {
     /// A parallelogram.
     Quad(QuadEmitter),
     /// A parallelogram that is sampled by its emission texture.
-    Picture(Box<PictureEmitter>),
+    TexturedQuad(Box<TexturedQuadEmitter>),
     /// A box.
     Box(BoxEmitter),
     /// A triangle.
@@ -109,7 +109,7 @@ macro_rules! of_any {
         match $emitter {
             Emitter::Sphere($it) => $asked,
             Emitter::Quad($it) => $asked,
-            Emitter::Picture($it) => $asked,
+            Emitter::TexturedQuad($it) => $asked,
             Emitter::Box($it) => $asked,
             Emitter::Triangle($it) => $asked,
             Emitter::Disk($it) => $asked,
@@ -161,7 +161,7 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
         Shape::Plane(_) => return None,
     };
     let bounds = bounds(shape, radiance)?;
-    Some(AreaLight { shape: emitter, radiance, pattern: None, object, part: Part::Whole, bounds })
+    Some(AreaLight { shape: emitter, radiance, texture: None, object, part: Part::Whole, bounds })
 }
 
 /// Bounds of a shape's emission. `None` if the shape is infinite. Flat shapes emit by the cosine. Others emit a quarter of their
@@ -188,33 +188,33 @@ fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
 
 impl AreaLight {
     /// The light with an emission texture, by which a quad is sampled as well.
-    pub fn with_pattern(mut self, pattern: Pattern) -> Self {
+    pub fn with_texture(mut self, texture: EmissionTexture) -> Self {
         if let Emitter::Quad(quad) = &self.shape {
-            let color = |at: [f64; 2]| pattern.texture().lookup(&TexturePoint::sharp(DVec2::from_array(at)));
-            let picture = PictureEmitter::new(*quad, pattern.texture().texels_across(), color);
+            let color = |at: [f64; 2]| texture.texture().lookup(&TexturePoint::sharp(DVec2::from_array(at)));
+            let picture = TexturedQuadEmitter::new(*quad, texture.texture().texels_across(), color);
             if let Some(picture) = picture {
-                self.shape = Emitter::Picture(Box::new(picture));
+                self.shape = Emitter::TexturedQuad(Box::new(picture));
             }
         }
-        Self { pattern: Some(Box::new(pattern)), ..self }
+        Self { texture: Some(Box::new(texture)), ..self }
     }
 
     /// [`Light::sample`](super::Light::sample).
     pub fn sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let sample = self.plain_sample(point, normal, u)?;
-        let (Some(pattern), End::At(target)) = (&self.pattern, sample.end) else { return Some(sample) };
+        let (Some(texture), End::At(target)) = (&self.texture, sample.end) else { return Some(sample) };
         let primitive = match sample.source {
             Source::Primitive(_, primitive) => primitive,
             Source::Object(_) | Source::Nothing => 0,
         };
-        Some(LightSample { weight: sample.weight * pattern.at(target, primitive), ..sample })
+        Some(LightSample { weight: sample.weight * texture.at(target, primitive), ..sample })
     }
 
     /// [`AreaLight::sample`] without its emission texture.
     #[inline]
     pub fn plain_sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let own = |sample: Arrival| {
-            let Arrival { direction, target, factor } = sample;
+        let own = |sample: LightSamplePoint| {
+            let LightSamplePoint { direction, target, factor } = sample;
             let (end, source) = (End::At(target), Source::Object(self.object));
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
@@ -224,7 +224,7 @@ impl AreaLight {
     }
 
     /// [`Light::pdf`](super::Light::pdf).
-    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &Met) -> f32 {
+    pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
         if !(met.normal.dot(met.direction) < 0.0) {
             return 0.0;
         }

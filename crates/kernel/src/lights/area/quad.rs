@@ -2,8 +2,8 @@
 
 use std::f32::consts::PI;
 
-use super::arrival::Arrival;
-use super::{Met, ShapeEmitter};
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter};
 use crate::math::elementary::{acos, sin_cos};
 use crate::math::{DVec3, Vec3};
 
@@ -35,7 +35,7 @@ struct Rectangle {
 impl ShapeEmitter for QuadEmitter {
     /// Samples a rectangle by solid angle, another parallelogram by area.
     #[inline(always)]
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let to_corner = self.corner_from(point);
         let by_area = self.by_area(to_corner, u);
         let (offset, factor) = match &self.rectangle {
@@ -43,20 +43,20 @@ impl ShapeEmitter for QuadEmitter {
                 let spherical = rectangle.seen_from(to_corner, self.normal);
                 let [x, y] = spherical.sample(u);
                 let offset = rectangle.x * x + rectangle.y * y + self.normal * spherical.z;
-                let is_told = spherical.is_told();
-                let x = if is_told { offset.x } else { by_area.0.x };
-                let y = if is_told { offset.y } else { by_area.0.y };
-                let z = if is_told { offset.z } else { by_area.0.z };
-                (Vec3::new(x, y, z), if is_told { spherical.solid_angle } else { by_area.1 })
+                let is_accurate = spherical.is_accurate();
+                let x = if is_accurate { offset.x } else { by_area.0.x };
+                let y = if is_accurate { offset.y } else { by_area.0.y };
+                let z = if is_accurate { offset.z } else { by_area.0.z };
+                (Vec3::new(x, y, z), if is_accurate { spherical.solid_angle } else { by_area.1 })
             }
             None => by_area,
         };
         let direction = offset * (1.0 / offset.length_squared().sqrt());
         let is_front = to_corner.dot(self.normal) < 0.0;
-        Arrival { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
+        LightSamplePoint { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
     }
 
-    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         let to_corner = self.corner_from(from);
         if !(to_corner.dot(self.normal) < 0.0) {
             return 0.0;
@@ -100,12 +100,12 @@ impl QuadEmitter {
     #[inline(always)]
     pub(super) fn by_area(&self, to_corner: Vec3, u: [f32; 2]) -> (Vec3, f32) {
         let offset = to_corner + self.u * u[0] + self.v * u[1];
-        (offset, self.shown(offset))
+        (offset, self.projected_solid_angle(offset))
     }
 
     /// Solid angle that the quad would fill if all of it were at this offset from the point; not above 0 from behind.
     #[inline(always)]
-    pub(super) fn shown(&self, offset: Vec3) -> f32 {
+    pub(super) fn projected_solid_angle(&self, offset: Vec3) -> f32 {
         let nearness = 1.0 / offset.length_squared().sqrt();
         let height = -offset.dot(self.normal) * self.area;
         height * nearness * nearness * nearness
@@ -115,7 +115,7 @@ impl QuadEmitter {
     #[inline(always)]
     pub(super) fn density(&self, to_corner: Vec3) -> Option<f32> {
         let spherical = self.rectangle.as_ref().map(|rectangle| rectangle.seen_from(to_corner, self.normal));
-        spherical.filter(SphericalRectangle::is_told).map(|spherical| 1.0 / spherical.solid_angle)
+        spherical.filter(SphericalRectangle::is_accurate).map(|spherical| 1.0 / spherical.solid_angle)
     }
 
     /// Vectors whose products with an offset from the corner are its coordinates along the edges.
@@ -218,7 +218,7 @@ impl SphericalRectangle {
 
     /// Whether the solid angle has kept its digits.
     #[inline(always)]
-    pub fn is_told(&self) -> bool {
+    pub fn is_accurate(&self) -> bool {
         self.solid_angle >= LEAST_SOLID_ANGLE
     }
 

@@ -1,9 +1,9 @@
 //! Lights with a round side and caps: cylinders and cones.
 
-use super::arrival::Arrival;
 use super::disk::{DiskEmitter, perpendicular};
 use super::meridians::{Meridians, Pole, Turn};
-use super::{Met, ShapeEmitter};
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter};
 use crate::geometry::cone::Cone;
 use crate::geometry::cylinder::Cylinder;
 use crate::math::{DVec3, Vec3};
@@ -51,7 +51,7 @@ struct View<V> {
 
 impl<S: Side> ShapeEmitter for RoundEmitter<S> {
     /// Samples by solid angle: uniform but for its change from one meridian to the next, and for the 20 % of a cap.
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let view = self.view(point);
         let share = view.share as f32;
         let (direction, distance, factor) = match (view.side, view.cap) {
@@ -67,13 +67,13 @@ impl<S: Side> ShapeEmitter for RoundEmitter<S> {
                 let (direction, distance, factor) = cap.sample(normal, [rest.min(1.0_f32.next_down()), u[1]]);
                 (direction, distance, factor / f64::from(1.0 - share))
             }
-            (_, None) => return Arrival::NOTHING,
+            (_, None) => return LightSamplePoint::NOTHING,
         };
         let direction = direction.as_vec3();
-        Arrival { direction, target: point + direction * distance as f32, factor: factor as f32 }
+        LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         let view = self.view(from);
         let share = f64::from(view.share as f32);
         let is_cap = |normal: DVec3| met.normal.as_dvec3().dot(normal) > 1.0 - 1e-5;

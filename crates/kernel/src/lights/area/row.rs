@@ -1,6 +1,6 @@
 //! Samples of one light that is a shape, for a row of points.
 
-use super::arrival::Arrival;
+use super::sample_point::LightSamplePoint;
 use super::{AreaLight, Emitter, MeshEmitter, ShapeEmitter};
 use crate::lights::row::{LightRow, row_of};
 use crate::lights::sample::Source;
@@ -10,7 +10,7 @@ use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
 macro_rules! row_of_facets {
     ($i:ident => ($facets:expr, $light:expr), $points:expr, $u:expr) => {{
         let mut row = row_of!(Source::Nothing, $i => {
-            let sample: Arrival = $facets.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
+            let sample: LightSamplePoint = $facets.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
             (sample.direction, sample.target, $light.radiance * sample.factor)
         });
         for $i in 0..LANES {
@@ -31,7 +31,7 @@ impl AreaLight {
         macro_rules! row_by {
             ($emitter:expr) => {
                 row_of!(source, i => {
-                    let sample: Arrival = $emitter.sample(lane(points, i), [u[0][i], u[1][i]]);
+                    let sample: LightSamplePoint = $emitter.sample(lane(points, i), [u[0][i], u[1][i]]);
                     (sample.direction, sample.target, self.radiance * sample.factor)
                 })
             };
@@ -49,7 +49,7 @@ impl AreaLight {
         if let Some(facets) = self.shape.as_mesh().and_then(MeshEmitter::facets) {
             return row_of_facets!(i => (facets, self), points, u);
         }
-        if let Emitter::Picture(picture) = &self.shape {
+        if let Emitter::TexturedQuad(picture) = &self.shape {
             return row_by!(picture);
         }
         if let Emitter::Sphere(sphere) = &self.shape {

@@ -2,8 +2,8 @@
 
 use std::f32::consts::PI;
 
-use super::arrival::Arrival;
-use super::{Met, ShapeEmitter};
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter};
 use crate::math::frame::Frame;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
@@ -21,7 +21,7 @@ impl ShapeEmitter for SphereEmitter {
     /// Samples uniformly over the solid angle (*Physically Based Rendering*, 4th ed., section 6.2.4), exactly for
     /// narrow cones too.
     #[inline(always)]
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (axis, distance, sin2_max) = self.cone_around(point);
         let is_outside = sin2_max < 1.0;
         let sin2_max = if is_outside { sin2_max } else { 0.0 };
@@ -32,7 +32,7 @@ impl ShapeEmitter for SphereEmitter {
         let depth = (sin2_max - sin2).max(0.0).sqrt();
         let direction = Frame::from_normal(axis).to_world(local);
         let factor = 2.0 * PI * one_minus_cos_max;
-        Arrival {
+        LightSamplePoint {
             direction,
             target: point + direction * (distance * (local.z - depth)),
             factor: if is_outside { factor } else { 0.0 },
@@ -40,7 +40,7 @@ impl ShapeEmitter for SphereEmitter {
     }
 
     /// The same in all directions that hit the sphere.
-    fn pdf(&self, from: Vec3, _: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, _: &LightHit) -> f32 {
         self.cone(from).map_or(0.0, |(_, _, sin2_max)| 1.0 / (2.0 * PI * one_minus_cos(sin2_max)))
     }
 

@@ -2,11 +2,11 @@
 
 use std::f64::consts::PI;
 
-use super::arrival::Arrival;
 use super::disk::perpendicular;
 use super::linear::Linear;
 use super::meridians::Turn;
-use super::{Met, ShapeEmitter};
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter};
 use crate::geometry::RayF64;
 use crate::geometry::torus::Torus;
 use crate::math::elementary::sin_cos;
@@ -79,19 +79,19 @@ struct Place {
 impl ShapeEmitter for TorusEmitter {
     /// Samples a direction whose first hit on the torus faces the point. If a direction hits it twice, both hits count for its
     /// pdf, so that no sample is occluded.
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
-        let Some(view) = View::new(&self.torus, point) else { return Arrival::NOTHING };
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+        let Some(view) = View::new(&self.torus, point) else { return LightSamplePoint::NOTHING };
         let slices = view.slices();
         let side = 2.0 * f64::from(u[0]) - 1.0;
         let (share, density) = slices.sample(side.abs());
         let tau = share * view.reach;
         let turn = libm::sinh(tau) / view.closeness;
-        let Some(slice) = view.slice(Turn::of(turn.copysign(side))) else { return Arrival::NOTHING };
+        let Some(slice) = view.slice(Turn::of(turn.copysign(side))) else { return LightSamplePoint::NOTHING };
         let (sine, in_slice) = slice.sines(&view).sample(f64::from(u[1]));
         let place = slice.place(&view, slice.tangent(2.0 * sine - 1.0));
         let own = view.per_turn(density, tau) * 0.5 * in_slice / place.factor;
         if !(own > 0.0) {
-            return Arrival::NOTHING;
+            return LightSamplePoint::NOTHING;
         }
         let offset = view.offset(&slice, &place);
         let direction = offset.normalize();
@@ -100,10 +100,14 @@ impl ShapeEmitter for TorusEmitter {
         let (density, distance) =
             first.map_or((own, offset.length()), |first| (densities.max(0.5 * own), first));
         let direction = direction.as_vec3();
-        Arrival { direction, target: point + direction * distance as f32, factor: (1.0 / density) as f32 }
+        LightSamplePoint {
+            direction,
+            target: point + direction * distance as f32,
+            factor: (1.0 / density) as f32,
+        }
     }
 
-    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         View::new(&self.torus, from).map_or(0.0, |view| {
             let slices = view.slices();
             view.densities(&self.torus, &slices, met.direction.as_dvec3()).0 as f32

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::arrival::Arrival;
-use super::{Met, ShapeEmitter};
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter};
 use crate::geometry::triangle::Triangle;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::warp;
@@ -32,9 +32,11 @@ struct Spherical {
 
 impl ShapeEmitter for TriangleEmitter {
     /// Samples uniformly over the solid angle, or over the area.
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
-        let Some((offsets, spherical)) = self.seen_from(point.as_dvec3()) else { return Arrival::NOTHING };
-        let (direction, distance, factor) = if spherical.is_told() {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+        let Some((offsets, spherical)) = self.seen_from(point.as_dvec3()) else {
+            return LightSamplePoint::NOTHING;
+        };
+        let (direction, distance, factor) = if spherical.is_accurate() {
             let direction = spherical.sample(u.map(f64::from));
             let distance = offsets[0].dot(self.normal) / direction.dot(self.normal);
             let farthest = offsets.iter().map(|offset| offset.length()).fold(0.0, f64::max);
@@ -48,12 +50,12 @@ impl ShapeEmitter for TriangleEmitter {
             (direction, distance, -direction.dot(self.normal) * self.area / (distance * distance))
         };
         let direction = direction.as_vec3();
-        Arrival { direction, target: point + direction * distance as f32, factor: factor as f32 }
+        LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
     }
 
-    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         match self.seen_from(from.as_dvec3()) {
-            Some((_, spherical)) if spherical.is_told() => (1.0 / spherical.solid_angle) as f32,
+            Some((_, spherical)) if spherical.is_accurate() => (1.0 / spherical.solid_angle) as f32,
             Some(_) => met.pdf_by_area(self.area),
             None => 0.0,
         }
@@ -92,7 +94,7 @@ impl TriangleEmitter {
 }
 
 impl Spherical {
-    fn is_told(&self) -> bool {
+    fn is_accurate(&self) -> bool {
         (LEAST_SOLID_ANGLE..TAU - ALMOST_HALF).contains(&self.solid_angle)
     }
 

@@ -74,7 +74,7 @@ impl Surface {
         let (on, count) = match outline {
             Outline::Shape(shape) => {
                 let areas = shape.areas();
-                let most = if light.pattern.is_some() { PIECES / areas.len().max(1) } else { 1 };
+                let most = if light.texture.is_some() { PIECES / areas.len().max(1) } else { 1 };
                 let side = most.isqrt().max(1);
                 let count = areas.len() * side * side;
                 (On::Shape { shape: *shape, side: side as u32, areas, reach: reach(shape)? }, count)
@@ -84,7 +84,7 @@ impl Surface {
                 (On::Mesh { rounding: *rounding }, mesh.primitives().count())
             }
         };
-        let asked = if light.pattern.is_some() { ASKED } else { 1 };
+        let asked = if light.texture.is_some() { ASKED } else { 1 };
         let of = |index: usize| {
             let mut sum = DVec3::ZERO;
             let mut area = 0.0;
@@ -153,8 +153,8 @@ impl On {
 
 /// Radiance of a place, W·sr⁻¹·m⁻².
 fn radiance(light: &AreaLight, place: &OnPiece) -> Vec3 {
-    let pattern = light.pattern.as_ref();
-    light.radiance * pattern.map_or(Vec3::ONE, |pattern| pattern.at(place.point.as_vec3(), place.primitive))
+    let texture = light.texture.as_ref();
+    light.radiance * texture.map_or(Vec3::ONE, |texture| texture.at(place.point.as_vec3(), place.primitive))
 }
 
 /// Upper bound on the lengths from which the points of a shape are computed. `None` if the shape is infinite.

@@ -12,8 +12,8 @@ use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
 use crate::lights::delta::DeltaLight;
 use crate::lights::{
-    AreaLight, Chart, DirectionalLight, Emitter, Environment, MeshEmitter, Part, Patch, Pattern, SkyMap,
-    SpotLight, area_light,
+    AreaLight, Chart, DirectionalLight, EmissionTexture, Emitter, Environment, MeshEmitter, Part, Patch,
+    SkyMap, SpotLight, area_light,
 };
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Texture, TextureFilter, Wrap};
@@ -193,7 +193,7 @@ fn sampled(light: &Light, count: u32) -> Mean {
 #[track_caller]
 fn assert_same_irradiance(name: &str, light: &Light, source: &PhotonSource, shape: Option<&Shape>) {
     let expected = sampled(light, 1 << 13);
-    let greatest_error = if light.pattern().is_some() { 5e-3 } else { 3e-3 };
+    let greatest_error = if light.emission_texture().is_some() { 5e-3 } else { 3e-3 };
     assert!(expected.mean > 0.0, "{name}");
     let around = Ball { radius: DISC.radius * 1.001, ..DISC };
     let beside = Ball { center: DISC.center + DVec3::new(0.1, 0.0, 0.05), radius: 0.15 };

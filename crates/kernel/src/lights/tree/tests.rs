@@ -439,7 +439,7 @@ fn the_density_of_a_mesh_is_that_of_its_samples() {
             object: 4,
             part: Part::Listed,
             bounds,
-            pattern: None,
+            texture: None,
         };
         let (mut next, mut compared) = (random::unit(5), 0);
         for _ in 0..2000 {
@@ -451,7 +451,7 @@ fn the_density_of_a_mesh_is_that_of_its_samples() {
             };
             let Emitter::Mesh(mesh) = &light.shape else { panic!("a mesh") };
             let front = mesh.normal_of(primitive).expect("one of its triangles").as_vec3();
-            let met = crate::lights::Met {
+            let met = crate::lights::LightHit {
                 direction: sample.direction,
                 distance: (target - point).length(),
                 normal: front,

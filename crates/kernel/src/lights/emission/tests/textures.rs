@@ -23,7 +23,7 @@ fn texture(width: u32, height: u32, filter: TextureFilter) -> Arc<Texture> {
 
 /// A light with a texture.
 fn textured(light: AreaLight, texture: &Arc<Texture>, chart: Chart) -> Light {
-    Light::Area(AreaLight { pattern: Some(Box::new(Pattern::new(texture, chart))), ..light })
+    Light::Area(AreaLight { texture: Some(Box::new(EmissionTexture::new(texture, chart))), ..light })
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn meshes_send_what_samples_of_them_say() {
         let light = AreaLight {
             shape: Emitter::Mesh(mesh),
             radiance: COLOR,
-            pattern: None,
+            texture: None,
             object: OBJECT,
             part: Part::Listed,
             bounds,

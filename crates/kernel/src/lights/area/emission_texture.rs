@@ -13,7 +13,7 @@ use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
 /// Factor on the radiance of a lamp, from point to point.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pattern {
+pub struct EmissionTexture {
     texture: Arc<Texture>,
     chart: Chart,
 }
@@ -38,7 +38,7 @@ pub struct Patch {
     pub uvs: [Vec2; 3],
 }
 
-impl Pattern {
+impl EmissionTexture {
     /// The emission texture of a lamp with these texture coordinates.
     pub fn new(texture: &Arc<Texture>, chart: Chart) -> Self {
         Self { texture: Arc::clone(texture), chart }

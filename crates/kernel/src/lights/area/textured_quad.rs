@@ -1,8 +1,8 @@
 //! Textured quad lights, sampled by their emission texture as well as by solid angle.
 
-use super::arrival::Arrival;
 use super::quad::QuadEmitter;
-use super::{Met, ShapeEmitter};
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter};
 use crate::lights::tree::bounds::strength;
 use crate::math::{DVec3, Vec3};
 use crate::sampling::grid::{Grid, InGrid};
@@ -11,7 +11,7 @@ use crate::sampling::grid::{Grid, InGrid};
 /// angle. Their pdf is the mean of both (the balance heuristic for one sample: Veach, *Robust Monte Carlo Methods for Light
 /// Transport Simulation*, 1997, section 9.2.4).
 #[derive(Clone, Debug, PartialEq)]
-pub struct PictureEmitter {
+pub struct TexturedQuadEmitter {
     quad: QuadEmitter,
     /// Number of cells along both edges.
     size: [usize; 2],
@@ -32,10 +32,10 @@ const LOOKUPS: (usize, usize) = (2, 4);
 /// Largest fraction of the samples that a texture chooses: the texture ignores distances.
 const MOST_BY_PICTURE: f64 = 0.9;
 
-impl ShapeEmitter for PictureEmitter {
+impl ShapeEmitter for TexturedQuadEmitter {
     /// Samples by the texture or by the solid angle.
     #[inline(always)]
-    fn sample(&self, point: Vec3, u: [f32; 2]) -> Arrival {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let by_picture = u[0] < self.share;
         let (before, share) = if by_picture { (0.0, self.share) } else { (self.share, 1.0 - self.share) };
         let rest = (u[0] - before) / share;
@@ -53,16 +53,16 @@ impl ShapeEmitter for PictureEmitter {
             let of_quad = self.quad.density(to_corner).unwrap_or(1.0 / by_area);
             let density = self.share * of_cell / by_area + (1.0 - self.share) * of_quad;
             let factor = if by_area > 0.0 { 1.0 / density } else { 0.0 };
-            return Arrival { direction, target: point + offset, factor };
+            return LightSamplePoint { direction, target: point + offset, factor };
         }
         if !(own.factor > 0.0) {
-            return Arrival { factor: 0.0, ..own };
+            return LightSamplePoint { factor: 0.0, ..own };
         }
         let density = self.density(own.target - point, to_corner, 1.0 / own.factor);
-        Arrival { factor: 1.0 / density, ..own }
+        LightSamplePoint { factor: 1.0 / density, ..own }
     }
 
-    fn pdf(&self, from: Vec3, met: &Met) -> f32 {
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         let to_corner = self.quad.corner_from(from);
         let of_quad = self.quad.pdf(from, met);
         if of_quad > 0.0 { self.density(met.direction * met.distance, to_corner, of_quad) } else { 0.0 }
@@ -73,7 +73,7 @@ impl ShapeEmitter for PictureEmitter {
     }
 }
 
-impl PictureEmitter {
+impl TexturedQuadEmitter {
     /// An emitter from the colours at places along both edges, in [0, 1], with so many texels along the edges. `None` if
     /// the texture has too little contrast.
     pub fn new(quad: QuadEmitter, texels: [f64; 2], color: impl Fn([f64; 2]) -> Vec3) -> Option<Self> {
@@ -111,7 +111,7 @@ impl PictureEmitter {
             (if place > 0.0 { place as usize } else { 0 }).min(self.size[axis] - 1)
         };
         let of_cell = self.cell_density(cell(0), cell(1));
-        self.share * of_cell / self.quad.shown(offset) + (1.0 - self.share) * of_quad
+        self.share * of_cell / self.quad.projected_solid_angle(offset) + (1.0 - self.share) * of_quad
     }
 
     /// Density of a cell over the area, relative to that of a constant texture.

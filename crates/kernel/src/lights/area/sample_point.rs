@@ -4,7 +4,7 @@ use crate::math::Vec3;
 
 /// A sample of a point on a light, computed without branches.
 #[derive(Clone, Copy, Debug)]
-pub struct Arrival {
+pub struct LightSamplePoint {
     /// Unit direction to the sampled point.
     pub direction: Vec3,
     /// Sampled point.
@@ -13,7 +13,7 @@ pub struct Arrival {
     pub factor: f32,
 }
 
-impl Arrival {
+impl LightSamplePoint {
     /// No sample: the light is not visible.
     pub const NOTHING: Self = Self { direction: Vec3::ZERO, target: Vec3::ZERO, factor: 0.0 };
 }
