@@ -105,6 +105,11 @@ impl MeshInstance {
         if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
     }
 
+    /// Corners of a triangle in the mesh's coordinates, in the order of the file.
+    pub(super) fn local_corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3())
+    }
+
     /// Number of triangles of the mesh.
     pub(super) fn triangle_count(&self) -> usize {
         self.tree.loaded().mesh.triangles.len()
