@@ -118,6 +118,7 @@ pub fn ray_file(path: &Path) -> io::Result<Vec<Ray>> {
             origin: Vec3::new(word(0), word(1), word(2)),
             direction: Vec3::new(word(3), word(4), word(5)),
             t_max: word(7),
+            start: Ray::NO_TRIANGLE,
         }
     });
     Ok(rows.collect())

@@ -1,6 +1,6 @@
 //! Affine transforms in double precision, inverted once.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec3, Vec3Swizzles as _};
 
 /// An affine map `x ↦ linear·x + translation` with its inverse.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,6 +70,16 @@ impl Transform {
         self.inverse_linear * v
     }
 
+    /// By how much distances grow at most on the way from the outside.
+    pub fn inverse_growth(&self) -> f64 {
+        let DMat3 { x_axis, y_axis, z_axis } = self.inverse_linear.transpose();
+        let lengths = DVec3::new(x_axis.length(), y_axis.length(), z_axis.length());
+        // Rows at right angles, as those of a scale before a rotation: the longest tells it.
+        let products = DVec3::new(x_axis.dot(y_axis), y_axis.dot(z_axis), z_axis.dot(x_axis));
+        let is_straight = products.abs().cmple(lengths * lengths.yzx() * 1e-9).all();
+        if is_straight { lengths.max_element() * (1.0 + 1e-8) } else { lengths.length() }
+    }
+
     /// Whether the map turns right-handed axes into left-handed ones.
     pub fn mirrors(&self) -> bool {
         self.linear.determinant() < 0.0
@@ -133,6 +143,9 @@ mod tests {
         let p = DVec3::new(0.3, -0.8, 12.0);
         assert!((t.inverse_point(t.point(p)) - p).length() < 1e-12);
         assert!(t.mirrors());
+        assert!((t.inverse_growth() - 2.0).abs() < 1e-6, "{}", t.inverse_growth());
+        let sheared = Transform { inverse_linear: DMat3::from_cols(DVec3::X, DVec3::new(3.0, 1.0, 0.0), DVec3::Z), ..t };
+        assert!(sheared.inverse_growth() >= 3.3027, "the greatest singular value");
         // A normal stays perpendicular to a transformed tangent.
         assert!(t.normal(DVec3::Y).dot(t.vector(DVec3::new(1.0, 0.0, 2.0))).abs() < 1e-12);
     }

@@ -45,16 +45,17 @@ pub fn meshes() -> Vec<Vec<[Vec3; 3]>> {
     ]
 }
 
-/// The nearest hit by testing every triangle.
+/// The nearest hit by testing every triangle but the one on which the ray starts.
 pub fn brute(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit> {
     let sheared = ShearedRay::new(ray.origin, ray.direction);
-    let hits = (0..).zip(mesh).filter_map(|(id, corners)| {
+    let others = (0..).zip(mesh).filter(|&(id, _)| id != ray.start);
+    let hits = others.filter_map(|(id, corners)| {
         sheared.intersect(corners, ray.t_max).map(|hit| ShapeHit { primitive: id, ..hit })
     });
     hits.min_by(|a, b| a.t.total_cmp(&b.t).then(a.primitive.cmp(&b.primitive)))
 }
 
-/// Rays at random, at corners and edges, along axes with both zeros, and from corners.
+/// Rays at random, at corners and edges, along axes with both zeros, from corners, and some that leave a triangle out.
 pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
     let mut next = random(11);
     let mut rays = Vec::new();
@@ -72,6 +73,10 @@ pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
         rays.push(Ray { t_max: 0.9, ..Ray::new(origin, target - origin) });
         rays.push(Ray::new(Vec3::new(target.x, 20.0, target.z), Vec3::new(zero, -1.0, zero)));
         rays.push(Ray::new(triangle[2], Vec3::new(next(), next(), next())));
+        // Through a triangle that is left out, and from one.
+        let start = (i % mesh.len().max(1)) as u32;
+        rays.push(Ray::new(origin, target - origin).leaving(start));
+        rays.push(Ray::new(target, Vec3::new(next(), next(), next())).leaving(start));
     }
     rays.push(Ray::new(Vec3::NAN, Vec3::X));
     rays.push(Ray::new(Vec3::ZERO, Vec3::new(f32::INFINITY, 0.0, f32::NAN)));

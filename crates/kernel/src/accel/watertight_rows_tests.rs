@@ -23,7 +23,7 @@ impl Loops for Tested<'_> {
         let (rays, mut found, mut any) = (ShearedRows::new(&rows), HitRows::none(), 0);
         let (met, mut nearest) = ((1 << self.rays.len()) - 1, ends);
         for (number, corners) in (0..).zip(self.triangles) {
-            any |= rays.any(corners, met, &ends, folds);
+            any |= rays.any((number, corners), met, &ends, folds);
             rays.closest((number, corners), (met, &mut nearest), &mut found, folds);
         }
         (found, any)
@@ -50,14 +50,16 @@ fn rays_side_by_side_have_the_bits_that_each_has_alone() {
                 _ => Vec3::new(next(), next(), next()) * 4.0,
             };
             let aside = Vec3::new(next(), next(), next()) * [0.0, 0.3][round / 2 % 2];
-            Ray { t_max: [f32::INFINITY, 0.9, 1.0][round % 3], ..Ray::new(origin, target + aside - origin) }
+            let t_max = [f32::INFINITY, 0.9, 1.0][round % 3];
+            let start = [Ray::NO_TRIANGLE, round as u32 / 2 % 8][round % 2];
+            Ray { t_max, start, ..Ray::new(origin, target + aside - origin) }
         };
         let rays: Vec<Ray> = (0..=round % PACKET).map(|_| ray(&mut next)).collect();
         let alone: Vec<_> = rays
             .iter()
             .map(|ray| {
                 let (sheared, mut best) = (ShearedRay::new(ray.origin, ray.direction), None);
-                for (number, corners) in (0..).zip(&triangles) {
+                for (number, corners) in (0..).zip(&triangles).filter(|&(number, _)| number != ray.start) {
                     let end = best.map_or(ray.t_max, |best: ShapeHit| best.t);
                     let Some(hit) = sheared.intersect(corners, end) else { continue };
                     if best.is_none_or(|best| hit.t < best.t) {

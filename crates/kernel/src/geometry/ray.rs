@@ -12,12 +12,24 @@ pub struct Ray {
     pub direction: Vec3,
     /// End of the ray; ∞ for a half-line.
     pub t_max: f32,
+    /// Number of the triangle on which the ray starts, among those that it may meet, or [`Ray::NO_TRIANGLE`]. A triangle is flat
+    /// and the ray starts on the side to which it goes, so that it does not meet this triangle again: tests leave it out.
+    pub start: u32,
 }
 
 impl Ray {
+    /// A number that no triangle has.
+    pub const NO_TRIANGLE: u32 = u32::MAX;
+
     /// A half-line.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        Self { origin, direction, t_max: f32::INFINITY }
+        Self { origin, direction, t_max: f32::INFINITY, start: Self::NO_TRIANGLE }
+    }
+
+    /// The ray, with the triangle on which it starts.
+    #[inline(always)]
+    pub fn leaving(self, start: u32) -> Self {
+        Self { start, ..self }
     }
 
     /// The segment that ends just before `to`, shortened by the rounding errors of its two ends, so that it does not
@@ -28,7 +40,7 @@ impl Ray {
         let size = from.abs().max_element() + to.abs().max_element();
         let relative = size / direction.abs().max_element().max(f32::MIN_POSITIVE);
         let shortening = 4.0 * f32::EPSILON * (1.0 + relative);
-        Self { origin: from, direction, t_max: 1.0 - shortening.min(0.5) }
+        Self { t_max: 1.0 - shortening.min(0.5), ..Self::new(from, direction) }
     }
 
     /// The segment, extended by the error of its end.

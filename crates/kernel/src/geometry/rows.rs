@@ -43,19 +43,27 @@ pub struct RayRows {
     pub origin: [Row; 3],
     /// Coordinates of the directions.
     pub direction: [Row; 3],
+    /// [`Ray::start`] of each ray.
+    pub start: [u32; PACKET],
 }
 
 impl RayRows {
-    /// Rows of these coordinates.
+    /// Rows of these coordinates, of rays that start on no triangle.
     #[inline(always)]
     pub fn of(origin: [Row; 3], direction: [Row; 3]) -> Self {
-        Self { origin, direction }
+        Self { origin, direction, start: [Ray::NO_TRIANGLE; PACKET] }
+    }
+
+    /// The rays, with the triangles on which they start.
+    #[inline(always)]
+    pub fn leaving(self, start: [u32; PACKET]) -> Self {
+        Self { start, ..self }
     }
 
     /// The ray in a lane, without an end.
     pub fn ray(&self, lane: usize) -> Ray {
         let of = |rows: &[Row; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
-        Ray::new(of(&self.origin), of(&self.direction))
+        Ray::new(of(&self.origin), of(&self.direction)).leaving(self.start[lane])
     }
 
     /// Rows of at most [`PACKET`] rays, and their ends.
@@ -79,6 +87,7 @@ impl RayRows {
                 self.direction[axis][lane] = ray.direction[axis];
             }
             ends[lane] = ray.t_max;
+            self.start[lane] = ray.start;
         }
     }
 

@@ -81,7 +81,7 @@ impl<'a> ShearedRows<'a> {
         found: &mut HitRows,
         folds: impl Folds,
     ) {
-        let hits = self.hits(corners, ends);
+        let hits = self.hits(number, corners, ends);
         let mut is_nearer = [0; PACKET];
         for i in 0..PACKET {
             // A hit at the end of a ray counts; a hit as far as one on an earlier triangle does not.
@@ -101,8 +101,8 @@ impl<'a> ShearedRows<'a> {
 
     /// A bit for each ray in `met` that hits a triangle; the others end below 0.
     #[inline(always)]
-    pub fn any(&self, corners: &[Vec3; 3], met: u32, ends: &Ends, folds: impl Folds) -> u32 {
-        let hits = self.hits(corners, ends);
+    pub fn any(&self, (number, corners): (u32, &[Vec3; 3]), met: u32, ends: &Ends, folds: impl Folds) -> u32 {
+        let hits = self.hits(number, corners, ends);
         let doubtful = folds.bits(&hits.doubtful) & met;
         let hit = folds.bits(&hits.hit) & met;
         if doubtful == 0 { hit } else { hit | self.decided(doubtful, corners, ends) }
@@ -168,9 +168,9 @@ impl<'a> ShearedRows<'a> {
         seen
     }
 
-    /// [`ShearedRay::intersect`] side by side.
+    /// [`ShearedRay::intersect`] side by side, for the rays that do not start on the triangle.
     #[inline(always)]
-    fn hits(&self, corners: &[Vec3; 3], ends: &Ends) -> Hits {
+    fn hits(&self, number: u32, corners: &[Vec3; 3], ends: &Ends) -> Hits {
         let [a, b, c] = [self.sheared(corners[0]), self.sheared(corners[1]), self.sheared(corners[2])];
         let mut hits = Hits {
             hit: [0; PACKET],
@@ -202,7 +202,7 @@ impl<'a> ShearedRows<'a> {
             let edge = 2.0 * x * y;
             let error = 3.0 * (gamma(3) * edge * z + error_edge * z + error_z * edge) * inverse.abs();
             let is_doubtful = (error > z * ILL_CONDITIONED) | (t.abs() <= error) | is_on_edge;
-            let is_inside = !(is_left & is_right);
+            let is_inside = !(is_left & is_right) & (self.rays.start[i] != number);
             let is_hit = is_inside & !is_doubtful & (t > 0.0) & (t <= ends[i]);
             hits.doubtful[i] = if is_inside & is_doubtful { TRUE } else { 0 };
             hits.hit[i] = if is_hit { TRUE } else { 0 };

@@ -160,7 +160,7 @@ impl Loops for LobeRays<'_> {
                 sent &= if cosines[i] > 0.0 { !0 } else { !bit };
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
-            let rays = RayRows::of(row.from, directions);
+            let rays = RayRows::of(row.from, directions).leaving(row.starts(&directions));
             let (hits, objects) = shot.world.geometry.closest_rows(&rays, &mut ends, sent, folds);
             arrived.rays.scattered += u64::from(sent.count_ones());
             if measure == Measure::Work {

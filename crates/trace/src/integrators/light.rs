@@ -256,7 +256,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         for i in 0..LANES {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
-        let rays = RayRows::of(self.row.from, direction);
+        let rays = RayRows::of(self.row.from, direction).leaving(self.row.starts(&direction));
         self.add_seen((&rays, &ends, traced), &SourceRow::of(source), &waiting.light, sums, folds);
     }
 
@@ -315,7 +315,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             set_lane(&mut direction, i, lane(&samples.directions, i));
             ends[i] = f32::INFINITY;
         }
-        (RayRows::of(self.row.from, direction), ends)
+        (RayRows::of(self.row.from, direction).leaving(self.row.starts(&direction)), ends)
     }
 }
 

@@ -17,6 +17,7 @@ use super::sink::Sink;
 use super::vertices::LitVertex;
 use super::view::{Measure, Ways};
 use crate::control::Cancelled;
+use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, lanes, traced};
 use crate::lights::{Source, SourceRow};
 use crate::math::Vec3;
@@ -325,13 +326,16 @@ impl Loops for Lifting<'_> {
         for i in 0..LANES {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
-        let rays = RayRows::of(row.from, direction);
+        let rays = RayRows::of(row.from, direction).leaving(row.start);
         let blocked = {
             let (traced, nothing) = (traced(&ends, folds), SourceRow::of(Source::Nothing));
             geometry.occluded_rows(&rays, &ends, traced, &nothing, folds)
         };
         let lifted = row.may_lift & !blocked;
         row.is_bounded &= !lifted;
+        for i in 0..LANES {
+            row.start[i] = if lifted & 1 << i != 0 { Ray::NO_TRIANGLE } else { row.start[i] };
+        }
         for axis in 0..3 {
             for i in 0..LANES {
                 let (from, to) = (row.from[axis][i], row.lifted[axis][i]);

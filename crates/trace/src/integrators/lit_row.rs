@@ -3,12 +3,13 @@
 use super::shot::Shot;
 use super::vertices::{Lift, LitVertex};
 use super::view::{Measure, Parts};
+use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
 use crate::materials::Lobes;
 use crate::materials::lobes::gloss;
 use crate::materials::phong::PhongBsdf;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane, truths};
 use crate::sampling::SamplerRow;
 use crate::scene::description::Shadows;
 
@@ -19,6 +20,8 @@ pub struct LitRow {
     pub used: u32,
     /// Origins of light samples and shadow rays.
     pub from: Lanes3,
+    /// Triangles at the origins, for [`LitRow::starts`].
+    pub(super) start: [u32; LANES],
     /// Horizon normals: nothing behind them is visible, in the lanes whose bits are set.
     pub(super) horizon: Lanes3,
     pub(super) is_bounded: u32,
@@ -116,6 +119,7 @@ impl LitRow {
     pub const EMPTY: Self = Self {
         used: 0,
         from: [[0.0; LANES]; 3],
+        start: [Ray::NO_TRIANGLE; LANES],
         horizon: [[0.0; LANES]; 3],
         is_bounded: 0,
         lifted: [[0.0; LANES]; 3],
@@ -184,6 +188,7 @@ impl LitRow {
         }
         (self.carried[i], self.medium[i]) = (other.carried[from], other.medium[from]);
         (self.slot[i], self.path[i], self.place[i]) = (other.slot[from], other.path[from], other.place[from]);
+        self.start[i] = other.start[from];
         self.is_glossy |= other.is_glossy;
         self.is_bent |= other.is_bent;
         self.is_bounded |= (other.is_bounded >> from & 1) << i;
@@ -206,6 +211,7 @@ impl LitRow {
         let LitVertex { path, place, vertex, shading, bsdf } = lit;
         let outlook = vertex.outlook(shot, path.history.is_seen);
         set_lane(&mut self.from, i, outlook.point);
+        self.start[i] = outlook.start;
         set_lane(&mut self.horizon, i, outlook.horizon.unwrap_or(Vec3::ZERO));
         self.is_bounded |= u32::from(outlook.horizon.is_some()) << i;
         if let Some(Lift { to, end }) = outlook.lift {
@@ -270,6 +276,22 @@ impl LitRow {
             }
         }
         Response { f, cosines, glosses }
+    }
+
+    /// [`Ray::start`] of rays from the vertices in these directions: none of a ray that goes behind its facet.
+    #[inline(always)]
+    pub(super) fn starts(&self, directions: &Lanes3) -> [u32; LANES] {
+        let apart = truths(self.apart);
+        let mut starts = self.start;
+        for i in 0..LANES {
+            let (facet, normal) = (lane(&self.facet, i), lane(&self.normal, i));
+            let choose = |facet: f32, normal: f32| if apart[i] != 0 { facet } else { normal };
+            let Vec3 { x, y, z } = lane(directions, i);
+            let height =
+                choose(facet.x, normal.x) * x + choose(facet.y, normal.y) * y + choose(facet.z, normal.z) * z;
+            starts[i] = if height > 0.0 { starts[i] } else { Ray::NO_TRIANGLE };
+        }
+        starts
     }
 
     /// Position of a vertex's surface, and the normal of its facet on the viewer's side.

@@ -92,10 +92,11 @@ impl Scattering<'_> {
     pub fn scatter(self, media: &[Medium], cones: &[Cone], next: &mut Vec<PathRay>) {
         let row = self.row;
         let ways = self.shot.world.geometry.instructions().run(self);
+        let starts = row.starts(&ways.directions);
         let of_lobe = |density: f32| move |cone: &Cone| cone.scattered(density);
         next.extend(lanes(ways.alive).map(|i| {
             let mut path = PathRay {
-                ray: Ray::new(lane(&row.from, i), lane(&ways.directions, i)),
+                ray: Ray::new(lane(&row.from, i), lane(&ways.directions, i)).leaving(starts[i]),
                 throughput: lane(&row.throughput, i) * lane(&ways.factors, i),
                 slot: row.slot[i],
                 path: row.path[i],

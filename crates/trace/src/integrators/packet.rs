@@ -7,13 +7,13 @@ use super::queues::PathRay;
 use super::shot::Shot;
 use super::vertices::way_up;
 use super::view::Measure;
-use crate::geometry::SurfacePoint;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::{self, HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
+use crate::geometry::{Ray, SurfacePoint};
 use crate::materials::phong::PhongBsdf;
 use crate::materials::{Material, Phong};
-use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, lane, set_lane, take, truths};
+use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, lane, set_lane, take, take_u32, truths};
 use crate::math::{DVec2, Vec3};
 use crate::sampling::CAMERA_PATH;
 use crate::scene::description::Shadows;
@@ -195,14 +195,15 @@ impl Loops for Meeting<'_> {
             }
             Rays::Paths(..) | Rays::Traced(..) => {
                 let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
+                let mut start = [Ray::NO_TRIANGLE; PACKET];
                 for lane in 0..PACKET {
                     let Some(path) = rays.of_queue(lane) else { break };
                     set_lane(&mut origin, lane, path.ray.origin);
                     set_lane(&mut direction, lane, path.ray.direction);
-                    ends[lane] = path.ray.t_max;
+                    (start[lane], ends[lane]) = (path.ray.start, path.ray.t_max);
                 }
                 traced = rows::traced(&ends, folds);
-                of_paths = RayRows::of(origin, direction);
+                of_paths = RayRows::of(origin, direction).leaving(start);
                 &of_paths
             }
         };
@@ -250,6 +251,7 @@ impl Loops for Meeting<'_> {
             let texture = phong.diffuse.texture().filter(|_| are_lit && measure.is_colored());
             match &world.geometry.objects()[id as usize] {
                 Object::Shape(shape) => {
+                    row.set_starts(of, &[Ray::NO_TRIANGLE; PACKET]);
                     if !surface.fill(shape, rows, &hits, of) {
                         continue;
                     }
@@ -257,7 +259,10 @@ impl Loops for Meeting<'_> {
                         surface.fill_uv(shape, rows, &hits, of);
                     }
                 }
-                Object::Mesh(mesh) => mesh.fill_surfaces(surface, rows, &hits, of, texture.is_some()),
+                Object::Mesh(mesh) => {
+                    row.set_starts(of, &mesh.scene_numbers(&hits.primitive));
+                    mesh.fill_surfaces(surface, rows, &hits, of, texture.is_some());
+                }
             }
             plain |= of;
             shining |= if material.emission.shines() { of } else { 0 };
@@ -390,6 +395,12 @@ impl LitRow {
         self.is_glossy |= *specular != Vec3::ZERO;
     }
 
+    /// Sets the triangles of some lanes.
+    #[inline(always)]
+    fn set_starts(&mut self, of: u32, starts: &[u32; PACKET]) {
+        take_u32(&truths(of), starts, &mut self.start);
+    }
+
     /// Sets normals and points above facets for the lanes of smooth surfaces.
     #[inline(always)]
     fn smooth(&mut self, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts, folds: impl Folds) {
@@ -434,6 +445,7 @@ impl LitRow {
             take(&of, &normals[axis], &mut self.normal[axis]);
             take(&of, &mirrored[axis], &mut self.mirrored_eye[axis]);
         }
+        take_u32(&rises, &[Ray::NO_TRIANGLE; PACKET], &mut self.start);
         take(&of, &ends, &mut self.lift_end);
         take(&of, &[UNBENT; PACKET], &mut self.bend);
         self.apart |= surface.smooth;

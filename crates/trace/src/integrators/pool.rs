@@ -123,6 +123,7 @@ impl Loops for Tracing<'_> {
                     packet.origin[axis][to] = row.rays.origin[axis][from];
                     packet.direction[axis][to] = row.rays.direction[axis][from];
                 }
+                packet.start[to] = row.rays.start[from];
                 ends[to] = row.ends[from];
                 sources.copy(to, &row.sources, from);
             }

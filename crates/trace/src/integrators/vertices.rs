@@ -18,6 +18,8 @@ pub struct Vertex<'a> {
     pub surface: SurfacePoint,
     /// Its material.
     pub material: &'a Material,
+    /// [`Ray::start`] of rays that leave.
+    start: u32,
     /// Starts of rays that leave, if they are known better than by the error of the surface.
     sides: Option<Sides>,
     /// Whether the path hits the front.
@@ -101,6 +103,7 @@ impl<'a> Vertex<'a> {
             normal: surface.normal * side,
             side,
             surface,
+            start: shot.world.geometry.triangle_number(hit),
             sides: None,
         }
     }
@@ -147,12 +150,11 @@ impl<'a> Vertex<'a> {
     /// A ray that starts here.
     pub fn leaving(&self, direction: Vec3) -> Ray {
         let SurfacePoint { point, error, normal, .. } = self.surface;
-        let origin = match self.sides {
-            Some(sides) if direction.dot(self.normal) < 0.0 => sides.beyond,
-            Some(sides) => sides.before,
-            None => offset_origin(point, error, normal, direction),
-        };
-        Ray::new(origin, direction)
+        match self.sides {
+            Some(sides) if direction.dot(self.normal) < 0.0 => Ray::new(sides.beyond, direction),
+            Some(sides) => Ray::new(sides.before, direction),
+            None => Ray::new(offset_origin(point, error, normal, direction), direction).leaving(self.start),
+        }
     }
 
     /// Origin of light samples. A facet of a smooth mesh sees lights from a point above it, if nothing is on the way there, so
@@ -161,18 +163,18 @@ impl<'a> Vertex<'a> {
     /// it is at vertices that the camera does not see, where the way up would cost a ray without a visible difference.
     pub fn outlook(&self, shot: &Shot<'_>, is_seen: bool) -> Outlook {
         if let Some(sides) = self.sides {
-            return Outlook { point: sides.before, horizon: None, lift: None };
+            return Outlook { point: sides.before, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
         }
         let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
         let on_facet = offset_origin(point, error, self.normal, self.normal);
         let is_traced = shot.settings.render.shadows != Shadows::Off;
         let (is_above, end) = way_up(on_facet, shadow_point, self.normal, error);
         if is_above && !is_traced {
-            return Outlook { point: shadow_point, horizon: None, lift: None };
+            return Outlook { point: shadow_point, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
         }
         let horizon = (is_traced && shading_normal != normal).then_some(self.normal);
         let lift = (is_above && is_seen).then_some(Lift { to: shadow_point, end });
-        Outlook { point: on_facet, horizon, lift }
+        Outlook { point: on_facet, start: self.start, horizon, lift }
     }
 }
 
@@ -193,6 +195,8 @@ const LEAST_LIFT: f32 = 8.0;
 pub struct Outlook {
     /// The point from which lights are sampled and shadow rays start.
     pub point: Vec3,
+    /// [`Ray::start`] of the rays in front of the facet.
+    pub start: u32,
     /// Horizon normal: nothing behind it is visible. `None` if the cosines or the shadow rays take care of this.
     pub horizon: Option<Vec3>,
     /// Another point above it. If nothing is on the way there, lights are sampled from it, in all directions.

@@ -22,7 +22,7 @@ pub struct Sides {
 impl Sides {
     /// The way from one to the other; t = 1 is its end.
     pub fn ray(&self) -> Ray {
-        Ray { origin: self.before, direction: self.beyond - self.before, t_max: 1.0 }
+        Ray { t_max: 1.0, ..Ray::new(self.before, self.beyond - self.before) }
     }
 }
 

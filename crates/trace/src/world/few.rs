@@ -56,7 +56,7 @@ impl MeshInstance {
                 }
             }
             if asked != 0 {
-                hit |= rays.any(&mesh.corners(number), asked, ends, folds);
+                hit |= rays.any((number, &mesh.corners(number)), asked, ends, folds);
             }
         }
         hit
@@ -65,7 +65,7 @@ impl MeshInstance {
     /// The rays in the mesh's coordinates.
     #[inline(always)]
     fn local_rows(&self, rows: &RayRows) -> RayRows {
-        let RayRows { mut origin, mut direction } = *rows;
+        let RayRows { mut origin, mut direction, mut start } = *rows;
         if self.transform != Transform::IDENTITY {
             for i in 0..PACKET {
                 let at = self.transform.inverse_point(lane(&origin, i).as_dvec3()).as_vec3();
@@ -74,6 +74,9 @@ impl MeshInstance {
                 set_lane(&mut direction, i, towards);
             }
         }
-        RayRows::of(origin, direction)
+        for start in &mut start {
+            *start = self.own_number(*start);
+        }
+        RayRows::of(origin, direction).leaving(start)
     }
 }

@@ -71,6 +71,7 @@ impl Geometry {
     /// [`Cancelled`].
     pub fn build(mut objects: Vec<Object>, token: &CancelToken) -> Result<Self, Cancelled> {
         let merged = MergedMeshes::of_objects(&mut objects, token)?;
+        number_triangles(&mut objects);
         let bounds: Vec<Option<Aabb>> = objects.iter().map(Object::bounds).collect();
         let unbounded =
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
@@ -215,6 +216,15 @@ impl Geometry {
         self.unbounded.iter().any(|&id| test(id)) || self.visited().any(ray, test)
     }
 
+    /// Number of the triangle of a hit among those of all meshes, for [`Ray::start`]; [`Ray::NO_TRIANGLE`] for other shapes.
+    #[inline(always)]
+    pub fn triangle_number(&self, hit: &Hit) -> u32 {
+        match &self.objects[hit.object as usize] {
+            Object::Shape(_) => Ray::NO_TRIANGLE,
+            Object::Mesh(mesh) => mesh.scene_number(hit.shape.primitive),
+        }
+    }
+
     /// The surface at a hit of this ray.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         self.asked_surface(ray, hit, Asked::ALL)
@@ -261,6 +271,21 @@ impl Geometry {
     }
 }
 
+/// Numbers the triangles of all meshes: first those of merged ones, in the order of their common tree, then the others. Meshes for
+/// which there are no numbers get none.
+fn number_triangles(objects: &mut [Object]) {
+    let mut next = Some(0_u32);
+    for of_merged in [true, false] {
+        let meshes = objects.iter_mut().filter_map(Object::mesh_mut);
+        for mesh in meshes.filter(|mesh| mesh.is_merged == of_merged) {
+            let count = u32::try_from(mesh.triangle_count()).ok();
+            let end = next.zip(count).and_then(|(first, count)| first.checked_add(count));
+            mesh.first = next.filter(|_| end.is_some());
+            next = end;
+        }
+    }
+}
+
 fn lowered(
     shape: &description::Shape,
     meshes: &[Arc<MeshTree>],
@@ -279,4 +304,77 @@ fn lowered(
         instance.tree.prepare_normals(token)?;
     }
     Ok(Object::Mesh(Box::new(instance)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assets::LoadedMesh;
+    use crate::geometry::mesh::TriangleMesh;
+    use crate::geometry::ray::offset_origin;
+    use crate::math::Vec3;
+    use crate::math::random::signed as random;
+    use crate::scene::description::Accel;
+
+    /// A mesh of random triangles.
+    fn mesh(seed: u64, count: u32) -> Arc<MeshTree> {
+        let mut next = random(seed);
+        let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
+        let mut mesh = TriangleMesh::default();
+        for i in 0..count {
+            let place = vector(1.0);
+            mesh.positions.extend([place, place + vector(0.5), place + vector(0.5)]);
+            mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+        }
+        let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+        Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels"))
+    }
+
+    /// Merged meshes, meshes of few triangles, and large ones with trees of their own, some of them moved.
+    fn geometry() -> Geometry {
+        let trees = [mesh(1, 70), mesh(2, 8), mesh(3, 17_000), mesh(4, 40)];
+        let placed = |(place, tree): (usize, usize)| {
+            let at = DVec3::X * (4 * place) as f64;
+            let turn = if place % 2 == 0 { DVec3::ZERO } else { DVec3::new(13.0, 57.0, 211.0) };
+            let transform = Transform::scale_rotate_translate(DVec3::new(1.0, 0.9, 1.1), turn, at);
+            Object::Mesh(Box::new(MeshInstance::new(Arc::clone(&trees[tree]), transform, false)))
+        };
+        let objects = [2, 0, 1, 3, 2].into_iter().enumerate().map(placed).collect();
+        Geometry::build(objects, &CancelToken::new()).expect("nobody cancels")
+    }
+
+    #[test]
+    fn triangles_of_all_meshes_have_different_numbers() {
+        let geometry = geometry();
+        let mut seen = std::collections::HashSet::new();
+        for (object, own) in (0..).zip(geometry.objects()) {
+            for primitive in 0..own.triangle_count() as u32 {
+                let hit = Hit { shape: ShapeHit { primitive, ..ShapeHit::at(1.0) }, object };
+                assert!(seen.insert(geometry.triangle_number(&hit)), "{object} {primitive}");
+            }
+        }
+        assert!(!seen.contains(&Ray::NO_TRIANGLE));
+    }
+
+    #[test]
+    fn rays_that_leave_a_triangle_out_hit_what_others_hit_from_there() {
+        let geometry = geometry();
+        let mut next = random(5);
+        let (mut started, mut hits) = (0, [0; 5]);
+        while started < 8000 {
+            let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
+            let place = Vec3::X * (4 * (started as u32 % 5)) as f32;
+            let ray = Ray::new(place + vector(3.0), vector(1.0));
+            let Some(hit) = geometry.closest(&ray) else { continue };
+            let surface = geometry.surface(&ray, &hit);
+            let direction = vector(1.0).normalize();
+            let origin = offset_origin(surface.point, surface.error, surface.normal, direction);
+            let leaving = Ray::new(origin, direction).leaving(geometry.triangle_number(&hit));
+            let found = geometry.closest(&leaving);
+            assert_eq!(found, geometry.closest(&Ray::new(origin, direction)), "{hit:?} {leaving:?}");
+            started += 1;
+            hits[hit.object as usize] += u32::from(found.is_some());
+        }
+        assert!(hits.iter().all(|&hits| hits > 10), "{hits:?} hits by the object that the rays leave");
+    }
 }

@@ -125,7 +125,7 @@ impl Geometry {
                 let find = || {
                     let all = shape.bounds().unwrap_or(Aabb::EMPTY);
                     let around = cell.bounds(&all).grown(Vec3::splat(table.margin));
-                    if self.is_clear(&around, &Region::Cell(around), hit.object, None) { 1 } else { NEVER }
+                    if self.is_clear(&around, &Region::Cell(around), hit.object) { 1 } else { NEVER }
                 };
                 table.state(cell.number(), find) != NEVER
             }
@@ -154,38 +154,44 @@ impl Geometry {
     /// The byte of a triangle.
     fn parts_from_edges(&self, object: u32, mesh: &MeshInstance, triangle: u32, margin: f32) -> u8 {
         let corners = mesh.world_corners(triangle);
+        let own_corners = mesh.local_corners(triangle);
+        let growth = mesh.transform.inverse_growth();
         let [a, b, c] = corners;
         let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
         let height = (b - a).cross(c - a).length() / longest;
         let least = (f64::from(PARTS) * FROM_EDGES * f64::from(margin) / height).ceil().max(1.0);
-        let middle = (a + b + c) / 3.0;
+        // Barycentric coordinates of at least some parts form a smaller triangle about the same middle.
+        let smaller = |corners: [DVec3; 3], parts: f64| {
+            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+            corners.map(|corner| middle + (corner - middle) * (1.0 - 3.0 * parts / f64::from(PARTS)))
+        };
+        let apart = APART * f64::from(margin);
         // Try a part further from the edges, for neighbours at a small angle.
         for parts in [least, 4.0 * least].into_iter().filter(|&parts| parts <= MOST_PARTS) {
-            // Barycentric coordinates of at least this form a smaller triangle about the same middle.
-            let inner =
-                corners.map(|corner| middle + (corner - middle) * (1.0 - 3.0 * parts / f64::from(PARTS)));
-            let region = Region::Triangle { corners: inner, apart: APART * f64::from(margin) };
+            let inner = smaller(own_corners, parts);
+            if !is_clear_of_own(mesh, triangle, inner, apart * growth) {
+                continue;
+            }
+            let inner = smaller(corners, parts);
+            let region = Region::Triangle { corners: inner, apart };
             let around = Aabb::around_f64(inner).grown(Vec3::splat(2.0 * margin));
-            if self.is_clear(&around, &region, object, Some(triangle)) {
+            if self.is_clear(&around, &region, object) {
                 return parts as u8;
             }
         }
         NEVER
     }
 
-    /// Whether nothing but an object, or its triangle, comes near a region; near surfaces overlap `around`.
-    fn is_clear(&self, around: &Aabb, region: &Region, own: u32, triangle: Option<u32>) -> bool {
+    /// Whether no other object comes near a region; near surfaces overlap `around`.
+    fn is_clear(&self, around: &Aabb, region: &Region, own: u32) -> bool {
         let is_near = |id: u32| match &self.objects()[id as usize] {
-            Object::Shape(shape) => id != own && shape_is_near(shape, around, region),
+            Object::Shape(shape) => shape_is_near(shape, around, region),
             Object::Mesh(mesh) => {
-                let own = triangle.filter(|_| id == own);
-                let mut is_near = false;
-                mesh.tree.triangles().meeting(&mesh.local_box(around), |other| {
-                    is_near |= Some(other) != own && region.is_near(mesh.world_corners(other), around);
-                });
-                is_near
+                let is_far = |other: u32| !region.is_near(mesh.world_corners(other), around);
+                !mesh.tree.triangles().meeting_while(&mesh.local_box(around), is_far)
             }
         };
+        let is_near = |id: u32| id != own && is_near(id);
         if self.unbounded().iter().any(|&id| is_near(id)) {
             return false;
         }
@@ -193,6 +199,15 @@ impl Geometry {
         self.tree().meeting(around, |id| is_clear = is_clear && !is_near(id));
         is_clear
     }
+}
+
+/// Whether a mesh's other triangles are apart from a part of one of them by a distance, all in the mesh's coordinates: its
+/// neighbours are the most triangles near it.
+fn is_clear_of_own(mesh: &MeshInstance, triangle: u32, part: [DVec3; 3], apart: f64) -> bool {
+    let around = Aabb::around_f64(part).grown(Vec3::splat((1.1 * apart) as f32));
+    mesh.tree.triangles().meeting_while(&around, |other| {
+        other == triangle || are_apart(part, mesh.local_corners(other), apart)
+    })
 }
 
 /// Whether a shape may have a point near a region, or encloses it.

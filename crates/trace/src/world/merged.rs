@@ -251,6 +251,14 @@ mod tests {
             let expected = each.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
             let found = geometry.closest(&ray);
             assert_eq!(found, expected, "{ray:?}");
+            // Leave that triangle out: the next hit is another one's.
+            if let Some(hit) = found {
+                let next = geometry.closest(&ray.leaving(geometry.triangle_number(&hit)));
+                let is_own =
+                    |next: Hit| (next.object, next.shape.primitive) == (hit.object, hit.shape.primitive);
+                assert!(!next.is_some_and(is_own), "{ray:?}");
+                assert!(next.is_none_or(|next| next.shape.t >= hit.shape.t), "{ray:?}");
+            }
             hits += u32::from(found.is_some());
             let nothing = Hit { shape: ShapeHit::at(0.0), object: 3 };
             let Hit { shape, object } = found.unwrap_or(nothing);

@@ -22,6 +22,8 @@ pub struct MeshInstance {
     pub smooth: bool,
     /// Whether rays find it in a tree over several meshes, in the scene's coordinates.
     pub(super) is_merged: bool,
+    /// Number of its first triangle among those of all meshes. `None` if there are more than numbers.
+    pub(super) first: Option<u32>,
 }
 
 /// A point of a triangle of an instance.
@@ -43,15 +45,16 @@ pub(super) struct Facet {
 impl MeshInstance {
     /// An instance of a mesh with its own tree.
     pub fn new(tree: Arc<MeshTree>, transform: Transform, smooth: bool) -> Self {
-        Self { tree, transform, smooth, is_merged: false }
+        Self { tree, transform, smooth, is_merged: false, first: None }
     }
 
     /// The ray in the mesh's coordinates, with the same t.
     pub(super) fn local_ray(&self, ray: &Ray) -> Ray {
+        let start = self.own_number(ray.start);
         if self.transform == Transform::IDENTITY {
-            return *ray;
+            return ray.leaving(start);
         }
-        self.moved(ray)
+        self.moved(ray).leaving(start)
     }
 
     /// The ray in the mesh's coordinates, if the mesh is moved.
@@ -59,8 +62,28 @@ impl MeshInstance {
         Ray {
             origin: self.transform.inverse_point(ray.origin.as_dvec3()).as_vec3(),
             direction: self.transform.inverse_vector(ray.direction.as_dvec3()).as_vec3(),
-            t_max: ray.t_max,
+            ..*ray
         }
+    }
+
+    /// The scene's number of a triangle, see [`Geometry::triangle_number`](super::Geometry::triangle_number).
+    #[inline(always)]
+    pub(super) fn scene_number(&self, triangle: u32) -> u32 {
+        self.first.map_or(Ray::NO_TRIANGLE, |first| first + triangle)
+    }
+
+    /// [`MeshInstance::scene_number`] of the triangles of a row; any numbers for lanes without one.
+    #[inline(always)]
+    pub fn scene_numbers(&self, triangles: &[u32; PACKET]) -> [u32; PACKET] {
+        let Some(first) = self.first else { return [Ray::NO_TRIANGLE; PACKET] };
+        triangles.map(|triangle| first.wrapping_add(triangle))
+    }
+
+    /// The number among the mesh's triangles of the one with this number in the scene; if that is another mesh's, a number that
+    /// no triangle has.
+    #[inline(always)]
+    pub(super) fn own_number(&self, in_scene: u32) -> u32 {
+        self.first.map_or(Ray::NO_TRIANGLE, |first| in_scene.wrapping_sub(first))
     }
 
     /// The box around it.
@@ -80,6 +103,11 @@ impl MeshInstance {
     pub fn world_corners(&self, triangle: u32) -> [DVec3; 3] {
         let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
         if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
+    }
+
+    /// Corners of a triangle in the mesh's coordinates, in the order of the file.
+    pub(super) fn local_corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3())
     }
 
     /// Number of triangles of the mesh.
@@ -297,6 +325,7 @@ impl MeshInstance {
         let is_there = self.transform == Transform::IDENTITY;
         let local = |lane: usize| {
             let ray = rows.ray(lane % PACKET);
+            let ray = ray.leaving(self.own_number(ray.start));
             if is_there { ray } else { self.moved(&ray) }
         };
         let mut rays = [local(met.trailing_zeros() as usize); PACKET];

@@ -123,6 +123,14 @@ impl Object {
         }
     }
 
+    /// [`Object::mesh`], to be changed.
+    pub(super) fn mesh_mut(&mut self) -> Option<&mut MeshInstance> {
+        match self {
+            Self::Shape(_) => None,
+            Self::Mesh(mesh) => Some(mesh),
+        }
+    }
+
     /// Number of triangles in it.
     pub fn triangle_count(&self) -> u64 {
         match self {

@@ -314,7 +314,12 @@ mod tests {
                 let to = target + Vec3::new(next(), next(), next()) * spread;
                 if i % 2 == 0 { Ray::segment(eye, to) } else { Ray::new(eye, to - eye) }
             };
-            let rays: Vec<Ray> = (0..=i % PACKET).map(|_| ray()).collect();
+            let mut rays: Vec<Ray> = (0..=i % PACKET).map(|_| ray()).collect();
+            // Leave out what some of them would hit.
+            for ray in rays.iter_mut().step_by(4) {
+                let start = geometry.closest(ray).map_or(7, |hit| geometry.triangle_number(&hit));
+                *ray = ray.leaving(start);
+            }
             let mut found = vec![None; rays.len()];
             geometry.closest_packet(&rays, &mut found);
             let alone: Vec<_> = rays.iter().map(|ray| geometry.closest(ray)).collect();

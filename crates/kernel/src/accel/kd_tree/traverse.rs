@@ -84,6 +84,9 @@ impl KdTree {
         self.visit(ray, |leaf| {
             for &place in leaf {
                 let triangle = &self.triangles[place as usize];
+                if triangle.id == ray.start {
+                    continue;
+                }
                 let Some(hit) = sheared.intersect(&triangle.corners, t_max) else { continue };
                 if best.is_none_or(|best| (hit.t, triangle.id) < (best.t, best.primitive)) {
                     best = Some(ShapeHit { primitive: triangle.id, ..hit });
@@ -102,7 +105,8 @@ impl KdTree {
         self.visit(ray, |leaf| {
             found = leaf.iter().any(|&place| {
                 let triangle = &self.triangles[place as usize];
-                Some(triangle.id) != except && sheared.intersect(&triangle.corners, ray.t_max).is_some()
+                let is_left_out = Some(triangle.id) == except || triangle.id == ray.start;
+                !is_left_out && sheared.intersect(&triangle.corners, ray.t_max).is_some()
             });
             (!found).then_some(ray.t_max)
         });

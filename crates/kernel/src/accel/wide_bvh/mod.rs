@@ -9,6 +9,7 @@ mod simd;
 
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
+use crate::geometry::rows::lanes;
 use crate::math::Vec3;
 
 pub use simd::{Instructions, Loops, pages};
@@ -193,8 +194,7 @@ impl WideBvh {
 
     fn meeting_below(&self, place: u32, other: &Aabb, visit: &mut impl FnMut(u32) -> bool) -> bool {
         let node = &self.nodes[place as usize];
-        let mut met = (0..node::WIDTH).filter(|&slot| node.bounds(slot).is_some_and(|own| own.meets(other)));
-        met.all(|slot| match node.child(slot) {
+        lanes(node.meeting(other)).all(|slot| match node.child(slot) {
             node::Child::Inner(child) => self.meeting_below(child, other, visit),
             node::Child::Leaf { first, count } => {
                 let packs = &self.packs[first as usize..(first + count) as usize];
@@ -366,7 +366,8 @@ mod tests {
                         .collect();
                     let any = tree.any_packet(&rays, &ends(&rays), &except);
                     for (i, ray) in rays.iter().enumerate() {
-                        let others = mesh.iter().zip(0..).filter(|&(_, id)| Some(id) != except[i]);
+                        let is_left_out = |id: u32| Some(id) == except[i] || id == ray.start;
+                        let others = mesh.iter().zip(0..).filter(|&(_, id)| !is_left_out(id));
                         let sheared = ShearedRay::new(ray.origin, ray.direction);
                         let hit = others
                             .clone()

@@ -101,6 +101,19 @@ impl Node {
         Some(Aabb { min: corner(0), max: corner(1) }).filter(|bounds| !bounds.is_empty())
     }
 
+    /// A bit for each slot whose box overlaps another one.
+    #[inline]
+    pub fn meeting(&self, other: &Aabb) -> u32 {
+        let mut met = [true; WIDTH];
+        for axis in 0..3 {
+            let (least, greatest) = (&self.rows[2 * axis], &self.rows[2 * axis + 1]);
+            for slot in 0..WIDTH {
+                met[slot] &= (least[slot] <= other.max[axis]) & (other.min[axis] <= greatest[slot]);
+            }
+        }
+        (0..WIDTH).fold(0, |bits, slot| bits | u32::from(met[slot]) << slot)
+    }
+
     /// The child of a slot.
     pub fn child(&self, slot: usize) -> Child {
         Child::decode(self.children[slot])

@@ -37,7 +37,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
             }
             Child::Leaf { first, count } => {
                 for pack in &tree.packs[first as usize..(first + count) as usize] {
-                    for lane in 0..PACK {
+                    for lane in (0..PACK).filter(|&lane| pack.ids[lane] != ray.start) {
                         nearer(pack, lane, &sheared, t_max, &mut best);
                         t_max = best.map_or(t_max, |best| best.t);
                     }
@@ -67,6 +67,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
                 let packs = &tree.packs[first as usize..(first + count) as usize];
                 let hits = |pack: &TrianglePack, lane: usize| {
                     Some(pack.ids[lane]) != except
+                        && pack.ids[lane] != ray.start
                         && sheared.intersect(&pack.corners(lane), ray.t_max).is_some()
                 };
                 if packs.iter().any(|pack| (0..PACK).any(|lane| hits(pack, lane))) {

@@ -26,6 +26,8 @@ pub struct Lines {
     origin: [F4; 3],
     shear: [F4; 3],
     axes: [usize; 3],
+    /// [`Ray::start`].
+    start: u32,
 }
 
 /// Axes of a sheared ray, indexed by the truth of x > y, x > z and y > z for the sizes of its direction, and by which
@@ -53,9 +55,9 @@ const AXES: [[i32; 4]; 64] = {
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
-    const _: () = assert!(size_of::<Ray>() == 28 && std::mem::offset_of!(Ray, direction) == 12);
+    const _: () = assert!(size_of::<Ray>() == 32 && std::mem::offset_of!(Ray, direction) == 12);
     let floats: *const f32 = std::ptr::from_ref(ray).cast();
-    // SAFETY: the first four and the last four of the seven floats of a ray.
+    // SAFETY: the first four of the seven floats of a ray, and the four after the first three.
     unsafe { (_mm_loadu_ps(floats), _mm_loadu_ps(floats.add(3))) }
 }
 
@@ -162,6 +164,7 @@ impl Lines {
             origin: in_four(_mm_permutevar_ps(origin, places)),
             shear: [shear_x, shear_y, F4(scale)],
             axes: [axes[0] as usize, axes[1] as usize, axes[2] as usize],
+            start: ray.start,
         }
     }
 
@@ -186,11 +189,24 @@ impl Lines {
         (near, F8::bits(near.le(far)))
     }
 
-    /// Tests the triangles of a pack.
+    /// Tests the triangles of a pack, but the one on which the ray starts.
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<F4> {
         let corners = [self.corner(pack, 0), self.corner(pack, 3), self.corner(pack, 6)];
-        triangle::hits(&corners, self.shear[2], self.shear[2].like(t_max), true)
+        let hits = triangle::hits(&corners, self.shear[2], self.shear[2].like(t_max), true);
+        let others = !self.own_lane(pack);
+        Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits }
+    }
+
+    /// A bit for the lane of the triangle on which the ray starts.
+    #[inline(always)]
+    fn own_lane(&self, pack: &TrianglePack) -> u32 {
+        // SAFETY: there is a value of `F4`; four numbers.
+        unsafe {
+            let ids = _mm_loadu_si128(pack.ids.as_ptr().cast());
+            let is_own = _mm_cmpeq_epi32(ids, _mm_set1_epi32(self.start.cast_signed()));
+            _mm_movemask_ps(_mm_castsi128_ps(is_own)) as u32
+        }
     }
 
     /// The corners whose first row is `row`.

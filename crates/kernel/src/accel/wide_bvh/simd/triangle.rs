@@ -20,8 +20,8 @@ pub struct Hits<V: Lanes> {
     pub v: V,
 }
 
-/// Tests all lanes; `shear_z` is t for each unit of z. `is_single` saves the error bound for triangles behind the ray's
-/// start, which most packs have if the ray starts near them, as after a bounce.
+/// Tests all lanes; `shear_z` is t for each unit of z. `is_single` saves the division and the error bound for triangles that the
+/// ray misses, and for those behind its start or beyond its end, which most packs have.
 #[inline(always)]
 pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: bool) -> Hits<V> {
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *corners;
@@ -31,34 +31,40 @@ pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: boo
     let outside = least.lt(zero) & zero.lt(greatest);
     let on_edge = least.eq(zero) | greatest.eq(zero);
     let determinant = wa + wb + wc;
-    let inverse = ax.like(1.0).over(determinant);
-    let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
-    let ahead = zero.lt(t) & t.le(t_max);
-    let candidate =
-        if is_single { on_edge | may_count(corners, determinant, shear_z, t) } else { zero.le(zero) };
-    let (mut hit, mut doubtful) = (0, 0);
-    if V::bits(V::without(candidate, outside)) != 0 {
-        let (error, reach) = distance_error(corners, shear_z, inverse);
-        let needle = (reach * reach.like(ILL_CONDITIONED)).lt(error);
-        let at_start = t.abs().le(error);
-        doubtful = V::bits(V::without(needle | at_start | on_edge, outside));
-        hit = V::bits(V::without(ahead, outside)) & !doubtful;
+    let along = (wa * az + wb * bz + wc * cz) * shear_z;
+    let none = Hits { hit: 0, doubtful: 0, t: zero, u: zero, v: zero };
+    if is_single {
+        let candidate = on_edge | may_count(corners, determinant, shear_z, along, t_max);
+        if V::bits(V::without(candidate, outside)) == 0 {
+            return none;
+        }
     }
+    let inverse = ax.like(1.0).over(determinant);
+    let t = along * inverse;
+    let ahead = zero.lt(t) & t.le(t_max);
+    let (error, reach) = distance_error(corners, shear_z, inverse);
+    let needle = (reach * reach.like(ILL_CONDITIONED)).lt(error);
+    let at_start = t.abs().le(error);
+    let doubtful = V::bits(V::without(needle | at_start | on_edge, outside));
+    let hit = V::bits(V::without(ahead, outside)) & !doubtful;
     Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
 /// Unit of rounding, divided by the ratio that makes a needle, and a little more for the rounding of [`may_count`] itself.
 const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
-/// False only if the triangle is no needle and t is below 0 by more than its error. Let s be the sum of the greatest x and y,
-/// whose product is at most s²/4, and d the greatest z. Then [`distance_error`] is at most 30·s·(s + d) units of rounding of
-/// the reach, divided by the determinant. A determinant whose inverse may be infinite counts as a needle's.
+/// False only if the triangle is no needle and t is below 0 by more than its error, or beyond the end. Let s be the sum of the
+/// greatest x and y, whose product is at most s²/4, and d the greatest z. Then [`distance_error`] is at most 30·s·(s + d) units
+/// of rounding of the reach, divided by the determinant. A determinant whose inverse may be infinite counts as a needle's.
+/// `along` is t times the determinant.
 #[inline(always)]
-fn may_count<V: Lanes>(corners: &Corners<V>, determinant: V, shear_z: V, t: V) -> V::Mask {
+fn may_count<V: Lanes>(corners: &Corners<V>, determinant: V, shear_z: V, along: V, t_max: V) -> V::Mask {
     let (sum, deepest) = (greatest(corners, 0) + greatest(corners, 1), greatest(corners, 2));
     let bound = sum * ((sum + deepest) * sum.like(30.0 * UNITS)) + sum.like(1e-37);
     let (size, reach) = (determinant.abs(), deepest * (shear_z.abs() * sum.like(ILL_CONDITIONED)));
-    size.le(bound) | sum.like(0.0).le(bound * reach + size * t)
+    let ahead = along.signed_by(determinant);
+    size.le(bound)
+        | (sum.like(0.0).le(bound * reach + ahead) & ahead.le(size * (t_max * sum.like(1.000_001))))
 }
 
 /// See `ShearedRay::distance_error`.
@@ -93,7 +99,7 @@ mod tests {
         // SAFETY: four floats are in every processor of this architecture.
         let like = unsafe { F4::splat(0.0) };
         let mut next = random(31);
-        let (mut needles, mut starts, mut passed, mut clear) = (0, 0, 0, 0);
+        let (mut needles, mut starts, mut passed, mut clear, mut beyond) = (0, 0, 0, 0, 0);
         for round in 0..400_000 {
             // Take needles of all widths, sizes and distances; those whose corners have |x| = |y| are the worst.
             let size = 2.0_f32.powf(next() * 12.0);
@@ -115,13 +121,25 @@ mod tests {
             let determinant = wa + wb + wc;
             let shear_z = like.like(2.0_f32.powf(next() * 8.0));
             let inverse = like.like(1.0).over(determinant);
-            let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
+            let along = (wa * az + wb * bz + wc * cz) * shear_z;
+            let t = along * inverse;
             let (error, reach) = distance_error(&corners, shear_z, inverse);
             let is_needle = F4::bits((reach * like.like(ILL_CONDITIONED)).lt(error)) != 0;
             let is_at_start = F4::bits(t.abs().le(error)) != 0;
-            let passes = F4::bits(may_count(&corners, determinant, shear_z, t)) != 0;
-            let is_ahead = F4::bits(like.lt(t)) != 0;
-            assert!(passes || !(is_ahead || is_needle || is_at_start), "{scalar:?}");
+            // Let the ray end before the triangle, at it, behind it, or nowhere.
+            let mut distance = [0.0; 4];
+            t.store(&mut distance);
+            let part = [0.5, 1.0, 1.0 + f32::EPSILON, 2.0, f32::INFINITY][round % 5];
+            let end = like.like((distance[0] * part).max(0.0));
+            let passes = F4::bits(may_count(&corners, determinant, shear_z, along, end)) != 0;
+            let is_ahead = F4::bits(like.lt(t) & t.le(end)) != 0;
+            let is_beyond = F4::bits(end.lt(t)) != 0;
+            let is_hit_again = is_at_start && !is_beyond;
+            assert!(passes || !(is_ahead || is_needle || is_hit_again), "{scalar:?}");
+            beyond += u32::from(is_beyond && !passes);
+            if is_beyond {
+                continue;
+            }
             if is_ahead {
                 continue;
             }
@@ -132,5 +150,6 @@ mod tests {
         }
         assert!(needles > 20_000 && starts > 2_000 && clear > 20_000, "{needles}, {starts}, {clear}");
         assert!(passed < 4 * (needles + starts), "{passed} pass of {needles} needles, {starts} at the start");
+        assert!(beyond > 5_000, "{beyond} beyond the end");
     }
 }

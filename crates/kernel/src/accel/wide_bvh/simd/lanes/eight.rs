@@ -64,6 +64,12 @@ impl Lanes for F8 {
     }
 
     #[inline(always)]
+    fn signed_by(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm256_xor_ps(self.0, _mm256_and_ps(other.0, _mm256_set1_ps(-0.0))) })
+    }
+
+    #[inline(always)]
     fn lt(self, other: Self) -> Mask8 {
         // SAFETY: as above.
         Mask8(unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0) })

@@ -64,6 +64,12 @@ impl Lanes for F4 {
     }
 
     #[inline(always)]
+    fn signed_by(self, other: Self) -> Self {
+        // SAFETY: as above.
+        Self(unsafe { _mm_xor_ps(self.0, _mm_and_ps(other.0, _mm_set1_ps(-0.0))) })
+    }
+
+    #[inline(always)]
     fn lt(self, other: Self) -> Mask4 {
         // SAFETY: as above.
         Mask4(unsafe { _mm_cmplt_ps(self.0, other.0) })

@@ -60,6 +60,8 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
     fn max(self, other: Self) -> Self;
     /// Absolute values.
     fn abs(self) -> Self;
+    /// Numbers, negated where `other` is below 0 or −0.
+    fn signed_by(self, other: Self) -> Self;
     /// self < other.
     fn lt(self, other: Self) -> Self::Mask;
     /// self ≤ other.

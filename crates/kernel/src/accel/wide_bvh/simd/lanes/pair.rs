@@ -92,6 +92,11 @@ impl<V: Lanes> Lanes for Pair<V> {
     }
 
     #[inline(always)]
+    fn signed_by(self, other: Self) -> Self {
+        Self(self.0.signed_by(other.0), self.1.signed_by(other.1))
+    }
+
+    #[inline(always)]
     fn lt(self, other: Self) -> Self::Mask {
         Pair(self.0.lt(other.0), self.1.lt(other.1))
     }

@@ -79,6 +79,15 @@ impl Lanes for F16 {
     }
 
     #[inline(always)]
+    fn signed_by(self, other: Self) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let signs = _mm512_and_si512(_mm512_castps_si512(other.0), _mm512_set1_epi32(i32::MIN));
+            Self(_mm512_castsi512_ps(_mm512_xor_si512(_mm512_castps_si512(self.0), signs)))
+        }
+    }
+
+    #[inline(always)]
     fn lt(self, other: Self) -> Mask16 {
         // SAFETY: as above.
         Mask16(unsafe { _mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0) })

@@ -20,6 +20,8 @@ pub struct Packet<V: Lanes> {
     shear: [V; 3],
     /// World axes that are the x, y and z axes of every sheared ray.
     axes: [usize; 3],
+    /// The triangles on which the rays start, by the bits of their numbers.
+    start: V,
     /// Rows of a node that hold the near planes.
     pub near: [usize; 3],
     /// Least and greatest origins along each axis.
@@ -40,6 +42,7 @@ impl<V: Lanes> Packet<V> {
             inverse: [like; 3],
             sheared_origin: [like; 3],
             shear: [like; 3],
+            start: like.gather(&rows.start),
             axes,
             near: [0; 3],
             origins: [[0.0; 2]; 3],
@@ -101,11 +104,13 @@ impl<V: Lanes> Packet<V> {
         V::bits(near.le(far)) != 0
     }
 
-    /// Tests the triangle in a lane of a pack against all rays.
+    /// Tests the triangle in a lane of a pack against all rays that do not start on it.
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
         let (a, b, c) = (self.corner(pack, 0, lane), self.corner(pack, 3, lane), self.corner(pack, 6, lane));
-        triangle::hits(&[a, b, c], self.shear[2], t_max, false)
+        let hits = triangle::hits(&[a, b, c], self.shear[2], t_max, false);
+        let others = !V::bits(self.start.eq(self.start.like(f32::from_bits(pack.ids[lane]))));
+        triangle::Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits }
     }
 
     /// A corner in each ray's sheared coordinates; `row` is the corner's first row.

@@ -11,6 +11,8 @@ pub struct Rows {
     pub origin: [Row; 3],
     pub direction: [Row; 3],
     pub ends: Ends,
+    /// Bits of [`Ray::start`]; NaN for none.
+    pub start: Row,
     /// A bit for each ray that is traced.
     pub traced: u32,
     /// First traced ray.
@@ -27,6 +29,7 @@ impl Rows {
             self.origin[axis][lane] = ray.origin[axis];
             self.direction[axis][lane] = ray.direction[axis];
         }
+        self.start[lane] = f32::from_bits(ray.start);
     }
 
     /// Rows of these rays. Lanes without a ray, or with one that ends below 0, repeat the first. `None` if there is no
@@ -40,8 +43,14 @@ impl Rows {
         }
         let first_lane = traced.trailing_zeros() as usize;
         let first = *rays.get(first_lane)?;
-        let mut rows =
-            Self { origin: [[0.0; SIZE]; 3], direction: [[0.0; SIZE]; 3], ends: [-1.0; SIZE], traced, first };
+        let mut rows = Self {
+            origin: [[0.0; SIZE]; 3],
+            direction: [[0.0; SIZE]; 3],
+            ends: [-1.0; SIZE],
+            start: [f32::NAN; SIZE],
+            traced,
+            first,
+        };
         match <&[Ray; SIZE]>::try_from(rays) {
             Ok(rays) if traced == ALL => {
                 for (lane, ray) in rays.iter().enumerate() {
