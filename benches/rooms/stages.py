@@ -19,7 +19,7 @@ RATE = 2000  # samples a second
 
 # Words in the names of functions, from the innermost frame outwards; the first stage that has one of them counts.
 STAGES = [
-    ("glass", ["crossing", "contact", "lonely", "meeting", "touch_error", "specular", "near_shape", "encloses"]),
+    ("glass", ["crossing", "contact", "isolated", "meeting", "touch_error", "specular", "near_shape", "encloses"]),
     ("lamps: picks", ["pick_flat", "pick_by_cuts", "picks", "flat_shares", "go_to", "samples_at"]),
     ("lamps: samples", ["sample_row", "sample_each", "sample_density", "inverse_densit"]),
     ("shadow rays", ["occluded", "any_packet", "any_rows", "any_avx", "any_of_few", "single::any", "packet::any", "pool", "is_hit", "doubtful_hit", "add_seen"]),

@@ -26,7 +26,7 @@ const PAIRS: [(&str, &str, &str); 8] = [
         "a fingerprint looks up the textures that materials name",
     ),
     ("scene/document/key", "scene/document/table", "a key may hold a table, a table holds keys"),
-    ("world/geometry", "world/lonely", "the geometry keeps what is found out of it"),
+    ("world/geometry", "world/isolated", "the geometry keeps what is found out of it"),
     ("world/mesh_instance", "world/mesh_rows", "rows of hits and single hits are interpolated alike"),
 ];
 

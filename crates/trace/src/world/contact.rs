@@ -4,7 +4,7 @@
 //! error of the hit. It crosses them together, on the way from a point that is certainly before all of them to one that is
 //! certainly beyond. Rays that leave start at these two points, so that none is missed and none is hit again.
 
-use super::lonely::meets;
+use super::isolated::meets;
 use super::{Geometry, Hit, MeshInstance, Object, World};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Asked, Ray, Shape, ShapeHit, SurfacePoint};
@@ -89,7 +89,7 @@ impl World {
     #[inline]
     pub fn contact(&self, at: &Meeting, memory: &mut NearMemory, visit: impl FnMut(Near)) -> Sides {
         let margin = self.geometry.margin(at);
-        let error = if self.geometry.is_lonely(&at.hit, &at.surface, margin) {
+        let error = if self.geometry.is_isolated(&at.hit, &at.surface, margin) {
             if self.is_large_ball(at.hit.object, margin) {
                 return self.contact_of_ball(at, visit);
             }

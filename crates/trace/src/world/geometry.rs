@@ -10,7 +10,7 @@ use crate::math::DVec3;
 use crate::math::transform::Transform;
 use crate::scene::description::{self, Lowered, Scene};
 
-use super::lonely::Lonely;
+use super::isolated::Isolated;
 use super::merged::MergedTriangle;
 use super::{MergedMeshes, MeshInstance, MeshTree, Object};
 
@@ -37,7 +37,7 @@ pub struct Geometry {
     /// Error of the triangles of any mesh, with a margin for ray tests there.
     mesh_rounding: f32,
     /// Places with nothing near their surface.
-    lonely: Lonely,
+    isolated: Isolated,
     instructions: Instructions,
 }
 
@@ -86,8 +86,8 @@ impl Geometry {
         let rounding = objects.iter().filter_map(Object::mesh).map(MeshInstance::rounding);
         let mesh_rounding = rounding.fold(0.0, f32::max);
         let origin = DVec3::ZERO;
-        let lonely = Lonely::new(&boxes);
-        Ok(Self { objects, origin, tree, merged, unbounded, mesh_rounding, lonely, instructions })
+        let isolated = Isolated::new(&boxes);
+        Ok(Self { objects, origin, tree, merged, unbounded, mesh_rounding, isolated, instructions })
     }
 
     /// The objects, which an index names.
@@ -148,8 +148,8 @@ impl Geometry {
     }
 
     /// Places with nothing near their surface.
-    pub(super) fn lonely(&self) -> &Lonely {
-        &self.lonely
+    pub(super) fn isolated(&self) -> &Isolated {
+        &self.isolated
     }
 
     /// The geometry, with packets traced by other instructions.
@@ -166,22 +166,33 @@ impl Geometry {
 
     /// The nearest hit; of hits at one distance, the object of the lowest number.
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_in(self.visited(), ray, |id, segment| match self.merged(id) {
+            Some(merged) => {
+                let shape = merged.closest(segment)?;
+                let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
+                Some(Hit { shape: ShapeHit { primitive, ..shape }, object })
+            }
+            None => self.hit(id, segment),
+        })
+    }
+
+    /// The nearest hit of the objects for which `counts` is true; of hits at one distance, the object of the lowest
+    /// number.
+    pub fn closest_of(&self, ray: &Ray, counts: impl Fn(u32) -> bool) -> Option<Hit> {
+        self.closest_in(&self.tree, ray, |id, segment| if counts(id) { self.hit(id, segment) } else { None })
+    }
+
+    /// The nearest hit of the objects of a tree and of the infinite ones, given the hit of each within a segment.
+    #[inline]
+    fn closest_in(
+        &self,
+        tree: &Bvh,
+        ray: &Ray,
+        mut hit: impl FnMut(u32, &Ray) -> Option<Hit>,
+    ) -> Option<Hit> {
         let mut best: Option<Hit> = None;
-        let mut ray_f64 = ray.to_f64();
-        let mut segment = *ray;
         let mut test = |id: u32, t_max: f32| {
-            segment.t_max = t_max;
-            let hit = match self.merged(id) {
-                Some(merged) => {
-                    let shape = merged.closest(&segment)?;
-                    let MergedTriangle { object, primitive } = merged.triangle(shape.primitive);
-                    Hit { shape: ShapeHit { primitive, ..shape }, object }
-                }
-                None => {
-                    ray_f64.t_max = f64::from(t_max);
-                    Hit { shape: self.objects[id as usize].closest(&segment, &ray_f64)?, object: id }
-                }
-            };
+            let hit = hit(id, &Ray { t_max, ..*ray })?;
             let nearer = best.is_none_or(|best| (hit.shape.t, hit.object) < (best.shape.t, best.object));
             nearer.then(|| {
                 best = Some(hit);
@@ -192,8 +203,15 @@ impl Geometry {
         for &id in &self.unbounded {
             end = test(id, end).unwrap_or(end);
         }
-        self.visited().closest(&Ray { t_max: end, ..*ray }, test);
+        tree.closest(&Ray { t_max: end, ..*ray }, test);
         best
+    }
+
+    /// The nearest hit of an object.
+    #[inline]
+    fn hit(&self, id: u32, ray: &Ray) -> Option<Hit> {
+        let shape = self.objects[id as usize].closest(ray, &ray.to_f64())?;
+        Some(Hit { shape, object: id })
     }
 
     /// Whether anything but the light itself lies on the segment.

@@ -9,7 +9,7 @@ pub mod contact;
 mod emitters;
 mod few;
 pub mod geometry;
-mod lonely;
+mod isolated;
 mod lower;
 mod merged;
 mod mesh_instance;

@@ -131,11 +131,7 @@ fn warning(loaded: &Loaded, flaw: Flaw, members: &[&OpenGlass]) -> Diagnostic {
 fn names(loaded: &Loaded, members: &[&OpenGlass]) -> String {
     let name = |open: &&OpenGlass| {
         let object = &loaded.scene.objects[open.object as usize];
-        let line = || {
-            let place = loaded.diagnostic_at(object.span.clone(), Severity::Warning, "", None).place;
-            let before = place.map_or(0, |place| place.source[..place.span.start].matches('\n').count());
-            format!("line {}", before + 1)
-        };
+        let line = || format!("line {}", loaded.line(&object.span));
         object.name.as_deref().map_or_else(line, |name| format!("\"{name}\""))
     };
     // One more takes no more room than the words about it.

@@ -125,8 +125,7 @@ impl Bodies {
         Ok(bodies)
     }
 
-    /// Makes a cavity of a body, by its objects, part of the body around it. Its front is where it is: on the side of the glass's
-    /// outside.
+    /// Makes the objects of a cavity part of the body around it. Their front stays on the outside of the glass, in the cavity.
     fn join(&mut self, cavity: &[u32], around: &[u32]) {
         let objects = || cavity.iter().chain(around).map(|&object| object as usize);
         let place = objects().map(|object| self.parts[object].place).max().unwrap_or_default();

@@ -1,4 +1,4 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::contact::{Meeting, Near, NearMemory, Sides};
@@ -8,10 +8,7 @@ use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
 use crate::geometry::{Asked, Ray};
 use crate::math::{DVec3, Vec3};
-use crate::scene::description::{
-    Accel, Camera, ColorSource, EmissionSource, Integrator, Located, Material, MaterialKind, Mesh, Object,
-    Photons, PixelFilter, Render, Scene, Shadows, Shape, Tonemap,
-};
+use crate::scene::description::{Accel, Located, Mesh, Object, Scene, Shape};
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
@@ -38,45 +35,11 @@ struct Build {
 
 impl Build {
     fn new() -> Self {
-        let grey = ColorSource::Constant(Vec3::splat(0.5));
-        let matte =
-            MaterialKind::Phong { diffuse: grey.clone(), specular: grey, shininess: 1.0, ambient: None };
-        let glass = |ior| MaterialKind::Glass { ior, tint: DVec3::ONE };
-        let material =
-            |kind| Material { name: String::new(), kind, emission: EmissionSource::NONE, normal_map: None };
-        let render = Render {
-            error: 0.0,
-            width: 1,
-            height: 1,
-            samples: 1,
-            shadow_samples: 1,
-            max_depth: 8,
-            integrator: Integrator::Path,
-            shadows: Shadows::Soft,
-            clamp: 0.0,
-            ambient: Vec3::ZERO,
-            background: Vec3::ZERO,
-            filter: PixelFilter::Box,
-            exposure: 0.0,
-            tonemap: Tonemap::None,
-            accel: Accel::Bvh,
-            seed: 0,
-        };
-        let (position, look_at) = (v(0.0, -9.0, 2.0), DVec3::ZERO);
-        let camera = Camera::LookAt { position, look_at, up: DVec3::Z, fov: 40.0, aperture: 0.0, focus: 9.0 };
-        let scene = Scene {
-            render,
-            output: None,
-            camera,
-            photons: Photons { enabled: false, count: 1, radius: 0.0, bounces: 1 },
-            textures: Vec::new(),
-            materials: [matte, glass(1.5), glass(1.33)].into_iter().map(material).collect(),
-            mesh_files: Vec::new(),
-            objects: Vec::new(),
-            lights: Vec::new(),
-            environment: None,
-        };
-        Self { scene, meshes: Vec::new() }
+        let text = "[camera]\nposition = [0, -9, 2]\nlook_at = [0, 0, 0]\nup = [0, 0, 1]\n\
+                    [materials.a]\ntype = 'phong'\n[materials.b]\ntype = 'glass'\n\
+                    [materials.c]\ntype = 'glass'\nior = 1.33\n";
+        let outcome = crate::scene::parse(Arc::from(text), Path::new("scene.toml"));
+        Self { scene: outcome.scene.expect("a scene"), meshes: Vec::new() }
     }
 
     fn shape(mut self, shape: Shape, material: usize) -> Self {
@@ -234,9 +197,9 @@ fn scenes(random: &mut Random) -> Vec<(World, Vec<DVec3>)> {
 }
 
 #[test]
-fn what_is_lonely_is_what_a_search_finds_nothing_at() {
+fn what_is_isolated_is_what_a_search_finds_nothing_at() {
     let mut random = Random(1);
-    let (mut lonely, mut asked, mut touching) = (0, 0, 0);
+    let (mut isolated, mut asked, mut touching) = (0, 0, 0);
     for (number, (world, places)) in scenes(&mut random).into_iter().enumerate() {
         for round in 0..30_000 {
             // To a place, to a point between two, near one, or anywhere.
@@ -269,8 +232,8 @@ fn what_is_lonely_is_what_a_search_finds_nothing_at() {
                 (world.contact_of(&at, (&memory, error), |one| near.push(one)), near)
             };
             let searched = found(false);
-            let is_lonely = world.geometry.is_lonely(&hit, &at.surface, world.geometry.margin(&at));
-            if is_lonely {
+            let is_isolated = world.geometry.is_isolated(&hit, &at.surface, world.geometry.margin(&at));
+            if is_isolated {
                 assert_eq!(found(true), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             }
             let mut near = Vec::new();
@@ -282,10 +245,10 @@ fn what_is_lonely_is_what_a_search_finds_nothing_at() {
                 }
             };
             touching += usize::from(searched.1.iter().any(is_other));
-            lonely += usize::from(is_lonely && round % 4 == 3);
+            isolated += usize::from(is_isolated && round % 4 == 3);
             asked += usize::from(round % 4 == 3);
         }
     }
     assert!(touching > 5000, "{touching}");
-    assert!(2 * lonely > asked, "{lonely} of {asked}");
+    assert!(2 * isolated > asked, "{isolated} of {asked}");
 }

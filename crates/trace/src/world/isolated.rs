@@ -1,4 +1,4 @@
-//! Lonely places: parts of surfaces with nothing near them. A ray that crosses a surface there need not search for contacts.
+//! Isolated places: parts of surfaces with nothing near them. A ray that crosses a surface there need not search for contacts.
 //!
 //! The first ray that asks computes it, for a triangle of a mesh or for a cell of the box around a shape, and a byte each keeps the
 //! result. The result depends on the geometry alone: it does not matter which ray asks first. `World::contact` gives the same with
@@ -23,7 +23,7 @@ const PARTS: f32 = 256.0;
 /// Most of these parts.
 const MOST_PARTS: f64 = 64.0;
 
-/// Distance of the lonely part of a triangle from its edges, in margins: neighbours at an angle of 30° and more are not near.
+/// Distance of the isolated part of a triangle from its edges, in margins: neighbours at an angle of 30° and more are not near.
 const FROM_EDGES: f64 = 4.0;
 
 /// Least distance, in margins, of surfaces that are not near: the box of a margin around the point, and room for the
@@ -35,7 +35,7 @@ const CELLS: usize = 16;
 
 /// Tables of all objects.
 #[derive(Debug, Default)]
-pub(super) struct Lonely {
+pub(super) struct Isolated {
     /// The diagonal of the box around all finite objects.
     reach: f32,
     tables: Vec<OnceLock<Table>>,
@@ -51,7 +51,7 @@ struct Table {
     states: Box<[AtomicU8]>,
 }
 
-impl Lonely {
+impl Isolated {
     /// Empty tables of the objects in these boxes.
     pub fn new(boxes: &[Aabb]) -> Self {
         let all = boxes.iter().fold(Aabb::EMPTY, |all, own| all.union(*own));
@@ -107,9 +107,9 @@ enum Region {
 
 impl Geometry {
     /// Whether only the object of the hit, and of a mesh only its triangle, is within a margin of a point.
-    pub(super) fn is_lonely(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
+    pub(super) fn is_isolated(&self, hit: &Hit, surface: &SurfacePoint, margin: Vec3) -> bool {
         let object = &self.objects()[hit.object as usize];
-        let table = self.lonely().tables[hit.object as usize].get_or_init(|| self.table(object));
+        let table = self.isolated().tables[hit.object as usize].get_or_init(|| self.table(object));
         if !(margin.max_element() <= table.margin) {
             return false;
         }
@@ -134,7 +134,7 @@ impl Geometry {
 
     /// A table for an object. Rays that come from farther than four times the size of the scene have larger margins than its own.
     fn table(&self, object: &Object) -> Table {
-        let of_rays = self.mesh_rounding() + 8.0 * f32::EPSILON * self.lonely().reach;
+        let of_rays = self.mesh_rounding() + 8.0 * f32::EPSILON * self.isolated().reach;
         match object {
             Object::Mesh(mesh) => {
                 let margin = of_rays.max(4.0 * mesh.rounding());
@@ -311,5 +311,5 @@ fn are_apart(one: [DVec3; 3], other: [DVec3; 3], distance: f64) -> bool {
 }
 
 #[cfg(test)]
-#[path = "lonely_tests.rs"]
+#[path = "isolated_tests.rs"]
 mod tests;
