@@ -15,11 +15,11 @@
 //! | [`accel`] | trees over boxes and ids, where a closure tests the shape; trees of boxes (by vector instructions) and of planes over triangles |
 //! | [`sampling`] | sample streams, warps, distributions |
 //! | [`materials`] | phong and its lobes, mirror, glass; texture lookup, normal maps, Fresnel |
-//! | [`lights`] | point and area lights, directional lights and environments; a tree over many lights; photon emission |
+//! | [`lights`] | lights without extent (`delta`), from beyond the scene (`infinite`), and shapes that emit (`area`); a tree over many lights; photon emission |
 //! | [`scene`] | the scene file: parsing, validation, diagnostics, the lowered description |
 //! | [`assets`] | bytes → meshes, textures, orbiter cameras |
 //! | [`world`] | everything ready to trace, immutable |
-//! | [`film`] | sums of samples, tone mapping, pictures |
+//! | [`film`] | sums of samples, the noise that their steps forecast, tone mapping, pictures |
 //! | [`integrators`] | whitted, path, photons, views |
 //! | [`compare`] | the error of a picture against a reference |
 //! | [`output`] | encoders, atomic writes, metadata |

@@ -144,7 +144,10 @@ mod tests {
         assert!((t.inverse_point(t.point(p)) - p).length() < 1e-12);
         assert!(t.mirrors());
         assert!((t.inverse_growth() - 2.0).abs() < 1e-6, "{}", t.inverse_growth());
-        let sheared = Transform { inverse_linear: DMat3::from_cols(DVec3::X, DVec3::new(3.0, 1.0, 0.0), DVec3::Z), ..t };
+        let sheared = Transform {
+            inverse_linear: DMat3::from_cols(DVec3::X, DVec3::new(3.0, 1.0, 0.0), DVec3::Z),
+            ..t
+        };
         assert!(sheared.inverse_growth() >= 3.3027, "the greatest singular value");
         // A normal stays perpendicular to a transformed tangent.
         assert!(t.normal(DVec3::Y).dot(t.vector(DVec3::new(1.0, 0.0, 2.0))).abs() < 1e-12);

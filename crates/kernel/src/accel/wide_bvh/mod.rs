@@ -8,8 +8,8 @@ mod node;
 mod simd;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::geometry::rows::lanes;
+use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
 pub use simd::{Instructions, Loops, pages};
