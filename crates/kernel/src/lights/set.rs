@@ -181,7 +181,7 @@ impl Lights {
                 self.by_object.insert(light.object, OfObject::Whole(number));
             }
             Part::Listed => {
-                light.shape.as_mesh().into_iter().flat_map(MeshEmitter::primitives).for_each(note)
+                light.shape.as_mesh().into_iter().flat_map(MeshEmitter::primitives).for_each(note);
             }
         }
     }
