@@ -72,7 +72,7 @@ impl MeshInstance {
         self.first.map_or(Ray::NO_TRIANGLE, |first| first + triangle)
     }
 
-    /// [`MeshInstance::scene_number`] of the triangles of a row; any numbers for lanes without one.
+    /// `scene_number` of the triangles of a row; any numbers for lanes without one.
     #[inline(always)]
     pub fn scene_numbers(&self, triangles: &[u32; PACKET]) -> [u32; PACKET] {
         let Some(first) = self.first else { return [Ray::NO_TRIANGLE; PACKET] };
