@@ -10,7 +10,7 @@ use super::imports::{Module, Modules};
 const PAIRS: [(&str, &str, &str); 8] = [
     (
         "accel/bvh/build",
-        "accel/bvh/crown",
+        "accel/bvh/top_node",
         "the upper levels are built of the references that the builder sorts",
     ),
     (

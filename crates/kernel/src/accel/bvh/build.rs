@@ -1,7 +1,7 @@
 //! Builds by binned surface area (Wald, *On fast Construction of SAH-based Bounding Volume Hierarchies*, 2007), the
 //! halves of large nodes in parallel. The tree is a function of the boxes alone, not of the threads.
 
-use super::crown::Crown;
+use super::top_node::TopNode;
 use super::{Bvh, Child, LEAF_SIZE, Node, SURFACE_AREA_LEVELS};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
@@ -51,7 +51,7 @@ impl Bvh {
             .collect();
         if references.is_empty() {
             let (nodes, order) = (Vec::new(), Vec::new());
-            return Ok(Self { nodes, order, bounds: Aabb::EMPTY, depth: 0, crown: Crown::EMPTY });
+            return Ok(Self { nodes, order, bounds: Aabb::EMPTY, depth: 0, top: TopNode::EMPTY });
         }
         // A tree over n boxes has fewer than n nodes; every subtree writes into a stretch of its own.
         let mut nodes = vec![Node::EMPTY; (references.len() - 1).max(1)];
@@ -61,8 +61,8 @@ impl Bvh {
             nodes[0] = Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root; 2] };
         }
         let order = references.iter().map(|reference| reference.id).collect();
-        let crown = Crown::new((tree.bounds, tree.root), &nodes, &references);
-        Ok(Self { nodes, order, bounds: tree.bounds, depth: tree.depth.max(1), crown })
+        let top = TopNode::new((tree.bounds, tree.root), &nodes, &references);
+        Ok(Self { nodes, order, bounds: tree.bounds, depth: tree.depth.max(1), top })
     }
 }
 

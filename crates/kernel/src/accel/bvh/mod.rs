@@ -1,14 +1,14 @@
 //! A binary bounding volume hierarchy, built by binned surface area.
 
 mod build;
-mod crown;
 mod packet;
+mod top_node;
 mod traverse;
 
 use crate::geometry::Aabb;
 
-use crown::Crown;
 pub use packet::{AnyTest, ClosestTest};
+use top_node::TopNode;
 
 /// Most primitives in a leaf that the surface area heuristic may make.
 const LEAF_SIZE: usize = 4;
@@ -34,7 +34,7 @@ pub struct Bvh {
     /// Number of levels of nodes.
     depth: usize,
     /// Start of the traversal by packets.
-    crown: Crown,
+    top: TopNode,
 }
 
 /// Two children with their boxes, one cache line.

@@ -6,7 +6,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::crown::{Beam, folded};
+use super::top_node::{Beam, folded};
 use super::{Bvh, Child, DEEP_STACK};
 use crate::accel::{Ends, PACKET};
 use crate::geometry::Aabb;
@@ -110,7 +110,7 @@ fn greatest(ends: &Ends) -> f32 {
 /// Stack of a packet: a lower bound on the entry distance, the rays that may meet the child, and the child.
 type Waiting = ArrayVec<(f32, u32, Child), DEEP_STACK>;
 
-/// Subtrees of the crown still to visit, the nearest last.
+/// Subtrees of the top node still to visit, the nearest last.
 struct Near {
     entry: Row,
     order: [u8; PACKET],
@@ -142,14 +142,14 @@ impl Near {
 }
 
 impl Bvh {
-    /// Subtrees of the crown that the rays of a packet may meet, with lower bounds on their entry distances.
+    /// Subtrees of the top node that the rays of a packet may meet, with lower bounds on their entry distances.
     #[inline(always)]
-    fn crown_met(&self, slabs: &SlabPacket<'_>, ends: &Ends, traced: u32, folds: impl Folds) -> (u32, Row) {
+    fn top_met(&self, slabs: &SlabPacket<'_>, ends: &Ends, traced: u32, folds: impl Folds) -> (u32, Row) {
         if traced == 0 {
             return (0, [0.0; PACKET]);
         }
         let one = traced.trailing_zeros() as usize;
-        self.crown.met(&Beam::around(slabs.origin, &slabs.inverse, ends, one), folds)
+        self.top.met(&Beam::around(slabs.origin, &slabs.inverse, ends, one), folds)
     }
 
     /// Visits the leaves that any of at most [`PACKET`] rays may meet, near ones first. Primitives outside of the tree come
@@ -166,7 +166,7 @@ impl Bvh {
     ) {
         let slabs = SlabPacket::new(rays);
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let mut near = Near::sorted(self.crown_met(&slabs, ends, traced, folds));
+        let mut near = Near::sorted(self.top_met(&slabs, ends, traced, folds));
         let mut stack = Waiting::new();
         loop {
             for &id in leaf {
@@ -184,7 +184,7 @@ impl Bvh {
                         if entry > end {
                             return;
                         }
-                        let (bounds, child) = self.crown.subtree(i);
+                        let (bounds, child) = self.top.subtree(i);
                         (entry, met(&slabs.enter(&bounds, ends), folds), child)
                     }
                 };
@@ -229,7 +229,7 @@ impl Bvh {
         let slabs = SlabPacket::new(rays);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let (mut subtrees, _) = self.crown_met(&slabs, ends, traced, folds);
+        let (mut subtrees, _) = self.top_met(&slabs, ends, traced, folds);
         let mut stack = Waiting::new();
         loop {
             for &id in leaf {
@@ -246,7 +246,7 @@ impl Bvh {
                     Some((_, in_it, child)) => (in_it, child),
                     None if subtrees == 0 => return traced & !free,
                     None => {
-                        let (bounds, child) = self.crown.subtree(subtrees.trailing_zeros() as usize % PACKET);
+                        let (bounds, child) = self.top.subtree(subtrees.trailing_zeros() as usize % PACKET);
                         subtrees &= subtrees - 1;
                         (met(&slabs.enter(&bounds, ends), folds), child)
                     }

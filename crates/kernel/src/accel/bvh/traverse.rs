@@ -117,8 +117,8 @@ impl Bvh {
     /// Visits every box that overlaps another one.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         let mut stack = ArrayVec::<Child, DEEP_STACK>::new();
-        for subtree in lanes(self.crown.meeting(other)) {
-            stack.push(self.crown.subtree(subtree).1);
+        for subtree in lanes(self.top.meeting(other)) {
+            stack.push(self.top.subtree(subtree).1);
             while let Some(current) = stack.pop() {
                 if current.count > 0 {
                     let places = current.first as usize..(current.first + current.count) as usize;

@@ -14,9 +14,9 @@ use crate::math::Vec3;
 use crate::math::lanes::{Folds, PlainFolds, TRUE};
 
 /// Up to [`PACKET`] subtrees that hold all primitives and replace the upper levels; a small scene is entirely in the
-/// crown.
+/// top node.
 #[derive(Clone, Debug)]
-pub(super) struct Crown {
+pub(super) struct TopNode {
     min: [Row; 3],
     max: [Row; 3],
     child: [Child; PACKET],
@@ -24,8 +24,8 @@ pub(super) struct Crown {
     used: u32,
 }
 
-impl Crown {
-    /// The crown of an empty tree.
+impl TopNode {
+    /// The top node of an empty tree.
     pub(super) const EMPTY: Self = Self {
         min: [[f32::INFINITY; PACKET]; 3],
         max: [[f32::NEG_INFINITY; PACKET]; 3],
@@ -48,15 +48,15 @@ impl Crown {
             let each = |first: u32| (references[first as usize].bounds, Child { first, count: 1 });
             open.extend((first..first + count).map(each));
         }
-        let mut crown = Self::EMPTY;
+        let mut top = Self::EMPTY;
         for (i, (bounds, child)) in open.into_iter().enumerate() {
             for axis in 0..3 {
-                (crown.min[axis][i], crown.max[axis][i]) = (bounds.min[axis], bounds.max[axis]);
+                (top.min[axis][i], top.max[axis][i]) = (bounds.min[axis], bounds.max[axis]);
             }
-            crown.child[i] = child;
-            crown.used |= 1 << i;
+            top.child[i] = child;
+            top.used |= 1 << i;
         }
-        crown
+        top
     }
 
     /// One of the subtrees and its box.
@@ -182,14 +182,10 @@ fn greatest(row: &Row) -> f32 {
 }
 
 impl Bvh {
-    /// Whether the crown holds all primitives one by one.
+    /// Whether the top node holds all primitives one by one.
     #[cfg(test)]
     pub(super) fn is_flat(&self) -> bool {
-        self.crown
-            .child
-            .iter()
-            .enumerate()
-            .all(|(i, child)| self.crown.used >> i & 1 == 0 || child.count == 1)
+        self.top.child.iter().enumerate().all(|(i, child)| self.top.used >> i & 1 == 0 || child.count == 1)
     }
 }
 
