@@ -162,8 +162,8 @@ impl Film {
     }
 
     /// Error of a half of a cell after the first `count` samples of each of its pixels, a power of two: the mean over the pixels of
-    /// the variance of their luminance over luminance² + [`RELMSE_LEAST`], and the power of the samples with which it falls. `None`
-    /// for fewer than two samples, for more than the pixels have, and if the half has no pixels.
+    /// the variance of their luminance over luminance² + [`RELMSE_LEAST`](crate::math::color::RELMSE_LEAST), and the power of the
+    /// samples with which it falls. `None` for fewer than two samples, for more than the pixels have, and if the half has no pixels.
     pub fn half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.tile(number / CELLS);
         let pixels = self.half_pixel_count(number, half);
