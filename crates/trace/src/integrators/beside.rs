@@ -1,19 +1,12 @@
 //! Techniques that find the light of lamps beside light samples, and the MIS weights of light samples against them (multiple
 //! importance sampling: Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
 
-use super::light::{Arrived, add_work};
-use super::lit_row::{LitRow, Response};
-use super::medium::{Medium, absorption};
-use super::shot::Shot;
-use super::view::Measure;
-use crate::geometry::rows::{RayRows, lanes};
+use super::lit_row::LitRow;
 use crate::lights::LightRow;
 use crate::materials::Lobes;
 use crate::materials::lobes::gloss;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
-use crate::sampling::Decision;
-use crate::world::{Hit, Loops};
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 
 /// Technique that competes with light samples.
 #[derive(Clone, Copy)]
@@ -106,7 +99,7 @@ impl Others {
 
 /// The glossy lobe of a vertex alone.
 #[inline(always)]
-fn glossy_lobe(row: &LitRow, i: usize) -> Lobes {
+pub(super) fn glossy_lobe(row: &LitRow, i: usize) -> Lobes {
     Lobes { diffuse: 0.0, specular: 1.0, ..row.lobes(i) }
 }
 
@@ -120,79 +113,6 @@ fn left_of_gloss(row: &LitRow, i: usize, gloss: f32, weight: f32) -> Vec3 {
         if all > 0.0 { (diffuse + glossy * weight) / all } else { 0.0 }
     };
     Vec3::new(part(diffuse.x, glossy.x), part(diffuse.y, glossy.y), part(diffuse.z, glossy.z))
-}
-
-/// Traces rays in the glossy lobes of the vertices whose bits are set, as many as samples of a lamp: a narrow lobe finds in a
-/// wide lamp what light samples hardly ever hit.
-pub(super) struct LobeRays<'a> {
-    pub(super) shot: &'a Shot<'a>,
-    pub(super) row: &'a LitRow,
-    pub(super) sharp: u32,
-    pub(super) measure: Measure,
-    /// Media of the vertices. `None` if all are in air.
-    pub(super) media: Option<&'a [Medium]>,
-    /// Light to which the rays' light is added.
-    pub(super) arrived: Arrived,
-}
-
-impl Loops for LobeRays<'_> {
-    type Done = Arrived;
-
-    #[inline(always)]
-    fn run(self, folds: impl Folds) -> Arrived {
-        let Self { shot, row, sharp, measure, media, mut arrived } = self;
-        let count = shot.settings.render.shadow_samples;
-        let sampler = row.sampler(shot);
-        let transmittance = |i: usize, distance: f32| {
-            media.map_or(Vec3::ONE, |media| absorption(shot.world, media[row.medium[i] as usize], distance))
-        };
-        for repetition in 0..count {
-            let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);
-            let mut directions = [[0.0; LANES]; 3];
-            for i in 0..LANES {
-                set_lane(&mut directions, i, glossy_lobe(row, i).sample(1.0, [u[0][i], u[1][i]]));
-            }
-            let Response { cosines, glosses, .. } = row.response(&directions);
-            let mut sent = sharp & !row.hidden(&directions, folds);
-            let mut ends = [-1.0; LANES];
-            for i in 0..LANES {
-                let bit = 1 << i;
-                sent &= if cosines[i] > 0.0 { !0 } else { !bit };
-                ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
-            }
-            let rays = RayRows::of(row.from, directions);
-            let (hits, objects) = shot.world.geometry.closest_rows(&rays, &mut ends, sent, folds);
-            arrived.rays.scattered += u64::from(sent.count_ones());
-            if measure == Measure::Work {
-                for i in lanes(sent) {
-                    ends[i] = hits.get(i).map_or(f32::INFINITY, |hit| hit.t);
-                }
-                add_work(shot, &rays, &ends, sent, &mut arrived.light);
-                continue;
-            }
-            for i in lanes(sent) {
-                let density = glossy_lobe(row, i).density(lane(&directions, i), glosses[i]);
-                let radiance = match hits.get(i) {
-                    Some(shape) => {
-                        let hit = Hit { shape, object: objects[i] };
-                        let normal = lane(&row.normal, i);
-                        let lookups = &mut arrived.rays.lookups;
-                        let radiance = shot.lamp_radiance(&rays.ray(i), normal, &hit, density, lookups);
-                        radiance * transmittance(i, hit.shape.t)
-                    }
-                    None => {
-                        let radiance = shot.radiance_beyond(&rays.ray(i), lane(&row.normal, i), density);
-                        radiance * transmittance(i, f32::MAX)
-                    }
-                };
-                let f = lane(&row.specular, i) * glosses[i];
-                let value = f * radiance * (cosines[i] / (density * count as f32));
-                let sum = lane(&arrived.light, i) + value;
-                set_lane(&mut arrived.light, i, sum);
-            }
-        }
-        arrived
-    }
 }
 
 /// MIS weight of a sample, if the other technique's pdf is so many times as high (the power heuristic).

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::cone::Cone;
 use super::medium::{Inside, Medium};
-use super::queues::{History, PathRay};
+use super::ray::{History, PathRay};
 use super::shot::Shot;
 use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, Row};

@@ -1,7 +1,7 @@
 //! Crossings of a ray at glass: of all surfaces that touch there at once, from one medium to another.
 
 use super::medium::{Inside, Medium};
-use super::queues::PathRay;
+use super::ray::PathRay;
 use super::shot::Shot;
 use super::vertices::Vertex;
 use crate::world::{Hit, Meeting, Near, NearMemory, Sides};

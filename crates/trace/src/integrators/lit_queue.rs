@@ -2,16 +2,16 @@
 
 use arrayvec::ArrayVec;
 
-use super::beside::{LobeRays, Others};
+use super::beside::Others;
 use super::cone::Cone;
 use super::light::{Arrived, LightRays, Lighting, Sums, add_where};
 use super::lit_row::{ALL, LitRow};
+use super::lobe_rays::LobeRays;
 use super::medium::Medium;
 use super::onward::{Onward, Scattering};
-use super::photons::gather::Gathering;
 use super::picking::Picking;
 use super::pool::Pool;
-use super::queues::PathRay;
+use super::ray::PathRay;
 use super::shot::Shot;
 use super::sink::Sink;
 use super::vertices::LitVertex;
@@ -151,21 +151,21 @@ impl LitQueue {
         self.pool.clear();
     }
 
-    /// Lights all vertices and drops them; returns the rays for it. If paths go on from the vertices, the rays of the
-    /// next round are added to `next`.
+    /// Lights all vertices and drops them; returns the rays for it. `gather` gives the light at a row that another technique
+    /// brings. If paths go on from the vertices, the rays of the next round are added to `next`.
     pub fn light(
         &mut self,
         shot: &Shot<'_>,
         measure: Measure,
-        (depth, onward): (u32, Option<Onward>),
+        onward: Option<Onward>,
+        gather: impl Fn(&LitRow) -> Option<Lanes3>,
         next: &mut Vec<PathRay>,
     ) -> Result<LightRays, Cancelled> {
         let mut rays = LightRays::default();
         let mut group: ArrayVec<Sums, ROWS> = ArrayVec::new();
         let together = if shot.world.lights.selection(shot.receivers()).is_some() { ROWS } else { 1 };
         // Hard shadows are by light samples alone.
-        let by_paths =
-            onward.is_some() && (shot.photons.is_none() || shot.settings.render.shadows == Shadows::Soft);
+        let by_paths = onward.is_some() && (!shot.gathers || shot.settings.render.shadows == Shadows::Soft);
         let scatters = onward.filter(|onward| onward.leads_on);
         for first in (0..self.count).step_by(together) {
             let end = (first + together).min(self.count);
@@ -190,13 +190,8 @@ impl LitQueue {
                 let row = &self.rows[number];
                 let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
                 let mut arrived = self.arrived(asked, shot, measure, sums);
-                if let Some(maps) = shot.photons {
-                    let gathering = Gathering { shot, row, maps, depth, measure };
-                    add_where(
-                        row.used,
-                        &shot.world.geometry.instructions().run(gathering),
-                        &mut arrived.light,
-                    );
+                if let Some(gathered) = gather(row) {
+                    add_where(row.used, &gathered, &mut arrived.light);
                 }
                 rays += arrived.rays;
                 self.note(number, measure, &arrived.light);

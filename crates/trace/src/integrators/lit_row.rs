@@ -61,7 +61,7 @@ pub struct LitRow {
     pub path: [u32; LANES],
     /// Places of the paths in the round's queue.
     pub place: [u32; LANES],
-    /// [`History::carried`](super::queues::History::carried) of the paths.
+    /// [`History::carried`](super::ray::History::carried) of the paths.
     pub carried: Lanes,
     /// Indices of the glass around the vertices.
     pub medium: [u32; LANES],

@@ -22,6 +22,7 @@ mod crossing;
 mod light;
 mod lit_queue;
 mod lit_row;
+mod lobe_rays;
 mod medium;
 mod onward;
 mod packet;
@@ -29,6 +30,7 @@ mod photons;
 mod picking;
 mod pool;
 mod queues;
+mod ray;
 mod settings;
 mod shot;
 mod sink;
@@ -46,9 +48,9 @@ use crate::film::{NegativeLobes, Pixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET, World};
 pub use counters::RayCounters;
-pub use photons::{Photon, PhotonMap, PhotonMaps, PhotonPass, PhotonSettings, Photons};
+pub use photons::{Photon, PhotonMap, PhotonMaps, PhotonPass, Photons};
 use queues::Queues;
-pub use settings::RenderSettings;
+pub use settings::{PhotonSettings, RenderSettings};
 pub use shot::receivers;
 use shot::{SampleBlock, Shot};
 use sink::Sink;
@@ -91,7 +93,7 @@ pub fn render_tile_by(
     let mut counters = RayCounters::default();
     let settings = &settings.heeded();
     let photons = photons.filter(|_| settings.gathers());
-    let shot = Shot { photons, ..Shot::new(world, settings, &block, token) };
+    let shot = Shot { gathers: photons.is_some(), ..Shot::new(world, settings, &block, token) };
     let clamp = if settings.view.shown().measure() == Measure::Work { 0.0 } else { settings.render.clamp };
     let mut queues = Queues::of_thread();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
@@ -101,11 +103,11 @@ pub fn render_tile_by(
         match settings.view.shown() {
             Shown::FirstHit(number) => {
                 shot.camera_rays(slots, &mut queues.rays, negative);
-                views::shade(&shot, number, &mut queues, &mut radiance, &mut counters)?;
+                views::shade((&shot, photons), number, &mut queues, &mut radiance, &mut counters)?;
             }
             shown @ (Shown::Light(_) | Shown::Film(_) | Shown::Bounds) => {
                 let sink = Sink { measure: shown.measure(), radiance: &mut radiance, clamp };
-                wave::trace(&shot, slots.clone(), &mut queues, sink, &mut counters, negative)?;
+                wave::trace((&shot, photons), slots.clone(), &mut queues, sink, &mut counters, negative)?;
                 if shown == Shown::Bounds {
                     shot.camera_rays(slots, &mut queues.rays, |_, _| {});
                     bounds::draw(&shot, &mut queues, &mut radiance)?;

@@ -5,7 +5,7 @@ use super::beside::weight;
 use super::cone::Cone;
 use super::lit_row::{LitRow, Response};
 use super::medium::Medium;
-use super::queues::{History, PathRay};
+use super::ray::{History, PathRay};
 use super::shot::Shot;
 use super::specular::SCATTERED;
 use crate::geometry::rows::lanes;

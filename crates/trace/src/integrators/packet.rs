@@ -3,7 +3,7 @@
 
 use super::camera::CameraRow;
 use super::lit_row::{LitRow, UNBENT, bsdf_parts};
-use super::queues::PathRay;
+use super::ray::PathRay;
 use super::shot::Shot;
 use super::vertices::way_up;
 use super::view::Measure;

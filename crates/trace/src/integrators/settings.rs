@@ -1,6 +1,6 @@
 //! Settings of a render.
 
-use super::{FirstHit, Measure, PhotonSettings, Shown, View};
+use super::{FirstHit, Measure, Shown, View};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::{Integrator, Render};
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
@@ -17,6 +17,17 @@ pub struct RenderSettings {
     pub view: View,
     /// Settings of photon maps. `None` if whitted gathers no photons.
     pub photons: Option<PhotonSettings>,
+}
+
+/// Settings of photon emission and gathering.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhotonSettings {
+    /// Photons emitted in a pass.
+    pub count: u32,
+    /// Radius of the first pass's kernels; 0 to choose it by the density of photons.
+    pub radius: f32,
+    /// Most scatterings of a photon.
+    pub bounces: u32,
 }
 
 impl RenderSettings {

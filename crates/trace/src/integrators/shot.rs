@@ -4,7 +4,6 @@ use std::array;
 use std::ops::Range;
 
 use super::RenderSettings;
-use super::photons::PhotonMaps;
 use super::view::Measure;
 use crate::control::CancelToken;
 use crate::film::{Part, Pixels};
@@ -25,8 +24,8 @@ pub struct Shot<'a> {
     pub token: &'a CancelToken,
     /// Growth of a pixel's beam with the distance; 0 if nothing needs it, as without mip levels.
     pub pixel_spread: f32,
-    /// Photons of the samples. `None` if none are gathered.
-    pub photons: Option<&'a PhotonMaps>,
+    /// Whether photons are gathered at the vertices.
+    pub gathers: bool,
     /// Whether paths find a constant environment without light samples: the ray that goes on anyway is at least as good as a
     /// sample, as only occluders tell one direction from another.
     pub leaves_sky: bool,
@@ -56,12 +55,12 @@ impl<'a> Shot<'a> {
             && render.shadow_samples == 1
             && render.clamp == 0.0;
         let lobes_find_sky = is_even && world.lights.selection(Receivers::Eye).is_none();
-        Self { world, settings, block, token, pixel_spread, photons: None, leaves_sky, lobes_find_sky }
+        Self { world, settings, block, token, pixel_spread, gathers: false, leaves_sky, lobes_find_sky }
     }
 
     /// Purpose of the light samples at its vertices.
     pub fn receivers(&self) -> Receivers {
-        receivers(self.settings, self.photons.is_some())
+        receivers(self.settings, self.gathers)
     }
 
     /// The random numbers of a slot.

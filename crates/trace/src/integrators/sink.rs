@@ -1,6 +1,6 @@
 //! Accumulator of light: a view takes its parts of the light.
 
-use super::queues::PathRay;
+use super::ray::PathRay;
 use super::view::{Measure, Parts};
 use crate::math::Vec3;
 

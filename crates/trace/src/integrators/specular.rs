@@ -2,7 +2,7 @@
 
 use super::cone::Bend;
 use super::medium::{Medium, ior};
-use super::queues::PathRay;
+use super::ray::PathRay;
 use super::vertices::{Shading, Vertex};
 use crate::materials::fresnel::{dielectric, refract};
 use crate::materials::mirror::reflect;

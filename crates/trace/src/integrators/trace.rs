@@ -1,6 +1,6 @@
 //! From rays in queues to hits.
 
-use super::queues::PathRay;
+use super::ray::PathRay;
 use super::shot::Shot;
 use crate::control::Cancelled;
 use crate::geometry::Ray;

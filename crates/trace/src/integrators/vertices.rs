@@ -2,7 +2,7 @@
 
 use super::RayCounters;
 use super::cone::{Bend, Cone};
-use super::queues::PathRay;
+use super::ray::PathRay;
 use super::shot::Shot;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Asked, Ray, SurfacePoint};

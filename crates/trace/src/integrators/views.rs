@@ -1,6 +1,6 @@
 //! Pictures of numbers at the first hit. All but distances are display values in [0, 1], not radiance.
 
-use super::photons::Look;
+use super::photons::{Look, PhotonMaps};
 use super::queues::Queues;
 use super::shot::Shot;
 use super::vertices::Vertex;
@@ -12,7 +12,7 @@ use crate::math::{DVec2, Vec3};
 
 /// Shows the first hit of each camera ray in the queue; black without a hit.
 pub fn shade(
-    shot: &Shot<'_>,
+    (shot, maps): (&Shot<'_>, Option<&PhotonMaps>),
     number: FirstHit,
     queues: &mut Queues,
     radiance: &mut [Vec3],
@@ -27,7 +27,9 @@ pub fn shade(
             FirstHit::Normal => (vertex.front_shading_normal(counters) + Vec3::ONE) * 0.5,
             FirstHit::Depth => Vec3::splat(distance(shot, surface)),
             FirstHit::Barycentric => surface.barycentric,
-            FirstHit::Photons => Vec3::splat(photons(shot, path.slot, &vertex)),
+            FirstHit::Photons => {
+                Vec3::splat(maps.map_or(0.0, |maps| photons(maps, shot, path.slot, &vertex)))
+            }
             FirstHit::Uv => fraction(surface.uv).as_vec2().extend(0.0),
             FirstHit::Albedo => {
                 vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups)
@@ -39,8 +41,7 @@ pub fn shade(
 }
 
 /// Photons around a point, of the pass of a sample.
-fn photons(shot: &Shot<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
-    let Some(maps) = shot.photons else { return 0.0 };
+fn photons(maps: &PhotonMaps, shot: &Shot<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
     let look = Look { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
     let (_, _, sample) = shot.block.place(slot);
     let pass = maps.pass(sample);

@@ -9,10 +9,14 @@ use super::RayCounters;
 use super::camera::CAMERA_ROWS;
 use super::crossing::{Crossing, CrossingMemory};
 use super::lit_queue::LitQueue;
+use super::lit_row::LitRow;
 use super::medium::{Medium, absorption};
 use super::onward::Onward;
 use super::packet::{Met, Rays};
-use super::queues::{PathRay, Queues};
+use super::photons::PhotonMaps;
+use super::photons::gather::Gathering;
+use super::queues::Queues;
+use super::ray::PathRay;
 use super::shot::Shot;
 use super::sink::{Part, Sink};
 use super::specular::{Interface, interface, reflected};
@@ -42,7 +46,7 @@ const POLL_INTERVAL: usize = 256;
 /// Follows the camera rays of some slots to the end; the sink takes the light that they see. `negative` gets the slots of
 /// negative weight.
 pub fn trace(
-    shot: &Shot<'_>,
+    (shot, maps): (&Shot<'_>, Option<&PhotonMaps>),
     slots: Range<u32>,
     queues: &mut Queues,
     sink: Sink<'_>,
@@ -59,9 +63,10 @@ pub fn trace(
     let mut wave = Wave {
         depth: 0,
         is_path,
-        goes_on: is_path || shot.photons.is_some(),
+        goes_on: is_path || shot.gathers,
         onward: None,
         shot,
+        maps,
         lit,
         surfaces,
         sink,
@@ -118,6 +123,8 @@ struct Wave<'a, 's> {
     /// Continuation of paths at Phong surfaces. `None` if they end there.
     onward: Option<Onward>,
     shot: &'a Shot<'a>,
+    /// Photons of the samples. `None` if none are gathered.
+    maps: Option<&'a PhotonMaps>,
     /// Vertices of this round that wait for direct light.
     lit: &'a mut LitQueue,
     /// Surfaces at the hits of the current packet.
@@ -134,7 +141,12 @@ struct Wave<'a, 's> {
 impl Wave<'_, '_> {
     fn light(&mut self) -> Result<(), Cancelled> {
         let before = self.next.len();
-        let rays = self.lit.light(self.shot, self.sink.measure, (self.depth, self.onward), self.next)?;
+        let (shot, maps, depth, measure) = (self.shot, self.maps, self.depth, self.sink.measure);
+        let gather = |row: &LitRow| {
+            let maps = maps?;
+            Some(shot.world.geometry.instructions().run(Gathering { shot, row, maps, depth, measure }))
+        };
+        let rays = self.lit.light(shot, measure, self.onward, gather, self.next)?;
         self.counters.shadow_rays += rays.shadow;
         self.counters.texture_lookups += rays.lookups;
         self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
@@ -276,7 +288,7 @@ impl Wave<'_, '_> {
     /// Whether another technique finds the light that a path meets: photons, behind mirrors and glass, or light samples alone, for
     /// hard shadows.
     fn is_gathered(&self, path: &PathRay) -> bool {
-        let goes_on = self.shot.photons.is_some() && !path.history.is_seen;
+        let goes_on = self.shot.gathers && !path.history.is_seen;
         goes_on && !(path.history.density > 0.0 && self.shot.settings.render.shadows == Shadows::Soft)
     }
 

@@ -33,6 +33,7 @@ mod clip;
 pub(super) mod gather;
 mod kernel;
 mod map;
+mod occlusion;
 mod packed;
 mod shoot;
 mod trials;
@@ -45,7 +46,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 
 use super::medium::Inside;
-use super::settings::RenderSettings;
+use super::settings::{PhotonSettings, RenderSettings};
 use super::shot::{SampleBlock, Shot};
 use crate::control::{CancelToken, Cancelled, Progress, unwatched};
 use crate::film::Rect;
@@ -58,17 +59,6 @@ use crate::world::{Hit, World, photon_source};
 pub(super) use map::Look;
 pub use map::{Photon, PhotonMap};
 use shoot::{Shooting, Shots};
-
-/// Settings of photon emission and gathering.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PhotonSettings {
-    /// Photons emitted in a pass.
-    pub count: u32,
-    /// Radius of the first pass's kernels; 0 to choose it by the density of photons.
-    pub radius: f32,
-    /// Most scatterings of a photon.
-    pub bounces: u32,
-}
 
 /// Photons that one thread emits together.
 const CHUNK: u32 = 2048;

@@ -10,7 +10,7 @@ use super::super::lit_row::{ALL, LitRow, UNBENT};
 use super::super::medium::{Inside, Medium, absorption, ior};
 use super::super::onward::{Onward, Scattering};
 use super::super::packet::Rays;
-use super::super::queues::{History, PathRay};
+use super::super::ray::{History, PathRay};
 use super::super::shot::Shot;
 use super::super::specular::{Interface, interface, reflected};
 use super::super::vertices::{LitVertex, Vertex};

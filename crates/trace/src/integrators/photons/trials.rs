@@ -1,9 +1,10 @@
 //! Unbiased estimate, by trials, of the inverse of the part of a kernel that receives photons.
 
-use super::chosen::{Place, is_apart};
+use super::chosen::Place;
 use super::clip::{Clip, material, receives};
 use super::kernel::sample;
 use super::map::{LEAST_COSINE, Look, REACH};
+use super::occlusion::is_apart;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Asked, Ray};
 use crate::math::frame::Frame;
