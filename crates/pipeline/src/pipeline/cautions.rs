@@ -71,7 +71,7 @@ impl Cause {
 }
 
 fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
-    let RenderSettings { render, photons, .. } = &settings.heeded();
+    let RenderSettings { render, photons, .. } = &settings.effective();
     let is_path = match render.integrator {
         Integrator::Path => true,
         Integrator::Whitted => false,

@@ -32,8 +32,8 @@ pub struct PhotonSettings {
 
 impl RenderSettings {
     /// The effective settings: ignored ones have their defaults.
-    pub fn heeded(&self) -> Self {
-        let mut render = self.render.heeded();
+    pub fn effective(&self) -> Self {
+        let mut render = self.render.effective();
         let photons = match render.integrator {
             Integrator::Whitted => self.photons,
             Integrator::Path => None,
@@ -53,7 +53,7 @@ impl RenderSettings {
             Shown::Light(Measure::Radiance(parts)) => parts.are_reflected() && self.render.max_depth > 1,
             Shown::Light(Measure::Work) | Shown::Film(_) | Shown::Bounds => self.render.max_depth > 1,
         };
-        shows && self.heeded().photons.is_some()
+        shows && self.effective().photons.is_some()
     }
 
     /// The textures that pictures with these settings look up.
@@ -72,7 +72,7 @@ impl RenderSettings {
             }
             Shown::Light(Measure::Radiance(parts)) if !parts.are_reflected() => {
                 // Mirrors and glass, through which such parts are visible too, have no normal maps.
-                let ambient = parts.ambient && self.heeded().render.ambient != Vec3::ZERO;
+                let ambient = parts.ambient && self.effective().render.ambient != Vec3::ZERO;
                 Lookups { ambient, lights: parts.emitted, ..Lookups::NONE }
             }
             // Boxes are drawn over the picture.
@@ -94,7 +94,7 @@ impl RenderSettings {
 
 impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
-        let Self { render, dof, view, photons } = self.heeded();
+        let Self { render, dof, view, photons } = self.effective();
         key.add(&render, of).flag(dof).choice(view.sampled());
         // All trees give the same hits; these two show the trees themselves.
         match view.shown() {

@@ -234,7 +234,7 @@ choice! {
 
 impl Render {
     /// With the defaults in place of what its integrator ignores.
-    pub fn heeded(self) -> Self {
+    pub fn effective(self) -> Self {
         match self.integrator {
             Integrator::Whitted => Self { clamp: 0.0, ..self },
             Integrator::Path => Self { shadows: Shadows::Soft, ambient: Vec3::ZERO, ..self },
@@ -265,7 +265,7 @@ impl Fingerprinted for Render {
             // All trees give the same hits; views that show the trees add it.
             accel: _,
             seed,
-        } = self.heeded();
+        } = self.effective();
         key.f32(error);
         key.u64(width.into()).u64(height.into()).u64(shadow_samples.into()).u64(max_depth.into());
         key.choice(integrator)

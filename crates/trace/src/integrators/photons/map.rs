@@ -1,8 +1,8 @@
 //! A photon map: photons by the cells of a grid. Only a hash of the cells is kept, so that the grid may be as fine as the radius
 //! requires wherever photons are. Look-ups weigh sixteen photons at a time.
 
-use super::chosen::{Choices, Place};
 use super::packed::{self, Packed};
+use super::reservoir::{Choices, Place};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::rows::lanes;
@@ -74,7 +74,7 @@ const CELL: f32 = 2.1;
 
 /// Query for photons at a surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Look {
+pub struct GatherPoint {
     /// A point of the surface.
     pub point: Vec3,
     /// Normal of its facet on the queried side.
@@ -83,7 +83,7 @@ pub struct Look {
     pub most_depth: u32,
 }
 
-impl Look {
+impl GatherPoint {
     /// The box around a kernel of this radius.
     pub fn kernel_box(&self, radius: f32) -> Aabb {
         let half = self.half_box() * radius;
@@ -219,7 +219,12 @@ impl PhotonMap {
 
     /// The irradiance by photons around a point, W·m⁻², and one of them that two random numbers choose by its contribution.
     #[inline(always)]
-    pub fn irradiance(&self, look: &Look, random: [f32; 2], folds: impl Folds) -> (Vec3, Option<Place>) {
+    pub fn irradiance(
+        &self,
+        look: &GatherPoint,
+        random: [f32; 2],
+        folds: impl Folds,
+    ) -> (Vec3, Option<Place>) {
         let mut sums = [[0.0; LANES]; 3];
         let mut choices = Choices::new(random[0]);
         let ranges = self.ranges(look);
@@ -251,7 +256,7 @@ impl PhotonMap {
 
     /// Number of photons around a point.
     #[inline(always)]
-    pub fn count_around(&self, look: &Look, folds: impl Folds) -> u32 {
+    pub fn count_around(&self, look: &GatherPoint, folds: impl Folds) -> u32 {
         let mut count = 0;
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
@@ -266,7 +271,7 @@ impl PhotonMap {
     /// Visits the photons around a point, each with its weight: Epanechnikov's kernel, in m⁻², whose integral over the tangent
     /// plane is 1 (Silverman, *Density Estimation for Statistics and Data Analysis*, 1986).
     #[inline(always)]
-    pub fn visit(&self, look: &Look, folds: impl Folds, mut visit: impl FnMut(&Photon, f32)) {
+    pub fn visit(&self, look: &GatherPoint, folds: impl Folds, mut visit: impl FnMut(&Photon, f32)) {
         let peak = self.peak();
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
@@ -287,7 +292,7 @@ impl PhotonMap {
 
     /// Ranges that may contain photons of a kernel.
     #[inline(always)]
-    fn ranges(&self, look: &Look) -> Ranges {
+    fn ranges(&self, look: &GatherPoint) -> Ranges {
         let mut ranges = Ranges { of: [[0; 2]; 8], count: 0 };
         if self.count == 0 {
             return ranges;
@@ -316,8 +321,14 @@ impl PhotonMap {
     /// Weights of the photons of a block that are in a range and in a kernel, given its value in the middle. `None` if there are no
     /// such photons.
     #[inline(always)]
-    fn weights(&self, look: &Look, range: [u32; 2], number: usize, folds: impl Folds) -> Option<Lanes> {
-        let Look { point, normal, most_depth } = *look;
+    fn weights(
+        &self,
+        look: &GatherPoint,
+        range: [u32; 2],
+        number: usize,
+        folds: impl Folds,
+    ) -> Option<Lanes> {
+        let GatherPoint { point, normal, most_depth } = *look;
         let block = &self.blocks[number];
         let radius_squared = self.radius * self.radius;
         let (reach, share) = (REACH * self.radius, 1.0 / radius_squared);
@@ -455,9 +466,13 @@ mod tests {
                         None => place(&mut next),
                     };
                     let mut found = Vec::new();
-                    map.visit(&Look { point, normal, most_depth: 1 }, PlainFolds, |photon, density| {
-                        found.push((photon.point.to_array(), density));
-                    });
+                    map.visit(
+                        &GatherPoint { point, normal, most_depth: 1 },
+                        PlainFolds,
+                        |photon, density| {
+                            found.push((photon.point.to_array(), density));
+                        },
+                    );
                     let near = |photon: &&Photon| {
                         let way = photon.point - point;
                         let above = way.dot(normal);
@@ -493,7 +508,7 @@ mod tests {
         let map = PhotonMap::new(&photons, 0.4, &CancelToken::new()).expect("nobody cancels");
         let sum = |most_depth: u32, normal: Vec3| {
             let mut sum = 0.0;
-            let look = Look { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
+            let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
             map.visit(&look, PlainFolds, |_, density| sum += density * step * step);
             let flux = f64::from(map.irradiance(&look, [0.5; 2], PlainFolds).0.x * step * step);
             assert!((flux - f64::from(sum)).abs() < 1e-4, "{flux} is not {sum}");

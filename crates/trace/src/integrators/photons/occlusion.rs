@@ -1,7 +1,7 @@
 //! Occlusion between a point and a photon of its kernel.
 
-use super::chosen::Place;
-use super::map::Look;
+use super::map::GatherPoint;
+use super::reservoir::Place;
 use crate::geometry::Ray;
 use crate::lights::Source;
 use crate::world::Geometry;
@@ -17,7 +17,7 @@ const NEAR: f32 = 1e-3;
 
 /// Whether something is between a point and a photon of its kernel: on the way above the surface, or, if one of them lacks that
 /// much room above it, on the way close to the surface.
-pub fn is_apart(geometry: &Geometry, look: &Look, photon: &Place, radius: f32) -> bool {
+pub fn is_occluded(geometry: &Geometry, look: &GatherPoint, photon: &Place, radius: f32) -> bool {
     if (photon.point - look.point).length_squared() < (NEAR * radius) * (NEAR * radius) {
         return false;
     }

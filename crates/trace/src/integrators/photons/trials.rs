@@ -1,10 +1,10 @@
 //! Unbiased estimate, by trials, of the inverse of the part of a kernel that receives photons.
 
-use super::chosen::Place;
 use super::clip::{Clip, material, receives};
 use super::kernel::sample;
-use super::map::{LEAST_COSINE, Look, REACH};
-use super::occlusion::is_apart;
+use super::map::{GatherPoint, LEAST_COSINE, REACH};
+use super::occlusion::is_occluded;
+use super::reservoir::Place;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Asked, Ray};
 use crate::math::frame::Frame;
@@ -26,7 +26,7 @@ const LAYERS: usize = 8;
 #[inline(never)]
 pub fn inverse_part(
     world: &World,
-    look: &Look,
+    look: &GatherPoint,
     radius: f32,
     clip: Clip,
     mut pair: impl FnMut(u32) -> Vec2,
@@ -65,7 +65,7 @@ fn mean_trials(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
 }
 
 /// Whether a place in the tangent plane has a surface above or below it that may hold photons of the kernel, with nothing between.
-fn is_reached(world: &World, look: &Look, place: Vec3, radius: f32) -> bool {
+fn is_reached(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bool {
     let above = REACH * radius * look.normal;
     let end = place - above;
     let mut start = place + above;
@@ -80,7 +80,7 @@ fn is_reached(world: &World, look: &Look, place: Vec3, radius: f32) -> bool {
         let photon = Place { point: surface.point, normal };
         if cosine.abs() > LEAST_COSINE
             && receives(material(world, hit.object, hit.shape.primitive))
-            && !is_apart(&world.geometry, look, &photon, radius)
+            && !is_occluded(&world.geometry, look, &photon, radius)
         {
             return true;
         }

@@ -2,8 +2,8 @@
 
 use super::cone::Cone;
 use super::medium::Medium;
-use super::view::Ways;
 use crate::geometry::Ray;
+use crate::integrators::view::Ways;
 use crate::math::Vec3;
 
 /// A path's ray.
@@ -20,48 +20,48 @@ pub struct PathRay {
     /// The glass around it.
     pub medium: Medium,
     /// Events before this ray.
-    pub history: History,
+    pub state: PathState,
     /// The beam around it.
     pub cone: Cone,
 }
 
 /// State of a path, beside its ray, that determines the weight of the light which it meets.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct History {
+pub struct PathState {
     /// Pdf in sr⁻¹ of the direction at the last vertex's lobes. 0 after the camera, a mirror or glass, and if the path passed
     /// through glass since: then no light sample finds what it meets.
     pub density: f32,
     /// The normal at the last vertex, by which its light samples went, if there is a pdf.
     pub normal: Vec3,
     /// Throughput for Russian roulette: the largest component, of all lobes, whatever the view shows.
-    pub carried: f32,
+    pub roulette_throughput: f32,
     /// Whether only the camera, mirrors and glass come before.
-    pub is_seen: bool,
+    pub only_specular_before: bool,
     /// Whether exactly one diffuse or glossy surface comes before.
-    pub is_step: bool,
+    pub one_diffuse_before: bool,
     /// Whether the last such surface had a glossy lobe.
-    pub is_from_gloss: bool,
+    pub is_after_gloss: bool,
 }
 
-impl History {
+impl PathState {
     /// The state of camera rays.
     pub const CAMERA: Self = Self {
         density: 0.0,
         normal: Vec3::ZERO,
-        carried: 1.0,
-        is_seen: true,
-        is_step: false,
-        is_from_gloss: false,
+        roulette_throughput: 1.0,
+        only_specular_before: true,
+        one_diffuse_before: false,
+        is_after_gloss: false,
     };
 
     /// The state after a δ lobe that keeps this part of the radiance.
     pub fn mirrored(self, part: f32) -> Self {
-        Self { density: 0.0, carried: self.carried * part, ..self }
+        Self { density: 0.0, roulette_throughput: self.roulette_throughput * part, ..self }
     }
 
     /// Whether the view shows light that reaches the first diffuse or glossy surface by this path.
-    pub fn shows(&self, ways: Ways) -> bool {
-        match (self.is_step, self.density > 0.0) {
+    pub fn contributes(&self, ways: Ways) -> bool {
+        match (self.one_diffuse_before, self.density > 0.0) {
             (true, true) => ways.direct,
             (true, false) => ways.caustic,
             (false, _) => ways.indirect,
@@ -98,7 +98,7 @@ mod tests {
             slot: 0,
             path,
             medium: Medium::default(),
-            history: History::CAMERA,
+            state: PathState::CAMERA,
             cone: Cone::default(),
         }
     }
@@ -106,15 +106,16 @@ mod tests {
     #[test]
     fn the_paths_of_a_sample_have_numbers_of_their_own() {
         // Follow all paths of 12 splits, and one that is always reflected or always refracted.
-        let (mut round, mut seen) = (vec![CAMERA_PATH + 1], HashSet::from([CAMERA_PATH, CAMERA_PATH + 1]));
+        let (mut round, mut only_specular_before) =
+            (vec![CAMERA_PATH + 1], HashSet::from([CAMERA_PATH, CAMERA_PATH + 1]));
         for _ in 0..12 {
             round = round.iter().flat_map(|&path| [1, 2].map(|way| numbered(path).next_path(way))).collect();
-            assert!(round.iter().all(|&path| seen.insert(path)));
+            assert!(round.iter().all(|&path| only_specular_before.insert(path)));
         }
         for way in [1, 2] {
-            let (mut path, mut seen) = (CAMERA_PATH + 1, HashSet::from([CAMERA_PATH]));
+            let (mut path, mut only_specular_before) = (CAMERA_PATH + 1, HashSet::from([CAMERA_PATH]));
             for length in 0..10_000 {
-                assert!(seen.insert(path), "way {way} comes back to itself after {length}");
+                assert!(only_specular_before.insert(path), "way {way} comes back to itself after {length}");
                 path = numbered(path).next_path(way);
             }
         }

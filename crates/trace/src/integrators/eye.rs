@@ -6,21 +6,22 @@
 use std::ops::Range;
 
 use super::RayCounters;
-use super::camera::CAMERA_ROWS;
-use super::crossing::{Crossing, CrossingMemory};
-use super::lit_queue::LitQueue;
-use super::lit_row::LitRow;
-use super::medium::{Medium, absorption};
-use super::onward::Onward;
-use super::packet::{Met, Rays};
+use super::direct::queue::DirectLightQueue;
+use super::memory::Memory;
 use super::photons::PhotonMaps;
 use super::photons::gather::Gathering;
-use super::queues::Queues;
-use super::ray::PathRay;
-use super::shot::Shot;
-use super::sink::{Part, Sink};
-use super::specular::{Interface, interface, reflected};
-use super::vertices::{LitVertex, Vertex};
+use super::transport::accumulator::{Accumulator, Part};
+use super::transport::batch::VertexBatch;
+use super::transport::camera::CAMERA_ROWS;
+use super::transport::crossing::{Crossing, CrossingMemory};
+use super::transport::interface::{Interface, interface, reflected};
+use super::transport::medium::{Medium, absorption};
+use super::transport::packet::{PacketHits, PacketSource};
+use super::transport::ray::PathRay;
+use super::transport::scatter::Continuation;
+use super::transport::scratch::Scratch;
+use super::transport::tile::TileContext;
+use super::transport::vertex::{ShadingVertex, Vertex};
 use super::view::Measure;
 use crate::control::Cancelled;
 use crate::geometry::rows::{RayRows, lanes};
@@ -46,90 +47,94 @@ const POLL_INTERVAL: usize = 256;
 /// Follows the camera rays of some slots to the end; the sink takes the light that they see. `negative` gets the slots of
 /// negative weight.
 pub fn trace(
-    (shot, maps): (&Shot<'_>, Option<&PhotonMaps>),
+    (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
     slots: Range<u32>,
-    queues: &mut Queues,
-    sink: Sink<'_>,
+    memory: &mut Memory,
+    accumulator: Accumulator<'_>,
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let Queues { rays, next, lit, surfaces, crossing, camera, hits, by_object } = queues;
+    let Memory { scratch, direct } = memory;
+    let Scratch { rays, next, surfaces, crossing, camera, hits, by_object } = scratch;
     next.clear();
-    let is_path = match shot.settings.render.integrator {
+    let is_path = match tile.settings.render.integrator {
         Integrator::Whitted => false,
         // The share of the lamps' light that arrives is measured at the first visible surface.
-        Integrator::Path => sink.measure != Measure::ArrivingShare,
+        Integrator::Path => accumulator.measure != Measure::ArrivingShare,
     };
-    let mut wave = Wave {
+    let mut wavefront = Wavefront {
         depth: 0,
         is_path,
-        goes_on: is_path || shot.gathers,
-        onward: None,
-        shot,
+        goes_on: is_path || tile.gathers,
+        continuation: None,
+        tile,
         maps,
-        lit,
+        direct,
         surfaces,
-        sink,
+        accumulator,
         next,
         crossing,
         place: 0,
         counters,
     };
-    wave.begin_round();
-    wave.lit.expect(slots.len(), shot.pixel_spread > 0.0);
+    wavefront.begin_round();
+    wavefront.direct.expect(slots.len(), tile.pixel_spread > 0.0);
     // Make and shade the camera rays, which are the first round.
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
-        shot.camera_rows(start..slots.end, camera);
+        tile.camera_rows(start..slots.end, camera);
         for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
             negative(first, row.negative);
             let count = (slots.end - first).min(PACKET as u32) as usize;
-            wave.shade_packet(Rays::Camera(row, first, count, first - slots.start))?;
+            wavefront.shade_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
         }
     }
     // Light their vertices, and give the light to the sink.
-    wave.light()?;
-    wave.lit.settle_run(slots.start, &mut wave.sink);
-    wave.next_round(rays);
+    wavefront.light()?;
+    wavefront.direct.settle_run(slots.start, &mut wavefront.accumulator);
+    wavefront.next_round(rays);
     // Follow the rays that go on, round by round.
     while !rays.is_empty() {
-        wave.lit.expect(rays.len(), shot.pixel_spread > 0.0);
-        if wave.goes_on {
+        wavefront.direct.expect(rays.len(), tile.pixel_spread > 0.0);
+        if wavefront.goes_on {
             // Find all hits first, so that packets are of one object.
-            shot.closest_hits(rays, hits)?;
+            tile.closest_hits(rays, hits)?;
             by_object.sort(hits);
             for places in by_object.places().chunks(PACKET) {
-                wave.shade_packet(Rays::Traced(rays, hits, places))?;
+                wavefront.shade_packet(PacketSource::Traced(rays, hits, places))?;
             }
         } else {
             for (paths, first) in rays.chunks(PACKET).zip((0..).step_by(PACKET)) {
-                wave.shade_packet(Rays::Paths(paths, first))?;
+                wavefront.shade_packet(PacketSource::Paths(paths, first))?;
             }
         }
         let slots: &[PathRay] = rays;
-        wave.light()?;
-        wave.lit.settle(|place| (slots[place].slot, slots[place].history.is_seen), &mut wave.sink);
-        wave.next_round(rays);
+        wavefront.light()?;
+        wavefront.direct.settle(
+            |place| (slots[place].slot, slots[place].state.only_specular_before),
+            &mut wavefront.accumulator,
+        );
+        wavefront.next_round(rays);
     }
     Ok(())
 }
 
 /// One round of all rays of a batch.
-struct Wave<'a, 's> {
+struct Wavefront<'a, 's> {
     /// Number of scatterings before the hits of this round.
     depth: u32,
     is_path: bool,
     /// Whether rays go on from diffuse and glossy surfaces: in path, and in whitted to find what photons do not bring.
     goes_on: bool,
     /// Continuation of paths at Phong surfaces. `None` if they end there.
-    onward: Option<Onward>,
-    shot: &'a Shot<'a>,
+    continuation: Option<Continuation>,
+    tile: &'a TileContext<'a>,
     /// Photons of the samples. `None` if none are gathered.
     maps: Option<&'a PhotonMaps>,
     /// Vertices of this round that wait for direct light.
-    lit: &'a mut LitQueue,
+    direct: &'a mut DirectLightQueue,
     /// Surfaces at the hits of the current packet.
     surfaces: &'a mut SurfaceRow,
-    sink: Sink<'s>,
+    accumulator: Accumulator<'s>,
     /// Rays of the next round.
     next: &'a mut Vec<PathRay>,
     /// Place of the current path in the round's queue.
@@ -138,15 +143,15 @@ struct Wave<'a, 's> {
     counters: &'a mut RayCounters,
 }
 
-impl Wave<'_, '_> {
+impl Wavefront<'_, '_> {
     fn light(&mut self) -> Result<(), Cancelled> {
         let before = self.next.len();
-        let (shot, maps, depth, measure) = (self.shot, self.maps, self.depth, self.sink.measure);
-        let gather = |row: &LitRow| {
+        let (tile, maps, depth, measure) = (self.tile, self.maps, self.depth, self.accumulator.measure);
+        let gather = |row: &VertexBatch| {
             let maps = maps?;
-            Some(shot.world.geometry.instructions().run(Gathering { shot, row, maps, depth, measure }))
+            Some(tile.world.geometry.instructions().run(Gathering { tile, row, maps, depth, measure }))
         };
-        let rays = self.lit.light(shot, measure, self.onward, gather, self.next)?;
+        let rays = self.direct.light(tile, measure, self.continuation, gather, self.next)?;
         self.counters.shadow_rays += rays.shadow;
         self.counters.texture_lookups += rays.lookups;
         self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
@@ -154,7 +159,7 @@ impl Wave<'_, '_> {
     }
 
     fn begin_round(&mut self) {
-        self.onward = self.goes_on.then(|| Onward::new(self.shot, self.depth));
+        self.continuation = self.goes_on.then(|| Continuation::new(self.tile, self.depth));
     }
 
     /// Makes the found rays those of the next round; the old ones stay as memory.
@@ -166,60 +171,63 @@ impl Wave<'_, '_> {
     }
 
     /// Shades the hits of a packet's rays.
-    fn shade_packet(&mut self, rays: Rays<'_>) -> Result<(), Cancelled> {
-        let shot = self.shot;
+    fn shade_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
+        let tile = self.tile;
         if (rays.place(0) as usize).is_multiple_of(POLL_INTERVAL) {
-            shot.token.check()?;
+            tile.token.check()?;
         }
-        let are_lit = self.depth < shot.settings.render.max_depth && self.sink.takes_reflected();
-        let met = shot.meet(rays, self.sink.measure, are_lit, (self.lit.spare(), self.surfaces));
-        self.counters.texture_lookups += met.lookups;
+        let are_lit = self.depth < tile.settings.render.max_depth && self.accumulator.takes_reflected();
+        let packet =
+            tile.intersect(rays, self.accumulator.measure, are_lit, (self.direct.spare(), self.surfaces));
+        self.counters.texture_lookups += packet.lookups;
         // Count the work of the rays, if the view shows it.
-        if self.sink.measure == Measure::Work {
+        if self.accumulator.measure == Measure::Work {
             for lane in 0..rays.count() {
-                self.add_work(&met.path(shot, &rays, lane), met.hit(lane));
+                self.add_work(&packet.path(tile, &rays, lane), packet.hit(lane));
             }
         }
         // Queue the plain vertices for direct light.
         if are_lit {
-            self.lit.keep();
-            if shot.pixel_spread > 0.0 {
-                for (lane, hit) in lanes(met.plain).filter_map(|lane| Some((lane, met.hit(lane)?))) {
-                    let cone = met.path(shot, &rays, lane).cone.after(hit.shape.t);
-                    self.lit.note_cone(rays.place(lane), cone);
+            self.direct.keep();
+            if tile.pixel_spread > 0.0 {
+                for (lane, hit) in lanes(packet.plain).filter_map(|lane| Some((lane, packet.hit(lane)?))) {
+                    let cone = packet.path(tile, &rays, lane).cone.after(hit.shape.t);
+                    self.direct.note_cone(rays.place(lane), cone);
                 }
             }
         }
         // Select the rays that find light by themselves, and those that need shading one by one.
-        let render = &shot.settings.render;
+        let render = &tile.settings.render;
         let all = ((1_u64 << rays.count()) - 1) as u32;
-        let plain = if render.ambient == Vec3::ZERO { met.shining } else { met.plain };
-        let is_dark_beyond = render.background == Vec3::ZERO && !shot.world.lights.are_beyond();
-        let beyond = if is_dark_beyond { 0 } else { all & !met.any };
-        let mut wanted = met.any & !met.plain;
+        let plain = if render.ambient == Vec3::ZERO { packet.shining } else { packet.plain };
+        let is_dark_beyond = render.background == Vec3::ZERO && !tile.world.lights.are_beyond();
+        let beyond = if is_dark_beyond { 0 } else { all & !packet.any };
+        let mut wanted = packet.any & !packet.plain;
         match rays {
-            Rays::Camera(row, first, ..) => self.add_seen(&row.rays, first, &met, (plain, beyond)),
-            Rays::Paths(..) | Rays::Traced(..) => wanted |= plain | beyond,
+            PacketSource::Camera(row, first, ..) => self.add_seen(&row.rays, first, &packet, (plain, beyond)),
+            PacketSource::Paths(..) | PacketSource::Traced(..) => wanted |= plain | beyond,
         }
         // Go in the order of the paths, as the contributions to a sample are added in that order.
         for lane in lanes(wanted) {
-            let (of_camera, bit) = (rays.camera_path(shot, lane), 1 << lane);
+            let (of_camera, bit) = (rays.camera_path(tile, lane), 1 << lane);
             let Some(path) = of_camera.as_ref().or_else(|| rays.of_queue(lane)) else { continue };
-            match met.hit(lane) {
-                Some(hit) if met.plain & bit != 0 => self.add_own_light(path, &hit, met.shining & bit != 0),
+            match packet.hit(lane) {
+                Some(hit) if packet.plain & bit != 0 => {
+                    self.add_own_light(path, &hit, packet.shining & bit != 0)
+                }
                 Some(hit) => {
                     self.place = rays.place(lane);
-                    let surface = met.surface(self.surfaces, lane);
+                    let surface = packet.surface(self.surfaces, lane);
                     self.shade(*path, hit, surface);
                 }
                 None => {
-                    let sky = shot.world.lights.environment().map(|_| met.sky(lane));
-                    self.add_beyond(path, shot.light_beyond_with(sky, path));
+                    let sky = tile.world.lights.environment().map(|_| packet.sky(lane));
+                    self.add_beyond(path, tile.light_beyond_with(sky, path));
                 }
             }
         }
         // Light the queued vertices while their data are in the cache.
-        if self.lit.is_full() {
+        if self.direct.is_full() {
             self.light()?;
         }
         Ok(())
@@ -228,48 +236,48 @@ impl Wave<'_, '_> {
     /// Adds the work of a path's ray up to its hit.
     fn add_work(&mut self, path: &PathRay, hit: Option<Hit>) {
         let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
-        self.sink.add_work(path.slot, self.shot.world.geometry.work(&Ray { t_max, ..path.ray }));
+        self.accumulator.add_work(path.slot, self.tile.world.geometry.work(&Ray { t_max, ..path.ray }));
     }
 
     /// Adds the emission that camera rays see: of plain surfaces, and from beyond everything. It is all that the sample of each ray
     /// gets before lamps.
-    fn add_seen(&mut self, rays: &RayRows, first: u32, met: &Met, (plain, beyond): (u32, u32)) {
-        let shot = self.shot;
-        let render = &shot.settings.render;
+    fn add_seen(&mut self, rays: &RayRows, first: u32, packet: &PacketHits, (plain, beyond): (u32, u32)) {
+        let tile = self.tile;
+        let render = &tile.settings.render;
         let mut known = None;
         for lane in lanes(plain) {
-            let object = met.object(lane);
+            let object = packet.object(lane);
             if known.is_none_or(|(own, _)| own != object) {
-                known = shot.plain_phong(object).map(|plain| (object, plain));
+                known = tile.plain_phong(object).map(|plain| (object, plain));
             }
             let Some((_, (material, phong))) = known else { continue };
             let slot = first + lane as u32;
-            if met.shining & 1 << lane != 0 {
-                self.sink.add(slot, Part::Emitted, material.emission.scale);
+            if packet.shining & 1 << lane != 0 {
+                self.accumulator.add(slot, Part::Emitted, material.emission.scale);
             }
             if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
                 let Some(bsdf) = phong.constant() else { continue };
-                self.sink.add(slot, Part::Ambient, render.ambient * bsdf.ambient);
+                self.accumulator.add(slot, Part::Ambient, render.ambient * bsdf.ambient);
             }
         }
-        let lights = &shot.world.lights;
+        let lights = &tile.world.lights;
         for lane in lanes(beyond) {
-            let sky = lights.environment().map(|_| met.sky(lane));
+            let sky = lights.environment().map(|_| packet.sky(lane));
             let beyond = lights.beyond_with(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
-            self.sink.add(first + lane as u32, Part::Emitted, render.background + beyond);
+            self.accumulator.add(first + lane as u32, Part::Emitted, render.background + beyond);
         }
     }
 
     /// Adds the emission and ambient light of a plain surface.
     fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
-        let Some((material, phong)) = self.shot.plain_phong(hit.object) else { return };
+        let Some((material, phong)) = self.tile.plain_phong(hit.object) else { return };
         if is_shining {
-            self.add_emitted(path, material.emission.scale, self.shot.lamp_weight(path, hit));
+            self.add_emitted(path, material.emission.scale, self.tile.lamp_weight(path, hit));
         }
-        let render = &self.shot.settings.render;
+        let render = &self.tile.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
             let Some(bsdf) = phong.constant() else { return };
-            self.sink.add(path.slot, Part::Ambient, path.throughput * render.ambient * bsdf.ambient);
+            self.accumulator.add(path.slot, Part::Ambient, path.throughput * render.ambient * bsdf.ambient);
         }
     }
 
@@ -278,57 +286,57 @@ impl Wave<'_, '_> {
         if self.is_gathered(path) {
             return;
         }
-        if path.history.is_seen {
-            self.sink.add(path.slot, Part::Emitted, path.throughput * radiance);
+        if path.state.only_specular_before {
+            self.accumulator.add(path.slot, Part::Emitted, path.throughput * radiance);
         } else {
-            self.sink.add_met(path, path.throughput * radiance * weight);
+            self.accumulator.add_met(path, path.throughput * radiance * weight);
         }
     }
 
     /// Whether another technique finds the light that a path meets: photons, behind mirrors and glass, or light samples alone, for
     /// hard shadows.
     fn is_gathered(&self, path: &PathRay) -> bool {
-        let goes_on = self.shot.gathers && !path.history.is_seen;
-        goes_on && !(path.history.density > 0.0 && self.shot.settings.render.shadows == Shadows::Soft)
+        let goes_on = self.tile.gathers && !path.state.only_specular_before;
+        goes_on && !(path.state.density > 0.0 && self.tile.settings.render.shadows == Shadows::Soft)
     }
 
     fn leave(&mut self, path: &PathRay) {
-        self.add_beyond(path, self.shot.light_beyond(path));
+        self.add_beyond(path, self.tile.light_beyond(path));
     }
 
     /// Adds the light that a path meets beyond everything; the background illuminates nothing.
     fn add_beyond(&mut self, path: &PathRay, beyond: Vec3) {
-        if path.history.is_seen {
-            let background = self.shot.settings.render.background;
-            self.sink.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
+        if path.state.only_specular_before {
+            let background = self.tile.settings.render.background;
+            self.accumulator.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
         } else if beyond != Vec3::ZERO && !self.is_gathered(path) {
-            self.sink.add_met(path, path.throughput * beyond);
+            self.accumulator.add_met(path, path.throughput * beyond);
         }
     }
 
     /// Shades the first surface that is more than a change between parts of one glass. `surface` is that of the hit, if it is
     /// known.
     fn shade(&mut self, mut path: PathRay, mut hit: Hit, mut surface: Option<SurfacePoint>) {
-        let shot = self.shot;
+        let tile = self.tile;
         for _ in 0..MOST_HIDDEN {
             let vertex = match surface.take() {
-                Some(surface) => Vertex::on(shot, &path, &hit, surface),
-                None => Vertex::to_shade(shot, &path, &hit),
+                Some(surface) => Vertex::on(tile, &path, &hit, surface),
+                None => Vertex::to_shade(tile, &path, &hit),
             };
             // Shade an opaque surface.
             if vertex.material.bsdf.glass().is_none() {
-                let weight = if vertex.emits() { shot.lamp_weight(&path, &hit) } else { 1.0 };
-                let after = shot.without_open(path.medium);
+                let weight = if vertex.emits() { tile.lamp_weight(&path, &hit) } else { 1.0 };
+                let after = tile.without_open(path.medium);
                 return self.shade_surface(path, &vertex, (hit.shape.t, after), weight);
             }
             // At glass, find all surfaces that touch here.
             let Crossing { sides, arrived, near, far, opaque } =
-                shot.crossing(&path, &vertex, &hit, self.crossing);
+                tile.crossing(&path, &vertex, &hit, self.crossing);
             path.medium = arrived;
             if let Some(touching) = opaque {
-                let vertex = Vertex::touching(shot, &path, (sides, &touching), hit.shape.t);
+                let vertex = Vertex::touching(tile, &path, (sides, &touching), hit.shape.t);
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
-                let weight = if vertex.emits() { shot.touching_lamp_weight(&path, &touched) } else { 1.0 };
+                let weight = if vertex.emits() { tile.touching_lamp_weight(&path, &touched) } else { 1.0 };
                 return self.shade_surface(path, &vertex, (hit.shape.t, near), weight);
             }
             // Reflect and refract at a change of glass.
@@ -336,12 +344,12 @@ impl Wave<'_, '_> {
                 return self.shade_glass(path, &vertex.between(sides), [near, far], hit.shape.t);
             }
             // Pass on, as nothing changes here.
-            path.throughput *= absorption(shot.world, arrived, hit.shape.t);
+            path.throughput *= absorption(tile.world, arrived, hit.shape.t);
             (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
-            path.history = path.history.hidden();
+            path.state = path.state.hidden();
             path.cone = path.cone.after(hit.shape.t);
-            let next = shot.world.geometry.closest(&path.ray);
-            if self.sink.measure == Measure::Work {
+            let next = tile.world.geometry.closest(&path.ray);
+            if self.accumulator.measure == Measure::Work {
                 self.add_work(&path, next);
             }
             match next {
@@ -349,7 +357,7 @@ impl Wave<'_, '_> {
                 None => return self.leave(&path),
             }
         }
-        if self.depth < shot.settings.render.max_depth {
+        if self.depth < tile.settings.render.max_depth {
             self.next.push(path);
         }
     }
@@ -363,14 +371,14 @@ impl Wave<'_, '_> {
         (distance, after): (f32, Medium),
         weight: f32,
     ) -> bool {
-        let shot = self.shot;
-        path.throughput *= absorption(shot.world, path.medium, distance);
+        let tile = self.tile;
+        path.throughput *= absorption(tile.world, path.medium, distance);
         path.medium = after;
         if vertex.emits() {
             let radiance = vertex.emitted(path, self.counters);
             self.add_emitted(path, radiance, weight);
         }
-        self.depth < shot.settings.render.max_depth
+        self.depth < tile.settings.render.max_depth
     }
 
     fn shade_surface(&mut self, mut path: PathRay, vertex: &Vertex<'_>, way: (f32, Medium), weight: f32) {
@@ -386,27 +394,28 @@ impl Wave<'_, '_> {
 
     fn shade_phong(&mut self, path: &PathRay, vertex: &Vertex<'_>, phong: &Phong) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
-        let ambient = self.shot.settings.render.ambient;
-        let takes_ambient = ambient != Vec3::ZERO && self.sink.takes_ambient();
+        let ambient = self.tile.settings.render.ambient;
+        let takes_ambient = ambient != Vec3::ZERO && self.accumulator.takes_ambient();
         // Look up no more textures than the picture shows.
-        if !self.sink.takes_reflected() {
+        if !self.accumulator.takes_reflected() {
             if takes_ambient {
                 let reflectance = phong.ambient_at(at, lookups);
-                self.sink.add(path.slot, Part::Ambient, path.throughput * ambient * reflectance);
+                self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * reflectance);
             }
             return;
         }
-        let bsdf = if self.sink.measure.is_colored() { phong.at(at, lookups) } else { phong.bleached() };
+        let bsdf =
+            if self.accumulator.measure.is_colored() { phong.at(at, lookups) } else { phong.bleached() };
         if takes_ambient {
-            self.sink.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient);
+            self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient);
         }
         if bsdf.is_black() {
             return;
         }
         let shading = vertex.shading(self.counters);
-        let lit = LitVertex { path, place: self.place, vertex, shading, bsdf };
-        let measure = if path.history.is_seen { self.sink.measure } else { Measure::ALL };
-        self.lit.push(self.shot, &lit, measure);
+        let lit = ShadingVertex { path, place: self.place, vertex, shading, bsdf };
+        let measure = if path.state.only_specular_before { self.accumulator.measure } else { Measure::ALL };
+        self.direct.push(self.tile, &lit, measure);
     }
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {
@@ -425,15 +434,15 @@ impl Wave<'_, '_> {
             return;
         }
         let shading = vertex.shading(self.counters);
-        let Interface { reflectance, refracted } = interface(self.shot.world, &path, vertex, &shading, far);
+        let Interface { reflectance, refracted } = interface(self.tile.world, &path, vertex, &shading, far);
         let mirrored = |weight: f32| reflected(&path, vertex, &shading, Vec3::splat(weight));
         let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
-        let splits = !self.is_path && path.history.is_seen;
+        let splits = !self.is_path && path.state.only_specular_before;
         if weaker >= LEAST_SPLIT && splits {
             self.push_reflected(mirrored(reflectance));
             self.push_refracted(refracted, 1.0 - reflectance);
-        } else if self.shot.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance {
+        } else if self.tile.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance {
             self.push_reflected(mirrored(1.0));
         } else {
             self.push_refracted(refracted, 1.0);
@@ -441,21 +450,23 @@ impl Wave<'_, '_> {
     }
 
     fn push_reflected(&mut self, ray: PathRay) {
-        let Some(ray) = self.spared(ray) else { return };
+        let Some(ray) = self.russian_roulette(ray) else { return };
         self.counters.reflected_rays += 1;
         self.next.push(ray);
     }
 
     fn push_refracted(&mut self, mut ray: PathRay, weight: f32) {
         ray.throughput *= weight;
-        let Some(ray) = self.spared(ray) else { return };
+        let Some(ray) = self.russian_roulette(ray) else { return };
         self.counters.refracted_rays += 1;
         self.next.push(ray);
     }
 
-    fn spared(&self, ray: PathRay) -> Option<PathRay> {
-        match self.onward {
-            Some(onward) if self.is_path || !ray.history.is_seen => onward.spared(self.shot, ray),
+    fn russian_roulette(&self, ray: PathRay) -> Option<PathRay> {
+        match self.continuation {
+            Some(continuation) if self.is_path || !ray.state.only_specular_before => {
+                continuation.russian_roulette(self.tile, ray)
+            }
             Some(_) | None => Some(ray),
         }
     }

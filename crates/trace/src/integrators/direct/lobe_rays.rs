@@ -1,12 +1,12 @@
 //! Rays in the glossy lobes of vertices that find the light of lamps beside light samples.
 
-use super::beside::glossy_lobe;
-use super::light::{Arrived, add_work};
-use super::lit_row::{LitRow, Response};
-use super::medium::{Medium, absorption};
-use super::shot::Shot;
-use super::view::Measure;
+use super::all_lights::{Arrived, add_work};
+use super::mis::glossy_lobe;
 use crate::geometry::rows::{RayRows, lanes};
+use crate::integrators::transport::batch::{Response, VertexBatch};
+use crate::integrators::transport::medium::{Medium, absorption};
+use crate::integrators::transport::tile::TileContext;
+use crate::integrators::view::Measure;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, lane, set_lane};
 use crate::sampling::Decision;
@@ -14,15 +14,15 @@ use crate::world::{Hit, Loops};
 
 /// Traces rays in the glossy lobes of the vertices whose bits are set, as many as samples of a lamp: a narrow lobe finds in a
 /// wide lamp what light samples hardly ever hit.
-pub(super) struct LobeRays<'a> {
-    pub(super) shot: &'a Shot<'a>,
-    pub(super) row: &'a LitRow,
-    pub(super) sharp: u32,
-    pub(super) measure: Measure,
+pub struct LobeRays<'a> {
+    pub tile: &'a TileContext<'a>,
+    pub row: &'a VertexBatch,
+    pub sharp: u32,
+    pub measure: Measure,
     /// Media of the vertices. `None` if all are in air.
-    pub(super) media: Option<&'a [Medium]>,
+    pub media: Option<&'a [Medium]>,
     /// Light to which the rays' light is added.
-    pub(super) arrived: Arrived,
+    pub arrived: Arrived,
 }
 
 impl Loops for LobeRays<'_> {
@@ -30,11 +30,11 @@ impl Loops for LobeRays<'_> {
 
     #[inline(always)]
     fn run(self, folds: impl Folds) -> Arrived {
-        let Self { shot, row, sharp, measure, media, mut arrived } = self;
-        let count = shot.settings.render.shadow_samples;
-        let sampler = row.sampler(shot);
+        let Self { tile, row, sharp, measure, media, mut arrived } = self;
+        let count = tile.settings.render.shadow_samples;
+        let sampler = row.sampler(tile);
         let transmittance = |i: usize, distance: f32| {
-            media.map_or(Vec3::ONE, |media| absorption(shot.world, media[row.medium[i] as usize], distance))
+            media.map_or(Vec3::ONE, |media| absorption(tile.world, media[row.medium[i] as usize], distance))
         };
         for repetition in 0..count {
             let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);
@@ -51,13 +51,13 @@ impl Loops for LobeRays<'_> {
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
             let rays = RayRows::of(row.from, directions);
-            let (hits, objects) = shot.world.geometry.closest_rows(&rays, &mut ends, sent, folds);
+            let (hits, objects) = tile.world.geometry.closest_rows(&rays, &mut ends, sent, folds);
             arrived.rays.scattered += u64::from(sent.count_ones());
             if measure == Measure::Work {
                 for i in lanes(sent) {
                     ends[i] = hits.get(i).map_or(f32::INFINITY, |hit| hit.t);
                 }
-                add_work(shot, &rays, &ends, sent, &mut arrived.light);
+                add_work(tile, &rays, &ends, sent, &mut arrived.light);
                 continue;
             }
             for i in lanes(sent) {
@@ -67,11 +67,11 @@ impl Loops for LobeRays<'_> {
                         let hit = Hit { shape, object: objects[i] };
                         let normal = lane(&row.normal, i);
                         let lookups = &mut arrived.rays.lookups;
-                        let radiance = shot.lamp_radiance(&rays.ray(i), normal, &hit, density, lookups);
+                        let radiance = tile.lamp_radiance(&rays.ray(i), normal, &hit, density, lookups);
                         radiance * transmittance(i, hit.shape.t)
                     }
                     None => {
-                        let radiance = shot.radiance_beyond(&rays.ray(i), lane(&row.normal, i), density);
+                        let radiance = tile.radiance_beyond(&rays.ray(i), lane(&row.normal, i), density);
                         radiance * transmittance(i, f32::MAX)
                     }
                 };

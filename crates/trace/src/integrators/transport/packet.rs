@@ -1,16 +1,16 @@
 //! Hits of a packet of rays, and rows of plain surfaces with all that direct light needs: one vertex at a time would cost more
 //! than the light.
 
+use super::batch::{UNBENT, VertexBatch, bsdf_parts};
 use super::camera::CameraRow;
-use super::lit_row::{LitRow, UNBENT, bsdf_parts};
 use super::ray::PathRay;
-use super::shot::Shot;
-use super::vertices::way_up;
-use super::view::Measure;
+use super::tile::TileContext;
+use super::vertex::way_up;
 use crate::geometry::SurfacePoint;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::{self, HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
+use crate::integrators::view::Measure;
 use crate::materials::phong::PhongBsdf;
 use crate::materials::{Material, Phong};
 use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, lane, set_lane, take, truths};
@@ -21,7 +21,7 @@ use crate::world::{Hit, Loops, Object, PACKET};
 
 /// Source of the rays of a packet.
 #[derive(Clone, Copy)]
-pub enum Rays<'a> {
+pub enum PacketSource<'a> {
     /// Rays of the camera: the row, its first slot, their number, and their first place in the round's queue.
     Camera(&'a CameraRow, u32, usize, u32),
     /// Rays of a queue, with their first place.
@@ -30,7 +30,7 @@ pub enum Rays<'a> {
     Traced(&'a [PathRay], &'a [Option<Hit>], &'a [u32]),
 }
 
-impl Rays<'_> {
+impl PacketSource<'_> {
     /// Number of the rays.
     pub fn count(&self) -> usize {
         match self {
@@ -51,9 +51,9 @@ impl Rays<'_> {
 
     /// The path of a camera ray in a lane. `None` for other sources.
     #[inline(always)]
-    pub fn camera_path(&self, shot: &Shot<'_>, lane: usize) -> Option<PathRay> {
+    pub fn camera_path(&self, tile: &TileContext<'_>, lane: usize) -> Option<PathRay> {
         match self {
-            Self::Camera(row, first, ..) => Some(shot.camera_path(row.rays.ray(lane), first + lane as u32)),
+            Self::Camera(row, first, ..) => Some(tile.camera_path(row.rays.ray(lane), first + lane as u32)),
             Self::Paths(..) | Self::Traced(..) => None,
         }
     }
@@ -71,7 +71,7 @@ impl Rays<'_> {
 
 /// Hits of a packet. A surface is plain if there are loops for its shape and for the look-ups of its material, a Phong, and
 /// its ray is not in glass.
-pub struct Met {
+pub struct PacketHits {
     hits: HitRows,
     object: [u32; PACKET],
     /// A bit for each ray that hits anything.
@@ -88,7 +88,7 @@ pub struct Met {
     sky: (Lanes3, Lanes),
 }
 
-impl Met {
+impl PacketHits {
     /// The hit of a ray.
     pub fn hit(&self, lane: usize) -> Option<Hit> {
         self.hits.get(lane).map(|shape| Hit { shape, object: self.object[lane] })
@@ -123,11 +123,11 @@ impl Met {
     }
 
     /// The path of a lane.
-    pub fn path(&self, shot: &Shot<'_>, rays: &Rays<'_>, lane: usize) -> PathRay {
+    pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
-            Rays::Camera(row, first, ..) => shot.camera_path(row.rays.ray(lane), first + lane as u32),
-            Rays::Paths(paths, _) => paths[lane],
-            Rays::Traced(paths, _, places) => paths[places[lane] as usize],
+            PacketSource::Camera(row, first, ..) => tile.camera_path(row.rays.ray(lane), first + lane as u32),
+            PacketSource::Paths(paths, _) => paths[lane],
+            PacketSource::Traced(paths, _, places) => paths[places[lane] as usize],
         }
     }
 
@@ -137,17 +137,24 @@ impl Met {
     }
 }
 
-impl Shot<'_> {
+impl TileContext<'_> {
     /// Traces at most [`PACKET`] rays. Plain surfaces go into the row, ready for direct light if requested; `used` are those
     /// that reflect light. Other surfaces go into the row of surfaces, as far as there are loops for them.
-    pub fn meet(
+    pub fn intersect(
         &self,
-        rays: Rays<'_>,
+        rays: PacketSource<'_>,
         measure: Measure,
         are_lit: bool,
-        (row, surface): (&mut LitRow, &mut SurfaceRow),
-    ) -> Met {
-        self.world.geometry.instructions().run(Meeting { shot: self, rays, measure, are_lit, row, surface })
+        (row, surface): (&mut VertexBatch, &mut SurfaceRow),
+    ) -> PacketHits {
+        self.world.geometry.instructions().run(PacketIntersection {
+            tile: self,
+            rays,
+            measure,
+            are_lit,
+            row,
+            surface,
+        })
     }
 
     /// Whether rows of surfaces hold everything for shading an object that is not plain.
@@ -167,33 +174,33 @@ impl Shot<'_> {
     }
 }
 
-struct Meeting<'a> {
-    shot: &'a Shot<'a>,
-    rays: Rays<'a>,
+struct PacketIntersection<'a> {
+    tile: &'a TileContext<'a>,
+    rays: PacketSource<'a>,
     measure: Measure,
     are_lit: bool,
-    row: &'a mut LitRow,
+    row: &'a mut VertexBatch,
     surface: &'a mut SurfaceRow,
 }
 
-impl Loops for Meeting<'_> {
-    type Done = Met;
+impl Loops for PacketIntersection<'_> {
+    type Done = PacketHits;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Met {
-        let Self { shot, rays, measure, are_lit, row, surface } = self;
-        let world = shot.world;
+    fn run(self, folds: impl Folds) -> PacketHits {
+        let Self { tile, rays, measure, are_lit, row, surface } = self;
+        let world = tile.world;
         row.reset();
         // Put the rays side by side.
         let (of_paths, traced);
         let mut ends = [-1.0; PACKET];
         let rows = match rays {
-            Rays::Camera(row, _, count, _) => {
+            PacketSource::Camera(row, _, count, _) => {
                 ends[..count].fill(f32::INFINITY);
                 traced = ((1_u64 << count) - 1) as u32;
                 &row.rays
             }
-            Rays::Paths(..) | Rays::Traced(..) => {
+            PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
                 for lane in 0..PACKET {
                     let Some(path) = rays.of_queue(lane) else { break };
@@ -208,8 +215,10 @@ impl Loops for Meeting<'_> {
         };
         // Find their hits, or take the known ones.
         let (hits, object) = match rays {
-            Rays::Camera(..) | Rays::Paths(..) => world.geometry.closest_rows(rows, &mut ends, traced, folds),
-            Rays::Traced(_, known, places) => {
+            PacketSource::Camera(..) | PacketSource::Paths(..) => {
+                world.geometry.closest_rows(rows, &mut ends, traced, folds)
+            }
+            PacketSource::Traced(_, known, places) => {
                 let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET]);
                 for (lane, &place) in places.iter().enumerate().take(PACKET) {
                     if let Some(hit) = &known[place as usize] {
@@ -224,15 +233,15 @@ impl Loops for Meeting<'_> {
         *surface = SurfaceRow::EMPTY;
         let any = hits.any(folds);
         let (mut left, mut plain, mut shining) = (any, 0, 0);
-        let (mut seen, mut from_gloss, mut lookups) = (!0, 0, 0);
+        let (mut only_specular_before, mut after_gloss, mut lookups) = (!0, 0, 0);
         match rays {
-            Rays::Camera(..) => left = if world.is_eye_in_air() { left } else { 0 },
-            Rays::Paths(..) | Rays::Traced(..) => {
+            PacketSource::Camera(..) => left = if world.is_eye_in_air() { left } else { 0 },
+            PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 for lane in 0..PACKET {
                     let Some(path) = rays.of_queue(lane) else { break };
                     left &= if path.medium.is_air() { !0 } else { !(1 << lane) };
-                    seen &= if path.history.is_seen { !0 } else { !(1 << lane) };
-                    from_gloss |= u32::from(path.history.is_from_gloss) << lane;
+                    only_specular_before &= if path.state.only_specular_before { !0 } else { !(1 << lane) };
+                    after_gloss |= u32::from(path.state.is_after_gloss) << lane;
                 }
             }
         }
@@ -245,7 +254,7 @@ impl Loops for Meeting<'_> {
             }
             let of = folds.bits(&of) & left;
             left &= !of;
-            let Some((material, phong)) = shot.plain_phong(id) else { continue };
+            let Some((material, phong)) = tile.plain_phong(id) else { continue };
             let Some(specular) = phong.specular.constant() else { continue };
             let texture = phong.diffuse.texture().filter(|_| are_lit && measure.is_colored());
             match &world.geometry.objects()[id as usize] {
@@ -274,31 +283,31 @@ impl Loops for Meeting<'_> {
                 }
             };
             row.used |= of & !bsdf.black(folds);
-            let seen = seen & of;
+            let only_specular_before = only_specular_before & of;
             row.set_bsdf(of, &bsdf, measure);
-            if seen != of && measure != Measure::ALL {
-                row.set_bsdf(of & !seen, &bsdf, Measure::ALL);
+            if only_specular_before != of && measure != Measure::ALL {
+                row.set_bsdf(of & !only_specular_before, &bsdf, Measure::ALL);
             }
         }
         // Set the positions and normals of the plain vertices.
-        (row.seen, row.from_gloss) = (seen, from_gloss);
-        let lifts = match shot.settings.render.shadows {
+        (row.only_specular_before, row.after_gloss) = (only_specular_before, after_gloss);
+        let lifts = match tile.settings.render.shadows {
             Shadows::Off => Lifts::All,
-            Shadows::Hard | Shadows::Soft => Lifts::IfFree(seen),
+            Shadows::Hard | Shadows::Soft => Lifts::IfFree(only_specular_before),
         };
         let front = if plain == 0 { 0 } else { row.place(&rays, rows, surface, lifts, folds) };
         // Compute the other surfaces, and the environment for rays without a hit.
-        let found = shot.fill_others(surface, rows, (&hits, &object), any & !plain, folds);
+        let found = tile.fill_others(surface, rows, (&hits, &object), any & !plain, folds);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
             Some(_) | None => ([[0.0; PACKET]; 3], [0.0; PACKET]),
         };
-        Met { hits, object, any, plain, shining: shining & front, found, lookups, sky }
+        PacketHits { hits, object, any, plain, shining: shining & front, found, lookups, sky }
     }
 }
 
-impl Shot<'_> {
+impl TileContext<'_> {
     /// Puts the surfaces of hits that are not plain into the row; returns a bit for each that is there.
     #[inline(always)]
     fn fill_others(
@@ -362,7 +371,7 @@ enum Lifts {
     IfFree(u32),
 }
 
-impl LitRow {
+impl VertexBatch {
     /// Sets the lobes of some lanes.
     #[inline(always)]
     fn set_bsdf(&mut self, of: u32, bsdf: &PhongRow, measure: Measure) {
@@ -416,9 +425,9 @@ impl LitRow {
         let above = folds.bits(&above) & surface.smooth;
         let rises = match lifts {
             Lifts::All => truths(above),
-            Lifts::IfFree(seen) => {
+            Lifts::IfFree(only_specular_before) => {
                 self.is_bounded |= folds.bits(&bent) & surface.smooth;
-                self.may_lift |= above & seen;
+                self.may_lift |= above & only_specular_before;
                 [0; PACKET]
             }
         };
@@ -436,14 +445,14 @@ impl LitRow {
         }
         take(&of, &ends, &mut self.lift_end);
         take(&of, &[UNBENT; PACKET], &mut self.bend);
-        self.apart |= surface.smooth;
+        self.has_facet |= surface.smooth;
     }
 
     /// Sets the positions of plain surfaces; returns a bit for each whose front the path hits.
     #[inline(always)]
     fn place(
         &mut self,
-        paths: &Rays<'_>,
+        paths: &PacketSource<'_>,
         rays: &RayRows,
         surface: &SurfaceRow,
         lifts: Lifts,
@@ -466,19 +475,19 @@ impl LitRow {
             self.smooth(rays, surface, lifts, folds);
         }
         match paths {
-            Rays::Camera(_, slot, ..) => {
+            PacketSource::Camera(_, slot, ..) => {
                 self.throughput = [[1.0; PACKET]; 3];
                 self.path = [CAMERA_PATH + 1; PACKET];
-                self.carried = [1.0; PACKET];
+                self.roulette_throughput = [1.0; PACKET];
                 for i in 0..PACKET {
                     self.slot[i] = slot + i as u32;
                 }
             }
-            Rays::Paths(..) | Rays::Traced(..) => {
+            PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 for i in 0..PACKET {
                     let Some(path) = paths.of_queue(i) else { break };
                     set_lane(&mut self.throughput, i, path.throughput);
-                    self.carried[i] = path.history.carried;
+                    self.roulette_throughput[i] = path.state.roulette_throughput;
                     (self.slot[i], self.path[i]) = (path.slot, path.path);
                 }
             }

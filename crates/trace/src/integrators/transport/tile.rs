@@ -3,17 +3,17 @@
 use std::array;
 use std::ops::Range;
 
-use super::RenderSettings;
-use super::view::Measure;
 use crate::control::CancelToken;
 use crate::film::{Part, Pixels};
+use crate::integrators::RenderSettings;
+use crate::integrators::view::Measure;
 use crate::lights::{Environment, Receivers};
 use crate::sampling::PixelSampler;
 use crate::scene::description::{Integrator, Shadows};
 use crate::world::{PACKET, World};
 
 /// Context of a tile: a world, the settings, and the requested samples.
-pub struct Shot<'a> {
+pub struct TileContext<'a> {
     /// The scene.
     pub world: &'a World,
     /// The settings.
@@ -33,7 +33,7 @@ pub struct Shot<'a> {
     pub lobes_find_sky: bool,
 }
 
-impl<'a> Shot<'a> {
+impl<'a> TileContext<'a> {
     /// The context for these samples.
     pub fn new(
         world: &'a World,

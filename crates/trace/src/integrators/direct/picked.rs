@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use super::light::{Lighting, Sums, add_where};
-use super::pool::Pool;
-use super::view::Measure;
+use super::all_lights::{Lighting, Sums, add_where};
+use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::rows::lanes;
+use crate::integrators::view::Measure;
 use crate::lights::{Light, LightRow, LightTree, Lobe, Middle, Picks, Receiver, ReceiverRow, Selection};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, lane, set_lane};
@@ -14,12 +14,12 @@ use crate::scene::description::Shadows;
 use crate::world::Loops;
 
 /// Lights the vertices of a row by picked lights.
-pub(super) struct Picking<'a, const WEIGHED: bool> {
-    pub(super) lighting: Lighting<'a, WEIGHED>,
-    pub(super) selection: Selection<'a>,
+pub struct Picking<'a, const WEIGHED: bool> {
+    pub lighting: Lighting<'a, WEIGHED>,
+    pub selection: Selection<'a>,
     /// Number of the row; then the pool for its rays.
-    pub(super) number: u32,
-    pub(super) pool: &'a mut Pool,
+    pub number: u32,
+    pub pool: &'a mut ShadowRayQueue,
 }
 
 /// One pick for each vertex of a row. The picks of one sample are in the order of the tree, so that rows of rays go to places
@@ -43,13 +43,13 @@ impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
     #[inline(always)]
     fn run(self, folds: impl Folds) -> Sums {
         let Self { lighting, selection, number, pool } = self;
-        let sampler = lighting.row.sampler(lighting.shot);
+        let sampler = lighting.row.sampler(lighting.tile);
         let mut sums = Sums::NOTHING;
         // Sample all lights beyond the scene, if the tree leaves them out.
         if selection.leaves_beyond {
             lighting.add_all(Light::is_beyond, &mut sums, folds);
         }
-        let samples = lighting.shot.settings.render.shadow_samples;
+        let samples = lighting.tile.settings.render.shadow_samples;
         let (each, tree) = (selection.picks.count, selection.tree);
         // With many samples, the rays of one row of picks already go to one place.
         let mut pool = (samples <= TOGETHER).then_some(pool);
@@ -70,7 +70,7 @@ struct Taking<'a> {
     tree: &'a LightTree,
     row: u32,
     /// Pool for the rays. `None` to trace rays at once.
-    pool: Option<&'a mut Pool>,
+    pool: Option<&'a mut ShadowRayQueue>,
     sums: &'a mut Sums,
 }
 
@@ -116,7 +116,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         samples: Range<u32>,
     ) -> Vec<PickRow> {
         let row = self.row;
-        let count = self.shot.settings.render.shadow_samples * way.count;
+        let count = self.tile.settings.render.shadow_samples * way.count;
         let group = way.count as usize;
         let (first, end) = (samples.start * way.count, samples.end * way.count);
         let mut numbers = vec![[0.0; LANES]; (end - first) as usize];
@@ -229,11 +229,11 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         folds: impl Folds,
     ) {
         let Taking { tree, row: row_number, pool, sums } = taking;
-        let (row, render) = (self.row, &self.shot.settings.render);
+        let (row, render) = (self.row, &self.tile.settings.render);
         let (lights, used) = pick.lights();
         let u = sampler.pairs(&row.path, Decision::Picked, number, count);
         let at = (&row.from, &row.normal);
-        let (mut samples, mut inverse, lookups) = self.shot.world.lights.sample_each(&lights, at, used, &u);
+        let (mut samples, mut inverse, lookups) = self.tile.world.lights.sample_each(&lights, at, used, &u);
         sums.rays.lookups += lookups;
         for i in 0..LANES {
             let weight = lane(&samples.weights, i) * pick.shares[i];
@@ -244,7 +244,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         let active = active & used;
         if WEIGHED {
             // Each group of picks has its own pdf, and as many rays in lobes as requested samples compete with all groups.
-            let others = self.others.to_each(render.shadow_samples) * render.shadow_samples as f32;
+            let others = self.others.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
             values = self.others.left(row, &samples, values, (&inverse, others));
         }
         if active == 0 {
@@ -279,7 +279,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// Aims rays at the middles of the lights that have one.
     fn aim_at_middles(&self, samples: &mut LightRow, lights: &[u32; LANES], active: u32) {
         for i in lanes(active) {
-            let Some((middle, source)) = self.shot.world.lights.get(lights[i]).middle() else { continue };
+            let Some((middle, source)) = self.tile.world.lights.get(lights[i]).middle() else { continue };
             let direction = match middle {
                 Middle::At(middle) => {
                     set_lane(&mut samples.targets, i, middle);

@@ -2,8 +2,8 @@
 
 use super::medium::{Inside, Medium};
 use super::ray::PathRay;
-use super::shot::Shot;
-use super::vertices::Vertex;
+use super::tile::TileContext;
+use super::vertex::Vertex;
 use crate::world::{Hit, Meeting, Near, NearMemory, Sides};
 
 /// A ray's crossing at a hit of glass.
@@ -27,7 +27,7 @@ pub struct CrossingMemory {
     near: Vec<Near>,
 }
 
-impl Shot<'_> {
+impl TileContext<'_> {
     /// The crossing of a ray at a hit of glass.
     pub fn crossing(
         &self,

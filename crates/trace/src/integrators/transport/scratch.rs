@@ -1,25 +1,20 @@
 //! Queues of rays.
 
-use std::cell::RefCell;
-
 use super::camera::CameraRow;
 use super::crossing::CrossingMemory;
-use super::lit_queue::LitQueue;
 use super::ray::PathRay;
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::world::Hit;
 
 /// The memory of batches, which each uses again.
 #[derive(Default)]
-pub struct Queues {
+pub struct Scratch {
     /// Rays of this round; camera rays at first.
     pub rays: Vec<PathRay>,
     /// Rays of the next round.
     pub next: Vec<PathRay>,
     /// Next rays of the camera.
     pub camera: Vec<CameraRow>,
-    /// Vertices of this round that wait for direct light.
-    pub lit: LitQueue,
     /// Surfaces at the hits of a packet.
     pub surfaces: SurfaceRow,
     /// Hits of the rays of this round.
@@ -63,22 +58,6 @@ impl ByObject {
     pub fn places(&self) -> &[u32] {
         &self.places
     }
-}
-
-impl Queues {
-    /// The queues that this thread left after its last tile; [`Queues::leave`] keeps them for the next.
-    pub fn of_thread() -> Self {
-        QUEUES.take()
-    }
-
-    /// Keeps the queues for the next tile of this thread.
-    pub fn leave(self) {
-        QUEUES.set(self);
-    }
-}
-
-thread_local! {
-    static QUEUES: RefCell<Queues> = RefCell::default();
 }
 
 #[cfg(test)]

@@ -95,8 +95,8 @@ mod tests {
         }
         for (weight, count) in weights.as_flattened().iter().zip(counts.as_flattened()) {
             let expected = f64::from(weight / total) * f64::from(DRAWS);
-            let apart = (f64::from(*count) - expected).abs();
-            assert!(apart <= 5.0 * expected.sqrt(), "{count} times where {expected} are expected");
+            let has_facet = (f64::from(*count) - expected).abs();
+            assert!(has_facet <= 5.0 * expected.sqrt(), "{count} times where {expected} are expected");
         }
         assert_eq!(Choices::new(0.3).chosen(0.5), None);
     }
