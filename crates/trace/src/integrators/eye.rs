@@ -27,7 +27,7 @@ use crate::control::Cancelled;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::geometry::{Ray, ShapeHit, SurfacePoint};
-use crate::materials::{Bsdf, Mirror, Phong};
+use crate::materials::{Bsdf, Mirror, Rough};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
 use crate::sampling::Decision;
@@ -248,16 +248,16 @@ impl Wavefront<'_, '_> {
         for lane in lanes(plain) {
             let object = packet.object(lane);
             if known.is_none_or(|(own, _)| own != object) {
-                known = tile.plain_phong(object).map(|plain| (object, plain));
+                known = tile.plain_rough(object).map(|plain| (object, plain));
             }
-            let Some((_, (material, phong))) = known else { continue };
+            let Some((_, (material, rough))) = known else { continue };
             let slot = first + lane as u32;
             if packet.shining & 1 << lane != 0 {
                 self.accumulator.add(slot, Part::Emitted, material.emission.scale);
             }
             if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
-                let Some(bsdf) = phong.constant() else { continue };
-                self.accumulator.add(slot, Part::Ambient, render.ambient * bsdf.ambient);
+                let Some(bsdf) = rough.constant() else { continue };
+                self.accumulator.add(slot, Part::Ambient, render.ambient * bsdf.ambient());
             }
         }
         let lights = &tile.world.lights;
@@ -270,14 +270,14 @@ impl Wavefront<'_, '_> {
 
     /// Adds the emission and ambient light of a plain surface.
     fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
-        let Some((material, phong)) = self.tile.plain_phong(hit.object) else { return };
+        let Some((material, rough)) = self.tile.plain_rough(hit.object) else { return };
         if is_shining {
             self.add_emitted(path, material.emission.scale, self.tile.lamp_weight(path, hit));
         }
         let render = &self.tile.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
-            let Some(bsdf) = phong.constant() else { return };
-            self.accumulator.add(path.slot, Part::Ambient, path.throughput * render.ambient * bsdf.ambient);
+            let Some(bsdf) = rough.constant() else { return };
+            self.accumulator.add(path.slot, Part::Ambient, path.throughput * render.ambient * bsdf.ambient());
         }
     }
 
@@ -386,28 +386,28 @@ impl Wavefront<'_, '_> {
             return;
         }
         match &vertex.material.bsdf {
-            Bsdf::Phong(phong) => self.shade_phong(&path, vertex, phong),
+            Bsdf::Rough(rough) => self.shade_rough(&path, vertex, rough),
             Bsdf::Mirror(mirror) => self.shade_mirror(&path, vertex, mirror),
             Bsdf::Glass(_) => {}
         }
     }
 
-    fn shade_phong(&mut self, path: &PathRay, vertex: &Vertex<'_>, phong: &Phong) {
+    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.tile.settings.render.ambient;
         let takes_ambient = ambient != Vec3::ZERO && self.accumulator.takes_ambient();
         // Look up no more textures than the picture shows.
         if !self.accumulator.takes_reflected() {
             if takes_ambient {
-                let reflectance = phong.ambient_at(at, lookups);
+                let reflectance = rough.ambient_at(at, lookups);
                 self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * reflectance);
             }
             return;
         }
         let bsdf =
-            if self.accumulator.measure.is_colored() { phong.at(at, lookups) } else { phong.bleached() };
+            if self.accumulator.measure.is_colored() { rough.at(at, lookups) } else { rough.bleached() };
         if takes_ambient {
-            self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient);
+            self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient());
         }
         if bsdf.is_black() {
             return;

@@ -8,6 +8,7 @@ use crate::integrators::transport::medium::{Medium, absorption};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::Measure;
 use crate::lights::{Light, LightRow, Middle, Pattern, Source, SourceRow};
+use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
@@ -121,7 +122,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             if light.is_single() {
                 let nowhere = [[0.0; LANES]; 2];
                 let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &nowhere);
-                let (values, active) = self.values(&samples, 1.0, folds);
+                let (values, active, _) = self.values(&samples, 1.0, folds);
                 self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
             } else {
                 let count = render.shadow_samples;
@@ -132,7 +133,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 for repetition in 0..count {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
-                    let (mut values, active) = self.values(&samples, 1.0 / count as f32, folds);
+                    let (mut values, active, response) = self.values(&samples, 1.0 / count as f32, folds);
                     // Multiply by the emission texture.
                     if let Some(pattern) = light.pattern() {
                         values = self.tinted(pattern, &samples, active, values);
@@ -148,7 +149,12 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                             light.inverse_densities(&samples)
                         };
                         let others = self.others.rays_per_sample(count);
-                        values = self.others.left(self.row, &samples, values, (&of_light, others));
+                        values = self.others.weighted(
+                            self.row,
+                            (&samples, &response),
+                            values,
+                            (&of_light, others),
+                        );
                     }
                     self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
                 }
@@ -272,10 +278,11 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         add_where(traced & !occluded, values, &mut sums.light);
     }
 
-    /// Contribution of each sample if it is not occluded, and a bit for each that is not 0.
+    /// Contribution of each sample if it is not occluded, a bit for each that is not 0, and the response of its vertex.
     #[inline(always)]
-    pub fn values(&self, samples: &LightRow, share: f32, folds: impl Folds) -> (Lanes3, u32) {
-        let Response { f, cosines, .. } = self.row.response(&samples.directions);
+    pub fn values(&self, samples: &LightRow, share: f32, folds: impl Folds) -> (Lanes3, u32, Response) {
+        let response = self.row.response(&samples.directions);
+        let Response { bsdf: BsdfValues { f, .. }, cosines } = &response;
         let mut arriving = samples.weights;
         if self.measure == Measure::ArrivingShare {
             for i in 0..LANES {
@@ -283,9 +290,9 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 set_lane(&mut arriving, i, light);
             }
         }
-        let (mut values, mut active) = (f, [0; LANES]);
+        let (mut values, mut active) = (*f, [0; LANES]);
         for i in 0..LANES {
-            let value = lane(&f, i) * lane(&arriving, i) * (cosines[i] * share);
+            let value = lane(f, i) * lane(&arriving, i) * (cosines[i] * share);
             set_lane(&mut values, i, value);
             let brings = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
             active[i] = if brings { TRUE } else { 0 };
@@ -293,7 +300,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         if let Some(media) = self.media.filter(|_| self.measure != Measure::ArrivingShare) {
             values = self.left_by_glass(media, samples, values);
         }
-        (values, folds.bits(&active) & self.used)
+        (values, folds.bits(&active) & self.used, response)
     }
 
     /// The shadow rays of the samples in `active`; the other lanes have no end.

@@ -1,12 +1,12 @@
-//! Rays in the glossy lobes of vertices that find the light of lamps beside light samples.
+//! Rays in the narrow lobes of vertices that find the light of lamps beside light samples.
 
 use super::all_lights::{Arrived, add_work};
-use super::mis::glossy_lobe;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::medium::{Medium, absorption};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::Measure;
+use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, lane, set_lane};
 use crate::sampling::Decision;
@@ -38,11 +38,10 @@ impl Loops for LobeRays<'_> {
         };
         for repetition in 0..count {
             let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);
-            let mut directions = [[0.0; LANES]; 3];
-            for i in 0..LANES {
-                set_lane(&mut directions, i, glossy_lobe(row, i).sample(1.0, [u[0][i], u[1][i]]));
-            }
-            let Response { cosines, glosses, .. } = row.response(&directions);
+            let directions = row.bsdf.sample(LobeSet::Narrow, &row.normal, &[0.0; LANES], &u);
+            let Response { bsdf, cosines } = row.response(&directions);
+            let densities = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &directions, &bsdf);
+            let [_, narrow] = row.bsdf.parts(&bsdf);
             let mut sent = sharp & !row.hidden(&directions, folds);
             let mut ends = [-1.0; LANES];
             for i in 0..LANES {
@@ -61,7 +60,7 @@ impl Loops for LobeRays<'_> {
                 continue;
             }
             for i in lanes(sent) {
-                let density = glossy_lobe(row, i).density(lane(&directions, i), glosses[i]);
+                let density = densities[i];
                 let radiance = match hits.get(i) {
                     Some(shape) => {
                         let hit = Hit { shape, object: objects[i] };
@@ -75,7 +74,7 @@ impl Loops for LobeRays<'_> {
                         radiance * transmittance(i, f32::MAX)
                     }
                 };
-                let f = lane(&row.specular, i) * glosses[i];
+                let f = lane(&narrow, i);
                 let value = f * radiance * (cosines[i] / (density * count as f32));
                 let sum = lane(&arrived.light, i) + value;
                 set_lane(&mut arrived.light, i, sum);

@@ -2,12 +2,12 @@
 //! (multiple importance sampling: Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
 
 use crate::geometry::{Ray, SurfacePoint};
-use crate::integrators::transport::batch::VertexBatch;
+use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::lights::{LightRow, Met, Source};
-use crate::materials::lobes::gloss;
-use crate::materials::{Lobes, TexturePoint};
+use crate::materials::TexturePoint;
+use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::world::Hit;
@@ -50,73 +50,55 @@ impl CompetingTechnique {
     /// Multiplies `values`, the contributions of light samples at the vertices of a row, by their power-heuristic weights. The
     /// inverse pdfs of the samples are given; `others` rays by the BSDF come on each sample.
     #[inline(always)]
-    pub fn left(
+    pub fn weighted(
         self,
         row: &VertexBatch,
-        samples: &LightRow,
+        (samples, response): (&LightRow, &Response),
         mut values: Lanes3,
         (of_light, others): (&Lanes, f32),
     ) -> Lanes3 {
-        if let Self::Nothing = self {
-            return values;
-        }
-        let mut glosses = [0.0; LANES];
-        if row.is_glossy {
-            for i in 0..LANES {
-                let mirrored = lane(&row.mirrored_eye, i);
-                glosses[i] = gloss(mirrored, lane(&samples.directions, i), row.shininess[i]);
-            }
-        }
+        // Weight each sample against the lobes in which rays leave its vertex.
+        let (lobes, start) = match self {
+            Self::Nothing => return values,
+            Self::Paths => (LobeSet::All, !0),
+            Self::Lobes(sharp) => (LobeSet::Narrow, sharp),
+        };
+        let densities = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf);
+        let mut weights = [1.0; LANES];
         for i in 0..LANES {
-            let density = self.lobes_of(row, i).density(lane(&samples.directions, i), glosses[i]);
-            let weight = weight(density * of_light[i] * others);
-            let weight = if self.start_from(i) { weight } else { 1.0 };
-            let left = match self {
-                Self::Nothing | Self::Paths => Vec3::splat(weight),
-                Self::Lobes(_) => left_of_gloss(row, i, glosses[i], weight),
-            };
-            let value = lane(&values, i) * left;
-            set_lane(&mut values, i, value);
+            let weight = weight(densities[i] * of_light[i] * others);
+            weights[i] = if start & 1 << i != 0 { weight } else { 1.0 };
+        }
+        // Apply the weights to the light of those lobes.
+        match lobes {
+            LobeSet::All => {
+                for i in 0..LANES {
+                    let value = lane(&values, i) * weights[i];
+                    set_lane(&mut values, i, value);
+                }
+            }
+            LobeSet::Narrow => {
+                let [wide, narrow] = row.bsdf.parts(&response.bsdf);
+                for i in 0..LANES {
+                    let left = left_of_narrow(lane(&wide, i), lane(&narrow, i), weights[i]);
+                    let value = lane(&values, i) * left;
+                    set_lane(&mut values, i, value);
+                }
+            }
         }
         values
     }
-
-    /// The lobes in which rays leave a vertex.
-    #[inline(always)]
-    fn lobes_of(self, row: &VertexBatch, i: usize) -> Lobes {
-        match self {
-            Self::Nothing | Self::Paths => row.lobes(i),
-            Self::Lobes(_) => glossy_lobe(row, i),
-        }
-    }
-
-    /// Whether rays leave a vertex.
-    #[inline(always)]
-    fn start_from(self, i: usize) -> bool {
-        match self {
-            Self::Nothing => false,
-            Self::Paths => true,
-            Self::Lobes(sharp) => sharp & 1 << i != 0,
-        }
-    }
 }
 
-/// The glossy lobe of a vertex alone.
+/// Reflected light with its narrow part weighted. The weight applies to that part alone, as rays in a lobe bring no light of wide
+/// lobes. Thereby the parts of a picture add up to it.
 #[inline(always)]
-pub fn glossy_lobe(row: &VertexBatch, i: usize) -> Lobes {
-    Lobes { diffuse: 0.0, specular: 1.0, ..row.lobes(i) }
-}
-
-/// Reflected light with its glossy part weighted. The weight applies to that part alone, as rays in a lobe bring no diffuse
-/// light. Thereby the parts of a picture add up to it.
-#[inline(always)]
-fn left_of_gloss(row: &VertexBatch, i: usize, gloss: f32, weight: f32) -> Vec3 {
-    let (diffuse, glossy) = (lane(&row.diffuse, i), lane(&row.specular, i) * gloss);
-    let part = |diffuse: f32, glossy: f32| {
-        let all = diffuse + glossy;
-        if all > 0.0 { (diffuse + glossy * weight) / all } else { 0.0 }
+fn left_of_narrow(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
+    let part = |wide: f32, narrow: f32| {
+        let all = wide + narrow;
+        if all > 0.0 { (wide + narrow * weight) / all } else { 0.0 }
     };
-    Vec3::new(part(diffuse.x, glossy.x), part(diffuse.y, glossy.y), part(diffuse.z, glossy.z))
+    Vec3::new(part(wide.x, narrow.x), part(wide.y, narrow.y), part(wide.z, narrow.z))
 }
 
 /// MIS weight of a sample, if the other technique's pdf is so many times as high (the power heuristic).

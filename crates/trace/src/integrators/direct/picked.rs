@@ -7,6 +7,7 @@ use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::rows::lanes;
 use crate::integrators::view::Measure;
 use crate::lights::{Light, LightRow, LightTree, Lobe, Middle, Picks, Receiver, ReceiverRow, Selection};
+use crate::materials::bsdf::NarrowLobe;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
@@ -153,13 +154,14 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         let row = self.row;
         let plain = ReceiverRow::plain(&row.from, &row.normal);
         let mut glossy = plain.clone();
-        for i in lanes(if row.is_glossy { self.used } else { 0 }) {
+        for i in lanes(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
             if let Some(lobe) = self.lobe(i) {
                 glossy.set_lobe(i, &lobe);
             }
         }
-        let Some(shares) = tree.flat_shares(&glossy, row.is_glossy) else { return };
-        let without = (WEIGHED && row.is_glossy).then(|| tree.flat_shares(&plain, false)).flatten();
+        let Some(shares) = tree.flat_shares(&glossy, row.bsdf.has_narrow_lobes()) else { return };
+        let without =
+            (WEIGHED && row.bsdf.has_narrow_lobes()).then(|| tree.flat_shares(&plain, false)).flatten();
         for (numbers, pick) in numbers.iter().zip(picks) {
             let picked = shares.pick(numbers);
             pick.lights = picked.lights;
@@ -201,19 +203,15 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         }
     }
 
-    /// The glossy lobe of a vertex.
+    /// The narrow lobe of a vertex, relative to its wide ones.
     #[inline(always)]
     fn lobe(&self, i: usize) -> Option<Lobe> {
-        let lobes = self.row.lobes(i);
-        if !(lobes.specular > 0.0) {
-            return None;
-        }
-        let [diffuse, glossy] = [lobes.value(0.0), lobes.value(1.0) - lobes.value(0.0)];
-        let is_both = diffuse > 0.0;
+        let NarrowLobe { axis, exponent, peak, wide } = self.row.bsdf.narrow_lobe(i)?;
+        let is_both = wide > 0.0;
         Some(Lobe {
-            axis: lobes.mirrored_eye,
-            shininess: lobes.shininess,
-            peak: if is_both { glossy / diffuse } else { 1.0 },
+            axis,
+            shininess: exponent,
+            peak: if is_both { peak / wide } else { 1.0 },
             diffuse: if is_both { 1.0 } else { 0.0 },
         })
     }
@@ -240,12 +238,12 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             set_lane(&mut samples.weights, i, weight);
             inverse[i] *= pick.weighed[i];
         }
-        let (mut values, active) = self.values(&samples, 1.0, folds);
+        let (mut values, active, response) = self.values(&samples, 1.0, folds);
         let active = active & used;
         if WEIGHED {
             // Each group of picks has its own pdf, and as many rays in lobes as requested samples compete with all groups.
             let others = self.others.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
-            values = self.others.left(row, &samples, values, (&inverse, others));
+            values = self.others.weighted(row, (&samples, &response), values, (&inverse, others));
         }
         if active == 0 {
             return;

@@ -19,6 +19,7 @@ use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{Measure, Ways};
 use crate::lights::{Source, SourceRow};
+use crate::materials::RoughKind;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes3, lane};
 use crate::scene::description::Shadows;
@@ -30,8 +31,9 @@ pub struct DirectLightQueue {
     rows: Vec<VertexBatch>,
     /// Rows in use; the others are memory.
     count: usize,
-    /// Index of the row for single vertices. If no row in use has this index, the row is full or there is none.
-    open: usize,
+    /// Index of the row for single vertices of each kind of BSDF. If no row in use has this index, the row is full or there is
+    /// none.
+    open: [usize; RoughKind::ALL.len()],
     /// Light of lamps at the vertex of each path of the round.
     arrived: Vec<Vec3>,
     /// The glass around vertices; the first entry is air.
@@ -107,7 +109,8 @@ impl DirectLightQueue {
             return;
         }
         let mut left = row.used;
-        if let Some(open) = kept.get_mut(self.open) {
+        let open = &mut self.open[row.bsdf.kind() as usize];
+        if let Some(open) = kept.get_mut(*open) {
             for lane in lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
                 open.copy(open.used.trailing_ones() as usize, row, lane);
                 left &= !(1 << lane);
@@ -115,7 +118,7 @@ impl DirectLightQueue {
         }
         if left != 0 {
             row.keep(left);
-            self.open = self.count;
+            *open = self.count;
             self.count += 1;
         }
     }
@@ -128,25 +131,29 @@ impl DirectLightQueue {
             medium = self.media.len() as u32;
             self.media.push(lit.path.medium);
         }
-        let (row, lane) = self.open_row();
+        let (row, lane) = self.open_row(lit.bsdf.kind());
         row.put(lane, tile, lit, measure, medium);
     }
 
-    /// A row with a free lane.
-    fn open_row(&mut self) -> (&mut VertexBatch, usize) {
-        if self.open >= self.count || self.rows[self.open].used == ALL {
-            self.spare().reset();
-            self.open = self.count;
+    /// A row of this kind with a free lane.
+    fn open_row(&mut self, kind: RoughKind) -> (&mut VertexBatch, usize) {
+        let mut number = self.open[kind as usize];
+        if number >= self.count || self.rows[number].used == ALL {
+            let row = self.spare();
+            row.reset();
+            row.bsdf.prepare(kind);
+            number = self.count;
+            self.open[kind as usize] = number;
             self.count += 1;
         }
-        let row = &mut self.rows[self.open];
+        let row = &mut self.rows[number];
         let lane = row.used.trailing_ones() as usize;
         (row, lane)
     }
 
     /// Drops all vertices.
     fn clear(&mut self) {
-        (self.count, self.open) = (0, 0);
+        (self.count, self.open) = (0, Default::default());
         // A cancelled round may have left rays.
         self.pool.clear();
     }

@@ -73,7 +73,7 @@ pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
 /// Whether photons are kept on a material.
 pub fn receives(material: &Material) -> bool {
     match &material.bsdf {
-        Bsdf::Phong(phong) => phong.constant().is_none_or(|bsdf| !bsdf.is_black()),
+        Bsdf::Rough(rough) => rough.constant().is_none_or(|bsdf| !bsdf.is_black()),
         Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
     }
 }

@@ -254,9 +254,9 @@ impl PhotonWavefront<'_> {
         let tile = self.tracing.tile;
         match &vertex.material.bsdf {
             // Light samples find direct light.
-            Bsdf::Phong(_) if lacks_photons => {}
-            Bsdf::Phong(phong) => {
-                let bsdf = phong.at(&vertex.texture_point, &mut self.counters.texture_lookups);
+            Bsdf::Rough(_) if lacks_photons => {}
+            Bsdf::Rough(rough) => {
+                let bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
                 if bsdf.is_black() {
                     return;
                 }
@@ -270,8 +270,9 @@ impl PhotonWavefront<'_> {
                     medium = self.media.len() as u32;
                     self.media.push(path.medium);
                 }
-                if self.open.used == ALL {
+                if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
                     self.scatter_open();
+                    self.open.bsdf.prepare(bsdf.kind());
                 }
                 let i = self.open.used.trailing_ones() as usize;
                 let lit = ShadingVertex { path, place: 0, vertex, shading, bsdf };

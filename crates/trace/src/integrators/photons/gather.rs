@@ -11,9 +11,8 @@ use crate::integrators::PACKET;
 use crate::integrators::transport::batch::VertexBatch;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::{Measure, Ways};
-use crate::materials::lobes::gloss;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, Lanes3, lane, set_lane};
+use crate::math::lanes::{Folds, Lanes3, set_lane};
 use crate::sampling::Decision;
 use crate::world::Loops;
 
@@ -56,7 +55,7 @@ impl Loops for Gathering<'_> {
             let (point, normal) = row.place_of(i);
             let look = GatherPoint { point, normal, most_depth };
             // At a surface without a glossy lobe, photons carry the light from a caustic, and the path from there leaves it out.
-            let gathers_bounced = indirect && row.albedos[1][i] == 0.0;
+            let gathers_bounced = indirect && !row.bsdf.has_narrow_lobe(i);
             let gathers_caustic =
                 if only_specular_before { caustic } else { indirect && row.after_gloss & 1 << i != 0 };
             let chances = if measure == Measure::Work {
@@ -113,14 +112,16 @@ fn brought(
     random: [f32; 2],
     folds: impl Folds,
 ) -> (Vec3, Option<Place>) {
-    let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
     if measure == Measure::Work {
-        (Vec3::splat(map.count_around(look, folds) as f32), None)
-    } else if specular == Vec3::ZERO && row.has_facet & 1 << i == 0 {
-        let (irradiance, photon) = map.irradiance(look, random, folds);
-        (diffuse * irradiance, photon)
-    } else {
-        reflected((row, i), (map, look), random, folds)
+        return (Vec3::splat(map.count_around(look, folds) as f32), None);
+    }
+    let is_flat = row.has_facet & 1 << i == 0;
+    match row.bsdf.even(i).filter(|_| is_flat) {
+        Some(f) => {
+            let (irradiance, photon) = map.irradiance(look, random, folds);
+            (f * irradiance, photon)
+        }
+        None => reflected((row, i), (map, look), random, folds),
     }
 }
 
@@ -132,14 +133,9 @@ fn reflected(
     random: [f32; 2],
     folds: impl Folds,
 ) -> (Vec3, Option<Place>) {
-    let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
-    let (mirrored, shininess) = (lane(&row.mirrored_eye, i), row.shininess[i]);
     let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
     map.visit(look, folds, |photon, density| {
-        let mut f = diffuse;
-        if specular != Vec3::ZERO {
-            f += specular * gloss(mirrored, photon.direction, shininess);
-        }
+        let f = row.bsdf.f_at(i, photon.direction);
         let light = f * photon.flux * (density * row.landed(i, photon.direction));
         sum += light;
         let weight = light.element_sum();

@@ -53,7 +53,7 @@ use crate::integrators::transport::medium::Inside;
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::tree::bounds::Space;
 use crate::lights::{Ball, LightBounds, PhotonSource};
-use crate::materials::{Bsdf, Material};
+use crate::materials::Material;
 use crate::scene::description::{Render, Shadows};
 use crate::world::{Hit, World, photon_source};
 use emit::{EmittedPhotons, PhotonTracing};
@@ -357,10 +357,7 @@ impl Specular {
     fn of(world: &World) -> Self {
         let mut own = Self { balls: Vec::new(), is_unbounded: false };
         for (id, object) in (0..).zip(world.geometry.objects()) {
-            let is_specular = |material: &Material| match material.bsdf {
-                Bsdf::Phong(_) => false,
-                Bsdf::Mirror(_) | Bsdf::Glass(_) => true,
-            };
+            let is_specular = |material: &Material| material.bsdf.is_delta();
             if world.materials_of(id).any(is_specular) {
                 own.balls.extend(object.ball());
                 own.is_unbounded |= object.ball().is_none();

@@ -4,9 +4,8 @@ use super::tile::TileContext;
 use super::vertex::{Lift, ShadingVertex};
 use crate::geometry::rows::lanes;
 use crate::integrators::view::{Measure, Parts};
-use crate::materials::Lobes;
-use crate::materials::lobes::gloss;
-use crate::materials::phong::PhongBsdf;
+use crate::materials::BsdfRow;
+use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
 use crate::sampling::SamplerRow;
@@ -43,16 +42,8 @@ pub struct VertexBatch {
     /// Normals before a normal map bent them, and the cosine between both; [`UNBENT`] without a normal map.
     pub smooth_normal: Lanes3,
     pub bend: Lanes,
-    /// The direction to the viewer, mirrored.
-    pub mirrored_eye: Lanes3,
-    /// The diffuse part of f in sr⁻¹, and the glossy one at its peak.
-    pub diffuse: Lanes3,
-    /// [`VertexBatch::diffuse`].
-    pub specular: Lanes3,
-    /// Exponent of the glossy lobe.
-    pub shininess: Lanes,
-    /// The largest components of kd and ks, whatever parts are shown.
-    pub albedos: [Lanes; 2],
+    /// BSDFs, all of one kind.
+    pub bsdf: BsdfRow,
     /// Throughput of the paths.
     pub throughput: Lanes3,
     /// Slots of the paths.
@@ -65,8 +56,6 @@ pub struct VertexBatch {
     pub roulette_throughput: Lanes,
     /// Indices of the glass around the vertices.
     pub medium: [u32; LANES],
-    /// Whether any vertex has a glossy lobe.
-    pub is_glossy: bool,
     /// Whether any vertex has a bent normal.
     pub is_bent: bool,
 }
@@ -90,14 +79,13 @@ impl VertexBatch {
             Measure::Work => true,
         };
         let is_soft = tile.settings.render.shadows == Shadows::Soft;
-        if !(self.is_glossy && shows && is_soft && tile.world.lights.can_be_found()) {
+        if !(self.bsdf.has_narrow_lobes() && shows && is_soft && tile.world.lights.can_be_found()) {
             return 0;
         }
         // A lobe is about as wide as 2π/(α + 1) sr.
         let filled = Self::FILLED * std::f32::consts::TAU / tile.world.lights.extent_beyond() - 1.0;
         let least = filled.min(Self::SHARP);
-        let is_sharp = |i: &usize| self.albedos[1][*i] > 0.0 && self.shininess[*i] >= least;
-        lanes(self.used).filter(is_sharp).fold(0, |sharp, i| sharp | 1 << i)
+        self.bsdf.narrower_than(self.used, least)
     }
 
     /// The random numbers of the vertices.
@@ -129,18 +117,13 @@ impl VertexBatch {
         normal: [[0.0; LANES]; 3],
         smooth_normal: [[0.0; LANES]; 3],
         bend: [UNBENT; LANES],
-        mirrored_eye: [[0.0; LANES]; 3],
-        diffuse: [[0.0; LANES]; 3],
-        specular: [[0.0; LANES]; 3],
-        shininess: [0.0; LANES],
-        albedos: [[0.0; LANES]; 2],
+        bsdf: BsdfRow::EMPTY,
         throughput: [[0.0; LANES]; 3],
         slot: [0; LANES],
         path: [0; LANES],
         place: [0; LANES],
         roulette_throughput: [0.0; LANES],
         medium: [0; LANES],
-        is_glossy: false,
         is_bent: false,
     };
 
@@ -149,7 +132,8 @@ impl VertexBatch {
     pub fn reset(&mut self) {
         (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
         (self.has_facet, self.only_specular_before, self.after_gloss) = (0, 0, 0);
-        (self.is_glossy, self.is_bent) = (false, false);
+        self.is_bent = false;
+        self.bsdf.reset();
         self.bend = [UNBENT; LANES];
     }
 
@@ -161,7 +145,7 @@ impl VertexBatch {
         }
     }
 
-    /// Takes a vertex of another row.
+    /// Takes a vertex of another row, whose BSDFs are of the same kind.
     pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
         for (own, other) in [
             (&mut self.from, &other.from),
@@ -171,20 +155,14 @@ impl VertexBatch {
             (&mut self.facet, &other.facet),
             (&mut self.normal, &other.normal),
             (&mut self.smooth_normal, &other.smooth_normal),
-            (&mut self.mirrored_eye, &other.mirrored_eye),
-            (&mut self.diffuse, &other.diffuse),
-            (&mut self.specular, &other.specular),
             (&mut self.throughput, &other.throughput),
         ] {
             set_lane(own, i, lane(other, from));
         }
-        (self.bend[i], self.shininess[i]) = (other.bend[from], other.shininess[from]);
-        for (own, other) in self.albedos.iter_mut().zip(&other.albedos) {
-            own[i] = other[from];
-        }
+        self.bsdf.copy(i, &other.bsdf, from);
+        self.bend[i] = other.bend[from];
         (self.roulette_throughput[i], self.medium[i]) = (other.roulette_throughput[from], other.medium[from]);
         (self.slot[i], self.path[i], self.place[i]) = (other.slot[from], other.path[from], other.place[from]);
-        self.is_glossy |= other.is_glossy;
         self.is_bent |= other.is_bent;
         self.is_bounded |= (other.is_bounded >> from & 1) << i;
         self.lift_end[i] = other.lift_end[from];
@@ -195,6 +173,7 @@ impl VertexBatch {
         self.used |= 1 << i;
     }
 
+    /// Sets a vertex, whose BSDF is of the row's kind.
     pub fn put(
         &mut self,
         i: usize,
@@ -221,31 +200,12 @@ impl VertexBatch {
         set_lane(&mut self.normal, i, shading.normal);
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.bend[i] = shading.bend.unwrap_or(UNBENT);
-        set_lane(&mut self.mirrored_eye, i, shading.mirrored(vertex.to_eye));
-        let [diffuse, specular] = bsdf_parts(bsdf, measure);
-        set_lane(&mut self.diffuse, i, diffuse);
-        set_lane(&mut self.specular, i, specular);
-        self.shininess[i] = bsdf.shininess;
-        self.albedos[0][i] = bsdf.diffuse.max_element();
-        self.albedos[1][i] = bsdf.specular.max_element();
+        self.bsdf.put(i, bsdf, measure.lobes(), shading.normal, vertex.to_eye);
         (self.roulette_throughput[i], self.medium[i]) = (path.state.roulette_throughput, medium);
         set_lane(&mut self.throughput, i, path.throughput);
         (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);
-        self.is_glossy |= bsdf.specular != Vec3::ZERO;
         self.is_bent |= shading.bend.is_some();
         self.used |= 1 << i;
-    }
-
-    /// The lobes of a vertex.
-    #[inline(always)]
-    pub fn lobes(&self, i: usize) -> Lobes {
-        Lobes {
-            normal: lane(&self.normal, i),
-            mirrored_eye: lane(&self.mirrored_eye, i),
-            diffuse: self.albedos[0][i],
-            specular: self.albedos[1][i],
-            shininess: self.shininess[i],
-        }
     }
 
     /// Response of the vertices to light from these directions.
@@ -261,15 +221,7 @@ impl VertexBatch {
                 cosines[i] *= terminator(cosines[i], smooth, self.bend[i]);
             }
         }
-        let (mut f, mut glosses) = (self.diffuse, [0.0; LANES]);
-        if self.is_glossy {
-            for i in 0..LANES {
-                let left = gloss(lane(&self.mirrored_eye, i), lane(directions, i), self.shininess[i]);
-                set_lane(&mut f, i, lane(&self.diffuse, i) + lane(&self.specular, i) * left);
-                glosses[i] = left;
-            }
-        }
-        Response { f, cosines, glosses }
+        Response { bsdf: self.bsdf.f(directions), cosines }
     }
 
     /// Position of a vertex's surface, and the normal of its facet on the viewer's side.
@@ -339,28 +291,14 @@ impl VertexBatch {
 
 /// Response of vertices to light from directions.
 pub struct Response {
-    /// The BSDF in sr⁻¹, of the shown parts.
-    pub f: Lanes3,
+    /// BSDFs.
+    pub bsdf: BsdfValues,
     /// Cosines, times the terminator factor; not above 0 if nothing arrives.
     pub cosines: Lanes,
-    /// [`gloss`].
-    pub glosses: Lanes,
 }
 
 /// A bit for each lane.
 pub const ALL: u32 = ((1_u64 << LANES) - 1) as u32;
-
-/// The diffuse part of f in sr⁻¹, and the glossy part at its peak, as far as they are shown.
-#[inline(always)]
-pub fn bsdf_parts(bsdf: &PhongBsdf, measure: Measure) -> [Vec3; 2] {
-    let Parts { diffuse, specular, .. } = match measure {
-        Measure::Radiance(parts) => parts,
-        Measure::Work => Parts::ALL,
-        Measure::ArrivingShare => return [Vec3::ONE, Vec3::ZERO],
-    };
-    let part = |is_taken: bool, value: Vec3| if is_taken { value } else { Vec3::ZERO };
-    [part(diffuse, bsdf.diffuse_value()), part(specular, bsdf.specular_peak())]
-}
 
 /// Terminator factor: softens the edge at which bent normals lose the light of their surface, 0 behind the surface; 1
 /// without bent normals (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).

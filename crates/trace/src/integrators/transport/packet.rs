@@ -1,7 +1,7 @@
 //! Hits of a packet of rays, and rows of plain surfaces with all that direct light needs: one vertex at a time would cost more
 //! than the light.
 
-use super::batch::{UNBENT, VertexBatch, bsdf_parts};
+use super::batch::{UNBENT, VertexBatch};
 use super::camera::CameraRow;
 use super::ray::PathRay;
 use super::tile::TileContext;
@@ -11,8 +11,8 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::{self, HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::integrators::view::Measure;
-use crate::materials::phong::PhongBsdf;
-use crate::materials::{Material, Phong};
+use crate::materials::bsdf::ShownLobes;
+use crate::materials::{Material, Rough};
 use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, lane, set_lane, take, truths};
 use crate::math::{DVec2, Vec3};
 use crate::sampling::CAMERA_PATH;
@@ -69,8 +69,8 @@ impl PacketSource<'_> {
     }
 }
 
-/// Hits of a packet. A surface is plain if there are loops for its shape and for the look-ups of its material, a Phong, and
-/// its ray is not in glass.
+/// Hits of a packet. A surface is plain if there are loops for its shape and for the look-ups of its material, a rough one, its
+/// ray is not in glass, and its BSDF is of the same kind as those of the other plain surfaces.
 pub struct PacketHits {
     hits: HitRows,
     object: [u32; PACKET],
@@ -164,13 +164,13 @@ impl TileContext<'_> {
         self.pixel_spread == 0.0 && self.world.untextured(object).is_some()
     }
 
-    /// The material of an object, and its Phong. `None` if the object is not plain.
+    /// The material of an object, and its rough BSDF. `None` if the object is not plain.
     #[inline(always)]
-    pub fn plain_phong(&self, object: u32) -> Option<(&Material, &Phong)> {
-        let (material, phong) = self.world.plain_phong(object)?;
+    pub fn plain_rough(&self, object: u32) -> Option<(&Material, &Rough)> {
+        let (material, rough) = self.world.plain_rough(object)?;
         // Ambient light needs look-ups for each surface by itself.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
-        (!has_ambient || phong.constant().is_some()).then_some((material, phong))
+        (!has_ambient || rough.constant().is_some()).then_some((material, rough))
     }
 }
 
@@ -254,40 +254,31 @@ impl Loops for PacketIntersection<'_> {
             }
             let of = folds.bits(&of) & left;
             left &= !of;
-            let Some((material, phong)) = tile.plain_phong(id) else { continue };
-            let Some(specular) = phong.specular.constant() else { continue };
-            let texture = phong.diffuse.texture().filter(|_| are_lit && measure.is_colored());
+            let Some((material, rough)) = tile.plain_rough(id) else { continue };
+            if plain == 0 {
+                row.bsdf.prepare(rough.kind());
+            } else if row.bsdf.kind() != rough.kind() {
+                continue;
+            }
+            let has_uv = rough.row_texture().is_some() && are_lit && measure.is_colored();
             match &world.geometry.objects()[id as usize] {
                 Object::Shape(shape) => {
                     if !surface.fill(shape, rows, &hits, of) {
                         continue;
                     }
-                    if texture.is_some() {
+                    if has_uv {
                         surface.fill_uv(shape, rows, &hits, of);
                     }
                 }
-                Object::Mesh(mesh) => mesh.fill_surfaces(surface, rows, &hits, of, texture.is_some()),
+                Object::Mesh(mesh) => mesh.fill_surfaces(surface, rows, &hits, of, has_uv),
             }
             plain |= of;
             shining |= if material.emission.shines() { of } else { 0 };
-            let bsdf = match texture {
-                Some(texture) => {
-                    lookups += u64::from(of.count_ones());
-                    let diffuse = texture.lookup_row(&surface.uv);
-                    PhongRow { diffuse, specular, shininess: phong.shininess }
-                }
-                None => {
-                    let Vec3 { x, y, z } = phong.diffuse.constant().unwrap_or(Vec3::ONE);
-                    let diffuse = [[x; PACKET], [y; PACKET], [z; PACKET]];
-                    PhongRow { diffuse, specular, shininess: phong.shininess }
-                }
-            };
-            row.used |= of & !bsdf.black(folds);
-            let only_specular_before = only_specular_before & of;
-            row.set_bsdf(of, &bsdf, measure);
-            if only_specular_before != of && measure != Measure::ALL {
-                row.set_bsdf(of & !only_specular_before, &bsdf, Measure::ALL);
-            }
+            lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
+            let shown = [(of, measure.lobes()), (of & !only_specular_before, ShownLobes::ALL)];
+            let shown = if measure == Measure::ALL { &shown[..1] } else { &shown };
+            let black = row.bsdf.fill(rough, has_uv.then_some(&surface.uv), shown, folds);
+            row.used |= of & !black;
         }
         // Set the positions and normals of the plain vertices.
         (row.only_specular_before, row.after_gloss) = (only_specular_before, after_gloss);
@@ -339,29 +330,6 @@ impl TileContext<'_> {
     }
 }
 
-/// [`PhongBsdf`](crate::materials::phong::PhongBsdf)s side by side, with one exponent.
-struct PhongRow {
-    diffuse: Lanes3,
-    specular: Vec3,
-    shininess: f32,
-}
-
-impl PhongRow {
-    /// A bit for each BSDF that reflects nothing.
-    #[inline(always)]
-    fn black(&self, folds: impl Folds) -> u32 {
-        if self.specular != Vec3::ZERO {
-            return 0;
-        }
-        let mut black = [0; PACKET];
-        for i in 0..PACKET {
-            let Vec3 { x, y, z } = lane(&self.diffuse, i);
-            black[i] = if (x == 0.0) & (y == 0.0) & (z == 0.0) { TRUE } else { 0 };
-        }
-        folds.bits(&black)
-    }
-}
-
 /// Vertices of smooth meshes to lift above their facets.
 #[derive(Clone, Copy)]
 enum Lifts {
@@ -372,37 +340,10 @@ enum Lifts {
 }
 
 impl VertexBatch {
-    /// Sets the lobes of some lanes.
-    #[inline(always)]
-    fn set_bsdf(&mut self, of: u32, bsdf: &PhongRow, measure: Measure) {
-        let PhongRow { diffuse, specular, shininess } = bsdf;
-        let white =
-            PhongBsdf { diffuse: Vec3::ONE, specular: *specular, shininess: *shininess, ambient: Vec3::ZERO };
-        let [of_white, glossy] = bsdf_parts(&white, measure);
-        let (mut shown, mut greatest) = ([[of_white.x; PACKET]; 3], [0.0; PACKET]);
-        if measure != Measure::ArrivingShare {
-            for i in 0..PACKET {
-                set_lane(&mut shown, i, lane(diffuse, i) * of_white);
-            }
-        }
-        for i in 0..PACKET {
-            greatest[i] = lane(diffuse, i).max_element();
-        }
-        let of = truths(of);
-        for axis in 0..3 {
-            take(&of, &shown[axis], &mut self.diffuse[axis]);
-            take(&of, &[glossy[axis]; PACKET], &mut self.specular[axis]);
-        }
-        take(&of, &[*shininess; PACKET], &mut self.shininess);
-        take(&of, &greatest, &mut self.albedos[0]);
-        take(&of, &[specular.max_element(); PACKET], &mut self.albedos[1]);
-        self.is_glossy |= *specular != Vec3::ZERO;
-    }
-
     /// Sets normals and points above facets for the lanes of smooth surfaces.
     #[inline(always)]
     fn smooth(&mut self, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts, folds: impl Folds) {
-        let [mut normals, mut mirrored] = [[[0.0; PACKET]; 3]; 2];
+        let mut normals = [[0.0; PACKET]; 3];
         let (mut ends, mut above, mut bent) = ([0.0; PACKET], [0; PACKET], [0; PACKET]);
         for i in 0..PACKET {
             let (geometric, direction) = (lane(&surface.normal, i), lane(&rays.direction, i));
@@ -412,8 +353,6 @@ impl VertexBatch {
             bent[i] = if is_bent { TRUE } else { 0 };
             let normal = shading * if geometric.dot(direction) > 0.0 { -1.0 } else { 1.0 };
             set_lane(&mut normals, i, normal);
-            let to_eye = -direction;
-            set_lane(&mut mirrored, i, normal * (2.0 * normal.dot(to_eye)) - to_eye);
         }
         for i in 0..PACKET {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
@@ -441,8 +380,8 @@ impl VertexBatch {
             take(&of, &surface.shadow_point[axis], &mut self.lifted[axis]);
             take(&rises, &surface.shadow_point[axis], &mut self.from[axis]);
             take(&of, &normals[axis], &mut self.normal[axis]);
-            take(&of, &mirrored[axis], &mut self.mirrored_eye[axis]);
         }
+        self.bsdf.orient(Some(&of), &normals, &rays.direction);
         take(&of, &ends, &mut self.lift_end);
         take(&of, &[UNBENT; PACKET], &mut self.bend);
         self.has_facet |= surface.smooth;
@@ -468,9 +407,8 @@ impl VertexBatch {
             let from = offset_origin(lane(&surface.point, i), lane(&surface.error, i), normal, normal);
             set_lane(&mut self.from, i, from);
             set_lane(&mut self.normal, i, normal);
-            let to_eye = -direction;
-            set_lane(&mut self.mirrored_eye, i, normal * (2.0 * normal.dot(to_eye)) - to_eye);
         }
+        self.bsdf.orient(None, &self.normal, &rays.direction);
         if surface.smooth != 0 {
             self.smooth(rays, surface, lifts, folds);
         }

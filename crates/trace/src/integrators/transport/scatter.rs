@@ -8,6 +8,7 @@ use super::ray::{PathRay, PathState};
 use super::tile::TileContext;
 use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
+use crate::materials::bsdf::LobeSet;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
 use crate::sampling::Decision;
 use crate::world::Loops;
@@ -101,7 +102,7 @@ impl BsdfSampling<'_> {
                     roulette_throughput: scattered.roulette_throughput[i],
                     only_specular_before: false,
                     one_diffuse_before: row.only_specular_before & 1 << i != 0,
-                    is_after_gloss: row.albedos[1][i] > 0.0,
+                    is_after_gloss: row.bsdf.has_narrow_lobe(i),
                 },
                 cone: cones
                     .get(row.place[i] as usize)
@@ -122,29 +123,21 @@ impl Loops for BsdfSampling<'_> {
         let sampler = row.sampler(tile);
         // Sample a direction for each vertex.
         let u = sampler.pairs(&row.path, Decision::Direction, 0, 1);
+        let are_narrow = row.bsdf.has_narrow_lobes();
         let [lobe, _] =
-            if row.is_glossy { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; LANES]; 2] };
-        let mut directions = [[0.0; LANES]; 3];
-        if row.is_glossy {
-            for i in 0..LANES {
-                set_lane(&mut directions, i, row.lobes(i).sample(lobe[i], [u[0][i], u[1][i]]));
-            }
-        } else {
-            for i in 0..LANES {
-                set_lane(&mut directions, i, row.lobes(i).sample_diffuse([u[0][i], u[1][i]]));
-            }
-        }
+            if are_narrow { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; LANES]; 2] };
+        let directions = row.bsdf.sample(LobeSet::All, &row.normal, &lobe, &u);
         // Evaluate the BSDF and the pdf there.
-        let Response { f, cosines, glosses } = row.response(&directions);
-        let [mut densities, mut roulette_throughput] = [[0.0; LANES]; 2];
-        let mut factors = f;
+        let Response { bsdf, cosines } = row.response(&directions);
+        let densities = row.bsdf.pdf(LobeSet::All, &row.normal, &directions, &bsdf);
+        let grey = row.bsdf.grey(&bsdf);
+        let mut roulette_throughput = [0.0; LANES];
+        let mut factors = bsdf.f;
         let mut alive = 0_u32;
         for i in 0..LANES {
-            let lobes = row.lobes(i);
-            densities[i] = lobes.density(lane(&directions, i), glosses[i]);
             let share = cosines[i] / densities[i];
-            roulette_throughput[i] = row.roulette_throughput[i] * lobes.value(glosses[i]) * share;
-            let factor = lane(&f, i) * share;
+            roulette_throughput[i] = row.roulette_throughput[i] * grey[i] * share;
+            let factor = lane(&bsdf.f, i) * share;
             set_lane(&mut factors, i, factor);
             let brings = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);
             let bit = 1 << i;

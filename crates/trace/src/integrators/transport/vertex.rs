@@ -6,8 +6,7 @@ use super::tile::TileContext;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Asked, Ray, SurfacePoint};
 use crate::integrators::RayCounters;
-use crate::materials::phong::PhongBsdf;
-use crate::materials::{Bsdf, Footprint, Material, TexturePoint};
+use crate::materials::{Footprint, Material, RoughBsdf, TexturePoint};
 use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Sides};
@@ -68,10 +67,7 @@ impl<'a> Vertex<'a> {
 
     fn shaded(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
         let material = &tile.world.materials[tile.world.material_index(hit)];
-        let is_lit = match &material.bsdf {
-            Bsdf::Phong(_) => true,
-            Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
-        };
+        let is_lit = !material.bsdf.is_delta();
         let asked = Asked { uv: material.is_textured(), shadow_point: is_lit };
         let surface = tile.world.geometry.asked_surface(by, hit, asked);
         Self::at_surface(tile, path, (material, surface), hit, distance)
@@ -91,10 +87,9 @@ impl<'a> Vertex<'a> {
         if tile.pixel_spread > 0.0 {
             let tangents = [surface.dpdu, surface.dpdv];
             footprint = Footprint::of_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents);
-            curvature = match &material.bsdf {
-                Bsdf::Phong(_) => 0.0,
-                Bsdf::Mirror(_) | Bsdf::Glass(_) => side * tile.world.geometry.curvature(hit, &surface),
-            };
+            if material.bsdf.is_delta() {
+                curvature = side * tile.world.geometry.curvature(hit, &surface);
+            }
         }
         Self {
             texture_point: TexturePoint { uv: surface.uv, footprint },
@@ -223,15 +218,6 @@ pub struct Shading {
     pub bend: Option<f32>,
 }
 
-impl Shading {
-    /// The direction to the viewer, mirrored: its cosine with a direction is that between the mirrored direction and the
-    /// viewer's.
-    pub fn mirrored(&self, to_eye: Vec3) -> Vec3 {
-        // (2(n·l)n − l)·v = (2(n·v)n − v)·l.
-        self.normal * (2.0 * self.normal.dot(to_eye)) - to_eye
-    }
-}
-
 /// A vertex with a lobe that is not δ, ready for direct light.
 pub struct ShadingVertex<'a> {
     /// The path that came here.
@@ -243,5 +229,5 @@ pub struct ShadingVertex<'a> {
     /// Its shading normals.
     pub shading: Shading,
     /// Its BSDF.
-    pub bsdf: PhongBsdf,
+    pub bsdf: RoughBsdf,
 }
