@@ -9,10 +9,10 @@ pub mod mipmaps;
 pub mod mirror;
 pub mod normal_map;
 pub mod phong;
+pub mod rough;
 pub mod texels;
 pub mod texture;
 
-pub use bsdf::{BsdfRow, Rough, RoughBsdf, RoughKind};
 pub use emission::Emission;
 pub use footprint::{Footprint, TexturePoint};
 pub use glass::Glass;
@@ -20,6 +20,7 @@ pub use mipmaps::Mipmaps;
 pub use mirror::Mirror;
 pub use normal_map::NormalMap;
 pub use phong::Phong;
+pub use rough::{BsdfRow, Rough, RoughBsdf, RoughKind};
 
 use crate::math::Vec3;
 

@@ -31,7 +31,7 @@ use crate::materials::{Bsdf, Mirror, Rough};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
 use crate::sampling::Decision;
-use crate::scene::description::{Integrator, Shadows};
+use crate::scene::description::Shadows;
 use crate::world::{Hit, PACKET};
 
 /// Least contribution of the weaker part for which a ray is split in two; below it, one part is chosen at random.
@@ -57,15 +57,8 @@ pub fn trace(
     let Memory { scratch, direct } = memory;
     let Scratch { rays, next, surfaces, crossing, camera, hits, by_object } = scratch;
     next.clear();
-    let is_path = match tile.settings.render.integrator {
-        Integrator::Whitted => false,
-        // The share of the lamps' light that arrives is measured at the first visible surface.
-        Integrator::Path => accumulator.measure != Measure::ArrivingShare,
-    };
     let mut wavefront = Wavefront {
         depth: 0,
-        is_path,
-        goes_on: is_path || tile.gathers,
         continuation: None,
         tile,
         maps,
@@ -95,7 +88,7 @@ pub fn trace(
     // Follow the rays that go on, round by round.
     while !rays.is_empty() {
         wavefront.direct.expect(rays.len(), tile.pixel_spread > 0.0);
-        if wavefront.goes_on {
+        if tile.behaviour.scatters {
             // Find all hits first, so that packets are of one object.
             tile.closest_hits(rays, hits)?;
             by_object.sort(hits);
@@ -122,9 +115,6 @@ pub fn trace(
 struct Wavefront<'a, 's> {
     /// Number of scatterings before the hits of this round.
     depth: u32,
-    is_path: bool,
-    /// Whether rays go on from diffuse and glossy surfaces: in path, and in whitted to find what photons do not bring.
-    goes_on: bool,
     /// Continuation of paths at Phong surfaces. `None` if they end there.
     continuation: Option<Continuation>,
     tile: &'a TileContext<'a>,
@@ -159,7 +149,7 @@ impl Wavefront<'_, '_> {
     }
 
     fn begin_round(&mut self) {
-        self.continuation = self.goes_on.then(|| Continuation::new(self.tile, self.depth));
+        self.continuation = self.tile.behaviour.scatters.then(|| Continuation::new(self.tile, self.depth));
     }
 
     /// Makes the found rays those of the next round; the old ones stay as memory.
@@ -296,7 +286,7 @@ impl Wavefront<'_, '_> {
     /// Whether another technique finds the light that a path meets: photons, behind mirrors and glass, or light samples alone, for
     /// hard shadows.
     fn is_gathered(&self, path: &PathRay) -> bool {
-        let goes_on = self.tile.gathers && !path.state.only_specular_before;
+        let goes_on = self.tile.behaviour.gathers && !path.state.only_specular_before;
         goes_on && !(path.state.density > 0.0 && self.tile.settings.render.shadows == Shadows::Soft)
     }
 
@@ -438,7 +428,7 @@ impl Wavefront<'_, '_> {
         let mirrored = |weight: f32| reflected(&path, vertex, &shading, Vec3::splat(weight));
         let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
-        let splits = !self.is_path && path.state.only_specular_before;
+        let splits = self.tile.behaviour.splits && path.state.only_specular_before;
         if weaker >= LEAST_SPLIT && splits {
             self.push_reflected(mirrored(reflectance));
             self.push_refracted(refracted, 1.0 - reflectance);
@@ -464,7 +454,7 @@ impl Wavefront<'_, '_> {
 
     fn russian_roulette(&self, ray: PathRay) -> Option<PathRay> {
         match self.continuation {
-            Some(continuation) if self.is_path || !ray.state.only_specular_before => {
+            Some(continuation) if !self.tile.behaviour.splits || !ray.state.only_specular_before => {
                 continuation.russian_roulette(self.tile, ray)
             }
             Some(_) | None => Some(ray),

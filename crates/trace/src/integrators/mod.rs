@@ -6,6 +6,7 @@
 //! ```text
 //! view, counters      contents of a picture; counters of rays
 //! settings            settings of a render
+//! method              behaviour of its rays: the scene's table of methods, as the view and photons let it apply
 //! transport           rays of a tile, their hits, vertices in rows; knows the world, neither methods nor photons
 //! direct              light samples, shadow rays, MIS weights
 //! photons             emission, photon maps, gathering
@@ -20,6 +21,7 @@ mod counters;
 mod direct;
 mod eye;
 mod memory;
+mod method;
 mod photons;
 mod settings;
 mod transport;
@@ -33,10 +35,11 @@ use crate::math::Vec3;
 use crate::world::{PACKET, World};
 pub use counters::RayCounters;
 use memory::Memory;
+use method::Behaviour;
+pub use method::receivers;
 pub use photons::{Photon, PhotonMap, PhotonMaps, PhotonPass, Photons};
 pub use settings::{PhotonSettings, RenderSettings};
 use transport::accumulator::Accumulator;
-pub use transport::tile::receivers;
 use transport::tile::{SampleBlock, TileContext};
 pub use view::{FirstHit, Measure, Parts, Shown, View};
 
@@ -77,7 +80,8 @@ pub fn render_tile_by(
     let mut counters = RayCounters::default();
     let settings = &settings.effective();
     let photons = photons.filter(|_| settings.gathers());
-    let tile = TileContext { gathers: photons.is_some(), ..TileContext::new(world, settings, &block, token) };
+    let behaviour = Behaviour::of(settings, photons.is_some());
+    let tile = TileContext::new(world, settings, &block, token, behaviour);
     let clamp = if settings.view.shown().measure() == Measure::Work { 0.0 } else { settings.render.clamp };
     let mut memory = Memory::of_thread();
     for start in (0..block.len()).step_by(BATCH_SIZE) {

@@ -2,7 +2,7 @@
 
 use super::{FirstHit, Measure, Shown, View};
 use crate::math::{DVec2, Vec3};
-use crate::scene::description::{Integrator, Render};
+use crate::scene::description::Render;
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use crate::world::Lookups;
 
@@ -15,7 +15,7 @@ pub struct RenderSettings {
     pub dof: bool,
     /// View to show.
     pub view: View,
-    /// Settings of photon maps. `None` if whitted gathers no photons.
+    /// Settings of photon maps. `None` if no photons are gathered.
     pub photons: Option<PhotonSettings>,
 }
 
@@ -34,10 +34,7 @@ impl RenderSettings {
     /// The effective settings: ignored ones have their defaults.
     pub fn effective(&self) -> Self {
         let mut render = self.render.effective();
-        let photons = match render.integrator {
-            Integrator::Whitted => self.photons,
-            Integrator::Path => None,
-        };
+        let photons = self.photons.filter(|_| render.integrator.method().gathers);
         if photons.is_some() {
             render.ambient = Vec3::ZERO;
         }

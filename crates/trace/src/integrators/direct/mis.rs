@@ -159,7 +159,7 @@ impl TileContext<'_> {
         if !lights.are_beyond() {
             return Vec3::ZERO;
         }
-        let samples = lights.samples_at(self.receivers(), ray.origin, normal);
+        let samples = lights.samples_at(self.behaviour.receivers, ray.origin, normal);
         lights.beyond_with(sky, ray.direction, |number, density| share(density * samples.of(number)))
     }
 
@@ -171,7 +171,7 @@ impl TileContext<'_> {
         let lights = &self.world.lights;
         lights.of_hit(hit.object, primitive).map_or(0.0, |(number, light)| {
             light.pdf(ray.origin, normal, &met)
-                * lights.samples_at(self.receivers(), ray.origin, normal).of(number)
+                * lights.samples_at(self.behaviour.receivers, ray.origin, normal).of(number)
         })
     }
 

@@ -170,10 +170,10 @@ impl DirectLightQueue {
     ) -> Result<LightRays, Cancelled> {
         let mut rays = LightRays::default();
         let mut group: ArrayVec<Sums, ROWS> = ArrayVec::new();
-        let together = if tile.world.lights.selection(tile.receivers()).is_some() { ROWS } else { 1 };
+        let together = if tile.world.lights.selection(tile.behaviour.receivers).is_some() { ROWS } else { 1 };
         // Hard shadows are by light samples alone.
-        let by_paths =
-            continuation.is_some() && (!tile.gathers || tile.settings.render.shadows == Shadows::Soft);
+        let by_paths = continuation.is_some()
+            && (!tile.behaviour.gathers || tile.settings.render.shadows == Shadows::Soft);
         let scatters = continuation.filter(|continuation| continuation.leads_on);
         for first in (0..self.count).step_by(together) {
             let end = (first + together).min(self.count);
@@ -241,7 +241,7 @@ impl DirectLightQueue {
         let (instructions, used) = (tile.world.geometry.instructions(), asked.used);
         let plain = Lighting::<false> { tile, row, used, measure, others, media };
         let weighed = Lighting::<true> { tile, row, used, measure, others, media };
-        let sums = match (others, tile.world.lights.selection(tile.receivers())) {
+        let sums = match (others, tile.world.lights.selection(tile.behaviour.receivers)) {
             (CompetingTechnique::Nothing, None) => instructions.run(plain),
             (CompetingTechnique::Nothing, Some(selection)) => {
                 instructions.run(Picking { lighting: plain, selection, number, pool: &mut pool })

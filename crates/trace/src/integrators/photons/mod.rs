@@ -48,6 +48,7 @@ use rayon::prelude::*;
 use crate::control::{CancelToken, Cancelled, Progress, unwatched};
 use crate::film::Rect;
 use crate::geometry::{Aabb, ShapeHit};
+use crate::integrators::method::Behaviour;
 use crate::integrators::settings::{PhotonSettings, RenderSettings};
 use crate::integrators::transport::medium::Inside;
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
@@ -235,6 +236,7 @@ impl Photons {
         let material = |object| world.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
         let inside = |&body: &u32| Inside { body, material: material(body) };
         let glasses: &[Inside] = &self.glasses.iter().map(inside).collect::<Vec<_>>();
+        let behaviour = Behaviour::of(&settings, false);
         let done = AtomicU64::new(0);
         let chunk = |first: u32| {
             // All photons of a number of passes are samples of one sequence.
@@ -244,7 +246,10 @@ impl Photons {
             let samples = start + first..start + (first + CHUNK).min(count);
             let place = Rect { x: number / at_once, y: u32::MAX, width: 1, height: 1 };
             let block = SampleBlock { pixels: place.into(), samples };
-            let tile = TileContext { pixel_spread: 0.0, ..TileContext::new(world, &settings, &block, token) };
+            let tile = TileContext {
+                pixel_spread: 0.0,
+                ..TileContext::new(world, &settings, &block, token, behaviour)
+            };
             let (share, most_depth) = (1.0 / count as f32, self.most_depth);
             let shots =
                 PhotonTracing { tile: &tile, emission, glasses, share, most_depth }.trace_photons()?;

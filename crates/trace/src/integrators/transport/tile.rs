@@ -6,10 +6,10 @@ use std::ops::Range;
 use crate::control::CancelToken;
 use crate::film::{Part, Pixels};
 use crate::integrators::RenderSettings;
-use crate::integrators::view::Measure;
+use crate::integrators::method::Behaviour;
 use crate::lights::{Environment, Receivers};
 use crate::sampling::PixelSampler;
-use crate::scene::description::{Integrator, Shadows};
+use crate::scene::description::Shadows;
 use crate::world::{PACKET, World};
 
 /// Context of a tile: a world, the settings, and the requested samples.
@@ -24,8 +24,8 @@ pub struct TileContext<'a> {
     pub token: &'a CancelToken,
     /// Growth of a pixel's beam with the distance; 0 if nothing needs it, as without mip levels.
     pub pixel_spread: f32,
-    /// Whether photons are gathered at the vertices.
-    pub gathers: bool,
+    /// Behaviour of the rays.
+    pub behaviour: Behaviour,
     /// Whether paths find a constant environment without light samples: the ray that goes on anyway is at least as good as a
     /// sample, as only occluders tell one direction from another.
     pub leaves_sky: bool,
@@ -40,6 +40,7 @@ impl<'a> TileContext<'a> {
         settings: &'a RenderSettings,
         block: &'a SampleBlock,
         token: &'a CancelToken,
+        behaviour: Behaviour,
     ) -> Self {
         let pixel_spread =
             if world.is_mipmapped() { world.camera.pixel_spread(settings.render.height) } else { 0.0 };
@@ -49,18 +50,13 @@ impl<'a> TileContext<'a> {
             Some(Environment::Map { .. }) | None => false,
         };
         let leaves_sky = is_even
-            && render.integrator == Integrator::Path
-            && settings.view.shown().measure() != Measure::ArrivingShare
+            && behaviour.scatters
+            && !behaviour.gathers
             && render.shadows == Shadows::Soft
             && render.shadow_samples == 1
             && render.clamp == 0.0;
         let lobes_find_sky = is_even && world.lights.selection(Receivers::Eye).is_none();
-        Self { world, settings, block, token, pixel_spread, gathers: false, leaves_sky, lobes_find_sky }
-    }
-
-    /// Purpose of the light samples at its vertices.
-    pub fn receivers(&self) -> Receivers {
-        receivers(self.settings, self.gathers)
+        Self { world, settings, block, token, pixel_spread, behaviour, leaves_sky, lobes_find_sky }
     }
 
     /// The random numbers of a slot.
@@ -68,13 +64,6 @@ impl<'a> TileContext<'a> {
         let (x, y, sample) = self.block.place(slot);
         PixelSampler::new(self.settings.render.seed, x, y, sample)
     }
-}
-
-/// Purpose of light samples, with photons or without. For the share of light that arrives, all light is sampled.
-pub fn receivers(settings: &RenderSettings, are_gathered: bool) -> Receivers {
-    let goes_on = are_gathered || settings.render.integrator == Integrator::Path;
-    let is_share = settings.view.shown().measure() == Measure::ArrivingShare;
-    if goes_on && !is_share { Receivers::Paths } else { Receivers::Eye }
 }
 
 /// The samples of a tile. A slot is the index of a sample among them: all of the first pixel, then all of the next.
