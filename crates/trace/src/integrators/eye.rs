@@ -13,33 +13,29 @@ use super::photons::gather::Gathering;
 use super::transport::accumulator::{Accumulator, Part};
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
-use super::transport::crossing::{Crossing, CrossingMemory};
+use super::transport::crossing::CrossingMemory;
 use super::transport::interface::{Interface, interface, reflected};
-use super::transport::medium::{Medium, absorption};
+use super::transport::medium::Medium;
 use super::transport::packet::{PacketHits, PacketSource};
 use super::transport::ray::PathRay;
 use super::transport::scatter::Continuation;
 use super::transport::scratch::Scratch;
 use super::transport::tile::TileContext;
 use super::transport::vertex::{ShadingVertex, Vertex};
+use super::transport::walk::{OpaqueHit, Reached};
 use super::view::Measure;
 use crate::control::Cancelled;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::geometry::surface_rows::SurfaceRow;
-use crate::geometry::{Ray, ShapeHit, SurfacePoint};
+use crate::geometry::{Ray, SurfacePoint};
 use crate::materials::{Bsdf, Mirror, Rough};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
-use crate::sampling::Decision;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, PACKET};
 
 /// Least contribution of the weaker part for which a ray is split in two; below it, one part is chosen at random.
 const LEAST_SPLIT: f32 = 0.01;
-
-/// Most surfaces without a change of glass that a ray passes in one round; each group of so many counts as a
-/// scattering.
-const MOST_HIDDEN: usize = 64;
 
 /// Rays between two polls of the token.
 const POLL_INTERVAL: usize = 256;
@@ -111,6 +107,12 @@ pub fn trace(
     Ok(())
 }
 
+/// Work of a path's ray up to its hit.
+fn work(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
+    let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
+    tile.world.geometry.work(&Ray { t_max, ..path.ray })
+}
+
 /// One round of all rays of a batch.
 struct Wavefront<'a, 's> {
     /// Number of scatterings before the hits of this round.
@@ -173,7 +175,8 @@ impl Wavefront<'_, '_> {
         // Count the work of the rays, if the view shows it.
         if self.accumulator.measure == Measure::Work {
             for lane in 0..rays.count() {
-                self.add_work(&packet.path(tile, &rays, lane), packet.hit(lane));
+                let path = packet.path(tile, &rays, lane);
+                self.accumulator.add_work(path.slot, work(tile, &path, packet.hit(lane)));
             }
         }
         // Queue the plain vertices for direct light.
@@ -221,12 +224,6 @@ impl Wavefront<'_, '_> {
             self.light()?;
         }
         Ok(())
-    }
-
-    /// Adds the work of a path's ray up to its hit.
-    fn add_work(&mut self, path: &PathRay, hit: Option<Hit>) {
-        let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
-        self.accumulator.add_work(path.slot, self.tile.world.geometry.work(&Ray { t_max, ..path.ray }));
     }
 
     /// Adds the emission that camera rays see: of plain surfaces, and from beyond everything. It is all that the sample of each ray
@@ -304,82 +301,50 @@ impl Wavefront<'_, '_> {
         }
     }
 
-    /// Shades the first surface that is more than a change between parts of one glass. `surface` is that of the hit, if it is
-    /// known.
-    fn shade(&mut self, mut path: PathRay, mut hit: Hit, mut surface: Option<SurfacePoint>) {
+    /// Follows a path to the first surface that is more than a change between parts of one glass, and shades that. `surface` is
+    /// that of the hit, if it is known.
+    fn shade(&mut self, path: PathRay, hit: Hit, surface: Option<SurfacePoint>) {
         let tile = self.tile;
-        for _ in 0..MOST_HIDDEN {
-            let vertex = match surface.take() {
-                Some(surface) => Vertex::on(tile, &path, &hit, surface),
-                None => Vertex::to_shade(tile, &path, &hit),
-            };
-            // Shade an opaque surface.
-            if vertex.material.bsdf.glass().is_none() {
-                let weight = if vertex.emits() { tile.lamp_weight(&path, &hit) } else { 1.0 };
-                let after = tile.without_open(path.medium);
-                return self.shade_surface(path, &vertex, (hit.shape.t, after), weight);
+        let accumulator = &mut self.accumulator;
+        let walk = tile.walk(path, (hit, surface), self.crossing, |path, next| {
+            if accumulator.measure == Measure::Work {
+                accumulator.add_work(path.slot, work(tile, path, next));
             }
-            // At glass, find all surfaces that touch here.
-            let Crossing { sides, arrived, near, far, opaque } =
-                tile.crossing(&path, &vertex, &hit, self.crossing);
-            path.medium = arrived;
-            if let Some(touching) = opaque {
-                let vertex = Vertex::touching(tile, &path, (sides, &touching), hit.shape.t);
-                let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
-                let weight = if vertex.emits() { tile.touching_lamp_weight(&path, &touched) } else { 1.0 };
-                return self.shade_surface(path, &vertex, (hit.shape.t, near), weight);
+        });
+        let path = walk.path;
+        match walk.reached {
+            Reached::Opaque(vertex, hit) => {
+                if self.arrive(&path, &vertex, hit) {
+                    match &vertex.material.bsdf {
+                        Bsdf::Rough(rough) => self.shade_rough(&path, &vertex, rough),
+                        Bsdf::Mirror(mirror) => self.shade_mirror(&path, &vertex, mirror),
+                        Bsdf::Glass(_) => {}
+                    }
+                }
             }
-            // Reflect and refract at a change of glass.
-            if near.glass() != far.glass() {
-                return self.shade_glass(path, &vertex.between(sides), [near, far], hit.shape.t);
-            }
-            // Pass on, as nothing changes here.
-            path.throughput *= absorption(tile.world, arrived, hit.shape.t);
-            (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
-            path.state = path.state.hidden();
-            path.cone = path.cone.after(hit.shape.t);
-            let next = tile.world.geometry.closest(&path.ray);
-            if self.accumulator.measure == Measure::Work {
-                self.add_work(&path, next);
-            }
-            match next {
-                Some(next) => hit = next,
-                None => return self.leave(&path),
-            }
-        }
-        if self.depth < tile.settings.render.max_depth {
-            self.next.push(path);
+            Reached::Glass(vertex, far) if self.goes_on() => self.shade_glass(&path, &vertex, far),
+            Reached::Hidden if self.goes_on() => self.next.push(path),
+            Reached::Glass(..) | Reached::Hidden => {}
+            Reached::Nothing => self.leave(&path),
         }
     }
 
-    /// Adds the emission of a surface to a path, which goes on in the medium `after`; returns whether the path may be scattered
-    /// there.
-    fn arrive(
-        &mut self,
-        path: &mut PathRay,
-        vertex: &Vertex<'_>,
-        (distance, after): (f32, Medium),
-        weight: f32,
-    ) -> bool {
-        let tile = self.tile;
-        path.throughput *= absorption(tile.world, path.medium, distance);
-        path.medium = after;
+    /// Whether paths may be scattered at the hits of this round.
+    fn goes_on(&self) -> bool {
+        self.depth < self.tile.settings.render.max_depth
+    }
+
+    /// Adds the emission of an opaque surface; returns whether the path may be scattered there.
+    fn arrive(&mut self, path: &PathRay, vertex: &Vertex<'_>, hit: OpaqueHit) -> bool {
         if vertex.emits() {
+            let weight = match hit {
+                OpaqueHit::Own(hit) => self.tile.lamp_weight(path, &hit),
+                OpaqueHit::Touching(hit) => self.tile.touching_lamp_weight(path, &hit),
+            };
             let radiance = vertex.emitted(path, self.counters);
             self.add_emitted(path, radiance, weight);
         }
-        self.depth < tile.settings.render.max_depth
-    }
-
-    fn shade_surface(&mut self, mut path: PathRay, vertex: &Vertex<'_>, way: (f32, Medium), weight: f32) {
-        if !self.arrive(&mut path, vertex, way, weight) {
-            return;
-        }
-        match &vertex.material.bsdf {
-            Bsdf::Rough(rough) => self.shade_rough(&path, vertex, rough),
-            Bsdf::Mirror(mirror) => self.shade_mirror(&path, vertex, mirror),
-            Bsdf::Glass(_) => {}
-        }
+        self.goes_on()
     }
 
     fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough) {
@@ -413,26 +378,17 @@ impl Wavefront<'_, '_> {
         self.push_reflected(reflected(path, vertex, &shading, mirror.reflectance));
     }
 
-    fn shade_glass(
-        &mut self,
-        mut path: PathRay,
-        vertex: &Vertex<'_>,
-        [near, far]: [Medium; 2],
-        distance: f32,
-    ) {
-        if !self.arrive(&mut path, vertex, (distance, near), 1.0) {
-            return;
-        }
+    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: Medium) {
         let shading = vertex.shading(self.counters);
-        let Interface { reflectance, refracted } = interface(self.tile.world, &path, vertex, &shading, far);
-        let mirrored = |weight: f32| reflected(&path, vertex, &shading, Vec3::splat(weight));
+        let Interface { reflectance, refracted } = interface(self.tile.world, path, vertex, &shading, far);
+        let mirrored = |weight: f32| reflected(path, vertex, &shading, Vec3::splat(weight));
         let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
         let splits = self.tile.behaviour.splits && path.state.only_specular_before;
         if weaker >= LEAST_SPLIT && splits {
             self.push_reflected(mirrored(reflectance));
             self.push_refracted(refracted, 1.0 - reflectance);
-        } else if self.tile.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance {
+        } else if self.tile.chooses_reflection(path, reflectance) {
             self.push_reflected(mirrored(1.0));
         } else {
             self.push_refracted(refracted, 1.0);

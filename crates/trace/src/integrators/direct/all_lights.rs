@@ -4,7 +4,7 @@ use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
-use crate::integrators::transport::medium::{Medium, absorption};
+use crate::integrators::transport::medium::{Media, absorption};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::Measure;
 use crate::lights::{Light, LightRow, Middle, Pattern, Source, SourceRow};
@@ -26,7 +26,7 @@ pub struct Lighting<'a, const WEIGHED: bool> {
     /// Competing technique; unused if nothing is weighted.
     pub others: CompetingTechnique,
     /// Media of the vertices. `None` if all are in air.
-    pub media: Option<&'a [Medium]>,
+    pub media: Option<&'a Media>,
 }
 
 /// Rays for the direct light of vertices.
@@ -169,12 +169,12 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// Multiplies values by the transmittance of glass around the vertices on the way to the samples.
     #[cold]
     #[inline(never)]
-    fn left_by_glass(&self, media: &[Medium], samples: &LightRow, mut values: Lanes3) -> Lanes3 {
+    fn left_by_glass(&self, media: &Media, samples: &LightRow, mut values: Lanes3) -> Lanes3 {
         for i in lanes(self.used) {
             let way = lane(&samples.targets, i) - lane(&self.row.from, i);
             let is_beyond = samples.beyond & 1 << i != 0;
             let distance = if is_beyond { f32::MAX } else { way.length() };
-            let left = absorption(self.tile.world, media[self.row.medium[i] as usize], distance);
+            let left = absorption(self.tile.world, media.get(self.row.medium[i]), distance);
             let value = lane(&values, i) * left;
             set_lane(&mut values, i, value);
         }

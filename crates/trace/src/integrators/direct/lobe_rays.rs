@@ -3,7 +3,7 @@
 use super::all_lights::{Arrived, add_work};
 use crate::geometry::rows::{RayRows, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
-use crate::integrators::transport::medium::{Medium, absorption};
+use crate::integrators::transport::medium::{Media, absorption};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::Measure;
 use crate::materials::bsdf::LobeSet;
@@ -20,7 +20,7 @@ pub struct LobeRays<'a> {
     pub sharp: u32,
     pub measure: Measure,
     /// Media of the vertices. `None` if all are in air.
-    pub media: Option<&'a [Medium]>,
+    pub media: Option<&'a Media>,
     /// Light to which the rays' light is added.
     pub arrived: Arrived,
 }
@@ -34,7 +34,7 @@ impl Loops for LobeRays<'_> {
         let count = tile.settings.render.shadow_samples;
         let sampler = row.sampler(tile);
         let transmittance = |i: usize, distance: f32| {
-            media.map_or(Vec3::ONE, |media| absorption(tile.world, media[row.medium[i] as usize], distance))
+            media.map_or(Vec3::ONE, |media| absorption(tile.world, media.get(row.medium[i]), distance))
         };
         for repetition in 0..count {
             let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);

@@ -12,7 +12,7 @@ use crate::geometry::rows::{RayRows, lanes, traced};
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::Cone;
-use crate::integrators::transport::medium::Medium;
+use crate::integrators::transport::medium::Media;
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::scatter::{BsdfSampling, Continuation};
 use crate::integrators::transport::tile::TileContext;
@@ -36,8 +36,8 @@ pub struct DirectLightQueue {
     open: [usize; RoughKind::ALL.len()],
     /// Light of lamps at the vertex of each path of the round.
     arrived: Vec<Vec3>,
-    /// The glass around vertices; the first entry is air.
-    media: Vec<Medium>,
+    /// Media of the vertices.
+    media: Media,
     /// Shadow rays of several rows.
     pool: ShadowRayQueue,
     /// Beams at the vertices of the paths of the round, if requested.
@@ -67,7 +67,6 @@ impl DirectLightQueue {
         self.arrived.clear();
         self.arrived.resize(paths, Vec3::ZERO);
         self.media.clear();
-        self.media.push(Medium::default());
     }
 
     /// Stores the beam at the vertex of a path.
@@ -110,7 +109,7 @@ impl DirectLightQueue {
         }
         let mut left = row.used;
         let open = &mut self.open[row.bsdf.kind() as usize];
-        if let Some(open) = kept.get_mut(*open) {
+        if let Some(open) = kept.get_mut(*open).filter(|open| open.bsdf.kind() == row.bsdf.kind()) {
             for lane in lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
                 open.copy(open.used.trailing_ones() as usize, row, lane);
                 left &= !(1 << lane);
@@ -126,11 +125,7 @@ impl DirectLightQueue {
     /// Adds a vertex.
     pub fn push(&mut self, tile: &TileContext<'_>, lit: &ShadingVertex<'_>, measure: Measure) {
         self.note_cone(lit.place, lit.vertex.cone);
-        let mut medium = 0;
-        if !lit.path.medium.is_air() {
-            medium = self.media.len() as u32;
-            self.media.push(lit.path.medium);
-        }
+        let medium = self.media.number(lit.path.medium);
         let (row, lane) = self.open_row(lit.bsdf.kind());
         row.put(lane, tile, lit, measure, medium);
     }
@@ -138,7 +133,8 @@ impl DirectLightQueue {
     /// A row of this kind with a free lane.
     fn open_row(&mut self, kind: RoughKind) -> (&mut VertexBatch, usize) {
         let mut number = self.open[kind as usize];
-        if number >= self.count || self.rows[number].used == ALL {
+        let is_open = |row: &VertexBatch| row.used != ALL && row.bsdf.kind() == kind;
+        if number >= self.count || !is_open(&self.rows[number]) {
             let row = self.spare();
             row.reset();
             row.bsdf.prepare(kind);
@@ -229,8 +225,8 @@ impl DirectLightQueue {
     }
 
     /// The glass around the vertices of a row. `None` if all are in air.
-    fn media_of(&self, row: &VertexBatch) -> Option<&[Medium]> {
-        (self.media.len() > 1 && row.is_inside()).then_some(&*self.media)
+    fn media_of(&self, row: &VertexBatch) -> Option<&Media> {
+        (!self.media.are_air() && row.is_inside()).then_some(&self.media)
     }
 
     /// Contributions of light samples; rays to picked lamps wait in the pool, under the row's number.

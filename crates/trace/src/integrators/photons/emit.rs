@@ -12,14 +12,15 @@ use crate::geometry::surface_rows::SurfaceRow;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::transport::batch::{ALL, UNBENT, VertexBatch};
 use crate::integrators::transport::cone::Cone;
-use crate::integrators::transport::crossing::{Crossing, CrossingMemory};
+use crate::integrators::transport::crossing::CrossingMemory;
 use crate::integrators::transport::interface::{Interface, interface, reflected};
-use crate::integrators::transport::medium::{Inside, Medium, absorption, ior};
+use crate::integrators::transport::medium::{Inside, Media, Medium, ior};
 use crate::integrators::transport::packet::PacketSource;
 use crate::integrators::transport::ray::{PathRay, PathState};
 use crate::integrators::transport::scatter::{BsdfSampling, Continuation};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, Vertex};
+use crate::integrators::transport::walk::{MOST_HIDDEN, Reached, Walk};
 use crate::integrators::view::Measure;
 use crate::integrators::{PACKET, RayCounters};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
@@ -28,9 +29,6 @@ use crate::math::Vec3;
 use crate::math::lanes::{Folds, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
 use crate::world::{Hit, Loops, World};
-
-/// Most surfaces without a change of glass that a photon passes at once.
-const MOST_HIDDEN: usize = 64;
 
 /// Squared difference of directions that are equal within rounding.
 const SAME: f32 = 1e-8;
@@ -73,7 +71,7 @@ impl PhotonTracing<'_> {
             references: vec![0.0; count as usize],
             next: Vec::new(),
             open: VertexBatch::EMPTY,
-            media: vec![Medium::default()],
+            media: Media::default(),
             crossing: CrossingMemory::default(),
             shots: EmittedPhotons::default(),
             counters: RayCounters::default(),
@@ -89,7 +87,7 @@ impl PhotonTracing<'_> {
             }
             // Scatter the single vertices, and apply Russian roulette.
             wavefront.scatter_open();
-            wavefront.media.truncate(1);
+            wavefront.media.clear();
             wavefront.spare();
             std::mem::swap(&mut rays, &mut wavefront.next);
             wavefront.next.clear();
@@ -134,8 +132,8 @@ struct PhotonWavefront<'a> {
     next: Vec<PathRay>,
     /// Row for single vertices.
     open: VertexBatch,
-    /// Media of the photons; the first entry is air.
-    media: Vec<Medium>,
+    /// Media of the photons at single vertices.
+    media: Media,
     crossing: CrossingMemory,
     shots: EmittedPhotons,
     counters: RayCounters,
@@ -213,40 +211,18 @@ impl PhotonWavefront<'_> {
         kept.push(photon);
     }
 
-    /// Shades the first surface that is more than a change between parts of one glass. `surface` is that of the hit, if it is
-    /// known.
-    fn shade(&mut self, mut path: PathRay, mut hit: Hit, mut surface: Option<SurfacePoint>) {
-        let tile = self.tracing.tile;
-        let mut lacks_photons = self.depth == 0;
-        for _ in 0..MOST_HIDDEN {
-            let vertex = match surface.take() {
-                Some(surface) => Vertex::on(tile, &path, &hit, surface),
-                None => Vertex::to_shade(tile, &path, &hit),
-            };
-            if vertex.material.bsdf.glass().is_none() {
-                path.throughput *= absorption(tile.world, path.medium, hit.shape.t);
-                path.medium = tile.without_open(path.medium);
-                return self.shade_surface(&path, &vertex, lacks_photons);
+    /// Follows a photon to the first surface that is more than a change between parts of one glass, and shades that. `surface` is
+    /// that of the hit, if it is known.
+    fn shade(&mut self, path: PathRay, hit: Hit, surface: Option<SurfacePoint>) {
+        let Walk { path, reached, has_passed } =
+            self.tracing.tile.walk(path, (hit, surface), &mut self.crossing, |_, _| {});
+        match reached {
+            Reached::Opaque(vertex, _) => {
+                let lacks_photons = self.depth == 0 && !has_passed;
+                self.shade_surface(&path, &vertex, lacks_photons);
             }
-            let Crossing { sides, arrived, near, far, opaque } =
-                tile.crossing(&path, &vertex, &hit, &mut self.crossing);
-            path.throughput *= absorption(tile.world, arrived, hit.shape.t);
-            path.medium = near;
-            if let Some(touching) = opaque {
-                let vertex = Vertex::touching(tile, &path, (sides, &touching), hit.shape.t);
-                return self.shade_surface(&path, &vertex, lacks_photons);
-            }
-            // Reflect or refract at a change of glass.
-            if near.glass() != far.glass() {
-                return self.shade_glass(&path, &vertex.between(sides), far);
-            }
-            // Pass on, as nothing changes here.
-            (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
-            lacks_photons = false;
-            match tile.world.geometry.closest(&path.ray) {
-                Some(next) => hit = next,
-                None => return,
-            }
+            Reached::Glass(vertex, far) => self.shade_glass(&path, &vertex, far),
+            Reached::Nothing | Reached::Hidden => {}
         }
     }
 
@@ -265,11 +241,7 @@ impl PhotonWavefront<'_> {
                     return;
                 }
                 let shading = vertex.shading(&mut self.counters);
-                let mut medium = 0;
-                if !path.medium.is_air() {
-                    medium = self.media.len() as u32;
-                    self.media.push(path.medium);
-                }
+                let medium = self.media.number(path.medium);
                 if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
                     self.scatter_open();
                     self.open.bsdf.prepare(bsdf.kind());
@@ -296,10 +268,8 @@ impl PhotonWavefront<'_> {
         let tile = self.tracing.tile;
         let shading = vertex.shading(&mut self.counters);
         let Interface { reflectance, refracted } = interface(tile.world, path, vertex, &shading, far);
-        let is_reflected =
-            |reflectance| tile.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance;
         match refracted {
-            Some(mut ray) if !is_reflected(reflectance) => {
+            Some(mut ray) if !tile.chooses_reflection(path, reflectance) => {
                 let eta = ior(tile.world, far) / ior(tile.world, path.medium);
                 ray.throughput *= 1.0 / (eta * eta);
                 self.push(path, vertex, (shading.normal, eta), ray);

@@ -14,3 +14,4 @@ pub mod scratch;
 pub mod tile;
 pub mod trace;
 pub mod vertex;
+pub mod walk;

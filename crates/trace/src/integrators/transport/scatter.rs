@@ -3,7 +3,7 @@
 use super::batch::{Response, VertexBatch};
 use super::cone::Cone;
 use super::interface::SCATTERED;
-use super::medium::Medium;
+use super::medium::Media;
 use super::ray::{PathRay, PathState};
 use super::tile::TileContext;
 use crate::geometry::Ray;
@@ -85,7 +85,7 @@ pub struct Scattered {
 impl BsdfSampling<'_> {
     /// Adds the rays of the next round. `media` are those of the vertices; `cones` are the beams at the vertices, by place, if
     /// beams are requested.
-    pub fn scatter(self, media: &[Medium], cones: &[Cone], next: &mut Vec<PathRay>) {
+    pub fn scatter(self, media: &Media, cones: &[Cone], next: &mut Vec<PathRay>) {
         let row = self.row;
         let scattered = self.tile.world.geometry.instructions().run(self);
         let of_lobe = |density: f32| move |cone: &Cone| cone.scattered(density);
@@ -95,7 +95,7 @@ impl BsdfSampling<'_> {
                 throughput: lane(&row.throughput, i) * lane(&scattered.factors, i),
                 slot: row.slot[i],
                 path: row.path[i],
-                medium: media[row.medium[i] as usize],
+                medium: media.get(row.medium[i]),
                 state: PathState {
                     density: scattered.densities[i],
                     normal: lane(&row.normal, i),
