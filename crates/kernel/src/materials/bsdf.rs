@@ -48,7 +48,7 @@ pub enum LobeSet {
 pub struct BsdfValues {
     /// f in sr⁻¹ of the shown lobes.
     pub f: Lanes3,
-    /// What f, pdf and the parts of f have in common; each kind has its own meaning for it.
+    /// A number for each surface that f, pdf and the parts of f share; each kind has its own.
     pub(super) shared: Lanes,
 }
 

@@ -40,7 +40,7 @@ const LEAST_SPLIT: f32 = 0.01;
 /// Rays between two polls of the token.
 const POLL_INTERVAL: usize = 256;
 
-/// Follows the camera rays of some slots to the end; the sink takes the light that they see. `negative` gets the slots of
+/// Follows the camera rays of some slots to the end; the accumulator takes the light that they see. `negative` gets the slots of
 /// negative weight.
 pub fn trace(
     (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
@@ -77,7 +77,7 @@ pub fn trace(
             wavefront.shade_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
         }
     }
-    // Light their vertices, and give the light to the sink.
+    // Light their vertices, and give the light to the accumulator.
     wavefront.light()?;
     wavefront.direct.settle_run(slots.start, &mut wavefront.accumulator);
     wavefront.next_round(rays);
@@ -231,6 +231,7 @@ impl Wavefront<'_, '_> {
     fn add_seen(&mut self, rays: &RayRows, first: u32, packet: &PacketHits, (plain, beyond): (u32, u32)) {
         let tile = self.tile;
         let render = &tile.settings.render;
+        // Add the emission and ambient light of plain surfaces.
         let mut known = None;
         for lane in lanes(plain) {
             let object = packet.object(lane);
@@ -247,6 +248,7 @@ impl Wavefront<'_, '_> {
                 self.accumulator.add(slot, Part::Ambient, render.ambient * bsdf.ambient());
             }
         }
+        // Add the background and the lights beyond the scene.
         let lights = &tile.world.lights;
         for lane in lanes(beyond) {
             let sky = lights.environment().map(|_| packet.sky(lane));

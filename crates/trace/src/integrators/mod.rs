@@ -7,7 +7,7 @@
 //! view, counters      contents of a picture; counters of rays
 //! settings            settings of a render
 //! method              behaviour of its rays: the scene's table of methods, as the view and photons let it apply
-//! transport           rays of a tile, their hits, vertices in rows; knows the world, neither methods nor photons
+//! transport           rays of a tile, their hits, vertices in rows; knows the world, neither integrators nor photons
 //! direct              light samples, shadow rays, MIS weights
 //! photons             emission, photon maps, gathering
 //! memory              memory of a thread's batches
@@ -73,16 +73,19 @@ pub fn render_tile_by(
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
+    // Prepare the samples and their sums.
     let block = SampleBlock { pixels: pixels.into(), samples };
     let weight = settings.render.filter.negative_weight();
     let mut is_negative = vec![false; if weight.is_some() { block.len() } else { 0 }];
     let mut radiance = vec![Vec3::ZERO; block.len()];
     let mut counters = RayCounters::default();
+    // Prepare what all rays have in common.
     let settings = &settings.effective();
     let photons = photons.filter(|_| settings.gathers());
     let behaviour = Behaviour::of(settings, photons.is_some());
     let tile = TileContext::new(world, settings, &block, token, behaviour);
     let clamp = if settings.view.shown().measure() == Measure::Work { 0.0 } else { settings.render.clamp };
+    // Render batch by batch.
     let mut memory = Memory::of_thread();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
         let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
@@ -110,6 +113,7 @@ pub fn render_tile_by(
             }
         }
     }
+    // Hand the samples over.
     memory.leave();
     let negative = weight.map(|weight| NegativeLobes { weight, is_negative });
     let samples = block.samples.len() as u32;

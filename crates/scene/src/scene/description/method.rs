@@ -12,7 +12,7 @@ choice! {
     }
 }
 
-/// What a rendering method does, and which settings it honours; it ignores the others.
+/// Properties of a rendering method, and the settings that it honours; it ignores all others of these.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Method {
     /// Whether camera paths are split at glass. Otherwise chance chooses between reflection and refraction.

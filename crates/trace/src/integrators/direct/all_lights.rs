@@ -24,7 +24,7 @@ pub struct Lighting<'a, const WEIGHED: bool> {
     pub used: u32,
     pub measure: Measure,
     /// Competing technique; unused if nothing is weighted.
-    pub others: CompetingTechnique,
+    pub competing: CompetingTechnique,
     /// Media of the vertices. `None` if all are in air.
     pub media: Option<&'a Media>,
 }
@@ -142,18 +142,18 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                     // Weight against the competing technique.
                     if WEIGHED {
                         let leaves_gloss = self.tile.lobes_find_sky && light.is_from_all_around();
-                        let of_light = if leaves_gloss && self.others.are_lobes() {
+                        let of_light = if leaves_gloss && self.competing.are_lobes() {
                             // Pretend that light samples hardly ever come, so that lobes bring all.
                             [f32::MAX; LANES]
                         } else {
                             light.inverse_densities(&samples)
                         };
-                        let others = self.others.rays_per_sample(count);
-                        values = self.others.weighted(
+                        let competing = self.competing.rays_per_sample(count);
+                        values = self.competing.weighted(
                             self.row,
                             (&samples, &response),
                             values,
-                            (&of_light, others),
+                            (&of_light, competing),
                         );
                     }
                     self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
@@ -239,9 +239,11 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         if is_untraced && self.measure == Measure::Work {
             return;
         }
+        // Without shadows, all of it arrives.
         let Some((middle, source)) = middle.filter(|_| !is_untraced) else {
             return add_where(waiting.active, &waiting.light, &mut sums.light);
         };
+        // Aim a ray at the middle of the light.
         let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
         for i in 0..LANES {
             let from = lane(&self.row.from, i);

@@ -37,11 +37,13 @@ impl Loops for LobeRays<'_> {
             media.map_or(Vec3::ONE, |media| absorption(tile.world, media.get(row.medium[i]), distance))
         };
         for repetition in 0..count {
+            // Sample a direction in each lobe.
             let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);
             let directions = row.bsdf.sample(LobeSet::Narrow, &row.normal, &[0.0; LANES], &u);
             let Response { bsdf, cosines } = row.response(&directions);
             let densities = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &directions, &bsdf);
             let [_, narrow] = row.bsdf.parts(&bsdf);
+            // Trace the rays above the surfaces.
             let mut sent = sharp & !row.hidden(&directions, folds);
             let mut ends = [-1.0; LANES];
             for i in 0..LANES {
@@ -52,6 +54,7 @@ impl Loops for LobeRays<'_> {
             let rays = RayRows::of(row.from, directions);
             let (hits, objects) = tile.world.geometry.closest_rows(&rays, &mut ends, sent, folds);
             arrived.rays.scattered += u64::from(sent.count_ones());
+            // Count the work of the rays, if the view shows it.
             if measure == Measure::Work {
                 for i in lanes(sent) {
                     ends[i] = hits.get(i).map_or(f32::INFINITY, |hit| hit.t);
@@ -59,6 +62,7 @@ impl Loops for LobeRays<'_> {
                 add_work(tile, &rays, &ends, sent, &mut arrived.light);
                 continue;
             }
+            // Add the light of lamps that they find.
             for i in lanes(sent) {
                 let density = densities[i];
                 let radiance = match hits.get(i) {

@@ -48,14 +48,14 @@ impl CompetingTechnique {
     }
 
     /// Multiplies `values`, the contributions of light samples at the vertices of a row, by their power-heuristic weights. The
-    /// inverse pdfs of the samples are given; `others` rays by the BSDF come on each sample.
+    /// inverse pdfs of the samples are given; `competing` rays by the BSDF come on each sample.
     #[inline(always)]
     pub fn weighted(
         self,
         row: &VertexBatch,
         (samples, response): (&LightRow, &Response),
         mut values: Lanes3,
-        (of_light, others): (&Lanes, f32),
+        (of_light, competing): (&Lanes, f32),
     ) -> Lanes3 {
         // Weight each sample against the lobes in which rays leave its vertex.
         let (lobes, start) = match self {
@@ -66,7 +66,7 @@ impl CompetingTechnique {
         let densities = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf);
         let mut weights = [1.0; LANES];
         for i in 0..LANES {
-            let weight = weight(densities[i] * of_light[i] * others);
+            let weight = weight(densities[i] * of_light[i] * competing);
             weights[i] = if start & 1 << i != 0 { weight } else { 1.0 };
         }
         // Apply the weights to the light of those lobes.

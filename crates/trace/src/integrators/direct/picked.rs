@@ -120,6 +120,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         let count = self.tile.settings.render.shadow_samples * way.count;
         let group = way.count as usize;
         let (first, end) = (samples.start * way.count, samples.end * way.count);
+        // Sort the random numbers of each group of picks.
         let mut numbers = vec![[0.0; LANES]; (end - first) as usize];
         for k in first..end {
             let u = sampler.pairs(&row.path, Decision::Pick, k, count);
@@ -136,6 +137,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 numbers[place + parts[i] as usize][i] = digits[i];
             }
         }
+        // Pick lights by the numbers.
         let mut picks = vec![PickRow::NOTHING; numbers.len()];
         if tree.is_flat() {
             self.pick_flat(tree, &numbers, &mut picks);
@@ -152,6 +154,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     #[inline(always)]
     fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; LANES]], picks: &mut [PickRow]) {
         let row = self.row;
+        // Estimate the light of each lamp at each vertex, with glossy lobes and without.
         let plain = ReceiverRow::plain(&row.from, &row.normal);
         let mut glossy = plain.clone();
         for i in lanes(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
@@ -159,9 +162,11 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 glossy.set_lobe(i, &lobe);
             }
         }
+        // Turn the estimates into probabilities.
         let Some(shares) = tree.flat_shares(&glossy, row.bsdf.has_narrow_lobes()) else { return };
         let without =
             (WEIGHED && row.bsdf.has_narrow_lobes()).then(|| tree.flat_shares(&plain, false)).flatten();
+        // Pick by each row of numbers.
         for (numbers, pick) in numbers.iter().zip(picks) {
             let picked = shares.pick(numbers);
             pick.lights = picked.lights;
@@ -229,6 +234,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         let Taking { tree, row: row_number, pool, sums } = taking;
         let (row, render) = (self.row, &self.tile.settings.render);
         let (lights, used) = pick.lights();
+        // Sample a point on each picked light.
         let u = sampler.pairs(&row.path, Decision::Picked, number, count);
         let at = (&row.from, &row.normal);
         let (mut samples, mut inverse, lookups) = self.tile.world.lights.sample_each(&lights, at, used, &u);
@@ -238,12 +244,14 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             set_lane(&mut samples.weights, i, weight);
             inverse[i] *= pick.weighed[i];
         }
+        // Compute what would arrive from it.
         let (mut values, active, response) = self.values(&samples, 1.0, folds);
         let active = active & used;
         if WEIGHED {
             // Each group of picks has its own pdf, and as many rays in lobes as requested samples compete with all groups.
-            let others = self.others.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
-            values = self.others.weighted(row, (&samples, &response), values, (&inverse, others));
+            let competing =
+                self.competing.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
+            values = self.competing.weighted(row, (&samples, &response), values, (&inverse, competing));
         }
         if active == 0 {
             return;
@@ -259,6 +267,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             Shadows::Hard => self.aim_at_middles(&mut samples, &lights, active),
             Shadows::Soft => {}
         }
+        // Trace shadow rays, or let them wait for others to the same lights.
         let traced = active & !row.hidden(&samples.directions, folds);
         let (rays, ends) = self.shadow_rays(&samples, traced);
         match pool {

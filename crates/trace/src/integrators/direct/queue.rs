@@ -76,7 +76,7 @@ impl DirectLightQueue {
         }
     }
 
-    /// Ends the round: the sink gets the light of lamps, in the order of the paths. `path` gives the slot of a place, and
+    /// Ends the round: the accumulator gets the light of lamps, in the order of the paths. `path` gives the slot of a place, and
     /// whether the camera sees its vertex.
     pub fn settle(&mut self, path: impl Fn(usize) -> (u32, bool), accumulator: &mut Accumulator<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
@@ -107,6 +107,7 @@ impl DirectLightQueue {
             self.count += 1;
             return;
         }
+        // Put few vertices together with others of their kind.
         let mut left = row.used;
         let open = &mut self.open[row.bsdf.kind() as usize];
         if let Some(open) = kept.get_mut(*open).filter(|open| open.bsdf.kind() == row.bsdf.kind()) {
@@ -216,7 +217,7 @@ impl DirectLightQueue {
     }
 
     /// Technique that competes with light samples.
-    fn others(&self, asked: Asked, tile: &TileContext<'_>, measure: Measure) -> CompetingTechnique {
+    fn competing(&self, asked: Asked, tile: &TileContext<'_>, measure: Measure) -> CompetingTechnique {
         if asked.by_paths {
             CompetingTechnique::Paths
         } else {
@@ -233,11 +234,11 @@ impl DirectLightQueue {
     fn sums(&mut self, asked: Asked, tile: &TileContext<'_>, measure: Measure, number: u32) -> Sums {
         let mut pool = std::mem::take(&mut self.pool);
         let row = &self.rows[asked.number];
-        let (others, media) = (self.others(asked, tile, measure), self.media_of(row));
+        let (competing, media) = (self.competing(asked, tile, measure), self.media_of(row));
         let (instructions, used) = (tile.world.geometry.instructions(), asked.used);
-        let plain = Lighting::<false> { tile, row, used, measure, others, media };
-        let weighed = Lighting::<true> { tile, row, used, measure, others, media };
-        let sums = match (others, tile.world.lights.selection(tile.behaviour.receivers)) {
+        let plain = Lighting::<false> { tile, row, used, measure, competing, media };
+        let weighed = Lighting::<true> { tile, row, used, measure, competing, media };
+        let sums = match (competing, tile.world.lights.selection(tile.behaviour.receivers)) {
             (CompetingTechnique::Nothing, None) => instructions.run(plain),
             (CompetingTechnique::Nothing, Some(selection)) => {
                 instructions.run(Picking { lighting: plain, selection, number, pool: &mut pool })
@@ -255,7 +256,7 @@ impl DirectLightQueue {
     fn arrived(&self, asked: Asked, tile: &TileContext<'_>, measure: Measure, sums: Sums) -> Arrived {
         let row = &self.rows[asked.number];
         let arrived = sums.arrived(measure);
-        match self.others(asked, tile, measure) {
+        match self.competing(asked, tile, measure) {
             CompetingTechnique::Lobes(sharp) => {
                 let media = self.media_of(row);
                 let lobes = LobeRays { tile, row, sharp, measure, media, arrived };
@@ -318,6 +319,7 @@ impl Loops for Lifting<'_> {
     #[inline(always)]
     fn run(self, folds: impl Folds) {
         let Self { geometry, row } = self;
+        // Make rays from the facets to the points above them.
         let mut direction = row.lifted;
         for axis in 0..3 {
             for i in 0..LANES {
@@ -329,10 +331,12 @@ impl Loops for Lifting<'_> {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
         let rays = RayRows::of(row.from, direction);
+        // Find what is on the way.
         let blocked = {
             let (traced, nothing) = (traced(&ends, folds), SourceRow::of(Source::Nothing));
             geometry.occluded_rows(&rays, &ends, traced, &nothing, folds)
         };
+        // Move the other vertices.
         let lifted = row.may_lift & !blocked;
         row.is_bounded &= !lifted;
         for axis in 0..3 {

@@ -88,7 +88,7 @@ impl PhotonTracing<'_> {
             // Scatter the single vertices, and apply Russian roulette.
             wavefront.scatter_open();
             wavefront.media.clear();
-            wavefront.spare();
+            wavefront.russian_roulette();
             std::mem::swap(&mut rays, &mut wavefront.next);
             wavefront.next.clear();
             wavefront.depth += 1;
@@ -236,10 +236,12 @@ impl PhotonWavefront<'_> {
                 if bsdf.is_black() {
                     return;
                 }
+                // Store the photon.
                 self.store(path, vertex.surface.point, vertex.normal);
                 if !(path.state.only_specular_before && self.goes_on()) {
                     return;
                 }
+                // Let it wait for being scattered, if it came by mirrors and glass alone.
                 let shading = vertex.shading(&mut self.counters);
                 let medium = self.media.number(path.medium);
                 if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
@@ -326,7 +328,7 @@ impl PhotonWavefront<'_> {
     }
 
     /// Russian roulette by flux: survivors have about the flux that they started with.
-    fn spare(&mut self) {
+    fn russian_roulette(&mut self) {
         let tile = self.tracing.tile;
         let mut kept = 0;
         for begin in (0..self.next.len()).step_by(PACKET) {

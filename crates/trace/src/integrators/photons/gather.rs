@@ -53,11 +53,13 @@ impl Loops for Gathering<'_> {
             let pass = maps.pass(sample);
             let only_specular_before = row.only_specular_before & 1 << i != 0;
             let (point, normal) = row.place_of(i);
+            // Choose the maps that hold light for the vertex.
             let look = GatherPoint { point, normal, most_depth };
             // At a surface without a glossy lobe, photons carry the light from a caustic, and the path from there leaves it out.
             let gathers_bounced = indirect && !row.bsdf.has_narrow_lobe(i);
             let gathers_caustic =
                 if only_specular_before { caustic } else { indirect && row.after_gloss & 1 << i != 0 };
+            // Choose the maps to look up by chance.
             let chances = if measure == Measure::Work {
                 [1.0; 2]
             } else if only_specular_before {
@@ -65,6 +67,7 @@ impl Loops for Gathering<'_> {
             } else {
                 [LOOKS_UNSEEN; 2]
             };
+            // Add their light, if the ways to the photons are free.
             let maps = [(gathers_caustic, &pass.caustic), (gathers_bounced, &pass.bounced)];
             let mut sum = Vec3::ZERO;
             for ((gathers, map), chance) in maps.into_iter().zip(chances) {

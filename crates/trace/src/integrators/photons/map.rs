@@ -135,6 +135,7 @@ impl PhotonMap {
     /// # Errors
     /// [`Cancelled`].
     pub fn new(photons: &[Photon], radius: f32, token: &CancelToken) -> Result<Self, Cancelled> {
+        // Count the photons of each bucket of cells.
         let cells = 1.0 / (CELL * radius);
         let mask = (photons.len().max(1).next_power_of_two() - 1) as u32;
         let mut starts = vec![0_u32; mask as usize + 2];
@@ -148,6 +149,7 @@ impl PhotonMap {
                 buckets.push(bucket);
             }
         }
+        // Sort the photons by bucket.
         for i in 1..starts.len() {
             starts[i] += starts[i - 1];
         }
@@ -162,6 +164,7 @@ impl PhotonMap {
                 *place += 1;
             }
         }
+        // Store them side by side.
         let rows = photons.len().div_ceil(LANES);
         let (mut blocks, mut depths) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
         for order in order.chunks(POLL_INTERVAL) {
@@ -328,6 +331,7 @@ impl PhotonMap {
         number: usize,
         folds: impl Folds,
     ) -> Option<Lanes> {
+        // Weigh the photons within the kernel by their distances.
         let GatherPoint { point, normal, most_depth } = *look;
         let block = &self.blocks[number];
         let radius_squared = self.radius * self.radius;
@@ -349,6 +353,7 @@ impl PhotonMap {
         if folds.bits(&near) == 0 {
             return None;
         }
+        // Leave out photons of other surfaces, and those from behind.
         let (own, from) = (packed::lanes(&block.normal), packed::lanes(&block.direction));
         for i in 0..LANES {
             let cosine = own[0][i] * normal.x + own[1][i] * normal.y + own[2][i] * normal.z;
@@ -361,6 +366,7 @@ impl PhotonMap {
             // An inclined surface has more photons over a part of the plane.
             weights[i] *= cosine / squared.sqrt();
         }
+        // Leave out photons of too many scatterings.
         if most_depth < self.most_depth {
             let depths = &self.depths[number];
             for i in 0..LANES {

@@ -72,9 +72,11 @@ fn is_reached(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bo
     let may_receive = |id: u32| world.materials_of(id).any(receives);
     for _ in 0..LAYERS {
         let ray = Ray::segment(start, end);
+        // Find the next surface below that may receive photons.
         let Some(hit) = world.geometry.closest_of(&ray, may_receive) else { return false };
         let bare = Asked { uv: false, shadow_point: false };
         let surface = world.geometry.asked_surface(&ray, &hit, bare);
+        // Succeed if it does, as surface with about the same normal to which the way is free.
         let cosine = surface.normal.dot(look.normal);
         let normal = if cosine < 0.0 { -surface.normal } else { surface.normal };
         let photon = Place { point: surface.point, normal };
@@ -84,6 +86,7 @@ fn is_reached(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bo
         {
             return true;
         }
+        // Go on below it.
         start = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
         if (end - start).dot(look.normal) >= 0.0 {
             return false;

@@ -52,7 +52,7 @@ pub struct VertexBatch {
     pub path: [u32; LANES],
     /// Places of the paths in the round's queue.
     pub place: [u32; LANES],
-    /// [`PathState::roulette_throughput`](super::ray::History::carried) of the paths.
+    /// [`PathState::roulette_throughput`](super::ray::PathState::roulette_throughput) of the paths.
     pub roulette_throughput: Lanes,
     /// Indices of the glass around the vertices.
     pub medium: [u32; LANES],
@@ -183,6 +183,7 @@ impl VertexBatch {
         medium: u32,
     ) {
         let ShadingVertex { path, place, vertex, shading, bsdf } = lit;
+        // Set the origin of light samples.
         let shadow_origin = vertex.shadow_origin(tile, path.state.only_specular_before);
         set_lane(&mut self.from, i, shadow_origin.point);
         set_lane(&mut self.horizon, i, shadow_origin.horizon.unwrap_or(Vec3::ZERO));
@@ -192,6 +193,7 @@ impl VertexBatch {
             self.lift_end[i] = end;
             self.may_lift |= 1 << i;
         }
+        // Set the surface and its normals.
         set_lane(&mut self.point, i, vertex.surface.point);
         set_lane(&mut self.facet, i, vertex.normal);
         self.has_facet |= 1 << i;
@@ -200,7 +202,9 @@ impl VertexBatch {
         set_lane(&mut self.normal, i, shading.normal);
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.bend[i] = shading.bend.unwrap_or(UNBENT);
+        // Set the BSDF.
         self.bsdf.put(i, bsdf, measure.lobes(), shading.normal, vertex.to_eye);
+        // Copy the state of the path.
         (self.roulette_throughput[i], self.medium[i]) = (path.state.roulette_throughput, medium);
         set_lane(&mut self.throughput, i, path.throughput);
         (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);

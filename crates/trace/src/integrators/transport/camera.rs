@@ -71,6 +71,7 @@ impl TileContext<'_> {
         let (settings, camera) = (self.settings, &self.world.camera);
         let (xs, ys, samples) = self.block.places(first);
         let sampler = SamplerRow::new(settings.render.seed, &xs, &ys, &samples);
+        // Sample places in the pixels.
         let mut in_pixel = sampler.pairs(&paths, Decision::Pixel, 0, 1);
         let mut negative = 0;
         settings.render.filter.sample_row(&mut in_pixel, |lane, sample: FilterSample| {
@@ -83,6 +84,7 @@ impl TileContext<'_> {
             let place = settings.from_middle(place);
             (places[0][lane], places[1][lane]) = (place.x, place.y);
         }
+        // Make rays through them, from points of the lens if it has an aperture.
         let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
         if settings.dof && camera.aperture > 0.0 {
             let lens = lens_row(sampler.pairs(&paths, Decision::Lens, 0, 1));

@@ -52,6 +52,7 @@ impl TileContext<'_> {
     /// those count that are left or entered here, so that a ray and its reverse see the same, as the ray's way around the others is
     /// unknown. The first of the media is the one that absorbed on the way here.
     fn media(&self, known: Medium, found: &[Near]) -> [Medium; 3] {
+        // Begin with the record of the ray, without open bodies.
         let (mut arrived, mut near) = (known, self.without_open(known));
         let mut far = near.retained(|glass| !self.world.is_closed(glass.body));
         let crossed = |as_front: bool| {
@@ -67,6 +68,7 @@ impl TileContext<'_> {
             Near::Around { object, material } => Some(Inside { body: object, material }),
             Near::Surface { .. } => None,
         });
+        // Leave the bodies whose backs are here.
         for glass in crossed(false) {
             if self.world.is_open(glass.body) {
                 near = near.entered(glass);
@@ -78,6 +80,7 @@ impl TileContext<'_> {
                 None => (arrived, near) = (arrived.entered(glass), near.entered(glass)),
             }
         }
+        // Enter those whose fronts are here, and those around the place.
         let far = crossed(true).chain(around).fold(far, Medium::entered);
         [arrived, near, far]
     }

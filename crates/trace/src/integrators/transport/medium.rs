@@ -76,7 +76,7 @@ impl Medium {
 /// Media of vertices, by number. Number 0 is air.
 #[derive(Debug, Default)]
 pub struct Media {
-    /// Those with glass, from number 1 on.
+    /// Media with glass, from number 1 on.
     inside: Vec<Medium>,
 }
 

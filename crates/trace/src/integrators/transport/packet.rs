@@ -183,14 +183,24 @@ struct PacketIntersection<'a> {
     surface: &'a mut SurfaceRow,
 }
 
+/// Plain surfaces of a packet.
+struct Plain {
+    /// A bit for each.
+    all: u32,
+    /// A bit for each that emits, on either side.
+    shining: u32,
+    /// Look-ups of their textures.
+    lookups: u64,
+}
+
 impl Loops for PacketIntersection<'_> {
     type Done = PacketHits;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> PacketHits {
-        let Self { tile, rays, measure, are_lit, row, surface } = self;
+    fn run(mut self, folds: impl Folds) -> PacketHits {
+        let (tile, rays) = (self.tile, self.rays);
         let world = tile.world;
-        row.reset();
+        self.row.reset();
         // Put the rays side by side.
         let (of_paths, traced);
         let mut ends = [-1.0; PACKET];
@@ -218,84 +228,114 @@ impl Loops for PacketIntersection<'_> {
             PacketSource::Camera(..) | PacketSource::Paths(..) => {
                 world.geometry.closest_rows(rows, &mut ends, traced, folds)
             }
-            PacketSource::Traced(_, known, places) => {
-                let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET]);
-                for (lane, &place) in places.iter().enumerate().take(PACKET) {
-                    if let Some(hit) = &known[place as usize] {
-                        hits.put(lane, &hit.shape);
-                        object[lane] = hit.object;
-                    }
-                }
-                (hits, object)
-            }
+            PacketSource::Traced(_, known, places) => known_hits(known, places),
         };
         // Keep the rays in air, whose surfaces may be plain.
-        *surface = SurfaceRow::EMPTY;
+        *self.surface = SurfaceRow::EMPTY;
         let any = hits.any(folds);
-        let (mut left, mut plain, mut shining) = (any, 0, 0);
-        let (mut only_specular_before, mut after_gloss, mut lookups) = (!0, 0, 0);
+        let (mut in_air, mut only_specular_before, mut after_gloss) = (any, !0, 0);
         match rays {
-            PacketSource::Camera(..) => left = if world.is_eye_in_air() { left } else { 0 },
+            PacketSource::Camera(..) => in_air = if world.is_eye_in_air() { any } else { 0 },
             PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 for lane in 0..PACKET {
                     let Some(path) = rays.of_queue(lane) else { break };
-                    left &= if path.medium.is_air() { !0 } else { !(1 << lane) };
+                    in_air &= if path.medium.is_air() { !0 } else { !(1 << lane) };
                     only_specular_before &= if path.state.only_specular_before { !0 } else { !(1 << lane) };
                     after_gloss |= u32::from(path.state.is_after_gloss) << lane;
                 }
             }
         }
-        // Compute the surfaces of each plain object, and look its material up.
-        while left != 0 {
-            let id = object[left.trailing_zeros() as usize % PACKET];
-            let mut of = [0; PACKET];
-            for lane in 0..PACKET {
-                of[lane] = if object[lane] == id { TRUE } else { 0 };
-            }
-            let of = folds.bits(&of) & left;
-            left &= !of;
-            let Some((material, rough)) = tile.plain_rough(id) else { continue };
-            if plain == 0 {
-                row.bsdf.prepare(rough.kind());
-            } else if row.bsdf.kind() != rough.kind() {
-                continue;
-            }
-            let has_uv = rough.row_texture().is_some() && are_lit && measure.is_colored();
-            match &world.geometry.objects()[id as usize] {
-                Object::Shape(shape) => {
-                    if !surface.fill(shape, rows, &hits, of) {
-                        continue;
-                    }
-                    if has_uv {
-                        surface.fill_uv(shape, rows, &hits, of);
-                    }
-                }
-                Object::Mesh(mesh) => mesh.fill_surfaces(surface, rows, &hits, of, has_uv),
-            }
-            plain |= of;
-            shining |= if material.emission.shines() { of } else { 0 };
-            lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
-            let shown = [(of, measure.lobes()), (of & !only_specular_before, ShownLobes::ALL)];
-            let shown = if measure == Measure::ALL { &shown[..1] } else { &shown };
-            let black = row.bsdf.fill(rough, has_uv.then_some(&surface.uv), shown, folds);
-            row.used |= of & !black;
-        }
+        // Compute the plain surfaces, with their BSDFs.
+        (self.row.only_specular_before, self.row.after_gloss) = (only_specular_before, after_gloss);
+        let plain = self.fill_plain(rows, (&hits, &object), in_air, folds);
         // Set the positions and normals of the plain vertices.
-        (row.only_specular_before, row.after_gloss) = (only_specular_before, after_gloss);
         let lifts = match tile.settings.render.shadows {
             Shadows::Off => Lifts::All,
             Shadows::Hard | Shadows::Soft => Lifts::IfFree(only_specular_before),
         };
-        let front = if plain == 0 { 0 } else { row.place(&rays, rows, surface, lifts, folds) };
+        let front = if plain.all == 0 { 0 } else { self.row.place(&rays, rows, self.surface, lifts, folds) };
         // Compute the other surfaces, and the environment for rays without a hit.
-        let found = tile.fill_others(surface, rows, (&hits, &object), any & !plain, folds);
+        let found = tile.fill_others(self.surface, rows, (&hits, &object), any & !plain.all, folds);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
             Some(_) | None => ([[0.0; PACKET]; 3], [0.0; PACKET]),
         };
-        PacketHits { hits, object, any, plain, shining: shining & front, found, lookups, sky }
+        let (shining, lookups) = (plain.shining & front, plain.lookups);
+        PacketHits { hits, object, any, plain: plain.all, shining, found, lookups, sky }
     }
+}
+
+impl PacketIntersection<'_> {
+    /// Puts the plain surfaces among the hits of `left` into the row of surfaces, and their BSDFs into the row of vertices.
+    #[inline(always)]
+    fn fill_plain(
+        &mut self,
+        rows: &RayRows,
+        (hits, object): (&HitRows, &[u32; PACKET]),
+        mut left: u32,
+        folds: impl Folds,
+    ) -> Plain {
+        let Self { tile, measure, are_lit, row, surface, .. } = self;
+        let mut plain = Plain { all: 0, shining: 0, lookups: 0 };
+        while left != 0 {
+            let (id, of) = first_object(object, left, folds);
+            left &= !of;
+            // Leave out objects that are not plain. The first plain one decides the kind of all BSDFs.
+            let Some((material, rough)) = tile.plain_rough(id) else { continue };
+            if plain.all == 0 {
+                row.bsdf.prepare(rough.kind());
+            } else if row.bsdf.kind() != rough.kind() {
+                continue;
+            }
+            // Compute the surfaces.
+            let has_uv = rough.row_texture().is_some() && *are_lit && measure.is_colored();
+            match &tile.world.geometry.objects()[id as usize] {
+                Object::Shape(shape) => {
+                    if !surface.fill(shape, rows, hits, of) {
+                        continue;
+                    }
+                    if has_uv {
+                        surface.fill_uv(shape, rows, hits, of);
+                    }
+                }
+                Object::Mesh(mesh) => mesh.fill_surfaces(surface, rows, hits, of, has_uv),
+            }
+            plain.all |= of;
+            plain.shining |= if material.emission.shines() { of } else { 0 };
+            // Look the material up. Beyond the vertices that the camera sees, all lobes count.
+            plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
+            let shown = [(of, measure.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
+            let shown = if *measure == Measure::ALL { &shown[..1] } else { &shown };
+            let black = row.bsdf.fill(rough, has_uv.then_some(&surface.uv), shown, folds);
+            row.used |= of & !black;
+        }
+        plain
+    }
+}
+
+/// The object that the first of the lanes in `left` hits, and a bit for each of these lanes that hits it.
+#[inline(always)]
+fn first_object(object: &[u32; PACKET], left: u32, folds: impl Folds) -> (u32, u32) {
+    let id = object[left.trailing_zeros() as usize % PACKET];
+    let mut of = [0; PACKET];
+    for lane in 0..PACKET {
+        of[lane] = if object[lane] == id { TRUE } else { 0 };
+    }
+    (id, folds.bits(&of) & left)
+}
+
+/// The hits of the rays at some places of a queue, side by side.
+#[inline(always)]
+fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitRows, [u32; PACKET]) {
+    let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET]);
+    for (lane, &place) in places.iter().enumerate().take(PACKET) {
+        if let Some(hit) = &known[place as usize] {
+            hits.put(lane, &hit.shape);
+            object[lane] = hit.object;
+        }
+    }
+    (hits, object)
 }
 
 impl TileContext<'_> {
@@ -311,12 +351,7 @@ impl TileContext<'_> {
     ) -> u32 {
         let mut found = 0;
         while left != 0 {
-            let id = object[left.trailing_zeros() as usize % PACKET];
-            let mut of = [0; PACKET];
-            for lane in 0..PACKET {
-                of[lane] = if object[lane] == id { TRUE } else { 0 };
-            }
-            let of = folds.bits(&of) & left;
+            let (id, of) = first_object(object, left, folds);
             left &= !of;
             if !self.is_held_by_rows(id) {
                 continue;
@@ -343,6 +378,7 @@ impl VertexBatch {
     /// Sets normals and points above facets for the lanes of smooth surfaces.
     #[inline(always)]
     fn smooth(&mut self, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts, folds: impl Folds) {
+        // Turn the shading normals to the viewer's side.
         let mut normals = [[0.0; PACKET]; 3];
         let (mut ends, mut above, mut bent) = ([0.0; PACKET], [0; PACKET], [0; PACKET]);
         for i in 0..PACKET {
@@ -354,12 +390,14 @@ impl VertexBatch {
             let normal = shading * if geometric.dot(direction) > 0.0 { -1.0 } else { 1.0 };
             set_lane(&mut normals, i, normal);
         }
+        // Find the points above the facets.
         for i in 0..PACKET {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
             let (is_above, end) = way_up(from, to, lane(&self.normal, i), lane(&surface.error, i));
             above[i] = if is_above { TRUE } else { 0 };
             ends[i] = end;
         }
+        // Decide which vertices rise at once, and which if nothing is on the way.
         let of = truths(surface.smooth);
         let above = folds.bits(&above) & surface.smooth;
         let rises = match lifts {
@@ -397,6 +435,7 @@ impl VertexBatch {
         lifts: Lifts,
         folds: impl Folds,
     ) -> u32 {
+        // Put the vertices on the facets, on the viewer's side.
         let mut front = [0; PACKET];
         self.medium = [0; PACKET];
         for i in 0..PACKET {
@@ -409,9 +448,11 @@ impl VertexBatch {
             set_lane(&mut self.normal, i, normal);
         }
         self.bsdf.orient(None, &self.normal, &rays.direction);
+        // Replace the normals of smooth surfaces.
         if surface.smooth != 0 {
             self.smooth(rays, surface, lifts, folds);
         }
+        // Copy the state of the paths.
         match paths {
             PacketSource::Camera(_, slot, ..) => {
                 self.throughput = [[1.0; PACKET]; 3];

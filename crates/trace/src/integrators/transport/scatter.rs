@@ -86,9 +86,11 @@ impl BsdfSampling<'_> {
     /// Adds the rays of the next round. `media` are those of the vertices; `cones` are the beams at the vertices, by place, if
     /// beams are requested.
     pub fn scatter(self, media: &Media, cones: &[Cone], next: &mut Vec<PathRay>) {
+        // Scatter the vertices side by side.
         let row = self.row;
         let scattered = self.tile.world.geometry.instructions().run(self);
         let of_lobe = |density: f32| move |cone: &Cone| cone.scattered(density);
+        // Make a path of each that goes on.
         next.extend(lanes(scattered.alive).map(|i| {
             let mut path = PathRay {
                 ray: Ray::new(lane(&row.from, i), lane(&scattered.directions, i)),

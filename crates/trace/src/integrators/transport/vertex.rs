@@ -80,9 +80,11 @@ impl<'a> Vertex<'a> {
         hit: &Hit,
         distance: f32,
     ) -> Self {
+        // Decide which side the path is on.
         let to_eye = -path.ray.direction;
         let side = if surface.normal.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
         let cone = path.cone.after(distance);
+        // Compute what beams need, if there are any.
         let (mut footprint, mut curvature) = (Footprint::POINT, 0.0);
         if tile.pixel_spread > 0.0 {
             let tangents = [surface.dpdu, surface.dpdv];

@@ -47,7 +47,8 @@ pub enum OpaqueHit {
 impl<'a> TileContext<'a> {
     /// Walks from the hit of a path's ray; `surface` is that of the hit, if it is known. `passed` gets the path after each surface
     /// that it passes, with its next hit.
-    #[inline]
+    // Inlined, as vertices are large to move.
+    #[inline(always)]
     pub fn walk(
         &self,
         mut path: PathRay,
