@@ -1,4 +1,14 @@
 //! glimt: the world that is traced, and the integrators. The map of the house is in the crate `glimt`.
+//!
+//! | folder | what it knows |
+//! | --- | --- |
+//! | [`world`] | everything ready to trace: objects under their trees, materials, lights, the camera, bodies of glass |
+//! | `integrators/` | [`RenderSettings`](integrators::RenderSettings), [`View`](integrators::View), and [`render_tile_by`](integrators::render_tile_by), which renders a tile |
+//! | `integrators/transport/` | rays of a tile, packets of their hits, vertices in rows of sixteen, the walk through glass, scattering |
+//! | `integrators/direct/` | light samples, shadow rays, lobe rays, MIS weights |
+//! | `integrators/photons/` | photon emission, maps, gathering |
+//!
+//! `world` knows neither pixels nor settings of a render. The table in `integrators` says which of its parts uses which.
 
 pub mod integrators;
 pub mod world;

@@ -274,7 +274,7 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
 /// The photon maps of so many samples. `None` if no photons are gathered.
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
     let token = CancelToken::new();
-    settings.heeded().photons.filter(|_| settings.gathers()).map(|of_photons| {
+    settings.effective().photons.filter(|_| settings.gathers()).map(|of_photons| {
         let photons = integrators::Photons::new(world, settings, of_photons, &unwatched, &token);
         let (photons, _) = photons.expect("nobody cancels");
         photons.maps(world, settings, 0..samples, &token).expect("nobody cancels")

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glimt::choice::Choice;
 use glimt::integrators::View;
-use glimt::materials::{Bsdf, TexturePoint};
+use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
     ColorSource, Falloff, Material, MaterialKind, Mesh, Shadows, Shape, TextureFilter, Wrap,
@@ -147,8 +147,8 @@ fn the_border_belongs_to_the_row_and_column_that_begin_there() {
     let (build, kind) = pictured(TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
     let square = build.quad(v(0.0, 0.0, -1.0), DVec3::X, DVec3::Y, kind);
     let world = square.world();
-    let Bsdf::Phong(phong) = &world.materials[0].bsdf else { panic!("a phong material") };
-    let at = |u, w| phong.diffuse.at(&TexturePoint::sharp(glimt::math::DVec2::new(u, w)), &mut 0);
+    let bsdf = &world.materials[0].bsdf;
+    let at = |u, w| bsdf.albedo(&TexturePoint::sharp(glimt::math::DVec2::new(u, w)), &mut 0);
     assert_eq!([at(0.0, 0.0), at(0.5, 0.0), at(0.0, 0.5), at(0.5, 0.5)], [BLUE, GREY, RED, GREEN]);
 }
 

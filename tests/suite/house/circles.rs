@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
-use super::all_sources;
 use super::imports::{Module, Modules};
+use super::{all_sources, root};
 
 /// Two files that import from each other, and why they do.
 const PAIRS: [(&str, &str, &str); 8] = [
@@ -31,15 +31,19 @@ const PAIRS: [(&str, &str, &str); 8] = [
 ];
 
 /// Rooms that have larger circles for now. To be removed with the last of these.
-const UNTANGLED_LATER: [&str; 1] = ["integrators"];
+const UNTANGLED_LATER: [&str; 0] = [];
+
+/// The files of all rooms, with their imports.
+fn all_modules() -> Modules {
+    Modules::new(all_sources().into_iter().map(|(file, inside)| {
+        let path = inside.to_str().expect("UTF-8").to_owned();
+        (path, fs::read_to_string(&file).expect("a source file"))
+    }))
+}
 
 /// Groups of files that reach each other by imports within their room.
 fn circles() -> Vec<Vec<String>> {
-    let sources = all_sources().into_iter().map(|(file, inside)| {
-        let path = inside.to_str().expect("UTF-8").to_owned();
-        (path, fs::read_to_string(&file).expect("a source file"))
-    });
-    let modules = Modules::new(sources);
+    let modules = all_modules();
     let used: BTreeMap<&Module, BTreeSet<Module>> = modules
         .all()
         .map(|module| {
@@ -87,4 +91,30 @@ fn files_of_a_room_import_in_one_direction_but_for_pairs_with_a_reason() {
         BTreeSet::from(UNTANGLED_LATER.map(str::to_owned)),
         "rooms without circles: take them from the list"
     );
+}
+
+/// Ranks of the parts of the integrators, by the `text` block of their map: a line for each rank.
+fn ranks() -> BTreeMap<String, usize> {
+    let map = fs::read_to_string(root().join("crates/trace/src/integrators/mod.rs")).expect("the map");
+    let block = map.split("```").nth(1).and_then(|block| block.strip_prefix("text\n")).expect("a table");
+    let lines = block.lines().filter_map(|line| line.strip_prefix("//! ")?.split_once("  ")).enumerate();
+    let parts = |(rank, (names, _)): (usize, (&str, &str))| {
+        names.split(", ").map(|name| (name.to_owned(), rank)).collect::<Vec<_>>()
+    };
+    lines.flat_map(parts).collect()
+}
+
+#[test]
+fn each_part_of_the_integrators_uses_those_above_it() {
+    let (modules, ranks) = (all_modules(), ranks());
+    let mut found = BTreeSet::new();
+    for module in modules.all().filter(|module| module[0] == "integrators" && module.len() > 1) {
+        let rank = ranks.get(&module[1]).unwrap_or_else(|| panic!("{module:?} is not in the table"));
+        found.insert(module[1].clone());
+        for used in modules.used_by(module) {
+            let is_other = used[0] == "integrators" && used.len() > 1 && used[1] != module[1];
+            assert!(!is_other || ranks[&used[1]] < *rank, "{module:?} uses {used:?}");
+        }
+    }
+    assert_eq!(found, ranks.into_keys().collect(), "parts that are there, and parts in the table");
 }

@@ -1,28 +1,28 @@
 //! Materials: reflection, transmission and emission of surfaces.
 
+pub mod bsdf;
 pub mod emission;
 pub mod footprint;
 pub mod fresnel;
 pub mod glass;
-pub mod lobes;
 pub mod mipmaps;
 pub mod mirror;
 pub mod normal_map;
 pub mod phong;
+pub mod rough;
 pub mod texels;
 pub mod texture;
 
 pub use emission::Emission;
 pub use footprint::{Footprint, TexturePoint};
 pub use glass::Glass;
-pub use lobes::Lobes;
 pub use mipmaps::Mipmaps;
 pub use mirror::Mirror;
 pub use normal_map::NormalMap;
 pub use phong::Phong;
+pub use rough::{BsdfRow, Rough, RoughBsdf, RoughKind};
 
 use crate::math::Vec3;
-use texture::Color;
 
 /// A material, ready for look-ups.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +39,7 @@ impl Material {
     /// Whether anything of it changes with texture coordinates.
     pub fn is_textured(&self) -> bool {
         let in_bsdf = match &self.bsdf {
-            Bsdf::Phong(phong) => phong.constant().is_none(),
+            Bsdf::Rough(rough) => rough.constant().is_none(),
             Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
         };
         in_bsdf || self.normal_map.is_some() || self.emission.texture.is_some()
@@ -47,22 +47,20 @@ impl Material {
 
     /// Whether any of its textures has mip levels.
     pub fn is_mipmapped(&self) -> bool {
-        let of_bsdf = match &self.bsdf {
-            Bsdf::Phong(Phong { diffuse, specular, shininess: _, ambient }) => {
-                [Some(diffuse), Some(specular), ambient.as_ref()].map(|color| color.and_then(Color::texture))
-            }
-            Bsdf::Mirror(_) | Bsdf::Glass(_) => [None; 3],
+        let in_bsdf = match &self.bsdf {
+            Bsdf::Rough(rough) => rough.is_mipmapped(),
+            Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
         };
         let others = [self.emission.texture.as_ref(), self.normal_map.as_ref().map(|map| &map.texture)];
-        of_bsdf.into_iter().chain(others).flatten().any(|texture| texture.mipmaps.is_some())
+        in_bsdf || others.into_iter().flatten().any(|texture| texture.mipmaps.is_some())
     }
 }
 
 /// A material's scattering of arriving light (bidirectional scattering distribution function).
 #[derive(Clone, Debug, PartialEq)]
 pub enum Bsdf {
-    /// A diffuse and glossy surface.
-    Phong(Phong),
+    /// A rough surface: its lobes are not δ.
+    Rough(Rough),
     /// A perfect mirror.
     Mirror(Mirror),
     /// A smooth dielectric.
@@ -70,11 +68,20 @@ pub enum Bsdf {
 }
 
 impl Bsdf {
+    /// Whether it is δ: a mirror or glass.
+    #[inline]
+    pub fn is_delta(&self) -> bool {
+        match self {
+            Self::Rough(_) => false,
+            Self::Mirror(_) | Self::Glass(_) => true,
+        }
+    }
+
     /// The glass that fills the shape. `None` for other materials.
     pub fn glass(&self) -> Option<&Glass> {
         match self {
             Self::Glass(glass) => Some(glass),
-            Self::Phong(_) | Self::Mirror(_) => None,
+            Self::Rough(_) | Self::Mirror(_) => None,
         }
     }
 
@@ -82,7 +89,7 @@ impl Bsdf {
     #[inline]
     pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
-            Self::Phong(phong) => phong.diffuse.at(at, lookups),
+            Self::Rough(rough) => rough.albedo(at, lookups),
             Self::Mirror(mirror) => mirror.reflectance,
             Self::Glass(glass) => glass.tint,
         }

@@ -7,7 +7,7 @@ use super::settings::{Overrides, View};
 use crate::choice::Choice;
 use crate::integrators::RenderSettings;
 use crate::scene::Loaded;
-use crate::scene::description::{Integrator, Light, MaterialKind, Scene};
+use crate::scene::description::{Light, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// The setting that a warning comes of.
@@ -71,18 +71,12 @@ impl Cause {
 }
 
 fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
-    let RenderSettings { render, photons, .. } = &settings.heeded();
-    let is_path = match render.integrator {
-        Integrator::Path => true,
-        Integrator::Whitted => false,
-    };
-    let is_specular = |index: usize| match scene.materials[index].kind {
-        MaterialKind::Mirror { .. } | MaterialKind::Glass { .. } => true,
-        MaterialKind::Phong { .. } => false,
-    };
+    let RenderSettings { render, photons, .. } = &settings.effective();
+    let finds_all_light = render.integrator.method().scatters;
+    let is_specular = |index: usize| scene.materials[index].kind.is_delta();
     let specular = || scene.objects.iter().filter_map(|object| object.material).any(is_specular);
     let mut warnings = Vec::new();
-    if is_path && scene.lights.iter().any(Light::sends) && specular() {
+    if finds_all_light && scene.lights.iter().any(Light::sends) && specular() {
         let message = "path finds no light of a [[light]] without size that passes mirror or glass before it meets a \
                        surface: what they would throw on it stays dark";
         warnings.push((Cause::Integrator, message.to_owned()));

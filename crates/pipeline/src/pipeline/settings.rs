@@ -96,7 +96,7 @@ pub struct Effective {
 
 impl Effective {
     pub(super) fn new(settings: &RenderSettings, threads: usize, outputs: &[PathBuf]) -> Self {
-        let RenderSettings { render, dof, view, photons } = settings.heeded();
+        let RenderSettings { render, dof, view, photons } = settings.effective();
         Self {
             width: render.width,
             height: render.height,

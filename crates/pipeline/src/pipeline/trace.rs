@@ -9,12 +9,13 @@ use rayon::ThreadPool;
 
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Pixels, TILE_SIZE, TileSamples};
-use crate::integrators::{PhotonMaps, RayCounters, RenderSettings, render_tile_by};
+use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::system::processor::seconds_of_thread;
 use crate::world::World;
 
-/// The function that renders a tile: see [`crate::integrators::render_tile`].
+/// The function that renders a tile, with photon maps or without: see [`crate::integrators::render_tile_by`].
 pub(super) type Kernel = fn(
+    Option<&PhotonMaps>,
     &World,
     &RenderSettings,
     Pixels,
@@ -69,10 +70,7 @@ impl Tracer<'_> {
         let Self { kernel, world, settings, token, photons, .. } = *self;
         let samples = job.samples.clone();
         let begin = seconds_of_thread();
-        let (samples, rays) = match photons {
-            Some(_) => render_tile_by(photons, world, settings, job.pixels, samples, token),
-            None => kernel(world, settings, job.pixels, samples, token),
-        }?;
+        let (samples, rays) = kernel(photons, world, settings, job.pixels, samples, token)?;
         Ok((samples, Cost { rays, seconds: seconds_of_thread() - begin }))
     }
 

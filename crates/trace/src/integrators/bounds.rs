@@ -1,7 +1,7 @@
 //! The boxes of the trees, as lines over the picture.
 
-use super::queues::Queues;
-use super::shot::Shot;
+use super::transport::scratch::Scratch;
+use super::transport::tile::TileContext;
 use crate::control::Cancelled;
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
@@ -35,14 +35,14 @@ struct Line {
 }
 
 /// Draws lines where the camera rays in the queue come near the edges of boxes.
-pub fn draw(shot: &Shot<'_>, queues: &mut Queues, radiance: &mut [Vec3]) -> Result<(), Cancelled> {
-    let render = &shot.settings.render;
-    let spread = shot.world.camera.pixel_spread(render.height);
+pub fn draw(tile: &TileContext<'_>, scratch: &mut Scratch, radiance: &mut [Vec3]) -> Result<(), Cancelled> {
+    let render = &tile.settings.render;
+    let spread = tile.world.camera.pixel_spread(render.height);
     let brightness = exp2(-render.exposure);
-    shot.closest_hits(&queues.rays, &mut queues.hits)?;
-    for (path, hit) in queues.rays.iter().zip(&queues.hits) {
+    tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
+    for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let end = hit.map_or(f32::INFINITY, |hit| hit.shape.t);
-        if let Some(Line { is_behind, depth }) = nearest_line(shot, &path.ray, end, spread) {
+        if let Some(Line { is_behind, depth }) = nearest_line(tile, &path.ray, end, spread) {
             let color = COLORS[depth as usize % COLORS.len()] * brightness;
             let own = &mut radiance[path.slot as usize];
             *own = own.lerp(color, if is_behind { FAINT } else { 1.0 });
@@ -53,9 +53,9 @@ pub fn draw(shot: &Shot<'_>, queues: &mut Queues, radiance: &mut [Vec3]) -> Resu
 
 /// The first of the lines that a ray hits: lines before the surface at `end` precede the others, and among these larger
 /// boxes precede smaller ones.
-fn nearest_line(shot: &Shot<'_>, ray: &Ray, end: f32, spread: f32) -> Option<Line> {
+fn nearest_line(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<Line> {
     let mut best: Option<Line> = None;
-    shot.world.geometry.along(ray, |local, Cell { bounds, depth, .. }, stretch| {
+    tile.world.geometry.along(ray, |local, Cell { bounds, depth, .. }, stretch| {
         let unit = local.direction.length();
         let pixel = |t: f32| t * spread * unit;
         let Stretch { enter, leave } = *stretch;

@@ -1,43 +1,31 @@
 //! Integrators: from a world and a tile to radiance. Rays travel in batches: a queue of camera rays, the shadow rays of their hits,
 //! the queue of the next bounces.
 //!
-//! Modules, from below:
-//! - `shot`: the common data of all rays of a tile; `queues`: the rays, with their beams (`cone`) and the
-//!   glass around them (`medium`).
-//! - `trace`: rays to hits; `packet`: packets of rays to hits and rows of plain surfaces.
-//! - `vertices`: all data of a hit for shading; `crossing`: surfaces that touch it; `specular`: reflection and refraction.
-//! - `lit_row`, `lit_queue`: vertices that wait for direct light; `light`: that light; `picking`, `pool`: that of picked lights;
-//!   `beside`: other techniques that find lamps, and MIS weights.
-//! - `sink`: accumulates the parts of light that the view shows.
-//! - `wave`: the rays round by round, for both methods. Paths are scattered `onward` at diffuse and glossy surfaces; in whitted
-//!   they end there.
-//! - `views`: views of first hits; `bounds`: the boxes of the trees as lines over the picture.
+//! Each line may use those above it, and no others: `tests/suite/house` compares the sources with this table.
+//!
+//! ```text
+//! view, counters      contents of a picture; counters of rays
+//! settings            settings of a render
+//! method              behaviour of its rays: the scene's table of methods, as the view and photons let it apply
+//! transport           rays of a tile, their hits, vertices in rows; knows the world, neither integrators nor photons
+//! direct              light samples, shadow rays, MIS weights
+//! photons             emission, photon maps, gathering
+//! memory              memory of a thread's batches
+//! eye                 the rays of the camera, round by round, in whitted and path
+//! aov, bounds         views of first hits; boxes of the trees as lines over the picture
+//! ```
 
-mod beside;
+mod aov;
 mod bounds;
-mod camera;
-mod cone;
 mod counters;
-mod crossing;
-mod light;
-mod lit_queue;
-mod lit_row;
-mod medium;
-mod onward;
-mod packet;
+mod direct;
+mod eye;
+mod memory;
+mod method;
 mod photons;
-mod picking;
-mod pool;
-mod queues;
 mod settings;
-mod shot;
-mod sink;
-mod specular;
-mod trace;
-mod vertices;
+mod transport;
 mod view;
-mod views;
-mod wave;
 
 use std::ops::Range;
 
@@ -46,12 +34,13 @@ use crate::film::{NegativeLobes, Pixels, TileSamples};
 use crate::math::Vec3;
 use crate::world::{PACKET, World};
 pub use counters::RayCounters;
-pub use photons::{Photon, PhotonMap, PhotonMaps, PhotonPass, PhotonSettings, Photons};
-use queues::Queues;
-pub use settings::RenderSettings;
-pub use shot::receivers;
-use shot::{SampleBlock, Shot};
-use sink::Sink;
+use memory::Memory;
+use method::Behaviour;
+pub use method::receivers;
+pub use photons::{Photon, PhotonMap, PhotonMaps, PhotonPass, Photons};
+pub use settings::{PhotonSettings, RenderSettings};
+use transport::accumulator::Accumulator;
+use transport::tile::{SampleBlock, TileContext};
 pub use view::{FirstHit, Measure, Parts, Shown, View};
 
 /// Camera rays that go through the queues together.
@@ -84,36 +73,48 @@ pub fn render_tile_by(
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
+    // Prepare the samples and their sums.
     let block = SampleBlock { pixels: pixels.into(), samples };
     let weight = settings.render.filter.negative_weight();
     let mut is_negative = vec![false; if weight.is_some() { block.len() } else { 0 }];
     let mut radiance = vec![Vec3::ZERO; block.len()];
     let mut counters = RayCounters::default();
-    let settings = &settings.heeded();
+    // Prepare what all rays have in common.
+    let settings = &settings.effective();
     let photons = photons.filter(|_| settings.gathers());
-    let shot = Shot { photons, ..Shot::new(world, settings, &block, token) };
+    let behaviour = Behaviour::of(settings, photons.is_some());
+    let tile = TileContext::new(world, settings, &block, token, behaviour);
     let clamp = if settings.view.shown().measure() == Measure::Work { 0.0 } else { settings.render.clamp };
-    let mut queues = Queues::of_thread();
+    // Render batch by batch.
+    let mut memory = Memory::of_thread();
     for start in (0..block.len()).step_by(BATCH_SIZE) {
         let slots = start as u32..(start + BATCH_SIZE).min(block.len()) as u32;
         counters.camera_rays += slots.len() as u64;
         let negative = |first: u32, bits: u32| mark(&mut is_negative, first, bits);
         match settings.view.shown() {
             Shown::FirstHit(number) => {
-                shot.camera_rays(slots, &mut queues.rays, negative);
-                views::shade(&shot, number, &mut queues, &mut radiance, &mut counters)?;
+                tile.camera_rays(slots, &mut memory.scratch.rays, negative);
+                aov::shade((&tile, photons), number, &mut memory.scratch, &mut radiance, &mut counters)?;
             }
             shown @ (Shown::Light(_) | Shown::Film(_) | Shown::Bounds) => {
-                let sink = Sink { measure: shown.measure(), radiance: &mut radiance, clamp };
-                wave::trace(&shot, slots.clone(), &mut queues, sink, &mut counters, negative)?;
+                let accumulator = Accumulator { measure: shown.measure(), radiance: &mut radiance, clamp };
+                eye::trace(
+                    (&tile, photons),
+                    slots.clone(),
+                    &mut memory,
+                    accumulator,
+                    &mut counters,
+                    negative,
+                )?;
                 if shown == Shown::Bounds {
-                    shot.camera_rays(slots, &mut queues.rays, |_, _| {});
-                    bounds::draw(&shot, &mut queues, &mut radiance)?;
+                    tile.camera_rays(slots, &mut memory.scratch.rays, |_, _| {});
+                    bounds::draw(&tile, &mut memory.scratch, &mut radiance)?;
                 }
             }
         }
     }
-    queues.leave();
+    // Hand the samples over.
+    memory.leave();
     let negative = weight.map(|weight| NegativeLobes { weight, is_negative });
     let samples = block.samples.len() as u32;
     Ok((TileSamples { pixels: block.pixels, samples, radiance, negative }, counters))

@@ -1,8 +1,8 @@
 //! Settings of a render.
 
-use super::{FirstHit, Measure, PhotonSettings, Shown, View};
+use super::{FirstHit, Measure, Shown, View};
 use crate::math::{DVec2, Vec3};
-use crate::scene::description::{Integrator, Render};
+use crate::scene::description::Render;
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use crate::world::Lookups;
 
@@ -15,18 +15,26 @@ pub struct RenderSettings {
     pub dof: bool,
     /// View to show.
     pub view: View,
-    /// Settings of photon maps. `None` if whitted gathers no photons.
+    /// Settings of photon maps. `None` if no photons are gathered.
     pub photons: Option<PhotonSettings>,
+}
+
+/// Settings of photon emission and gathering.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhotonSettings {
+    /// Photons emitted in a pass.
+    pub count: u32,
+    /// Radius of the first pass's kernels; 0 to choose it by the density of photons.
+    pub radius: f32,
+    /// Most scatterings of a photon.
+    pub bounces: u32,
 }
 
 impl RenderSettings {
     /// The effective settings: ignored ones have their defaults.
-    pub fn heeded(&self) -> Self {
-        let mut render = self.render.heeded();
-        let photons = match render.integrator {
-            Integrator::Whitted => self.photons,
-            Integrator::Path => None,
-        };
+    pub fn effective(&self) -> Self {
+        let mut render = self.render.effective();
+        let photons = self.photons.filter(|_| render.integrator.method().gathers);
         if photons.is_some() {
             render.ambient = Vec3::ZERO;
         }
@@ -42,7 +50,7 @@ impl RenderSettings {
             Shown::Light(Measure::Radiance(parts)) => parts.are_reflected() && self.render.max_depth > 1,
             Shown::Light(Measure::Work) | Shown::Film(_) | Shown::Bounds => self.render.max_depth > 1,
         };
-        shows && self.heeded().photons.is_some()
+        shows && self.effective().photons.is_some()
     }
 
     /// The textures that pictures with these settings look up.
@@ -61,7 +69,7 @@ impl RenderSettings {
             }
             Shown::Light(Measure::Radiance(parts)) if !parts.are_reflected() => {
                 // Mirrors and glass, through which such parts are visible too, have no normal maps.
-                let ambient = parts.ambient && self.heeded().render.ambient != Vec3::ZERO;
+                let ambient = parts.ambient && self.effective().render.ambient != Vec3::ZERO;
                 Lookups { ambient, lights: parts.emitted, ..Lookups::NONE }
             }
             // Boxes are drawn over the picture.
@@ -83,7 +91,7 @@ impl RenderSettings {
 
 impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
-        let Self { render, dof, view, photons } = self.heeded();
+        let Self { render, dof, view, photons } = self.effective();
         key.add(&render, of).flag(dof).choice(view.sampled());
         // All trees give the same hits; these two show the trees themselves.
         match view.shown() {

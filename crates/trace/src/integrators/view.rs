@@ -2,6 +2,7 @@
 
 use crate::choice;
 use crate::film::Quantity;
+use crate::materials::bsdf::ShownLobes;
 
 choice! {
     /// Content of a picture.
@@ -134,6 +135,16 @@ impl Measure {
         match self {
             Self::Radiance(_) | Self::Work => true,
             Self::ArrivingShare => false,
+        }
+    }
+
+    /// Lobes of rough surfaces that it shows.
+    #[inline(always)]
+    pub fn lobes(self) -> ShownLobes {
+        match self {
+            Self::Radiance(Parts { diffuse, specular, .. }) => ShownLobes::Of { diffuse, specular },
+            Self::Work => ShownLobes::ALL,
+            Self::ArrivingShare => ShownLobes::Unit,
         }
     }
 

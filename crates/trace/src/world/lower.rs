@@ -8,7 +8,7 @@ use super::{Image, Images};
 use crate::assets::FileMaterial;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Color, Texture, TextureFilter, Wrap};
-use crate::materials::{Bsdf, Emission, Glass, Material, Mirror, NormalMap, Phong};
+use crate::materials::{Bsdf, Emission, Glass, Material, Mirror, NormalMap, Phong, Rough};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, ColorSource, EmissionSource, MaterialKind, Scene, TextureUse};
 
@@ -16,12 +16,12 @@ use crate::scene::description::{self, ColorSource, EmissionSource, MaterialKind,
 pub fn material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
     let color = |source: &ColorSource| declared_color(scene, images, source);
     let bsdf = match &material.kind {
-        MaterialKind::Phong { diffuse, specular, shininess, ambient } => Bsdf::Phong(Phong {
+        MaterialKind::Phong { diffuse, specular, shininess, ambient } => Bsdf::Rough(Rough::Phong(Phong {
             diffuse: color(diffuse),
             specular: color(specular),
             shininess: *shininess,
             ambient: ambient.as_ref().map(color),
-        }),
+        })),
         MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: *reflectance }),
         MaterialKind::Glass { ior, tint } => Bsdf::Glass(Glass::new(*ior, *tint)),
     };
@@ -111,7 +111,7 @@ fn file_phong(images: &Images, own: &FileMaterial) -> Material {
         .normal_texture
         .as_ref()
         .map(|path| NormalMap { texture: texture(path, TextureUse::Normal), strength: 1.0 });
-    Material { bsdf: Bsdf::Phong(phong), emission: file_emission(images, own), normal_map }
+    Material { bsdf: Bsdf::Rough(Rough::Phong(phong)), emission: file_emission(images, own), normal_map }
 }
 
 /// The material of triangles of a mesh file that name none.
@@ -122,7 +122,7 @@ pub fn fallback_material() -> Material {
         shininess: 1.0,
         ambient: None,
     };
-    Material { bsdf: Bsdf::Phong(phong), emission: Emission::NONE, normal_map: None }
+    Material { bsdf: Bsdf::Rough(Rough::Phong(phong)), emission: Emission::NONE, normal_map: None }
 }
 
 fn declared_color(scene: &Scene, images: &Images, source: &ColorSource) -> Color {

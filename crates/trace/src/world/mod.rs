@@ -43,7 +43,7 @@ pub use textures::{
 use crate::assets::OrbiterCamera;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
-use crate::materials::{Bsdf, Material, Mipmaps, Phong};
+use crate::materials::{Bsdf, Material, Mipmaps, Rough};
 use crate::scene::description;
 
 /// The images of a scene.
@@ -134,9 +134,9 @@ impl World {
         self.materials[first as usize..][..count].iter().chain(self.materials.get(one as usize))
     }
 
-    /// The material of an object and its Phong. `None` if anything bends its normals, its emission is textured, or its
-    /// textures have mip levels or are those of its glossy lobe.
-    pub fn plain_phong(&self, object: u32) -> Option<(&Material, &Phong)> {
+    /// The material of an object and its rough BSDF. `None` if anything bends its normals, its emission is textured, or rows are
+    /// not filled with the BSDF.
+    pub fn plain_rough(&self, object: u32) -> Option<(&Material, &Rough)> {
         let material = match self.object_materials[object as usize] {
             ObjectMaterial::One(index) => &self.materials[index as usize],
             ObjectMaterial::OfFile { .. } => return None,
@@ -145,10 +145,7 @@ impl World {
             return None;
         }
         match &material.bsdf {
-            Bsdf::Phong(phong) => {
-                let has_no_levels = phong.diffuse.texture().is_none_or(|texture| texture.mipmaps.is_none());
-                (has_no_levels && phong.specular.texture().is_none()).then_some((material, phong))
-            }
+            Bsdf::Rough(rough) => rough.fills_rows().then_some((material, rough)),
             Bsdf::Mirror(_) | Bsdf::Glass(_) => None,
         }
     }

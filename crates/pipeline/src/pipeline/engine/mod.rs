@@ -75,7 +75,7 @@ pub(super) struct Means {
 
 impl Default for Means {
     fn default() -> Self {
-        Self { kernel: crate::integrators::render_tile, most_film_bytes: u64::MAX, nice: 0 }
+        Self { kernel: crate::integrators::render_tile_by, most_film_bytes: u64::MAX, nice: 0 }
     }
 }
 
@@ -299,7 +299,7 @@ impl Engine {
         let screen = Screen { bounds: request.preview, plan, sink };
         let before = || if is_new { coarse.show_without_photons(screen, hear) } else { Ok(()) };
         table.run(Stage::Photons, || photons(asked, key, store, sending, hear, before))?;
-        let photons_key = plan.settings.heeded().photons.filter(|_| plan.settings.gathers()).map(key);
+        let photons_key = plan.settings.effective().photons.filter(|_| plan.settings.gathers()).map(key);
         self.plan = Some(ready.plan.clone());
         self.at_hand = Some(at_hand);
         Ok(photons_key)

@@ -121,7 +121,7 @@ impl PhotonStore {
         let Sending { world, plan, pool, token, .. } = sending;
         let watch = Stopwatch::start(token);
         let photons = &self.photons;
-        let settings = plan.settings.heeded();
+        let settings = plan.settings.effective();
         let pass = ticking(pool, tick, || photons.pass(world, &settings, number, token))?;
         let pass = Arc::new(pass);
         let sent = self.sent.get();
@@ -198,7 +198,7 @@ pub(in crate::pipeline) fn photons(
     mut tick: impl FnMut(),
     before: impl FnOnce() -> Result<(), Stop>,
 ) -> Result<Staged<()>, Stop> {
-    let settings = sending.plan.settings.heeded();
+    let settings = sending.plan.settings.effective();
     let skipped = |why: &str| Ok(Staged::skipped((), why));
     let Some(of_photons) = settings.photons else {
         return match wanted.unwrap_or(enabled) {

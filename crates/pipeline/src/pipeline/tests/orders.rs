@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Pixels, Rect, TileSamples};
-use crate::integrators::{RayCounters, RenderSettings};
+use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::pipeline::engine::Means;
 use crate::pipeline::settings::View;
 use crate::world::World;
@@ -74,6 +74,7 @@ fn an_older_request_that_comes_late_is_dropped() {
 static BREAKS: AtomicBool = AtomicBool::new(true);
 
 fn breaks_once(
+    photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
     pixels: Pixels,
@@ -81,7 +82,7 @@ fn breaks_once(
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     assert!(!BREAKS.swap(false, Ordering::SeqCst), "a tile broke");
-    KERNEL(world, settings, pixels, samples, token)
+    KERNEL(photons, world, settings, pixels, samples, token)
 }
 
 #[test]
@@ -95,6 +96,7 @@ fn the_worker_survives_a_panic() {
 static TILES: AtomicUsize = AtomicUsize::new(0);
 
 fn breaks_first(
+    photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
     pixels: Pixels,
@@ -126,6 +128,7 @@ fn a_film_that_does_not_fit_is_an_error() {
 
 /// Slow enough that orders arrive during the render.
 pub(super) fn slow(
+    photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
     pixels: Pixels,
@@ -133,7 +136,7 @@ pub(super) fn slow(
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     std::thread::sleep(Duration::from_millis(2));
-    KERNEL(world, settings, pixels, samples, token)
+    KERNEL(photons, world, settings, pixels, samples, token)
 }
 
 #[test]
@@ -342,6 +345,7 @@ static HELD: AtomicBool = AtomicBool::new(false);
 
 /// Holds the work when the tiles of a pass are done, and at no other time.
 fn held_between_passes(
+    photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
     pixels: Pixels,
@@ -350,7 +354,7 @@ fn held_between_passes(
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     token.check()?;
     let first = samples.start == 0;
-    let done = KERNEL(world, settings, pixels, samples, &CancelToken::new());
+    let done = KERNEL(photons, world, settings, pixels, samples, &CancelToken::new());
     if first {
         // Long enough for every tile of the pass to be begun.
         std::thread::sleep(Duration::from_millis(50));
@@ -468,6 +472,7 @@ fn warnings_are_said_before_anything_is_rendered() {
 
 /// A kernel as the real one, but a little slower.
 fn leisurely(
+    photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
     pixels: Pixels,
@@ -476,7 +481,7 @@ fn leisurely(
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     token.check()?;
     std::thread::sleep(Duration::from_millis(5));
-    crate::integrators::render_tile(world, settings, pixels, samples, token)
+    KERNEL(photons, world, settings, pixels, samples, token)
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Pixels, TileSamples};
-use crate::integrators::{RayCounters, RenderSettings};
+use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::world::World;
 
 /// All light comes through the glass around the lamp; so many photons in a pass.
@@ -70,16 +70,17 @@ fn time_that_ends_while_photons_are_sent_ends_the_render() {
 
 static WITHOUT: AtomicBool = AtomicBool::new(false);
 
-/// Renders without photons.
+/// A kernel as the real one, which notes whether it renders without photons.
 fn without(
+    photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
     pixels: Pixels,
     samples: Range<u32>,
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
-    WITHOUT.store(true, Ordering::SeqCst);
-    KERNEL(world, settings, pixels, samples, token)
+    WITHOUT.fetch_or(photons.is_none(), Ordering::SeqCst);
+    KERNEL(photons, world, settings, pixels, samples, token)
 }
 
 /// Whether each preview lacked the light of photons, and whether the photons were there when it came.
@@ -136,4 +137,31 @@ fn maps_are_kept_while_there_is_room() {
     assert!(8 * of_pass > MOST, "{of_pass} bytes a pass: all have room");
     let kept = report.kept_memory_bytes;
     assert!(kept <= MOST && kept + of_pass > MOST, "{kept} bytes kept of passes of {of_pass}");
+}
+
+/// Whether the kernel below was given photons.
+static WITH: AtomicBool = AtomicBool::new(false);
+
+/// A kernel that renders every sample black, with photons or without.
+fn black(
+    photons: Option<&PhotonMaps>,
+    world: &World,
+    settings: &RenderSettings,
+    pixels: Pixels,
+    samples: Range<u32>,
+    token: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    WITH.fetch_or(photons.is_some(), Ordering::SeqCst);
+    let (mut samples, rays) = KERNEL(photons, world, settings, pixels, samples, token)?;
+    samples.radiance.fill(crate::math::Vec3::ZERO);
+    Ok((samples, rays))
+}
+
+#[test]
+fn a_kernel_renders_every_tile_also_where_photons_are_gathered() {
+    let mut bench = Bench::with(&wrapped(1000), black);
+    bench.done();
+    let picture = std::fs::read(bench.path("out.ppm")).expect("a picture");
+    let bytes = picture.rsplitn(2, |byte| *byte == b'\n').next().expect("pixels");
+    assert!(WITH.load(Ordering::SeqCst) && bytes.iter().all(|byte| *byte == 0));
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::*;
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Pixels, TileSamples};
-use crate::integrators::{RayCounters, RenderSettings};
+use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::output::FileIdentity;
 use crate::world::World;
 
@@ -107,6 +107,7 @@ static IS_LINKED: AtomicBool = AtomicBool::new(false);
 
 /// During the first tile the link comes to lead to the texture.
 fn relinks(
+    photons: Option<&PhotonMaps>,
     world: &World,
     settings: &RenderSettings,
     pixels: Pixels,
@@ -119,7 +120,7 @@ fn relinks(
         fs::remove_file(link).expect("removed");
         symlink("skin.ppm", link).expect("a link");
     }
-    KERNEL(world, settings, pixels, samples, token)
+    KERNEL(photons, world, settings, pixels, samples, token)
 }
 
 #[test]

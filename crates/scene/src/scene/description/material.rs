@@ -88,6 +88,14 @@ impl MaterialKind {
         }
     }
 
+    /// Whether it is δ: a mirror or glass.
+    pub fn is_delta(&self) -> bool {
+        match self {
+            Self::Phong { .. } => false,
+            Self::Mirror { .. } | Self::Glass { .. } => true,
+        }
+    }
+
     /// Whether it is glass.
     pub fn is_glass(&self) -> bool {
         self.substance().is_some()

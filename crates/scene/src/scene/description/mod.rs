@@ -6,6 +6,7 @@
 mod camera;
 mod light;
 mod material;
+mod method;
 mod render;
 mod shape;
 
@@ -18,9 +19,9 @@ pub use material::{
     ColorSource, EmissionSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter,
     TextureRole, TextureUse, Wrap,
 };
+pub use method::{Integrator, Method};
 pub use render::{
-    Accel, Integrator, KeyRange, MOST_SCATTERINGS, PixelFilter, Render, RenderKey, Shadows, Tonemap,
-    render_keys,
+    Accel, KeyRange, MOST_SCATTERINGS, PixelFilter, Render, RenderKey, Shadows, Tonemap, render_keys,
 };
 pub use shape::{Lowered, Mesh, Object, Shape, Sheet, greatest};
 

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
+use super::method::Integrator;
 use crate::choice;
 use crate::choice::Choice;
 pub use crate::film::tone::Tonemap;
@@ -198,16 +199,6 @@ macro_rules! settings {
 render_keys!(settings);
 
 choice! {
-    /// Rendering methods.
-    pub enum Integrator {
-        /// Direct light by Phong, mirror, glass, ambient.
-        Whitted = "whitted",
-        /// All light, by paths from the eye, without bias.
-        Path = "path",
-    }
-}
-
-choice! {
     /// Methods for shadows.
     pub enum Shadows {
         /// Nothing stops light.
@@ -234,10 +225,13 @@ choice! {
 
 impl Render {
     /// With the defaults in place of what its integrator ignores.
-    pub fn heeded(self) -> Self {
-        match self.integrator {
-            Integrator::Whitted => Self { clamp: 0.0, ..self },
-            Integrator::Path => Self { shadows: Shadows::Soft, ambient: Vec3::ZERO, ..self },
+    pub fn effective(self) -> Self {
+        let method = self.integrator.method();
+        Self {
+            shadows: if method.honours_shadows { self.shadows } else { Shadows::Soft },
+            ambient: if method.honours_ambient { self.ambient } else { Vec3::ZERO },
+            clamp: if method.honours_clamp { self.clamp } else { 0.0 },
+            ..self
         }
     }
 }
@@ -265,7 +259,7 @@ impl Fingerprinted for Render {
             // All trees give the same hits; views that show the trees add it.
             accel: _,
             seed,
-        } = self.heeded();
+        } = self.effective();
         key.f32(error);
         key.u64(width.into()).u64(height.into()).u64(shadow_samples.into()).u64(max_depth.into());
         key.choice(integrator)

@@ -20,7 +20,7 @@ mod value;
 
 use std::path::{Path, PathBuf};
 
-use super::description::{Camera, Environment, Integrator, Light, Scene};
+use super::description::{Camera, Environment, Light, Scene};
 use super::source::Source;
 use super::{MAX_FILE_BYTES, Outcome, Setting, facing, toml};
 use crate::math::Vec3;
@@ -161,10 +161,10 @@ fn warn_about_darkness(context: &Context<'_>, scene: &Scene) {
     let lamps = scene.objects.iter().filter_map(|object| object.material).any(emits);
     let lights = scene.lights.iter().any(Light::sends) || scene.environment.iter().any(Environment::sends);
     // `path` and photons have light of their own in its place.
-    let is_ambient = match scene.render.integrator {
-        Integrator::Whitted => scene.render.ambient != Vec3::ZERO && !scene.photons.enabled,
-        Integrator::Path => false,
-    };
+    let method = scene.render.integrator.method();
+    let is_ambient = method.honours_ambient
+        && scene.render.ambient != Vec3::ZERO
+        && !(method.gathers && scene.photons.enabled);
     if !lights && !own_materials && !lamps && !is_ambient {
         let help = "add a [[light]] or an [environment], give a material in use `emission`, or set `ambient` in [render]";
         context.report(Issue::warning(0..0, "nothing lights this scene").help(help));

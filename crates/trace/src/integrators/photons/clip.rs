@@ -4,7 +4,7 @@
 use arrayvec::ArrayVec;
 
 use super::kernel::weight_over;
-use super::map::{LEAST_COSINE, Look, REACH};
+use super::map::{GatherPoint, LEAST_COSINE, REACH};
 use crate::geometry::{Aabb, Shape, ShapeHit};
 use crate::materials::{Bsdf, Material};
 use crate::math::frame::Frame;
@@ -49,7 +49,7 @@ const PIECES: usize = 8;
 const WALLS: usize = 4;
 
 /// Computes the part of a kernel that receives photons.
-pub fn clip(world: &World, look: &Look, radius: f32) -> Clip {
+pub fn clip(world: &World, look: &GatherPoint, radius: f32) -> Clip {
     let mut around = Around::new(look, radius);
     let mut is_crowded = false;
     let bounds = look.kernel_box(radius);
@@ -73,7 +73,7 @@ pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
 /// Whether photons are kept on a material.
 pub fn receives(material: &Material) -> bool {
     match &material.bsdf {
-        Bsdf::Phong(phong) => phong.constant().is_none_or(|bsdf| !bsdf.is_black()),
+        Bsdf::Rough(rough) => rough.constant().is_none_or(|bsdf| !bsdf.is_black()),
         Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
     }
 }
@@ -112,7 +112,7 @@ struct Around {
 }
 
 impl Around {
-    fn new(look: &Look, radius: f32) -> Self {
+    fn new(look: &GatherPoint, radius: f32) -> Self {
         let Frame { s, t, n } = Frame::from_normal(look.normal);
         let radius = f64::from(radius);
         Self {
@@ -282,7 +282,7 @@ mod tests {
 
     /// Part of a kernel of radius 0.1 at (x, 0, z), which faces up, among shapes.
     fn told(x: f32, z: f32, shapes: &[Shape]) -> Option<f64> {
-        let look = Look { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
+        let look = GatherPoint { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
         let mut around = Around::new(&look, 0.1);
         let are_told = shapes.iter().all(|shape| around.add_shape(shape, || true));
         around.part().filter(|_| are_told)

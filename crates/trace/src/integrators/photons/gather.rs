@@ -1,18 +1,18 @@
 //! Gathering of photons at vertices.
 
-use super::super::PACKET;
-use super::super::lit_row::LitRow;
-use super::super::shot::Shot;
-use super::super::view::{Measure, Ways};
 use super::PhotonMaps;
-use super::chosen::{Place, is_apart};
 use super::clip::{Clip, clip};
-use super::map::{Look, PhotonMap};
+use super::map::{GatherPoint, PhotonMap};
+use super::occlusion::is_occluded;
+use super::reservoir::Place;
 use super::trials::inverse_part;
 use crate::geometry::rows::lanes;
-use crate::materials::lobes::gloss;
+use crate::integrators::PACKET;
+use crate::integrators::transport::batch::VertexBatch;
+use crate::integrators::transport::tile::TileContext;
+use crate::integrators::view::{Measure, Ways};
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, Lanes3, lane, set_lane};
+use crate::math::lanes::{Folds, Lanes3, set_lane};
 use crate::sampling::Decision;
 use crate::world::Loops;
 
@@ -26,9 +26,9 @@ const LOOKS_BOUNCED: f32 = 0.5;
 /// Gathers photons at the vertices of a row.
 pub struct Gathering<'a> {
     /// Context of the tile.
-    pub shot: &'a Shot<'a>,
+    pub tile: &'a TileContext<'a>,
     /// The vertices.
-    pub row: &'a LitRow,
+    pub row: &'a VertexBatch,
     /// The maps of the samples that are rendered.
     pub maps: &'a PhotonMaps,
     /// Scatterings of the paths before the vertices.
@@ -43,27 +43,31 @@ impl Loops for Gathering<'_> {
     /// Gathered light that is reflected towards the camera, before the throughput of the paths.
     #[inline(always)]
     fn run(self, folds: impl Folds) -> Lanes3 {
-        let Self { shot, row, maps, depth, measure } = self;
+        let Self { tile, row, maps, depth, measure } = self;
         let mut sums = [[0.0; PACKET]; 3];
-        let [looks, choices] = row.sampler(shot).pairs(&row.path, Decision::Gather, 0, 1);
-        let Some(most_depth) = shot.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
+        let [looks, choices] = row.sampler(tile).pairs(&row.path, Decision::Gather, 0, 1);
+        let Some(most_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let Ways { caustic, indirect, .. } = measure.ways();
         for i in lanes(row.used) {
-            let (_, _, sample) = shot.block.place(row.slot[i]);
+            let (_, _, sample) = tile.block.place(row.slot[i]);
             let pass = maps.pass(sample);
-            let is_seen = row.seen & 1 << i != 0;
+            let only_specular_before = row.only_specular_before & 1 << i != 0;
             let (point, normal) = row.place_of(i);
-            let look = Look { point, normal, most_depth };
+            // Choose the maps that hold light for the vertex.
+            let look = GatherPoint { point, normal, most_depth };
             // At a surface without a glossy lobe, photons carry the light from a caustic, and the path from there leaves it out.
-            let gathers_bounced = indirect && row.albedos[1][i] == 0.0;
-            let gathers_caustic = if is_seen { caustic } else { indirect && row.from_gloss & 1 << i != 0 };
+            let gathers_bounced = indirect && !row.bsdf.has_narrow_lobe(i);
+            let gathers_caustic =
+                if only_specular_before { caustic } else { indirect && row.after_gloss & 1 << i != 0 };
+            // Choose the maps to look up by chance.
             let chances = if measure == Measure::Work {
                 [1.0; 2]
-            } else if is_seen {
+            } else if only_specular_before {
                 [1.0, LOOKS_BOUNCED]
             } else {
                 [LOOKS_UNSEEN; 2]
             };
+            // Add their light, if the ways to the photons are free.
             let maps = [(gathers_caustic, &pass.caustic), (gathers_bounced, &pass.bounced)];
             let mut sum = Vec3::ZERO;
             for ((gathers, map), chance) in maps.into_iter().zip(chances) {
@@ -71,7 +75,7 @@ impl Loops for Gathering<'_> {
                     // The rest of the random number is random again.
                     let random = [choices[i], looks[i] / chance];
                     let (light, photon) = brought((row, i), (map, &look), measure, random, folds);
-                    sum += light * (reached(shot, (row, i), &look, photon, map.radius()) / chance);
+                    sum += light * (reached(tile, (row, i), &look, photon, map.radius()) / chance);
                 }
             }
             set_lane(&mut sums, i, sum);
@@ -84,20 +88,20 @@ impl Loops for Gathering<'_> {
 /// of the kernel that receives photons, or an estimate of it.
 #[inline(never)]
 fn reached(
-    shot: &Shot<'_>,
-    (row, i): (&LitRow, usize),
-    look: &Look,
+    tile: &TileContext<'_>,
+    (row, i): (&VertexBatch, usize),
+    look: &GatherPoint,
     photon: Option<Place>,
     radius: f32,
 ) -> f32 {
     let Some(photon) = photon else { return 1.0 };
-    match clip(shot.world, look, radius) {
+    match clip(tile.world, look, radius) {
         Clip::Part(part) => 1.0 / part,
-        Clip::Cut | Clip::Crowded if is_apart(&shot.world.geometry, look, &photon, radius) => 0.0,
+        Clip::Cut | Clip::Crowded if is_occluded(&tile.world.geometry, look, &photon, radius) => 0.0,
         by_trials @ (Clip::Cut | Clip::Crowded) => {
-            let sampler = shot.sampler(row.slot[i]);
+            let sampler = tile.sampler(row.slot[i]);
             let pair = |number| sampler.pair(row.path[i], Decision::Trial(number));
-            inverse_part(shot.world, look, radius, by_trials, pair)
+            inverse_part(tile.world, look, radius, by_trials, pair)
         }
     }
 }
@@ -105,39 +109,36 @@ fn reached(
 /// Light of a map's photons at a vertex that is reflected towards the camera, and one of the photons.
 #[inline(always)]
 fn brought(
-    (row, i): (&LitRow, usize),
-    (map, look): (&PhotonMap, &Look),
+    (row, i): (&VertexBatch, usize),
+    (map, look): (&PhotonMap, &GatherPoint),
     measure: Measure,
     random: [f32; 2],
     folds: impl Folds,
 ) -> (Vec3, Option<Place>) {
-    let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
     if measure == Measure::Work {
-        (Vec3::splat(map.count_around(look, folds) as f32), None)
-    } else if specular == Vec3::ZERO && row.apart & 1 << i == 0 {
-        let (irradiance, photon) = map.irradiance(look, random, folds);
-        (diffuse * irradiance, photon)
-    } else {
-        reflected((row, i), (map, look), random, folds)
+        return (Vec3::splat(map.count_around(look, folds) as f32), None);
+    }
+    let is_flat = row.has_facet & 1 << i == 0;
+    match row.bsdf.even(i).filter(|_| is_flat) {
+        Some(f) => {
+            let (irradiance, photon) = map.irradiance(look, random, folds);
+            (f * irradiance, photon)
+        }
+        None => reflected((row, i), (map, look), random, folds),
     }
 }
 
 /// [`Gathering::brought`], with each photon weighted by its direction.
 #[inline(always)]
 fn reflected(
-    (row, i): (&LitRow, usize),
-    (map, look): (&PhotonMap, &Look),
+    (row, i): (&VertexBatch, usize),
+    (map, look): (&PhotonMap, &GatherPoint),
     random: [f32; 2],
     folds: impl Folds,
 ) -> (Vec3, Option<Place>) {
-    let (diffuse, specular) = (lane(&row.diffuse, i), lane(&row.specular, i));
-    let (mirrored, shininess) = (lane(&row.mirrored_eye, i), row.shininess[i]);
     let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
     map.visit(look, folds, |photon, density| {
-        let mut f = diffuse;
-        if specular != Vec3::ZERO {
-            f += specular * gloss(mirrored, photon.direction, shininess);
-        }
+        let f = row.bsdf.f_at(i, photon.direction);
         let light = f * photon.flux * (density * row.landed(i, photon.direction));
         sum += light;
         let weight = light.element_sum();

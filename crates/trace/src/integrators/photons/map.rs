@@ -1,8 +1,8 @@
 //! A photon map: photons by the cells of a grid. Only a hash of the cells is kept, so that the grid may be as fine as the radius
 //! requires wherever photons are. Look-ups weigh sixteen photons at a time.
 
-use super::chosen::{Choices, Place};
 use super::packed::{self, Packed};
+use super::reservoir::{Choices, Place};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::rows::lanes;
@@ -74,7 +74,7 @@ const CELL: f32 = 2.1;
 
 /// Query for photons at a surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Look {
+pub struct GatherPoint {
     /// A point of the surface.
     pub point: Vec3,
     /// Normal of its facet on the queried side.
@@ -83,7 +83,7 @@ pub struct Look {
     pub most_depth: u32,
 }
 
-impl Look {
+impl GatherPoint {
     /// The box around a kernel of this radius.
     pub fn kernel_box(&self, radius: f32) -> Aabb {
         let half = self.half_box() * radius;
@@ -135,6 +135,7 @@ impl PhotonMap {
     /// # Errors
     /// [`Cancelled`].
     pub fn new(photons: &[Photon], radius: f32, token: &CancelToken) -> Result<Self, Cancelled> {
+        // Count the photons of each bucket of cells.
         let cells = 1.0 / (CELL * radius);
         let mask = (photons.len().max(1).next_power_of_two() - 1) as u32;
         let mut starts = vec![0_u32; mask as usize + 2];
@@ -148,6 +149,7 @@ impl PhotonMap {
                 buckets.push(bucket);
             }
         }
+        // Sort the photons by bucket.
         for i in 1..starts.len() {
             starts[i] += starts[i - 1];
         }
@@ -162,6 +164,7 @@ impl PhotonMap {
                 *place += 1;
             }
         }
+        // Store them side by side.
         let rows = photons.len().div_ceil(LANES);
         let (mut blocks, mut depths) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
         for order in order.chunks(POLL_INTERVAL) {
@@ -219,7 +222,12 @@ impl PhotonMap {
 
     /// The irradiance by photons around a point, W·m⁻², and one of them that two random numbers choose by its contribution.
     #[inline(always)]
-    pub fn irradiance(&self, look: &Look, random: [f32; 2], folds: impl Folds) -> (Vec3, Option<Place>) {
+    pub fn irradiance(
+        &self,
+        look: &GatherPoint,
+        random: [f32; 2],
+        folds: impl Folds,
+    ) -> (Vec3, Option<Place>) {
         let mut sums = [[0.0; LANES]; 3];
         let mut choices = Choices::new(random[0]);
         let ranges = self.ranges(look);
@@ -251,7 +259,7 @@ impl PhotonMap {
 
     /// Number of photons around a point.
     #[inline(always)]
-    pub fn count_around(&self, look: &Look, folds: impl Folds) -> u32 {
+    pub fn count_around(&self, look: &GatherPoint, folds: impl Folds) -> u32 {
         let mut count = 0;
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
@@ -266,7 +274,7 @@ impl PhotonMap {
     /// Visits the photons around a point, each with its weight: Epanechnikov's kernel, in m⁻², whose integral over the tangent
     /// plane is 1 (Silverman, *Density Estimation for Statistics and Data Analysis*, 1986).
     #[inline(always)]
-    pub fn visit(&self, look: &Look, folds: impl Folds, mut visit: impl FnMut(&Photon, f32)) {
+    pub fn visit(&self, look: &GatherPoint, folds: impl Folds, mut visit: impl FnMut(&Photon, f32)) {
         let peak = self.peak();
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
@@ -287,7 +295,7 @@ impl PhotonMap {
 
     /// Ranges that may contain photons of a kernel.
     #[inline(always)]
-    fn ranges(&self, look: &Look) -> Ranges {
+    fn ranges(&self, look: &GatherPoint) -> Ranges {
         let mut ranges = Ranges { of: [[0; 2]; 8], count: 0 };
         if self.count == 0 {
             return ranges;
@@ -316,8 +324,15 @@ impl PhotonMap {
     /// Weights of the photons of a block that are in a range and in a kernel, given its value in the middle. `None` if there are no
     /// such photons.
     #[inline(always)]
-    fn weights(&self, look: &Look, range: [u32; 2], number: usize, folds: impl Folds) -> Option<Lanes> {
-        let Look { point, normal, most_depth } = *look;
+    fn weights(
+        &self,
+        look: &GatherPoint,
+        range: [u32; 2],
+        number: usize,
+        folds: impl Folds,
+    ) -> Option<Lanes> {
+        // Weigh the photons within the kernel by their distances.
+        let GatherPoint { point, normal, most_depth } = *look;
         let block = &self.blocks[number];
         let radius_squared = self.radius * self.radius;
         let (reach, share) = (REACH * self.radius, 1.0 / radius_squared);
@@ -338,6 +353,7 @@ impl PhotonMap {
         if folds.bits(&near) == 0 {
             return None;
         }
+        // Leave out photons of other surfaces, and those from behind.
         let (own, from) = (packed::lanes(&block.normal), packed::lanes(&block.direction));
         for i in 0..LANES {
             let cosine = own[0][i] * normal.x + own[1][i] * normal.y + own[2][i] * normal.z;
@@ -350,6 +366,7 @@ impl PhotonMap {
             // An inclined surface has more photons over a part of the plane.
             weights[i] *= cosine / squared.sqrt();
         }
+        // Leave out photons of too many scatterings.
         if most_depth < self.most_depth {
             let depths = &self.depths[number];
             for i in 0..LANES {
@@ -455,9 +472,13 @@ mod tests {
                         None => place(&mut next),
                     };
                     let mut found = Vec::new();
-                    map.visit(&Look { point, normal, most_depth: 1 }, PlainFolds, |photon, density| {
-                        found.push((photon.point.to_array(), density));
-                    });
+                    map.visit(
+                        &GatherPoint { point, normal, most_depth: 1 },
+                        PlainFolds,
+                        |photon, density| {
+                            found.push((photon.point.to_array(), density));
+                        },
+                    );
                     let near = |photon: &&Photon| {
                         let way = photon.point - point;
                         let above = way.dot(normal);
@@ -493,7 +514,7 @@ mod tests {
         let map = PhotonMap::new(&photons, 0.4, &CancelToken::new()).expect("nobody cancels");
         let sum = |most_depth: u32, normal: Vec3| {
             let mut sum = 0.0;
-            let look = Look { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
+            let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
             map.visit(&look, PlainFolds, |_, density| sum += density * step * step);
             let flux = f64::from(map.irradiance(&look, [0.5; 2], PlainFolds).0.x * step * step);
             assert!((flux - f64::from(sum)).abs() < 1e-4, "{flux} is not {sum}");

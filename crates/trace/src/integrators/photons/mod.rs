@@ -28,13 +28,14 @@
 //! | flat pieces of its plane, walls at their borders, wide spheres | p in closed form; all of it is reached |
 //! | anything else | one photon of the kernel, chosen by its contribution, decides whether the kernel's light arrives; trials, at places chosen by the kernel, give 1/p |
 
-mod chosen;
 mod clip;
+mod emit;
 pub(super) mod gather;
 mod kernel;
 mod map;
+mod occlusion;
 mod packed;
-mod shoot;
+mod reservoir;
 mod trials;
 
 use crate::math::lanes::PlainFolds;
@@ -44,31 +45,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-use super::medium::Inside;
-use super::settings::RenderSettings;
-use super::shot::{SampleBlock, Shot};
 use crate::control::{CancelToken, Cancelled, Progress, unwatched};
 use crate::film::Rect;
 use crate::geometry::{Aabb, ShapeHit};
+use crate::integrators::method::Behaviour;
+use crate::integrators::settings::{PhotonSettings, RenderSettings};
+use crate::integrators::transport::medium::Inside;
+use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::tree::bounds::Space;
 use crate::lights::{Ball, LightBounds, PhotonSource};
-use crate::materials::{Bsdf, Material};
+use crate::materials::Material;
 use crate::scene::description::{Render, Shadows};
 use crate::world::{Hit, World, photon_source};
-pub(super) use map::Look;
+use emit::{EmittedPhotons, PhotonTracing};
+pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
-use shoot::{Shooting, Shots};
-
-/// Settings of photon emission and gathering.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PhotonSettings {
-    /// Photons emitted in a pass.
-    pub count: u32,
-    /// Radius of the first pass's kernels; 0 to choose it by the density of photons.
-    pub radius: f32,
-    /// Most scatterings of a photon.
-    pub bounces: u32,
-}
 
 /// Photons that one thread emits together.
 const CHUNK: u32 = 2048;
@@ -159,7 +150,7 @@ impl Photons {
         let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
         let mut own = Self { settings: photons, most_depth, emission, glasses, radii: [photons.radius; 2] };
         // Trace pass 0, and choose the radii by its photons.
-        let sent = own.shoot((world, settings), 0, progress, token)?;
+        let sent = own.trace_photons((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
             let kinds = [&sent.caustic, &sent.bounced];
             let size = own.emission.as_ref().map_or(1.0, |emission| emission.around().radius as f32);
@@ -198,7 +189,7 @@ impl Photons {
         number: u32,
         token: &CancelToken,
     ) -> Result<PhotonPass, Cancelled> {
-        let sent = self.shoot((world, settings), number, &unwatched, token)?;
+        let sent = self.trace_photons((world, settings), number, &unwatched, token)?;
         self.mapped(&sent, number, token)
     }
 
@@ -229,7 +220,7 @@ impl Photons {
     }
 
     /// The photons of a pass in the order of their numbers.
-    fn shoot(
+    fn trace_photons(
         &self,
         (world, settings): (&World, &RenderSettings),
         number: u32,
@@ -245,6 +236,7 @@ impl Photons {
         let material = |object| world.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
         let inside = |&body: &u32| Inside { body, material: material(body) };
         let glasses: &[Inside] = &self.glasses.iter().map(inside).collect::<Vec<_>>();
+        let behaviour = Behaviour::of(&settings, false);
         let done = AtomicU64::new(0);
         let chunk = |first: u32| {
             // All photons of a number of passes are samples of one sequence.
@@ -252,21 +244,25 @@ impl Photons {
             let at_once = u32::MAX / count;
             let start = number % at_once * count;
             let samples = start + first..start + (first + CHUNK).min(count);
-            let tile = Rect { x: number / at_once, y: u32::MAX, width: 1, height: 1 };
-            let block = SampleBlock { pixels: tile.into(), samples };
-            let shot = Shot { pixel_spread: 0.0, ..Shot::new(world, &settings, &block, token) };
+            let place = Rect { x: number / at_once, y: u32::MAX, width: 1, height: 1 };
+            let block = SampleBlock { pixels: place.into(), samples };
+            let tile = TileContext {
+                pixel_spread: 0.0,
+                ..TileContext::new(world, &settings, &block, token, behaviour)
+            };
             let (share, most_depth) = (1.0 / count as f32, self.most_depth);
-            let shots = Shooting { shot: &shot, emission, glasses, share, most_depth }.shoot()?;
+            let shots =
+                PhotonTracing { tile: &tile, emission, glasses, share, most_depth }.trace_photons()?;
             let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
             progress(done, count.into());
             Ok(shots)
         };
-        let chunks: Vec<Shots> = (0..self.settings.count.div_ceil(CHUNK))
+        let chunks: Vec<EmittedPhotons> = (0..self.settings.count.div_ceil(CHUNK))
             .into_par_iter()
             .map(|number| chunk(number * CHUNK))
             .collect::<Result<_, _>>()?;
         let lookups = chunks.iter().map(|chunk| chunk.lookups).sum();
-        let joined = |of: fn(&Shots) -> &[Photon]| -> Result<Vec<Photon>, Cancelled> {
+        let joined = |of: fn(&EmittedPhotons) -> &[Photon]| -> Result<Vec<Photon>, Cancelled> {
             let mut all = Vec::with_capacity(chunks.iter().map(|chunk| of(chunk).len()).sum());
             for chunk in &chunks {
                 token.check()?;
@@ -319,7 +315,8 @@ fn radius_to_hold(photons: &[Photon], wanted: f32, size: f32, token: &CancelToke
         let map = PhotonMap::new(&some, radius, token)?;
         // Count others than the photon itself.
         let count = |&Photon { point, normal, .. }: &Photon| {
-            map.count_around(&Look { point, normal, most_depth: u32::MAX }, PlainFolds).saturating_sub(1)
+            map.count_around(&GatherPoint { point, normal, most_depth: u32::MAX }, PlainFolds)
+                .saturating_sub(1)
         };
         let mut counts: Vec<u32> = some.iter().step_by(some.len().div_ceil(LOOKS)).map(count).collect();
         counts.sort_unstable();
@@ -365,10 +362,7 @@ impl Specular {
     fn of(world: &World) -> Self {
         let mut own = Self { balls: Vec::new(), is_unbounded: false };
         for (id, object) in (0..).zip(world.geometry.objects()) {
-            let is_specular = |material: &Material| match material.bsdf {
-                Bsdf::Phong(_) => false,
-                Bsdf::Mirror(_) | Bsdf::Glass(_) => true,
-            };
+            let is_specular = |material: &Material| material.bsdf.is_delta();
             if world.materials_of(id).any(is_specular) {
                 own.balls.extend(object.ball());
                 own.is_unbounded |= object.ball().is_none();

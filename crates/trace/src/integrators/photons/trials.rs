@@ -1,9 +1,10 @@
 //! Unbiased estimate, by trials, of the inverse of the part of a kernel that receives photons.
 
-use super::chosen::{Place, is_apart};
 use super::clip::{Clip, material, receives};
 use super::kernel::sample;
-use super::map::{LEAST_COSINE, Look, REACH};
+use super::map::{GatherPoint, LEAST_COSINE, REACH};
+use super::occlusion::is_occluded;
+use super::reservoir::Place;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Asked, Ray};
 use crate::math::frame::Frame;
@@ -25,7 +26,7 @@ const LAYERS: usize = 8;
 #[inline(never)]
 pub fn inverse_part(
     world: &World,
-    look: &Look,
+    look: &GatherPoint,
     radius: f32,
     clip: Clip,
     mut pair: impl FnMut(u32) -> Vec2,
@@ -64,25 +65,28 @@ fn mean_trials(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
 }
 
 /// Whether a place in the tangent plane has a surface above or below it that may hold photons of the kernel, with nothing between.
-fn is_reached(world: &World, look: &Look, place: Vec3, radius: f32) -> bool {
+fn is_reached(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bool {
     let above = REACH * radius * look.normal;
     let end = place - above;
     let mut start = place + above;
     let may_receive = |id: u32| world.materials_of(id).any(receives);
     for _ in 0..LAYERS {
         let ray = Ray::segment(start, end);
+        // Find the next surface below that may receive photons.
         let Some(hit) = world.geometry.closest_of(&ray, may_receive) else { return false };
         let bare = Asked { uv: false, shadow_point: false };
         let surface = world.geometry.asked_surface(&ray, &hit, bare);
+        // Succeed if it does, as surface with about the same normal to which the way is free.
         let cosine = surface.normal.dot(look.normal);
         let normal = if cosine < 0.0 { -surface.normal } else { surface.normal };
         let photon = Place { point: surface.point, normal };
         if cosine.abs() > LEAST_COSINE
             && receives(material(world, hit.object, hit.shape.primitive))
-            && !is_apart(&world.geometry, look, &photon, radius)
+            && !is_occluded(&world.geometry, look, &photon, radius)
         {
             return true;
         }
+        // Go on below it.
         start = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
         if (end - start).dot(look.normal) >= 0.0 {
             return false;

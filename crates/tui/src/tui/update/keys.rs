@@ -9,7 +9,7 @@ use super::{camera, history, overlay, places, pointer, rectangle};
 use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
-use crate::scene::description::{Integrator, Shadows};
+use crate::scene::description::{Integrator, Method, Shadows};
 use crate::tui::ExitStatus;
 use crate::tui::action::Action;
 use crate::tui::event::{Effect, KeyPress};
@@ -89,19 +89,25 @@ fn change(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
 }
 
 fn cycle_integrator(state: &mut State) -> Vec<Effect> {
-    state.request.toggles.integrator = Some(match state.request.integrator() {
-        Integrator::Whitted => Integrator::Path,
-        Integrator::Path => Integrator::Whitted,
-    });
+    let (all, own) = (Integrator::ALL, state.request.integrator());
+    let next = all.iter().skip_while(|one| **one != own).nth(1).or(all.first());
+    state.request.toggles.integrator = next.copied();
     render(state, false)
 }
 
+/// Message that the integrator does not honour a setting, with another one that does. `None` if it honours the setting.
+fn refused(state: &State, honours: impl Fn(Method) -> bool, what: &str) -> Option<String> {
+    let own = state.request.integrator();
+    if honours(own.method()) {
+        return None;
+    }
+    let other = Integrator::ALL.iter().find(|one| honours(one.method()))?;
+    Some(format!("{} {what}; press i for {}", own.name(), other.name()))
+}
+
 fn cycle_shadows(state: &mut State) -> Vec<Effect> {
-    match state.request.integrator() {
-        Integrator::Path => {
-            return notify(state, "path ignores `shadows`; press i for whitted");
-        }
-        Integrator::Whitted => {}
+    if let Some(refused) = refused(state, |method| method.honours_shadows, "ignores `shadows`") {
+        return notify(state, &refused);
     }
     let next = match state.request.shadows() {
         Shadows::Soft => Shadows::Hard,
@@ -127,11 +133,8 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
 }
 
 fn toggle_photons(state: &mut State) -> Vec<Effect> {
-    match state.request.integrator() {
-        Integrator::Path => {
-            return notify(state, "path gathers no photons; press i for whitted");
-        }
-        Integrator::Whitted => {}
+    if let Some(refused) = refused(state, |method| method.gathers, "gathers no photons") {
+        return notify(state, &refused);
     }
     state.request.toggles.photons = Some(!state.request.photons());
     render(state, false)

@@ -8,7 +8,6 @@ use super::layout::Layout;
 use super::message;
 use super::text::{Tone, columns, put, rest};
 use crate::choice::Choice;
-use crate::scene::description::Integrator;
 use crate::scene::report::summary;
 use crate::tui::action::Action;
 use crate::tui::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
@@ -100,10 +99,8 @@ fn show(hint: &Hint, area: Rect, is_long: bool, state: &State, buffer: &mut Buff
 
 /// Each toggle with its value, in bold where the keys have changed it.
 fn toggles(state: &State) -> Vec<Hint> {
-    let shadows = match state.request.integrator() {
-        Integrator::Whitted => state.request.shadows().name(),
-        Integrator::Path => "–",
-    };
+    let honours_shadows = state.request.integrator().method().honours_shadows;
+    let shadows = if honours_shadows { state.request.shadows().name() } else { "–" };
     let on_off = |on| if on { "on" } else { "off" };
     let photons = on_off(state.request.effective.as_ref().is_some_and(|it| it.photons));
     let keys = &state.request.toggles;

@@ -1,7 +1,7 @@
 //! From rays in queues to hits.
 
-use super::queues::PathRay;
-use super::shot::Shot;
+use super::ray::PathRay;
+use super::tile::TileContext;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::world::{Hit, PACKET};
@@ -9,7 +9,7 @@ use crate::world::{Hit, PACKET};
 /// Rays between two polls of the token.
 const POLL_INTERVAL: usize = 256;
 
-impl Shot<'_> {
+impl TileContext<'_> {
     /// Finds the nearest hit of every ray in a queue, in place of the content of `hits`.
     pub fn closest_hits(&self, rays: &[PathRay], hits: &mut Vec<Option<Hit>>) -> Result<(), Cancelled> {
         hits.clear();

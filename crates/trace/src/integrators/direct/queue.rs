@@ -2,24 +2,25 @@
 
 use arrayvec::ArrayVec;
 
-use super::beside::{LobeRays, Others};
-use super::cone::Cone;
-use super::light::{Arrived, LightRays, Lighting, Sums, add_where};
-use super::lit_row::{ALL, LitRow};
-use super::medium::Medium;
-use super::onward::{Onward, Scattering};
-use super::photons::gather::Gathering;
-use super::picking::Picking;
-use super::pool::Pool;
-use super::queues::PathRay;
-use super::shot::Shot;
-use super::sink::Sink;
-use super::vertices::LitVertex;
-use super::view::{Measure, Ways};
+use super::all_lights::{Arrived, LightRays, Lighting, Sums, add_where};
+use super::lobe_rays::LobeRays;
+use super::mis::CompetingTechnique;
+use super::picked::Picking;
+use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, lanes, traced};
+use crate::integrators::transport::accumulator::Accumulator;
+use crate::integrators::transport::batch::{ALL, VertexBatch};
+use crate::integrators::transport::cone::Cone;
+use crate::integrators::transport::medium::Media;
+use crate::integrators::transport::ray::PathRay;
+use crate::integrators::transport::scatter::{BsdfSampling, Continuation};
+use crate::integrators::transport::tile::TileContext;
+use crate::integrators::transport::vertex::ShadingVertex;
+use crate::integrators::view::{Measure, Ways};
 use crate::lights::{Source, SourceRow};
+use crate::materials::RoughKind;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes3, lane};
 use crate::scene::description::Shadows;
@@ -27,18 +28,19 @@ use crate::world::{Geometry, Loops};
 
 /// Vertices that wait for direct light, side by side; each is lit by itself, whatever vertices share its row.
 #[derive(Default)]
-pub struct LitQueue {
-    rows: Vec<LitRow>,
+pub struct DirectLightQueue {
+    rows: Vec<VertexBatch>,
     /// Rows in use; the others are memory.
     count: usize,
-    /// Index of the row for single vertices. If no row in use has this index, the row is full or there is none.
-    open: usize,
+    /// Index of the row for single vertices of each kind of BSDF. If no row in use has this index, the row is full or there is
+    /// none.
+    open: [usize; RoughKind::ALL.len()],
     /// Light of lamps at the vertex of each path of the round.
     arrived: Vec<Vec3>,
-    /// The glass around vertices; the first entry is air.
-    media: Vec<Medium>,
+    /// Media of the vertices.
+    media: Media,
     /// Shadow rays of several rows.
-    pool: Pool,
+    pool: ShadowRayQueue,
     /// Beams at the vertices of the paths of the round, if requested.
     cones: Vec<Cone>,
 }
@@ -46,7 +48,7 @@ pub struct LitQueue {
 /// Rows that are lit together if lights are picked.
 const ROWS: usize = 64;
 
-impl LitQueue {
+impl DirectLightQueue {
     /// Number of rows from which they are lit before more come, while their data are in the cache.
     const FULL: usize = 64;
 
@@ -66,7 +68,6 @@ impl LitQueue {
         self.arrived.clear();
         self.arrived.resize(paths, Vec3::ZERO);
         self.media.clear();
-        self.media.push(Medium::default());
     }
 
     /// Stores the beam at the vertex of a path.
@@ -76,24 +77,24 @@ impl LitQueue {
         }
     }
 
-    /// Ends the round: the sink gets the light of lamps, in the order of the paths. `path` gives the slot of a place, and
+    /// Ends the round: the accumulator gets the light of lamps, in the order of the paths. `path` gives the slot of a place, and
     /// whether the camera sees its vertex.
-    pub fn settle(&mut self, path: impl Fn(usize) -> (u32, bool), sink: &mut Sink<'_>) {
+    pub fn settle(&mut self, path: impl Fn(usize) -> (u32, bool), accumulator: &mut Accumulator<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
-            let (slot, is_seen) = path(place);
-            sink.add_arrived(slot, *light, is_seen);
+            let (slot, only_specular_before) = path(place);
+            accumulator.add_arrived(slot, *light, only_specular_before);
         }
     }
 
-    /// [`LitQueue::settle`] for paths whose slots are consecutive.
-    pub fn settle_run(&mut self, first: u32, sink: &mut Sink<'_>) {
-        sink.add_arrived_run(first, &self.arrived);
+    /// [`DirectLightQueue::settle`] for paths whose slots are consecutive.
+    pub fn settle_run(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+        accumulator.add_arrived_run(first, &self.arrived);
     }
 
-    /// An empty row to fill, then to keep by [`LitQueue::keep`] or to drop.
-    pub fn spare(&mut self) -> &mut LitRow {
+    /// An empty row to fill, then to keep by [`DirectLightQueue::keep`] or to drop.
+    pub fn spare(&mut self) -> &mut VertexBatch {
         if self.count == self.rows.len() {
-            self.rows.push(LitRow::EMPTY);
+            self.rows.push(VertexBatch::EMPTY);
         }
         &mut self.rows[self.count]
     }
@@ -107,8 +108,10 @@ impl LitQueue {
             self.count += 1;
             return;
         }
+        // Put few vertices together with others of their kind.
         let mut left = row.used;
-        if let Some(open) = kept.get_mut(self.open) {
+        let open = &mut self.open[row.bsdf.kind() as usize];
+        if let Some(open) = kept.get_mut(*open).filter(|open| open.bsdf.kind() == row.bsdf.kind()) {
             for lane in lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
                 open.copy(open.used.trailing_ones() as usize, row, lane);
                 left &= !(1 << lane);
@@ -116,96 +119,97 @@ impl LitQueue {
         }
         if left != 0 {
             row.keep(left);
-            self.open = self.count;
+            *open = self.count;
             self.count += 1;
         }
     }
 
     /// Adds a vertex.
-    pub fn push(&mut self, shot: &Shot<'_>, lit: &LitVertex<'_>, measure: Measure) {
+    pub fn push(&mut self, tile: &TileContext<'_>, lit: &ShadingVertex<'_>, measure: Measure) {
         self.note_cone(lit.place, lit.vertex.cone);
-        let mut medium = 0;
-        if !lit.path.medium.is_air() {
-            medium = self.media.len() as u32;
-            self.media.push(lit.path.medium);
-        }
-        let (row, lane) = self.open_row();
-        row.put(lane, shot, lit, measure, medium);
+        let medium = self.media.number(lit.path.medium);
+        let (row, lane) = self.open_row(lit.bsdf.kind());
+        row.put(lane, tile, lit, measure, medium);
     }
 
-    /// A row with a free lane.
-    fn open_row(&mut self) -> (&mut LitRow, usize) {
-        if self.open >= self.count || self.rows[self.open].used == ALL {
-            self.spare().reset();
-            self.open = self.count;
+    /// A row of this kind with a free lane.
+    fn open_row(&mut self, kind: RoughKind) -> (&mut VertexBatch, usize) {
+        let mut number = self.open[kind as usize];
+        let is_open = |row: &VertexBatch| row.used != ALL && row.bsdf.kind() == kind;
+        if number >= self.count || !is_open(&self.rows[number]) {
+            let row = self.spare();
+            row.reset();
+            row.bsdf.prepare(kind);
+            number = self.count;
+            self.open[kind as usize] = number;
             self.count += 1;
         }
-        let row = &mut self.rows[self.open];
+        let row = &mut self.rows[number];
         let lane = row.used.trailing_ones() as usize;
         (row, lane)
     }
 
     /// Drops all vertices.
     fn clear(&mut self) {
-        (self.count, self.open) = (0, 0);
+        (self.count, self.open) = (0, Default::default());
         // A cancelled round may have left rays.
         self.pool.clear();
     }
 
-    /// Lights all vertices and drops them; returns the rays for it. If paths go on from the vertices, the rays of the
-    /// next round are added to `next`.
+    /// Lights all vertices and drops them; returns the rays for it. `gather` gives the light at a row that another technique
+    /// brings. If paths go on from the vertices, the rays of the next round are added to `next`.
     pub fn light(
         &mut self,
-        shot: &Shot<'_>,
+        tile: &TileContext<'_>,
         measure: Measure,
-        (depth, onward): (u32, Option<Onward>),
+        continuation: Option<Continuation>,
+        gather: impl Fn(&VertexBatch) -> Option<Lanes3>,
         next: &mut Vec<PathRay>,
     ) -> Result<LightRays, Cancelled> {
         let mut rays = LightRays::default();
         let mut group: ArrayVec<Sums, ROWS> = ArrayVec::new();
-        let together = if shot.world.lights.selection(shot.receivers()).is_some() { ROWS } else { 1 };
+        let together = if tile.world.lights.selection(tile.behaviour.receivers).is_some() { ROWS } else { 1 };
         // Hard shadows are by light samples alone.
-        let by_paths =
-            onward.is_some() && (shot.photons.is_none() || shot.settings.render.shadows == Shadows::Soft);
-        let scatters = onward.filter(|onward| onward.leads_on);
+        let by_paths = continuation.is_some()
+            && (!tile.behaviour.gathers || tile.settings.render.shadows == Shadows::Soft);
+        let scatters = continuation.filter(|continuation| continuation.leads_on);
         for first in (0..self.count).step_by(together) {
             let end = (first + together).min(self.count);
             // Sample the lights at each row; rays to picked lights wait in the pool.
             for number in first..end {
-                shot.token.check()?;
+                tile.token.check()?;
                 let row = &mut self.rows[number];
                 if row.may_lift != 0 {
-                    shot.world.geometry.instructions().run(Lifting { geometry: &shot.world.geometry, row });
+                    tile.world.geometry.instructions().run(Lifting { geometry: &tile.world.geometry, row });
                 }
                 let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
-                let sums = self.sums(asked, shot, measure, group.len() as u32);
+                let sums = self.sums(asked, tile, measure, group.len() as u32);
                 group.push(sums);
                 if self.pool.is_full() {
-                    self.pool.trace(&shot.world.geometry, &mut group);
+                    self.pool.trace(&tile.world.geometry, &mut group);
                 }
             }
             // Trace the rest of the pool.
-            self.pool.trace(&shot.world.geometry, &mut group);
+            self.pool.trace(&tile.world.geometry, &mut group);
             // Add the light by rays in lobes and by photons, and store the result.
             for (number, sums) in (first..end).zip(group.drain(..)) {
                 let row = &self.rows[number];
                 let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
-                let mut arrived = self.arrived(asked, shot, measure, sums);
-                if let Some(maps) = shot.photons {
-                    let gathering = Gathering { shot, row, maps, depth, measure };
-                    add_where(
-                        row.used,
-                        &shot.world.geometry.instructions().run(gathering),
-                        &mut arrived.light,
-                    );
+                let mut arrived = self.arrived(asked, tile, measure, sums);
+                if let Some(gathered) = gather(row) {
+                    add_where(row.used, &gathered, &mut arrived.light);
                 }
                 rays += arrived.rays;
                 self.note(number, measure, &arrived.light);
             }
             // Scatter the paths that go on.
-            if let Some(onward) = scatters {
+            if let Some(continuation) = scatters {
                 for row in &self.rows[first..end] {
-                    Scattering { shot, row, used: row.used, onward }.scatter(&self.media, &self.cones, next);
+                    BsdfSampling { tile, row, used: row.used, continuation }.scatter(
+                        &self.media,
+                        &self.cones,
+                        next,
+                    );
                 }
             }
         }
@@ -214,34 +218,34 @@ impl LitQueue {
     }
 
     /// Technique that competes with light samples.
-    fn others(&self, asked: Asked, shot: &Shot<'_>, measure: Measure) -> Others {
+    fn competing(&self, asked: Asked, tile: &TileContext<'_>, measure: Measure) -> CompetingTechnique {
         if asked.by_paths {
-            Others::Paths
+            CompetingTechnique::Paths
         } else {
-            Others::lobes(self.rows[asked.number].sharp(shot, measure) & asked.used)
+            CompetingTechnique::lobes(self.rows[asked.number].sharp(tile, measure) & asked.used)
         }
     }
 
     /// The glass around the vertices of a row. `None` if all are in air.
-    fn media_of(&self, row: &LitRow) -> Option<&[Medium]> {
-        (self.media.len() > 1 && row.is_inside()).then_some(&*self.media)
+    fn media_of(&self, row: &VertexBatch) -> Option<&Media> {
+        (!self.media.are_air() && row.is_inside()).then_some(&self.media)
     }
 
     /// Contributions of light samples; rays to picked lamps wait in the pool, under the row's number.
-    fn sums(&mut self, asked: Asked, shot: &Shot<'_>, measure: Measure, number: u32) -> Sums {
+    fn sums(&mut self, asked: Asked, tile: &TileContext<'_>, measure: Measure, number: u32) -> Sums {
         let mut pool = std::mem::take(&mut self.pool);
         let row = &self.rows[asked.number];
-        let (others, media) = (self.others(asked, shot, measure), self.media_of(row));
-        let (instructions, used) = (shot.world.geometry.instructions(), asked.used);
-        let plain = Lighting::<false> { shot, row, used, measure, others, media };
-        let weighed = Lighting::<true> { shot, row, used, measure, others, media };
-        let sums = match (others, shot.world.lights.selection(shot.receivers())) {
-            (Others::Nothing, None) => instructions.run(plain),
-            (Others::Nothing, Some(selection)) => {
+        let (competing, media) = (self.competing(asked, tile, measure), self.media_of(row));
+        let (instructions, used) = (tile.world.geometry.instructions(), asked.used);
+        let plain = Lighting::<false> { tile, row, used, measure, competing, media };
+        let weighed = Lighting::<true> { tile, row, used, measure, competing, media };
+        let sums = match (competing, tile.world.lights.selection(tile.behaviour.receivers)) {
+            (CompetingTechnique::Nothing, None) => instructions.run(plain),
+            (CompetingTechnique::Nothing, Some(selection)) => {
                 instructions.run(Picking { lighting: plain, selection, number, pool: &mut pool })
             }
-            (Others::Paths | Others::Lobes(_), None) => instructions.run(weighed),
-            (Others::Paths | Others::Lobes(_), Some(selection)) => {
+            (CompetingTechnique::Paths | CompetingTechnique::Lobes(_), None) => instructions.run(weighed),
+            (CompetingTechnique::Paths | CompetingTechnique::Lobes(_), Some(selection)) => {
                 instructions.run(Picking { lighting: weighed, selection, number, pool: &mut pool })
             }
         };
@@ -250,16 +254,16 @@ impl LitQueue {
     }
 
     /// Light that arrives, including that of rays in lobes.
-    fn arrived(&self, asked: Asked, shot: &Shot<'_>, measure: Measure, sums: Sums) -> Arrived {
+    fn arrived(&self, asked: Asked, tile: &TileContext<'_>, measure: Measure, sums: Sums) -> Arrived {
         let row = &self.rows[asked.number];
         let arrived = sums.arrived(measure);
-        match self.others(asked, shot, measure) {
-            Others::Lobes(sharp) => {
+        match self.competing(asked, tile, measure) {
+            CompetingTechnique::Lobes(sharp) => {
                 let media = self.media_of(row);
-                let lobes = LobeRays { shot, row, sharp, measure, media, arrived };
-                shot.world.geometry.instructions().run(lobes)
+                let lobes = LobeRays { tile, row, sharp, measure, media, arrived };
+                tile.world.geometry.instructions().run(lobes)
             }
-            Others::Nothing | Others::Paths => arrived,
+            CompetingTechnique::Nothing | CompetingTechnique::Paths => arrived,
         }
     }
 
@@ -287,10 +291,10 @@ impl LitQueue {
 }
 
 /// A bit for each vertex whose direct light is shown.
-fn shown(row: &LitRow, measure: Measure) -> u32 {
+fn shown(row: &VertexBatch, measure: Measure) -> u32 {
     let Ways { direct, indirect, .. } = measure.ways();
     let hidden = |bits: u32, is_shown: bool| if is_shown { 0 } else { bits };
-    !(hidden(row.seen, direct) | hidden(!row.seen, indirect))
+    !(hidden(row.only_specular_before, direct) | hidden(!row.only_specular_before, indirect))
 }
 
 /// Vertices to light, and options.
@@ -307,7 +311,7 @@ struct Asked {
 /// Moves the vertices of a row above their facets, if nothing is on the way.
 struct Lifting<'a> {
     geometry: &'a Geometry,
-    row: &'a mut LitRow,
+    row: &'a mut VertexBatch,
 }
 
 impl Loops for Lifting<'_> {
@@ -316,6 +320,7 @@ impl Loops for Lifting<'_> {
     #[inline(always)]
     fn run(self, folds: impl Folds) {
         let Self { geometry, row } = self;
+        // Make rays from the facets to the points above them.
         let mut direction = row.lifted;
         for axis in 0..3 {
             for i in 0..LANES {
@@ -327,10 +332,12 @@ impl Loops for Lifting<'_> {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
         let rays = RayRows::of(row.from, direction).leaving(row.start);
+        // Find what is on the way.
         let blocked = {
             let (traced, nothing) = (traced(&ends, folds), SourceRow::of(Source::Nothing));
             geometry.occluded_rows(&rays, &ends, traced, &nothing, folds)
         };
+        // Move the other vertices.
         let lifted = row.may_lift & !blocked;
         row.is_bounded &= !lifted;
         for i in 0..LANES {

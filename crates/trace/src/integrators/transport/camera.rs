@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use super::cone::Cone;
 use super::medium::{Inside, Medium};
-use super::queues::{History, PathRay};
-use super::shot::Shot;
+use super::ray::{PathRay, PathState};
+use super::tile::TileContext;
 use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, Row};
 use crate::math::lanes::{Folds, set_lane};
@@ -27,7 +27,7 @@ pub struct CameraRow {
     pub negative: u32,
 }
 
-impl Shot<'_> {
+impl TileContext<'_> {
     /// Makes rays through the pixels of some slots, in place of the queue's content, and marks those with a negative
     /// weight.
     pub fn camera_rays(
@@ -52,16 +52,16 @@ impl Shot<'_> {
     pub fn camera_rows(&self, slots: Range<u32>, rows: &mut Vec<CameraRow>) {
         rows.clear();
         let count = slots.len().div_ceil(PACKET).min(CAMERA_ROWS);
-        self.world.geometry.instructions().run(Camera { shot: self, first: slots.start, count, rows });
+        self.world.geometry.instructions().run(Camera { tile: self, first: slots.start, count, rows });
     }
 
     /// The path of a camera ray.
     pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
         let around = self.world.glass_around(ray.origin).map(|(body, material)| Inside { body, material });
         let medium = around.fold(Medium::default(), Medium::entered);
-        let history = History::CAMERA;
+        let state = PathState::CAMERA;
         let cone = Cone { width: 0.0, spread: self.pixel_spread };
-        PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, medium, history, cone }
+        PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, medium, state, cone }
     }
 
     /// The rays of the slots from `first` on, also beyond the last. To be called inside of loops for each instruction set.
@@ -71,6 +71,7 @@ impl Shot<'_> {
         let (settings, camera) = (self.settings, &self.world.camera);
         let (xs, ys, samples) = self.block.places(first);
         let sampler = SamplerRow::new(settings.render.seed, &xs, &ys, &samples);
+        // Sample places in the pixels.
         let mut in_pixel = sampler.pairs(&paths, Decision::Pixel, 0, 1);
         let mut negative = 0;
         settings.render.filter.sample_row(&mut in_pixel, |lane, sample: FilterSample| {
@@ -83,6 +84,7 @@ impl Shot<'_> {
             let place = settings.from_middle(place);
             (places[0][lane], places[1][lane]) = (place.x, place.y);
         }
+        // Make rays through them, from points of the lens if it has an aperture.
         let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
         if settings.dof && camera.aperture > 0.0 {
             let lens = lens_row(sampler.pairs(&paths, Decision::Lens, 0, 1));
@@ -103,9 +105,9 @@ impl Shot<'_> {
     }
 }
 
-/// [`Shot::camera_row`].
+/// [`TileContext::camera_row`].
 struct Camera<'a> {
-    shot: &'a Shot<'a>,
+    tile: &'a TileContext<'a>,
     first: u32,
     count: usize,
     rows: &'a mut Vec<CameraRow>,
@@ -117,7 +119,7 @@ impl Loops for Camera<'_> {
     #[inline(always)]
     fn run(self, _: impl Folds) {
         for number in 0..self.count as u32 {
-            self.rows.push(self.shot.camera_row(self.first + number * PACKET as u32));
+            self.rows.push(self.tile.camera_row(self.first + number * PACKET as u32));
         }
     }
 }
@@ -135,9 +137,9 @@ fn lens_row([u, v]: [Row; 2]) -> [Row; 2] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tile::SampleBlock;
     use super::*;
     use crate::film::Rect;
-    use crate::integrators::shot::SampleBlock;
 
     #[test]
     fn rows_of_places_go_on_over_samples_and_pixels() {

@@ -4,24 +4,25 @@
 //! Photons carry basic flux, Φ/n². At a surface whose shading normal Nₛ is not that of its facet N₉, scattering follows the adjoint
 //! of its BSDF: f·|wi·Nₛ|·|wo·N₉|/|wi·N₉| (Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 5.3).
 
-use super::super::cone::Cone;
-use super::super::crossing::{Crossing, CrossingMemory};
-use super::super::lit_row::{ALL, LitRow, UNBENT};
-use super::super::medium::{Inside, Medium, absorption, ior};
-use super::super::onward::{Onward, Scattering};
-use super::super::packet::Rays;
-use super::super::queues::{History, PathRay};
-use super::super::shot::Shot;
-use super::super::specular::{Interface, interface, reflected};
-use super::super::vertices::{LitVertex, Vertex};
-use super::super::view::Measure;
-use super::super::{PACKET, RayCounters};
 use super::map::Photon;
 use crate::control::Cancelled;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::lanes;
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::geometry::{Ray, SurfacePoint};
+use crate::integrators::transport::batch::{ALL, UNBENT, VertexBatch};
+use crate::integrators::transport::cone::Cone;
+use crate::integrators::transport::crossing::CrossingMemory;
+use crate::integrators::transport::interface::{Interface, interface, reflected};
+use crate::integrators::transport::medium::{Inside, Media, Medium, ior};
+use crate::integrators::transport::packet::PacketSource;
+use crate::integrators::transport::ray::{PathRay, PathState};
+use crate::integrators::transport::scatter::{BsdfSampling, Continuation};
+use crate::integrators::transport::tile::TileContext;
+use crate::integrators::transport::vertex::{ShadingVertex, Vertex};
+use crate::integrators::transport::walk::{MOST_HIDDEN, Reached, Walk};
+use crate::integrators::view::Measure;
+use crate::integrators::{PACKET, RayCounters};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
 use crate::materials::Bsdf;
 use crate::math::Vec3;
@@ -29,16 +30,13 @@ use crate::math::lanes::{Folds, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
 use crate::world::{Hit, Loops, World};
 
-/// Most surfaces without a change of glass that a photon passes at once.
-const MOST_HIDDEN: usize = 64;
-
 /// Squared difference of directions that are equal within rounding.
 const SAME: f32 = 1e-8;
 
 /// Common data of all photons of a part of a pass.
-pub struct Shooting<'a> {
+pub struct PhotonTracing<'a> {
     /// The world, and the numbers of the photons as the samples of a single pixel; their slots count from 0.
-    pub shot: &'a Shot<'a>,
+    pub tile: &'a TileContext<'a>,
     /// Emission of the lights.
     pub emission: &'a PhotonSource,
     /// The closed shapes of glass that lights may be in, with their materials.
@@ -51,7 +49,7 @@ pub struct Shooting<'a> {
 
 /// Photons of one part of a pass.
 #[derive(Default)]
-pub struct Shots {
+pub struct EmittedPhotons {
     /// Caustic photons, which came by mirrors and glass alone, in the order of their numbers within each round.
     pub caustic: Vec<Photon>,
     /// Bounced photons, scattered at a caustic, in the same order.
@@ -60,49 +58,49 @@ pub struct Shots {
     pub lookups: u64,
 }
 
-impl Shooting<'_> {
+impl PhotonTracing<'_> {
     /// Traces the photons.
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn shoot(&self) -> Result<Shots, Cancelled> {
-        let count = self.shot.block.len() as u32;
-        let mut flight = Flight {
-            shooting: self,
+    pub fn trace_photons(&self) -> Result<EmittedPhotons, Cancelled> {
+        let count = self.tile.block.len() as u32;
+        let mut wavefront = PhotonWavefront {
+            tracing: self,
             depth: 0,
             references: vec![0.0; count as usize],
             next: Vec::new(),
-            open: LitRow::EMPTY,
-            media: vec![Medium::default()],
+            open: VertexBatch::EMPTY,
+            media: Media::default(),
             crossing: CrossingMemory::default(),
-            shots: Shots::default(),
+            shots: EmittedPhotons::default(),
             counters: RayCounters::default(),
         };
         // Emit the photons, then trace them round by round.
         let mut rays = Vec::new();
-        flight.start(count, &mut rays);
-        let (mut row, mut surfaces) = (LitRow::EMPTY, SurfaceRow::EMPTY);
+        wavefront.start(count, &mut rays);
+        let (mut row, mut surfaces) = (VertexBatch::EMPTY, SurfaceRow::EMPTY);
         while !rays.is_empty() {
             for packet in rays.chunks(PACKET) {
-                self.shot.token.check()?;
-                flight.meet(packet, &mut row, &mut surfaces);
+                self.tile.token.check()?;
+                wavefront.intersect(packet, &mut row, &mut surfaces);
             }
             // Scatter the single vertices, and apply Russian roulette.
-            flight.scatter_open();
-            flight.media.truncate(1);
-            flight.spare();
-            std::mem::swap(&mut rays, &mut flight.next);
-            flight.next.clear();
-            flight.depth += 1;
+            wavefront.scatter_open();
+            wavefront.media.clear();
+            wavefront.russian_roulette();
+            std::mem::swap(&mut rays, &mut wavefront.next);
+            wavefront.next.clear();
+            wavefront.depth += 1;
         }
-        flight.shots.lookups += flight.counters.texture_lookups;
-        Ok(flight.shots)
+        wavefront.shots.lookups += wavefront.counters.texture_lookups;
+        Ok(wavefront.shots)
     }
 
     /// The ray of a photon from beyond all finite objects, started at its hit on planes of glass on the way there. `None` if
     /// something opaque is there.
     fn past_planes(&self, ray: Ray) -> Option<Ray> {
-        let world = self.shot.world;
+        let world = self.tile.world;
         let mut start = ray.origin;
         for _ in 0..MOST_HIDDEN {
             let back = Ray::new(start, -ray.direction);
@@ -118,56 +116,56 @@ impl Shooting<'_> {
 
     /// The glass around a point.
     fn medium_at(&self, point: Vec3) -> Medium {
-        let world = self.shot.world;
+        let world = self.tile.world;
         let around = |glass: &&Inside| world.encloses(glass.body, point);
         self.glasses.iter().filter(around).copied().fold(Medium::default(), Medium::entered)
     }
 }
 
 /// Some photons under way.
-struct Flight<'a> {
-    shooting: &'a Shooting<'a>,
+struct PhotonWavefront<'a> {
+    tracing: &'a PhotonTracing<'a>,
     /// Scatterings so far.
     depth: u32,
     /// Largest component of each photon at its start, by slot.
     references: Vec<f32>,
     next: Vec<PathRay>,
     /// Row for single vertices.
-    open: LitRow,
-    /// Media of the photons; the first entry is air.
-    media: Vec<Medium>,
+    open: VertexBatch,
+    /// Media of the photons at single vertices.
+    media: Media,
     crossing: CrossingMemory,
-    shots: Shots,
+    shots: EmittedPhotons,
     counters: RayCounters,
 }
 
-impl Flight<'_> {
+impl PhotonWavefront<'_> {
     /// Emits photons at the lights.
     fn start(&mut self, count: u32, rays: &mut Vec<PathRay>) {
-        let shooting = self.shooting;
-        let shot = shooting.shot;
-        let has_planes = shot.world.geometry.has_unbounded();
+        let tracing = self.tracing;
+        let tile = tracing.tile;
+        let has_planes = tile.world.geometry.has_unbounded();
         for begin in (0..count).step_by(PACKET) {
-            let numbers = shot.world.geometry.instructions().run(Drawing { shot, first: begin });
+            let numbers = tile.world.geometry.instructions().run(Drawing { tile, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
                 // Emit a photon, and start it behind planes of glass on its way.
-                let Some(emitted) = shooting.emission.emit(numbers) else { continue };
+                let Some(emitted) = tracing.emission.emit(numbers) else { continue };
                 let past_planes = is_beyond(&emitted) && has_planes;
                 let ray = emitted.ray();
-                let Some(ray) = (if past_planes { shooting.past_planes(ray) } else { Some(ray) }) else {
+                let Some(ray) = (if past_planes { tracing.past_planes(ray) } else { Some(ray) }) else {
                     continue;
                 };
                 let offset = begin as usize + i;
                 let path = PathRay {
                     ray,
-                    throughput: emitted.flux * shooting.share,
+                    throughput: emitted.flux * tracing.share,
                     slot: offset as u32,
                     path: CAMERA_PATH + 1,
-                    medium: shooting.medium_at(ray.origin),
-                    history: History::CAMERA,
+                    medium: tracing.medium_at(ray.origin),
+                    state: PathState::CAMERA,
                     cone: Cone::default(),
                 };
-                self.references[offset] = flux(shot.world, &path);
+                self.references[offset] = flux(tile.world, &path);
                 rays.push(path);
             }
         }
@@ -175,31 +173,31 @@ impl Flight<'_> {
 
     /// Whether photons are scattered at the end of their rays.
     fn goes_on(&self) -> bool {
-        self.depth < self.shooting.most_depth
+        self.depth < self.tracing.most_depth
     }
 
     /// Traces each photon of a packet to its hit.
-    fn meet(&mut self, rays: &[PathRay], row: &mut LitRow, surfaces: &mut SurfaceRow) {
-        let shot = self.shooting.shot;
-        let met = shot.meet(Rays::Paths(rays, 0), Measure::ALL, true, (row, surfaces));
-        self.counters.texture_lookups += met.lookups;
+    fn intersect(&mut self, rays: &[PathRay], row: &mut VertexBatch, surfaces: &mut SurfaceRow) {
+        let tile = self.tracing.tile;
+        let packet = tile.intersect(PacketSource::Paths(rays, 0), Measure::ALL, true, (row, surfaces));
+        self.counters.texture_lookups += packet.lookups;
         // Light samples find direct light.
         if self.depth > 0 {
             for i in lanes(row.used) {
                 let (point, normal) = row.place_of(i);
                 self.store(&rays[i], point, normal);
             }
-            row.keep(row.seen);
-            for i in lanes(row.used & row.apart) {
+            row.keep(row.only_specular_before);
+            for i in lanes(row.used & row.has_facet) {
                 let counts = row.landed(i, -rays[i].ray.direction);
                 set_lane(&mut row.throughput, i, rays[i].throughput * counts);
             }
             self.scatter(row);
         }
         // Shade other surfaces one by one.
-        for i in lanes(met.any & !met.plain) {
-            if let Some(hit) = met.hit(i) {
-                self.shade(rays[i], hit, met.surface(surfaces, i));
+        for i in lanes(packet.any & !packet.plain) {
+            if let Some(hit) = packet.hit(i) {
+                self.shade(rays[i], hit, packet.surface(surfaces, i));
             }
         }
     }
@@ -208,73 +206,51 @@ impl Flight<'_> {
     fn store(&mut self, path: &PathRay, point: Vec3, normal: Vec3) {
         let (direction, flux) = (-path.ray.direction, path.throughput);
         let photon = Photon { point, direction, flux, normal, depth: self.depth };
-        let kept = if path.history.is_seen { &mut self.shots.caustic } else { &mut self.shots.bounced };
+        let kept =
+            if path.state.only_specular_before { &mut self.shots.caustic } else { &mut self.shots.bounced };
         kept.push(photon);
     }
 
-    /// Shades the first surface that is more than a change between parts of one glass. `surface` is that of the hit, if it is
-    /// known.
-    fn shade(&mut self, mut path: PathRay, mut hit: Hit, mut surface: Option<SurfacePoint>) {
-        let shot = self.shooting.shot;
-        let mut lacks_photons = self.depth == 0;
-        for _ in 0..MOST_HIDDEN {
-            let vertex = match surface.take() {
-                Some(surface) => Vertex::on(shot, &path, &hit, surface),
-                None => Vertex::to_shade(shot, &path, &hit),
-            };
-            if vertex.material.bsdf.glass().is_none() {
-                path.throughput *= absorption(shot.world, path.medium, hit.shape.t);
-                path.medium = shot.without_open(path.medium);
-                return self.shade_surface(&path, &vertex, lacks_photons);
+    /// Follows a photon to the first surface that is more than a change between parts of one glass, and shades that. `surface` is
+    /// that of the hit, if it is known.
+    fn shade(&mut self, path: PathRay, hit: Hit, surface: Option<SurfacePoint>) {
+        let Walk { path, reached, has_passed } =
+            self.tracing.tile.walk(path, (hit, surface), &mut self.crossing, |_, _| {});
+        match reached {
+            Reached::Opaque(vertex, _) => {
+                let lacks_photons = self.depth == 0 && !has_passed;
+                self.shade_surface(&path, &vertex, lacks_photons);
             }
-            let Crossing { sides, arrived, near, far, opaque } =
-                shot.crossing(&path, &vertex, &hit, &mut self.crossing);
-            path.throughput *= absorption(shot.world, arrived, hit.shape.t);
-            path.medium = near;
-            if let Some(touching) = opaque {
-                let vertex = Vertex::touching(shot, &path, (sides, &touching), hit.shape.t);
-                return self.shade_surface(&path, &vertex, lacks_photons);
-            }
-            // Reflect or refract at a change of glass.
-            if near.glass() != far.glass() {
-                return self.shade_glass(&path, &vertex.between(sides), far);
-            }
-            // Pass on, as nothing changes here.
-            (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
-            lacks_photons = false;
-            match shot.world.geometry.closest(&path.ray) {
-                Some(next) => hit = next,
-                None => return,
-            }
+            Reached::Glass(vertex, far) => self.shade_glass(&path, &vertex, far),
+            Reached::Nothing | Reached::Hidden => {}
         }
     }
 
     fn shade_surface(&mut self, path: &PathRay, vertex: &Vertex<'_>, lacks_photons: bool) {
-        let shot = self.shooting.shot;
+        let tile = self.tracing.tile;
         match &vertex.material.bsdf {
             // Light samples find direct light.
-            Bsdf::Phong(_) if lacks_photons => {}
-            Bsdf::Phong(phong) => {
-                let bsdf = phong.at(&vertex.texture_point, &mut self.counters.texture_lookups);
+            Bsdf::Rough(_) if lacks_photons => {}
+            Bsdf::Rough(rough) => {
+                let bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
                 if bsdf.is_black() {
                     return;
                 }
+                // Store the photon.
                 self.store(path, vertex.surface.point, vertex.normal);
-                if !(path.history.is_seen && self.goes_on()) {
+                if !(path.state.only_specular_before && self.goes_on()) {
                     return;
                 }
+                // Let it wait for being scattered, if it came by mirrors and glass alone.
                 let shading = vertex.shading(&mut self.counters);
-                let mut medium = 0;
-                if !path.medium.is_air() {
-                    medium = self.media.len() as u32;
-                    self.media.push(path.medium);
-                }
-                if self.open.used == ALL {
+                let medium = self.media.number(path.medium);
+                if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
                     self.scatter_open();
+                    self.open.bsdf.prepare(bsdf.kind());
                 }
                 let i = self.open.used.trailing_ones() as usize;
-                let lit = LitVertex { path, place: 0, vertex, shading, bsdf };
-                self.open.put(i, shot, &lit, Measure::ALL, medium);
+                let lit = ShadingVertex { path, place: 0, vertex, shading, bsdf };
+                self.open.put(i, tile, &lit, Measure::ALL, medium);
                 let counts = self.open.landed(i, vertex.to_eye);
                 set_lane(&mut self.open.throughput, i, path.throughput * counts);
             }
@@ -291,14 +267,12 @@ impl Flight<'_> {
         if !self.goes_on() {
             return;
         }
-        let shot = self.shooting.shot;
+        let tile = self.tracing.tile;
         let shading = vertex.shading(&mut self.counters);
-        let Interface { reflectance, refracted } = interface(shot.world, path, vertex, &shading, far);
-        let is_reflected =
-            |reflectance| shot.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance;
+        let Interface { reflectance, refracted } = interface(tile.world, path, vertex, &shading, far);
         match refracted {
-            Some(mut ray) if !is_reflected(reflectance) => {
-                let eta = ior(shot.world, far) / ior(shot.world, path.medium);
+            Some(mut ray) if !tile.chooses_reflection(path, reflectance) => {
+                let eta = ior(tile.world, far) / ior(tile.world, path.medium);
                 ray.throughput *= 1.0 / (eta * eta);
                 self.push(path, vertex, (shading.normal, eta), ray);
             }
@@ -328,38 +302,42 @@ impl Flight<'_> {
 
     /// Scatters photons at the single vertices.
     fn scatter_open(&mut self) {
-        let mut open = std::mem::replace(&mut self.open, LitRow::EMPTY);
+        let mut open = std::mem::replace(&mut self.open, VertexBatch::EMPTY);
         self.scatter(&mut open);
         open.reset();
         self.open = open;
     }
 
     /// Scatters photons at the vertices of a row: directions are drawn by the cosine with the facet, as the adjoint has it.
-    fn scatter(&mut self, row: &mut LitRow) {
+    fn scatter(&mut self, row: &mut VertexBatch) {
         if !self.goes_on() || row.used == 0 {
             return;
         }
-        for i in lanes(row.used & row.apart) {
+        for i in lanes(row.used & row.has_facet) {
             let facet = lane(&row.facet, i);
             set_lane(&mut row.normal, i, facet);
             row.bend[i] = UNBENT;
         }
-        let onward = Onward { leads_on: true, is_risked: false };
+        let continuation = Continuation { leads_on: true, is_risked: false };
         let used = row.used;
-        Scattering { shot: self.shooting.shot, row, used, onward }.scatter(&self.media, &[], &mut self.next);
+        BsdfSampling { tile: self.tracing.tile, row, used, continuation }.scatter(
+            &self.media,
+            &[],
+            &mut self.next,
+        );
     }
 
     /// Russian roulette by flux: survivors have about the flux that they started with.
-    fn spare(&mut self) {
-        let shot = self.shooting.shot;
+    fn russian_roulette(&mut self) {
+        let tile = self.tracing.tile;
         let mut kept = 0;
         for begin in (0..self.next.len()).step_by(PACKET) {
             let end = self.next.len().min(begin + PACKET);
             let risks =
-                shot.world.geometry.instructions().run(Risking { shot, rays: &self.next[begin..end] });
+                tile.world.geometry.instructions().run(Risking { tile, rays: &self.next[begin..end] });
             for (place, risk) in (begin..end).zip(risks) {
                 let mut ray = self.next[place];
-                let flux = flux(shot.world, &ray);
+                let flux = flux(tile.world, &ray);
                 let chance = flux / self.references[ray.slot as usize];
                 if !(flux > 0.0 && risk < chance) {
                     continue;
@@ -390,7 +368,7 @@ fn is_beyond(emitted: &Emitted) -> bool {
 
 /// The random numbers of photon emission.
 struct Drawing<'a> {
-    shot: &'a Shot<'a>,
+    tile: &'a TileContext<'a>,
     first: u32,
 }
 
@@ -400,8 +378,8 @@ impl Loops for Drawing<'_> {
     #[inline(always)]
     fn run(self, _: impl Folds) -> Self::Done {
         let slots = std::array::from_fn(|i| self.first + i as u32);
-        let (xs, ys, samples) = self.shot.block.places_of(&slots);
-        let sampler = SamplerRow::new(self.shot.settings.render.seed, &xs, &ys, &samples);
+        let (xs, ys, samples) = self.tile.block.places_of(&slots);
+        let sampler = SamplerRow::new(self.tile.settings.render.seed, &xs, &ys, &samples);
         let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET], decision, 0, 1);
         let (light, aim) = (pairs(Decision::Lamp), pairs(Decision::Aim));
         let (position, direction) = (pairs(Decision::Start), pairs(Decision::Sent));
@@ -416,7 +394,7 @@ impl Loops for Drawing<'_> {
 
 /// The random numbers of Russian roulette.
 struct Risking<'a> {
-    shot: &'a Shot<'a>,
+    tile: &'a TileContext<'a>,
     rays: &'a [PathRay],
 }
 
@@ -429,8 +407,8 @@ impl Loops for Risking<'_> {
         for (i, ray) in self.rays.iter().enumerate().take(PACKET) {
             (slots[i], paths[i]) = (ray.slot, ray.path);
         }
-        let (xs, ys, samples) = self.shot.block.places_of(&slots);
-        let sampler = SamplerRow::new(self.shot.settings.render.seed, &xs, &ys, &samples);
+        let (xs, ys, samples) = self.tile.block.places_of(&slots);
+        let sampler = SamplerRow::new(self.tile.settings.render.seed, &xs, &ys, &samples);
         let [risks, _] = sampler.pairs(&paths, Decision::Roulette, 0, 1);
         risks
     }

@@ -1,12 +1,18 @@
 //! The normalised Phong material: f = kd/π + ks·(α+2)/(2π)·max(0, R·V)^α (Lafortune and Willems, *Using the
 //! Modified Phong Reflectance Model for Physically Based Rendering*, 1994).
 
-use std::f32::consts::{FRAC_1_PI, PI};
+pub mod lobes;
+mod row;
 
+use std::f32::consts::{FRAC_1_PI, PI};
+use std::sync::Arc;
+
+use super::bsdf::{RoughMaterial, RoughPoint};
 use super::footprint::TexturePoint;
-use super::lobes::{Lobes, gloss};
-use super::texture::Color;
+use super::texture::{Color, Texture};
 use crate::math::Vec3;
+use lobes::{Lobes, gloss};
+pub use row::PhongRow;
 
 /// Diffuse and glossy reflection on both sides.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,10 +40,11 @@ pub struct PhongBsdf {
     pub ambient: Vec3,
 }
 
-impl Phong {
-    /// Looks its textures up.
+impl RoughMaterial for Phong {
+    type Point = PhongBsdf;
+
     #[inline]
-    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> PhongBsdf {
+    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> PhongBsdf {
         let diffuse = self.diffuse.at(at, lookups);
         PhongBsdf {
             diffuse,
@@ -47,13 +54,7 @@ impl Phong {
         }
     }
 
-    /// Looks ka alone up.
-    pub fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        self.ambient.as_ref().unwrap_or(&self.diffuse).at(at, lookups)
-    }
-
-    /// The material with white in place of its textures.
-    pub fn bleached(&self) -> PhongBsdf {
+    fn bleached(&self) -> PhongBsdf {
         let bleached = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         PhongBsdf {
             diffuse: bleached(&self.diffuse),
@@ -62,12 +63,9 @@ impl Phong {
             ambient: bleached(self.ambient.as_ref().unwrap_or(&self.diffuse)),
         }
     }
-}
 
-impl Phong {
-    /// Its constant value. `None` if it has textures.
     #[inline]
-    pub fn constant(&self) -> Option<PhongBsdf> {
+    fn constant(&self) -> Option<PhongBsdf> {
         let diffuse = self.diffuse.constant()?;
         Some(PhongBsdf {
             diffuse,
@@ -75,6 +73,43 @@ impl Phong {
             shininess: self.shininess,
             ambient: self.ambient.as_ref().map_or(Some(diffuse), Color::constant)?,
         })
+    }
+
+    #[inline]
+    fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+        self.diffuse.at(at, lookups)
+    }
+
+    fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+        self.ambient.as_ref().unwrap_or(&self.diffuse).at(at, lookups)
+    }
+
+    fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        let Self { diffuse, specular, shininess: _, ambient } = self;
+        [Some(diffuse), Some(specular), ambient.as_ref()].into_iter().flatten().filter_map(Color::texture)
+    }
+
+    #[inline]
+    fn fills_rows(&self) -> bool {
+        let has_no_levels = self.diffuse.texture().is_none_or(|texture| texture.mipmaps.is_none());
+        has_no_levels && self.specular.texture().is_none()
+    }
+
+    #[inline]
+    fn row_texture(&self) -> Option<&Texture> {
+        self.diffuse.texture().map(|texture| &**texture)
+    }
+}
+
+impl RoughPoint for PhongBsdf {
+    #[inline]
+    fn is_black(&self) -> bool {
+        self.diffuse == Vec3::ZERO && self.specular == Vec3::ZERO
+    }
+
+    #[inline]
+    fn ambient(&self) -> Vec3 {
+        self.ambient
     }
 }
 
@@ -105,11 +140,6 @@ impl PhongBsdf {
     /// The glossy part of f in sr⁻¹ at the lobe's peak.
     pub fn specular_peak(&self) -> Vec3 {
         self.specular * ((self.shininess + 2.0) / (2.0 * PI))
-    }
-
-    /// Whether it reflects nothing.
-    pub fn is_black(&self) -> bool {
-        self.diffuse == Vec3::ZERO && self.specular == Vec3::ZERO
     }
 }
 

@@ -1,7 +1,7 @@
 //! Accumulator of light: a view takes its parts of the light.
 
-use super::queues::PathRay;
-use super::view::{Measure, Parts};
+use super::ray::PathRay;
+use crate::integrators::view::{Measure, Parts};
 use crate::math::Vec3;
 
 /// Kind of a contribution that no lamp's light makes.
@@ -15,7 +15,7 @@ pub enum Part {
 
 /// Accumulates radiance per slot, as far as the view shows it: in each round of paths first emission and ambient light,
 /// then the light of lamps, in the order of the paths.
-pub struct Sink<'a> {
+pub struct Accumulator<'a> {
     /// Measure of the numbers.
     pub measure: Measure,
     /// Sums, by slot.
@@ -24,7 +24,7 @@ pub struct Sink<'a> {
     pub clamp: f32,
 }
 
-impl Sink<'_> {
+impl Accumulator<'_> {
     /// Adds light that no lamp's ray brings.
     pub fn add(&mut self, slot: u32, part: Part, radiance: Vec3) {
         let parts = self.parts();
@@ -40,7 +40,7 @@ impl Sink<'_> {
     /// Adds light of a lamp that a path hits after a surface which the camera sees.
     pub fn add_met(&mut self, path: &PathRay, radiance: Vec3) {
         match self.measure {
-            Measure::Radiance(parts) if path.history.shows(parts.ways) => {
+            Measure::Radiance(parts) if path.state.contributes(parts.ways) => {
                 self.add_arrived(path.slot, radiance, false);
             }
             Measure::Radiance(_) | Measure::ArrivingShare | Measure::Work => {}
@@ -81,9 +81,9 @@ impl Sink<'_> {
     }
 
     /// Adds the light of lamps at a vertex, which the camera sees or not.
-    pub fn add_arrived(&mut self, slot: u32, contribution: Vec3, is_seen: bool) {
+    pub fn add_arrived(&mut self, slot: u32, contribution: Vec3, only_specular_before: bool) {
         let largest = contribution.max_element();
-        let is_clamped = !is_seen && self.clamp > 0.0 && largest > self.clamp;
+        let is_clamped = !only_specular_before && self.clamp > 0.0 && largest > self.clamp;
         let kept = if is_clamped { self.clamp / largest } else { 1.0 };
         self.radiance[slot as usize] += contribution * kept;
     }

@@ -1,13 +1,12 @@
 //! All data of a hit for shading, prepared once: the geometry, the shading normal, its bounds, and the BSDF.
 
-use super::RayCounters;
 use super::cone::{Bend, Cone};
-use super::queues::PathRay;
-use super::shot::Shot;
+use super::ray::PathRay;
+use super::tile::TileContext;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Asked, Ray, SurfacePoint};
-use crate::materials::phong::PhongBsdf;
-use crate::materials::{Bsdf, Footprint, Material, TexturePoint};
+use crate::integrators::RayCounters;
+use crate::materials::{Footprint, Material, RoughBsdf, TexturePoint};
 use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Sides};
@@ -40,58 +39,61 @@ pub struct Vertex<'a> {
 
 impl<'a> Vertex<'a> {
     /// The vertex at a hit.
-    pub fn new(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
-        let material = &shot.world.materials[shot.world.material_index(hit)];
-        let surface = shot.world.geometry.surface(&path.ray, hit);
-        Self::met(shot, path, (material, surface), hit, hit.shape.t)
+    pub fn new(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
+        let material = &tile.world.materials[tile.world.material_index(hit)];
+        let surface = tile.world.geometry.surface(&path.ray, hit);
+        Self::at_surface(tile, path, (material, surface), hit, hit.shape.t)
     }
 
     /// The vertex at a hit, with only those parts of the surface that its material needs.
-    pub fn to_shade(shot: &Shot<'a>, path: &PathRay, hit: &Hit) -> Self {
-        Self::shaded(shot, path, (&path.ray, hit), hit.shape.t)
+    pub fn to_shade(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
+        Self::shaded(tile, path, (&path.ray, hit), hit.shape.t)
     }
 
     /// The vertex at a hit whose surface is known.
-    pub fn on(shot: &Shot<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
-        let material = &shot.world.materials[shot.world.material_index(hit)];
-        Self::met(shot, path, (material, surface), hit, hit.shape.t)
+    pub fn on(tile: &TileContext<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
+        let material = &tile.world.materials[tile.world.material_index(hit)];
+        Self::at_surface(tile, path, (material, surface), hit, hit.shape.t)
     }
 
     /// The vertex of a surface that touches the surface of a hit at this distance, as the way between the sides of both
     /// hits it.
-    pub fn touching(shot: &Shot<'a>, path: &PathRay, (sides, hit): (Sides, &Hit), distance: f32) -> Self {
-        Self { sides: Some(sides), ..Self::shaded(shot, path, (&sides.ray(), hit), distance) }
+    pub fn touching(
+        tile: &TileContext<'a>,
+        path: &PathRay,
+        (sides, hit): (Sides, &Hit),
+        distance: f32,
+    ) -> Self {
+        Self { sides: Some(sides), ..Self::shaded(tile, path, (&sides.ray(), hit), distance) }
     }
 
-    fn shaded(shot: &Shot<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
-        let material = &shot.world.materials[shot.world.material_index(hit)];
-        let is_lit = match &material.bsdf {
-            Bsdf::Phong(_) => true,
-            Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
-        };
+    fn shaded(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
+        let material = &tile.world.materials[tile.world.material_index(hit)];
+        let is_lit = !material.bsdf.is_delta();
         let asked = Asked { uv: material.is_textured(), shadow_point: is_lit };
-        let surface = shot.world.geometry.asked_surface(by, hit, asked);
-        Self::met(shot, path, (material, surface), hit, distance)
+        let surface = tile.world.geometry.asked_surface(by, hit, asked);
+        Self::at_surface(tile, path, (material, surface), hit, distance)
     }
 
-    fn met(
-        shot: &Shot<'a>,
+    fn at_surface(
+        tile: &TileContext<'a>,
         path: &PathRay,
         (material, surface): (&'a Material, SurfacePoint),
         hit: &Hit,
         distance: f32,
     ) -> Self {
+        // Decide which side the path is on.
         let to_eye = -path.ray.direction;
         let side = if surface.normal.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
         let cone = path.cone.after(distance);
+        // Compute what beams need, if there are any.
         let (mut footprint, mut curvature) = (Footprint::POINT, 0.0);
-        if shot.pixel_spread > 0.0 {
+        if tile.pixel_spread > 0.0 {
             let tangents = [surface.dpdu, surface.dpdv];
             footprint = Footprint::of_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents);
-            curvature = match &material.bsdf {
-                Bsdf::Phong(_) => 0.0,
-                Bsdf::Mirror(_) | Bsdf::Glass(_) => side * shot.world.geometry.curvature(hit, &surface),
-            };
+            if material.bsdf.is_delta() {
+                curvature = side * tile.world.geometry.curvature(hit, &surface);
+            }
         }
         Self {
             texture_point: TexturePoint { uv: surface.uv, footprint },
@@ -103,7 +105,7 @@ impl<'a> Vertex<'a> {
             normal: surface.normal * side,
             side,
             surface,
-            start: shot.world.geometry.triangle_number(hit),
+            start: tile.world.geometry.triangle_number(hit),
             sides: None,
         }
     }
@@ -116,7 +118,7 @@ impl<'a> Vertex<'a> {
     /// The radiance that it emits. For paths that share their lamps with light samples, it is what light samples find: that of the
     /// point.
     pub fn emitted(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
-        let is_shared = path.history.density > 0.0;
+        let is_shared = path.state.density > 0.0;
         let at = if is_shared { TexturePoint::sharp(self.surface.uv) } else { self.texture_point };
         self.material.emission.at(&at, &mut counters.texture_lookups)
     }
@@ -161,20 +163,20 @@ impl<'a> Vertex<'a> {
     /// that its neighbours do not shadow what the normals say is lit. Light at that point reaches the facet without passing
     /// around a corner of a closed surface. Otherwise the origin is on the facet itself, and nothing behind it is visible; so
     /// it is at vertices that the camera does not see, where the way up would cost a ray without a visible difference.
-    pub fn outlook(&self, shot: &Shot<'_>, is_seen: bool) -> Outlook {
+    pub fn shadow_origin(&self, tile: &TileContext<'_>, only_specular_before: bool) -> ShadowOrigin {
         if let Some(sides) = self.sides {
-            return Outlook { point: sides.before, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
+            return ShadowOrigin { point: sides.before, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
         }
         let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
         let on_facet = offset_origin(point, error, self.normal, self.normal);
-        let is_traced = shot.settings.render.shadows != Shadows::Off;
+        let is_traced = tile.settings.render.shadows != Shadows::Off;
         let (is_above, end) = way_up(on_facet, shadow_point, self.normal, error);
         if is_above && !is_traced {
-            return Outlook { point: shadow_point, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
+            return ShadowOrigin { point: shadow_point, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
         }
         let horizon = (is_traced && shading_normal != normal).then_some(self.normal);
-        let lift = (is_above && is_seen).then_some(Lift { to: shadow_point, end });
-        Outlook { point: on_facet, start: self.start, horizon, lift }
+        let lift = (is_above && only_specular_before).then_some(Lift { to: shadow_point, end });
+        ShadowOrigin { point: on_facet, start: self.start, horizon, lift }
     }
 }
 
@@ -192,7 +194,7 @@ const LEAST_LIFT: f32 = 8.0;
 
 /// Origin of light samples and shadow rays.
 #[derive(Clone, Copy, Debug)]
-pub struct Outlook {
+pub struct ShadowOrigin {
     /// The point from which lights are sampled and shadow rays start.
     pub point: Vec3,
     /// [`Ray::start`] of the rays in front of the facet.
@@ -222,17 +224,8 @@ pub struct Shading {
     pub bend: Option<f32>,
 }
 
-impl Shading {
-    /// The direction to the viewer, mirrored: its cosine with a direction is that between the mirrored direction and the
-    /// viewer's.
-    pub fn mirrored(&self, to_eye: Vec3) -> Vec3 {
-        // (2(n·l)n − l)·v = (2(n·v)n − v)·l.
-        self.normal * (2.0 * self.normal.dot(to_eye)) - to_eye
-    }
-}
-
 /// A vertex with a lobe that is not δ, ready for direct light.
-pub struct LitVertex<'a> {
+pub struct ShadingVertex<'a> {
     /// The path that came here.
     pub path: &'a PathRay,
     /// Its place in the round's queue.
@@ -242,5 +235,5 @@ pub struct LitVertex<'a> {
     /// Its shading normals.
     pub shading: Shading,
     /// Its BSDF.
-    pub bsdf: PhongBsdf,
+    pub bsdf: RoughBsdf,
 }

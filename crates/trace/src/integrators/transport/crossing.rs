@@ -1,9 +1,9 @@
 //! Crossings of a ray at glass: of all surfaces that touch there at once, from one medium to another.
 
 use super::medium::{Inside, Medium};
-use super::queues::PathRay;
-use super::shot::Shot;
-use super::vertices::Vertex;
+use super::ray::PathRay;
+use super::tile::TileContext;
+use super::vertex::Vertex;
 use crate::world::{Hit, Meeting, Near, NearMemory, Sides};
 
 /// A ray's crossing at a hit of glass.
@@ -27,7 +27,7 @@ pub struct CrossingMemory {
     near: Vec<Near>,
 }
 
-impl Shot<'_> {
+impl TileContext<'_> {
     /// The crossing of a ray at a hit of glass.
     pub fn crossing(
         &self,
@@ -52,6 +52,7 @@ impl Shot<'_> {
     /// those count that are left or entered here, so that a ray and its reverse see the same, as the ray's way around the others is
     /// unknown. The first of the media is the one that absorbed on the way here.
     fn media(&self, known: Medium, found: &[Near]) -> [Medium; 3] {
+        // Begin with the record of the ray, without open bodies.
         let (mut arrived, mut near) = (known, self.without_open(known));
         let mut far = near.retained(|glass| !self.world.is_closed(glass.body));
         let crossed = |as_front: bool| {
@@ -67,6 +68,7 @@ impl Shot<'_> {
             Near::Around { object, material } => Some(Inside { body: object, material }),
             Near::Surface { .. } => None,
         });
+        // Leave the bodies whose backs are here.
         for glass in crossed(false) {
             if self.world.is_open(glass.body) {
                 near = near.entered(glass);
@@ -78,6 +80,7 @@ impl Shot<'_> {
                 None => (arrived, near) = (arrived.entered(glass), near.entered(glass)),
             }
         }
+        // Enter those whose fronts are here, and those around the place.
         let far = crossed(true).chain(around).fold(far, Medium::entered);
         [arrived, near, far]
     }

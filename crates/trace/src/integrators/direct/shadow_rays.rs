@@ -1,14 +1,14 @@
 //! Shadow rays of many rows of vertices, grouped by light: rays to one corner of the scene visit the same boxes on the way, while
 //! those of one row go everywhere.
 
-use super::light::{Sums, add_where};
+use super::all_lights::{Sums, add_where};
 use crate::geometry::rows::{Ends, RayRows, lanes};
 use crate::lights::{Source, SourceRow};
 use crate::math::lanes::{Folds, LANES, Lanes3};
 use crate::world::{Geometry, Loops};
 
 /// Rays of a row of vertices, and their contributions.
-struct Pooled {
+struct QueuedRow {
     /// The number of the row.
     row: u32,
     rays: RayRows,
@@ -21,8 +21,8 @@ struct Pooled {
 
 /// Shadow rays that wait to be traced.
 #[derive(Default)]
-pub struct Pool {
-    rows: Vec<Pooled>,
+pub struct ShadowRayQueue {
+    rows: Vec<QueuedRow>,
     /// Each ray's light, by its place in the tree, with the ray's own row and lane.
     order: Vec<(u32, u32)>,
     /// Rows and lanes of the rays, grouped by place.
@@ -33,7 +33,7 @@ pub struct Pool {
 const RUNS: usize = 1 << RUN_BITS;
 const RUN_BITS: u32 = 11;
 
-impl Pool {
+impl ShadowRayQueue {
     /// Number of rows of rays from which they are traced before more come, while they are in the cache.
     const FULL: usize = 512;
 
@@ -44,7 +44,7 @@ impl Pool {
 
     /// Takes the rays of `traced` of a row of vertices, with the places of their lights.
     #[inline(always)]
-    pub(super) fn push(
+    pub fn push(
         &mut self,
         row: u32,
         (rays, ends, traced): (RayRows, Ends, u32),
@@ -54,19 +54,19 @@ impl Pool {
     ) {
         let number = self.rows.len() as u32 * LANES as u32;
         self.order.extend(lanes(traced).map(|i| (places[i], number + i as u32)));
-        self.rows.push(Pooled { row, rays, ends, traced, sources: sources.clone(), values: *values });
+        self.rows.push(QueuedRow { row, rays, ends, traced, sources: sources.clone(), values: *values });
     }
 
     /// Traces all rays and drops them; adds the light that arrives to the sums of the rows, in the order in which rays
     /// came.
-    pub(super) fn trace(&mut self, geometry: &Geometry, sums: &mut [Sums]) {
+    pub fn trace(&mut self, geometry: &Geometry, sums: &mut [Sums]) {
         if self.rows.is_empty() {
             return;
         }
         self.sort();
         let Self { rows, sorted, .. } = self;
         geometry.instructions().run(Tracing { geometry, rows, rays: sorted });
-        for Pooled { row, traced, values, .. } in &*rows {
+        for QueuedRow { row, traced, values, .. } in &*rows {
             add_where(*traced, values, &mut sums[*row as usize].light);
         }
         self.clear();
@@ -102,7 +102,7 @@ impl Pool {
 /// Test that finds the rays which are occluded.
 struct Tracing<'a> {
     geometry: &'a Geometry,
-    rows: &'a mut [Pooled],
+    rows: &'a mut [QueuedRow],
     /// Their rows and lanes.
     rays: &'a [u32],
 }

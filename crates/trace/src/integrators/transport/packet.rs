@@ -1,18 +1,18 @@
 //! Hits of a packet of rays, and rows of plain surfaces with all that direct light needs: one vertex at a time would cost more
 //! than the light.
 
+use super::batch::{UNBENT, VertexBatch};
 use super::camera::CameraRow;
-use super::lit_row::{LitRow, UNBENT, bsdf_parts};
-use super::queues::PathRay;
-use super::shot::Shot;
-use super::vertices::way_up;
-use super::view::Measure;
+use super::ray::PathRay;
+use super::tile::TileContext;
+use super::vertex::way_up;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::{self, HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::materials::phong::PhongBsdf;
-use crate::materials::{Material, Phong};
+use crate::integrators::view::Measure;
+use crate::materials::bsdf::ShownLobes;
+use crate::materials::{Material, Rough};
 use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, lane, set_lane, take, take_u32, truths};
 use crate::math::{DVec2, Vec3};
 use crate::sampling::CAMERA_PATH;
@@ -21,7 +21,7 @@ use crate::world::{Hit, Loops, Object, PACKET};
 
 /// Source of the rays of a packet.
 #[derive(Clone, Copy)]
-pub enum Rays<'a> {
+pub enum PacketSource<'a> {
     /// Rays of the camera: the row, its first slot, their number, and their first place in the round's queue.
     Camera(&'a CameraRow, u32, usize, u32),
     /// Rays of a queue, with their first place.
@@ -30,7 +30,7 @@ pub enum Rays<'a> {
     Traced(&'a [PathRay], &'a [Option<Hit>], &'a [u32]),
 }
 
-impl Rays<'_> {
+impl PacketSource<'_> {
     /// Number of the rays.
     pub fn count(&self) -> usize {
         match self {
@@ -51,9 +51,9 @@ impl Rays<'_> {
 
     /// The path of a camera ray in a lane. `None` for other sources.
     #[inline(always)]
-    pub fn camera_path(&self, shot: &Shot<'_>, lane: usize) -> Option<PathRay> {
+    pub fn camera_path(&self, tile: &TileContext<'_>, lane: usize) -> Option<PathRay> {
         match self {
-            Self::Camera(row, first, ..) => Some(shot.camera_path(row.rays.ray(lane), first + lane as u32)),
+            Self::Camera(row, first, ..) => Some(tile.camera_path(row.rays.ray(lane), first + lane as u32)),
             Self::Paths(..) | Self::Traced(..) => None,
         }
     }
@@ -69,9 +69,9 @@ impl Rays<'_> {
     }
 }
 
-/// Hits of a packet. A surface is plain if there are loops for its shape and for the look-ups of its material, a Phong, and
-/// its ray is not in glass.
-pub struct Met {
+/// Hits of a packet. A surface is plain if there are loops for its shape and for the look-ups of its material, a rough one, its
+/// ray is not in glass, and its BSDF is of the same kind as those of the other plain surfaces.
+pub struct PacketHits {
     hits: HitRows,
     object: [u32; PACKET],
     /// A bit for each ray that hits anything.
@@ -88,7 +88,7 @@ pub struct Met {
     sky: (Lanes3, Lanes),
 }
 
-impl Met {
+impl PacketHits {
     /// The hit of a ray.
     pub fn hit(&self, lane: usize) -> Option<Hit> {
         self.hits.get(lane).map(|shape| Hit { shape, object: self.object[lane] })
@@ -123,11 +123,11 @@ impl Met {
     }
 
     /// The path of a lane.
-    pub fn path(&self, shot: &Shot<'_>, rays: &Rays<'_>, lane: usize) -> PathRay {
+    pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
-            Rays::Camera(row, first, ..) => shot.camera_path(row.rays.ray(lane), first + lane as u32),
-            Rays::Paths(paths, _) => paths[lane],
-            Rays::Traced(paths, _, places) => paths[places[lane] as usize],
+            PacketSource::Camera(row, first, ..) => tile.camera_path(row.rays.ray(lane), first + lane as u32),
+            PacketSource::Paths(paths, _) => paths[lane],
+            PacketSource::Traced(paths, _, places) => paths[places[lane] as usize],
         }
     }
 
@@ -137,17 +137,24 @@ impl Met {
     }
 }
 
-impl Shot<'_> {
+impl TileContext<'_> {
     /// Traces at most [`PACKET`] rays. Plain surfaces go into the row, ready for direct light if requested; `used` are those
     /// that reflect light. Other surfaces go into the row of surfaces, as far as there are loops for them.
-    pub fn meet(
+    pub fn intersect(
         &self,
-        rays: Rays<'_>,
+        rays: PacketSource<'_>,
         measure: Measure,
         are_lit: bool,
-        (row, surface): (&mut LitRow, &mut SurfaceRow),
-    ) -> Met {
-        self.world.geometry.instructions().run(Meeting { shot: self, rays, measure, are_lit, row, surface })
+        (row, surface): (&mut VertexBatch, &mut SurfaceRow),
+    ) -> PacketHits {
+        self.world.geometry.instructions().run(PacketIntersection {
+            tile: self,
+            rays,
+            measure,
+            are_lit,
+            row,
+            surface,
+        })
     }
 
     /// Whether rows of surfaces hold everything for shading an object that is not plain.
@@ -157,43 +164,53 @@ impl Shot<'_> {
         self.pixel_spread == 0.0 && self.world.untextured(object).is_some()
     }
 
-    /// The material of an object, and its Phong. `None` if the object is not plain.
+    /// The material of an object, and its rough BSDF. `None` if the object is not plain.
     #[inline(always)]
-    pub fn plain_phong(&self, object: u32) -> Option<(&Material, &Phong)> {
-        let (material, phong) = self.world.plain_phong(object)?;
+    pub fn plain_rough(&self, object: u32) -> Option<(&Material, &Rough)> {
+        let (material, rough) = self.world.plain_rough(object)?;
         // Ambient light needs look-ups for each surface by itself.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
-        (!has_ambient || phong.constant().is_some()).then_some((material, phong))
+        (!has_ambient || rough.constant().is_some()).then_some((material, rough))
     }
 }
 
-struct Meeting<'a> {
-    shot: &'a Shot<'a>,
-    rays: Rays<'a>,
+struct PacketIntersection<'a> {
+    tile: &'a TileContext<'a>,
+    rays: PacketSource<'a>,
     measure: Measure,
     are_lit: bool,
-    row: &'a mut LitRow,
+    row: &'a mut VertexBatch,
     surface: &'a mut SurfaceRow,
 }
 
-impl Loops for Meeting<'_> {
-    type Done = Met;
+/// Plain surfaces of a packet.
+struct Plain {
+    /// A bit for each.
+    all: u32,
+    /// A bit for each that emits, on either side.
+    shining: u32,
+    /// Look-ups of their textures.
+    lookups: u64,
+}
+
+impl Loops for PacketIntersection<'_> {
+    type Done = PacketHits;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Met {
-        let Self { shot, rays, measure, are_lit, row, surface } = self;
-        let world = shot.world;
-        row.reset();
+    fn run(mut self, folds: impl Folds) -> PacketHits {
+        let (tile, rays) = (self.tile, self.rays);
+        let world = tile.world;
+        self.row.reset();
         // Put the rays side by side.
         let (of_paths, traced);
         let mut ends = [-1.0; PACKET];
         let rows = match rays {
-            Rays::Camera(row, _, count, _) => {
+            PacketSource::Camera(row, _, count, _) => {
                 ends[..count].fill(f32::INFINITY);
                 traced = ((1_u64 << count) - 1) as u32;
                 &row.rays
             }
-            Rays::Paths(..) | Rays::Traced(..) => {
+            PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
                 let mut start = [Ray::NO_TRIANGLE; PACKET];
                 for lane in 0..PACKET {
@@ -209,101 +226,124 @@ impl Loops for Meeting<'_> {
         };
         // Find their hits, or take the known ones.
         let (hits, object) = match rays {
-            Rays::Camera(..) | Rays::Paths(..) => world.geometry.closest_rows(rows, &mut ends, traced, folds),
-            Rays::Traced(_, known, places) => {
-                let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET]);
-                for (lane, &place) in places.iter().enumerate().take(PACKET) {
-                    if let Some(hit) = &known[place as usize] {
-                        hits.put(lane, &hit.shape);
-                        object[lane] = hit.object;
-                    }
-                }
-                (hits, object)
+            PacketSource::Camera(..) | PacketSource::Paths(..) => {
+                world.geometry.closest_rows(rows, &mut ends, traced, folds)
             }
+            PacketSource::Traced(_, known, places) => known_hits(known, places),
         };
         // Keep the rays in air, whose surfaces may be plain.
-        *surface = SurfaceRow::EMPTY;
+        *self.surface = SurfaceRow::EMPTY;
         let any = hits.any(folds);
-        let (mut left, mut plain, mut shining) = (any, 0, 0);
-        let (mut seen, mut from_gloss, mut lookups) = (!0, 0, 0);
+        let (mut in_air, mut only_specular_before, mut after_gloss) = (any, !0, 0);
         match rays {
-            Rays::Camera(..) => left = if world.is_eye_in_air() { left } else { 0 },
-            Rays::Paths(..) | Rays::Traced(..) => {
+            PacketSource::Camera(..) => in_air = if world.is_eye_in_air() { any } else { 0 },
+            PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 for lane in 0..PACKET {
                     let Some(path) = rays.of_queue(lane) else { break };
-                    left &= if path.medium.is_air() { !0 } else { !(1 << lane) };
-                    seen &= if path.history.is_seen { !0 } else { !(1 << lane) };
-                    from_gloss |= u32::from(path.history.is_from_gloss) << lane;
+                    in_air &= if path.medium.is_air() { !0 } else { !(1 << lane) };
+                    only_specular_before &= if path.state.only_specular_before { !0 } else { !(1 << lane) };
+                    after_gloss |= u32::from(path.state.is_after_gloss) << lane;
                 }
             }
         }
-        // Compute the surfaces of each plain object, and look its material up.
-        while left != 0 {
-            let id = object[left.trailing_zeros() as usize % PACKET];
-            let mut of = [0; PACKET];
-            for lane in 0..PACKET {
-                of[lane] = if object[lane] == id { TRUE } else { 0 };
-            }
-            let of = folds.bits(&of) & left;
-            left &= !of;
-            let Some((material, phong)) = shot.plain_phong(id) else { continue };
-            let Some(specular) = phong.specular.constant() else { continue };
-            let texture = phong.diffuse.texture().filter(|_| are_lit && measure.is_colored());
-            match &world.geometry.objects()[id as usize] {
-                Object::Shape(shape) => {
-                    row.set_starts(of, &[Ray::NO_TRIANGLE; PACKET]);
-                    if !surface.fill(shape, rows, &hits, of) {
-                        continue;
-                    }
-                    if texture.is_some() {
-                        surface.fill_uv(shape, rows, &hits, of);
-                    }
-                }
-                Object::Mesh(mesh) => {
-                    row.set_starts(of, &mesh.scene_numbers(&hits.primitive));
-                    mesh.fill_surfaces(surface, rows, &hits, of, texture.is_some());
-                }
-            }
-            plain |= of;
-            shining |= if material.emission.shines() { of } else { 0 };
-            let bsdf = match texture {
-                Some(texture) => {
-                    lookups += u64::from(of.count_ones());
-                    let diffuse = texture.lookup_row(&surface.uv);
-                    PhongRow { diffuse, specular, shininess: phong.shininess }
-                }
-                None => {
-                    let Vec3 { x, y, z } = phong.diffuse.constant().unwrap_or(Vec3::ONE);
-                    let diffuse = [[x; PACKET], [y; PACKET], [z; PACKET]];
-                    PhongRow { diffuse, specular, shininess: phong.shininess }
-                }
-            };
-            row.used |= of & !bsdf.black(folds);
-            let seen = seen & of;
-            row.set_bsdf(of, &bsdf, measure);
-            if seen != of && measure != Measure::ALL {
-                row.set_bsdf(of & !seen, &bsdf, Measure::ALL);
-            }
-        }
+        // Compute the plain surfaces, with their BSDFs.
+        (self.row.only_specular_before, self.row.after_gloss) = (only_specular_before, after_gloss);
+        let plain = self.fill_plain(rows, (&hits, &object), in_air, folds);
         // Set the positions and normals of the plain vertices.
-        (row.seen, row.from_gloss) = (seen, from_gloss);
-        let lifts = match shot.settings.render.shadows {
+        let lifts = match tile.settings.render.shadows {
             Shadows::Off => Lifts::All,
-            Shadows::Hard | Shadows::Soft => Lifts::IfFree(seen),
+            Shadows::Hard | Shadows::Soft => Lifts::IfFree(only_specular_before),
         };
-        let front = if plain == 0 { 0 } else { row.place(&rays, rows, surface, lifts, folds) };
+        let front = if plain.all == 0 { 0 } else { self.row.place(&rays, rows, self.surface, lifts, folds) };
         // Compute the other surfaces, and the environment for rays without a hit.
-        let found = shot.fill_others(surface, rows, (&hits, &object), any & !plain, folds);
+        let found = tile.fill_others(self.surface, rows, (&hits, &object), any & !plain.all, folds);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
             Some(_) | None => ([[0.0; PACKET]; 3], [0.0; PACKET]),
         };
-        Met { hits, object, any, plain, shining: shining & front, found, lookups, sky }
+        let (shining, lookups) = (plain.shining & front, plain.lookups);
+        PacketHits { hits, object, any, plain: plain.all, shining, found, lookups, sky }
     }
 }
 
-impl Shot<'_> {
+impl PacketIntersection<'_> {
+    /// Puts the plain surfaces among the hits of `left` into the row of surfaces, and their BSDFs into the row of vertices.
+    #[inline(always)]
+    fn fill_plain(
+        &mut self,
+        rows: &RayRows,
+        (hits, object): (&HitRows, &[u32; PACKET]),
+        mut left: u32,
+        folds: impl Folds,
+    ) -> Plain {
+        let Self { tile, measure, are_lit, row, surface, .. } = self;
+        let mut plain = Plain { all: 0, shining: 0, lookups: 0 };
+        while left != 0 {
+            let (id, of) = first_object(object, left, folds);
+            left &= !of;
+            // Leave out objects that are not plain. The first plain one decides the kind of all BSDFs.
+            let Some((material, rough)) = tile.plain_rough(id) else { continue };
+            if plain.all == 0 {
+                row.bsdf.prepare(rough.kind());
+            } else if row.bsdf.kind() != rough.kind() {
+                continue;
+            }
+            // Compute the surfaces.
+            let has_uv = rough.row_texture().is_some() && *are_lit && measure.is_colored();
+            match &tile.world.geometry.objects()[id as usize] {
+                Object::Shape(shape) => {
+                    row.set_starts(of, &[Ray::NO_TRIANGLE; PACKET]);
+                    if !surface.fill(shape, rows, hits, of) {
+                        continue;
+                    }
+                    if has_uv {
+                        surface.fill_uv(shape, rows, hits, of);
+                    }
+                }
+                Object::Mesh(mesh) => {
+                    row.set_starts(of, &mesh.scene_numbers(&hits.primitive));
+                    mesh.fill_surfaces(surface, rows, hits, of, has_uv);
+                }
+            }
+            plain.all |= of;
+            plain.shining |= if material.emission.shines() { of } else { 0 };
+            // Look the material up. Beyond the vertices that the camera sees, all lobes count.
+            plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
+            let shown = [(of, measure.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
+            let shown = if *measure == Measure::ALL { &shown[..1] } else { &shown };
+            let black = row.bsdf.fill(rough, has_uv.then_some(&surface.uv), shown, folds);
+            row.used |= of & !black;
+        }
+        plain
+    }
+}
+
+/// The object that the first of the lanes in `left` hits, and a bit for each of these lanes that hits it.
+#[inline(always)]
+fn first_object(object: &[u32; PACKET], left: u32, folds: impl Folds) -> (u32, u32) {
+    let id = object[left.trailing_zeros() as usize % PACKET];
+    let mut of = [0; PACKET];
+    for lane in 0..PACKET {
+        of[lane] = if object[lane] == id { TRUE } else { 0 };
+    }
+    (id, folds.bits(&of) & left)
+}
+
+/// The hits of the rays at some places of a queue, side by side.
+#[inline(always)]
+fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitRows, [u32; PACKET]) {
+    let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET]);
+    for (lane, &place) in places.iter().enumerate().take(PACKET) {
+        if let Some(hit) = &known[place as usize] {
+            hits.put(lane, &hit.shape);
+            object[lane] = hit.object;
+        }
+    }
+    (hits, object)
+}
+
+impl TileContext<'_> {
     /// Puts the surfaces of hits that are not plain into the row; returns a bit for each that is there.
     #[inline(always)]
     fn fill_others(
@@ -316,12 +356,7 @@ impl Shot<'_> {
     ) -> u32 {
         let mut found = 0;
         while left != 0 {
-            let id = object[left.trailing_zeros() as usize % PACKET];
-            let mut of = [0; PACKET];
-            for lane in 0..PACKET {
-                of[lane] = if object[lane] == id { TRUE } else { 0 };
-            }
-            let of = folds.bits(&of) & left;
+            let (id, of) = first_object(object, left, folds);
             left &= !of;
             if !self.is_held_by_rows(id) {
                 continue;
@@ -335,29 +370,6 @@ impl Shot<'_> {
     }
 }
 
-/// [`PhongBsdf`](crate::materials::phong::PhongBsdf)s side by side, with one exponent.
-struct PhongRow {
-    diffuse: Lanes3,
-    specular: Vec3,
-    shininess: f32,
-}
-
-impl PhongRow {
-    /// A bit for each BSDF that reflects nothing.
-    #[inline(always)]
-    fn black(&self, folds: impl Folds) -> u32 {
-        if self.specular != Vec3::ZERO {
-            return 0;
-        }
-        let mut black = [0; PACKET];
-        for i in 0..PACKET {
-            let Vec3 { x, y, z } = lane(&self.diffuse, i);
-            black[i] = if (x == 0.0) & (y == 0.0) & (z == 0.0) { TRUE } else { 0 };
-        }
-        folds.bits(&black)
-    }
-}
-
 /// Vertices of smooth meshes to lift above their facets.
 #[derive(Clone, Copy)]
 enum Lifts {
@@ -367,34 +379,7 @@ enum Lifts {
     IfFree(u32),
 }
 
-impl LitRow {
-    /// Sets the lobes of some lanes.
-    #[inline(always)]
-    fn set_bsdf(&mut self, of: u32, bsdf: &PhongRow, measure: Measure) {
-        let PhongRow { diffuse, specular, shininess } = bsdf;
-        let white =
-            PhongBsdf { diffuse: Vec3::ONE, specular: *specular, shininess: *shininess, ambient: Vec3::ZERO };
-        let [of_white, glossy] = bsdf_parts(&white, measure);
-        let (mut shown, mut greatest) = ([[of_white.x; PACKET]; 3], [0.0; PACKET]);
-        if measure != Measure::ArrivingShare {
-            for i in 0..PACKET {
-                set_lane(&mut shown, i, lane(diffuse, i) * of_white);
-            }
-        }
-        for i in 0..PACKET {
-            greatest[i] = lane(diffuse, i).max_element();
-        }
-        let of = truths(of);
-        for axis in 0..3 {
-            take(&of, &shown[axis], &mut self.diffuse[axis]);
-            take(&of, &[glossy[axis]; PACKET], &mut self.specular[axis]);
-        }
-        take(&of, &[*shininess; PACKET], &mut self.shininess);
-        take(&of, &greatest, &mut self.albedos[0]);
-        take(&of, &[specular.max_element(); PACKET], &mut self.albedos[1]);
-        self.is_glossy |= *specular != Vec3::ZERO;
-    }
-
+impl VertexBatch {
     /// Sets the triangles of some lanes.
     #[inline(always)]
     fn set_starts(&mut self, of: u32, starts: &[u32; PACKET]) {
@@ -404,7 +389,8 @@ impl LitRow {
     /// Sets normals and points above facets for the lanes of smooth surfaces.
     #[inline(always)]
     fn smooth(&mut self, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts, folds: impl Folds) {
-        let [mut normals, mut mirrored] = [[[0.0; PACKET]; 3]; 2];
+        // Turn the shading normals to the viewer's side.
+        let mut normals = [[0.0; PACKET]; 3];
         let (mut ends, mut above, mut bent) = ([0.0; PACKET], [0; PACKET], [0; PACKET]);
         for i in 0..PACKET {
             let (geometric, direction) = (lane(&surface.normal, i), lane(&rays.direction, i));
@@ -414,22 +400,22 @@ impl LitRow {
             bent[i] = if is_bent { TRUE } else { 0 };
             let normal = shading * if geometric.dot(direction) > 0.0 { -1.0 } else { 1.0 };
             set_lane(&mut normals, i, normal);
-            let to_eye = -direction;
-            set_lane(&mut mirrored, i, normal * (2.0 * normal.dot(to_eye)) - to_eye);
         }
+        // Find the points above the facets.
         for i in 0..PACKET {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
             let (is_above, end) = way_up(from, to, lane(&self.normal, i), lane(&surface.error, i));
             above[i] = if is_above { TRUE } else { 0 };
             ends[i] = end;
         }
+        // Decide which vertices rise at once, and which if nothing is on the way.
         let of = truths(surface.smooth);
         let above = folds.bits(&above) & surface.smooth;
         let rises = match lifts {
             Lifts::All => truths(above),
-            Lifts::IfFree(seen) => {
+            Lifts::IfFree(only_specular_before) => {
                 self.is_bounded |= folds.bits(&bent) & surface.smooth;
-                self.may_lift |= above & seen;
+                self.may_lift |= above & only_specular_before;
                 [0; PACKET]
             }
         };
@@ -443,24 +429,25 @@ impl LitRow {
             take(&of, &surface.shadow_point[axis], &mut self.lifted[axis]);
             take(&rises, &surface.shadow_point[axis], &mut self.from[axis]);
             take(&of, &normals[axis], &mut self.normal[axis]);
-            take(&of, &mirrored[axis], &mut self.mirrored_eye[axis]);
         }
+        self.bsdf.orient(Some(&of), &normals, &rays.direction);
         take_u32(&rises, &[Ray::NO_TRIANGLE; PACKET], &mut self.start);
         take(&of, &ends, &mut self.lift_end);
         take(&of, &[UNBENT; PACKET], &mut self.bend);
-        self.apart |= surface.smooth;
+        self.has_facet |= surface.smooth;
     }
 
     /// Sets the positions of plain surfaces; returns a bit for each whose front the path hits.
     #[inline(always)]
     fn place(
         &mut self,
-        paths: &Rays<'_>,
+        paths: &PacketSource<'_>,
         rays: &RayRows,
         surface: &SurfaceRow,
         lifts: Lifts,
         folds: impl Folds,
     ) -> u32 {
+        // Put the vertices on the facets, on the viewer's side.
         let mut front = [0; PACKET];
         self.medium = [0; PACKET];
         for i in 0..PACKET {
@@ -471,26 +458,27 @@ impl LitRow {
             let from = offset_origin(lane(&surface.point, i), lane(&surface.error, i), normal, normal);
             set_lane(&mut self.from, i, from);
             set_lane(&mut self.normal, i, normal);
-            let to_eye = -direction;
-            set_lane(&mut self.mirrored_eye, i, normal * (2.0 * normal.dot(to_eye)) - to_eye);
         }
+        self.bsdf.orient(None, &self.normal, &rays.direction);
+        // Replace the normals of smooth surfaces.
         if surface.smooth != 0 {
             self.smooth(rays, surface, lifts, folds);
         }
+        // Copy the state of the paths.
         match paths {
-            Rays::Camera(_, slot, ..) => {
+            PacketSource::Camera(_, slot, ..) => {
                 self.throughput = [[1.0; PACKET]; 3];
                 self.path = [CAMERA_PATH + 1; PACKET];
-                self.carried = [1.0; PACKET];
+                self.roulette_throughput = [1.0; PACKET];
                 for i in 0..PACKET {
                     self.slot[i] = slot + i as u32;
                 }
             }
-            Rays::Paths(..) | Rays::Traced(..) => {
+            PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 for i in 0..PACKET {
                     let Some(path) = paths.of_queue(i) else { break };
                     set_lane(&mut self.throughput, i, path.throughput);
-                    self.carried[i] = path.history.carried;
+                    self.roulette_throughput[i] = path.state.roulette_throughput;
                     (self.slot[i], self.path[i]) = (path.slot, path.path);
                 }
             }

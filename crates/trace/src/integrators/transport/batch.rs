@@ -1,13 +1,12 @@
 //! Vertices that wait for direct light, sixteen side by side.
 
-use super::shot::Shot;
-use super::vertices::{Lift, LitVertex};
-use super::view::{Measure, Parts};
+use super::tile::TileContext;
+use super::vertex::{Lift, ShadingVertex};
 use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
-use crate::materials::Lobes;
-use crate::materials::lobes::gloss;
-use crate::materials::phong::PhongBsdf;
+use crate::integrators::view::{Measure, Parts};
+use crate::materials::BsdfRow;
+use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane, truths};
 use crate::sampling::SamplerRow;
@@ -15,47 +14,39 @@ use crate::scene::description::Shadows;
 
 /// Vertices to be lit.
 #[derive(Clone)]
-pub struct LitRow {
+pub struct VertexBatch {
     /// A bit for each lane with a vertex.
     pub used: u32,
     /// Origins of light samples and shadow rays.
     pub from: Lanes3,
-    /// Triangles at the origins, for [`LitRow::starts`].
-    pub(super) start: [u32; LANES],
+    /// Triangles at the origins, for [`VertexBatch::starts`].
+    pub start: [u32; LANES],
     /// Horizon normals: nothing behind them is visible, in the lanes whose bits are set.
-    pub(super) horizon: Lanes3,
-    pub(super) is_bounded: u32,
+    pub horizon: Lanes3,
+    pub is_bounded: u32,
     /// Points above the facets that see lights in all directions, if nothing is on the way to the points, in the lanes whose
     /// bits are set; with the ends of these ways.
-    pub(super) lifted: Lanes3,
-    pub(super) lift_end: Lanes,
-    pub(super) may_lift: u32,
+    pub lifted: Lanes3,
+    pub lift_end: Lanes,
+    pub may_lift: u32,
     /// Points of the surfaces and normals of their facets on the viewer's side, in the lanes whose bits are set; in other lanes
     /// these are `from` and `normal`.
-    pub(super) point: Lanes3,
-    /// [`LitRow::point`].
-    pub(super) facet: Lanes3,
-    /// [`LitRow::point`].
-    pub(super) apart: u32,
+    pub point: Lanes3,
+    /// [`VertexBatch::point`].
+    pub facet: Lanes3,
+    /// [`VertexBatch::point`].
+    pub has_facet: u32,
     /// A bit for each vertex that the camera sees, directly or by mirrors and glass.
-    pub(super) seen: u32,
+    pub only_specular_before: u32,
     /// A bit for each vertex whose path comes from a surface with a glossy lobe.
-    pub(super) from_gloss: u32,
+    pub after_gloss: u32,
     /// Normals for the cosines.
     pub normal: Lanes3,
     /// Normals before a normal map bent them, and the cosine between both; [`UNBENT`] without a normal map.
-    pub(super) smooth_normal: Lanes3,
-    pub(super) bend: Lanes,
-    /// The direction to the viewer, mirrored.
-    pub mirrored_eye: Lanes3,
-    /// The diffuse part of f in sr⁻¹, and the glossy one at its peak.
-    pub diffuse: Lanes3,
-    /// [`LitRow::diffuse`].
-    pub specular: Lanes3,
-    /// Exponent of the glossy lobe.
-    pub shininess: Lanes,
-    /// The largest components of kd and ks, whatever parts are shown.
-    pub albedos: [Lanes; 2],
+    pub smooth_normal: Lanes3,
+    pub bend: Lanes,
+    /// BSDFs, all of one kind.
+    pub bsdf: BsdfRow,
     /// Throughput of the paths.
     pub throughput: Lanes3,
     /// Slots of the paths.
@@ -64,20 +55,18 @@ pub struct LitRow {
     pub path: [u32; LANES],
     /// Places of the paths in the round's queue.
     pub place: [u32; LANES],
-    /// [`History::carried`](super::queues::History::carried) of the paths.
-    pub carried: Lanes,
+    /// [`PathState::roulette_throughput`](super::ray::PathState::roulette_throughput) of the paths.
+    pub roulette_throughput: Lanes,
     /// Indices of the glass around the vertices.
     pub medium: [u32; LANES],
-    /// Whether any vertex has a glossy lobe.
-    pub is_glossy: bool,
     /// Whether any vertex has a bent normal.
-    pub(super) is_bent: bool,
+    pub is_bent: bool,
 }
 
 /// Value in place of the cosine between two equal normals.
-pub(super) const UNBENT: f32 = -2.0;
+pub const UNBENT: f32 = -2.0;
 
-impl LitRow {
+impl VertexBatch {
     /// Least α of lobes that are worth rays of their own under any light.
     const SHARP: f32 = 100.0;
 
@@ -86,33 +75,32 @@ impl LitRow {
     const FILLED: f32 = 1.5;
 
     /// A bit for each vertex whose highlights of lamps are too rare for light samples alone.
-    pub(super) fn sharp(&self, shot: &Shot<'_>, measure: Measure) -> u32 {
+    pub fn sharp(&self, tile: &TileContext<'_>, measure: Measure) -> u32 {
         let shows = match measure {
             Measure::Radiance(Parts { specular, .. }) => specular,
             Measure::ArrivingShare => false,
             Measure::Work => true,
         };
-        let is_soft = shot.settings.render.shadows == Shadows::Soft;
-        if !(self.is_glossy && shows && is_soft && shot.world.lights.can_be_found()) {
+        let is_soft = tile.settings.render.shadows == Shadows::Soft;
+        if !(self.bsdf.has_narrow_lobes() && shows && is_soft && tile.world.lights.can_be_found()) {
             return 0;
         }
         // A lobe is about as wide as 2π/(α + 1) sr.
-        let filled = Self::FILLED * std::f32::consts::TAU / shot.world.lights.extent_beyond() - 1.0;
+        let filled = Self::FILLED * std::f32::consts::TAU / tile.world.lights.extent_beyond() - 1.0;
         let least = filled.min(Self::SHARP);
-        let is_sharp = |i: &usize| self.albedos[1][*i] > 0.0 && self.shininess[*i] >= least;
-        lanes(self.used).filter(is_sharp).fold(0, |sharp, i| sharp | 1 << i)
+        self.bsdf.narrower_than(self.used, least)
     }
 
     /// The random numbers of the vertices.
     #[inline(always)]
-    pub fn sampler(&self, shot: &Shot<'_>) -> SamplerRow<LANES> {
-        let (block, slots) = (shot.block, &self.slot);
+    pub fn sampler(&self, tile: &TileContext<'_>) -> SamplerRow<LANES> {
+        let (block, slots) = (tile.block, &self.slot);
         let mut is_run = true;
         for i in 0..LANES {
             is_run &= slots[i] == slots[0] + i as u32;
         }
         let (xs, ys, samples) = if is_run { block.places(slots[0]) } else { block.places_of(slots) };
-        SamplerRow::new(shot.settings.render.seed, &xs, &ys, &samples)
+        SamplerRow::new(tile.settings.render.seed, &xs, &ys, &samples)
     }
 
     /// A row without vertices.
@@ -127,24 +115,19 @@ impl LitRow {
         may_lift: 0,
         point: [[0.0; LANES]; 3],
         facet: [[0.0; LANES]; 3],
-        apart: 0,
-        seen: 0,
-        from_gloss: 0,
+        has_facet: 0,
+        only_specular_before: 0,
+        after_gloss: 0,
         normal: [[0.0; LANES]; 3],
         smooth_normal: [[0.0; LANES]; 3],
         bend: [UNBENT; LANES],
-        mirrored_eye: [[0.0; LANES]; 3],
-        diffuse: [[0.0; LANES]; 3],
-        specular: [[0.0; LANES]; 3],
-        shininess: [0.0; LANES],
-        albedos: [[0.0; LANES]; 2],
+        bsdf: BsdfRow::EMPTY,
         throughput: [[0.0; LANES]; 3],
         slot: [0; LANES],
         path: [0; LANES],
         place: [0; LANES],
-        carried: [0.0; LANES],
+        roulette_throughput: [0.0; LANES],
         medium: [0; LANES],
-        is_glossy: false,
         is_bent: false,
     };
 
@@ -152,21 +135,22 @@ impl LitRow {
     #[inline(always)]
     pub fn reset(&mut self) {
         (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
-        (self.apart, self.seen, self.from_gloss) = (0, 0, 0);
-        (self.is_glossy, self.is_bent) = (false, false);
+        (self.has_facet, self.only_specular_before, self.after_gloss) = (0, 0, 0);
+        self.is_bent = false;
+        self.bsdf.reset();
         self.bend = [UNBENT; LANES];
     }
 
     /// Keeps these vertices only.
-    pub(super) fn keep(&mut self, these: u32) {
-        let Self { used, is_bounded, may_lift, apart, seen, from_gloss, .. } = self;
-        for bits in [used, is_bounded, may_lift, apart, seen, from_gloss] {
+    pub fn keep(&mut self, these: u32) {
+        let Self { used, is_bounded, may_lift, has_facet, only_specular_before, after_gloss, .. } = self;
+        for bits in [used, is_bounded, may_lift, has_facet, only_specular_before, after_gloss] {
             *bits &= these;
         }
     }
 
-    /// Takes a vertex of another row.
-    pub(super) fn copy(&mut self, i: usize, other: &Self, from: usize) {
+    /// Takes a vertex of another row, whose BSDFs are of the same kind.
+    pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
         for (own, other) in [
             (&mut self.from, &other.from),
             (&mut self.horizon, &other.horizon),
@@ -175,83 +159,63 @@ impl LitRow {
             (&mut self.facet, &other.facet),
             (&mut self.normal, &other.normal),
             (&mut self.smooth_normal, &other.smooth_normal),
-            (&mut self.mirrored_eye, &other.mirrored_eye),
-            (&mut self.diffuse, &other.diffuse),
-            (&mut self.specular, &other.specular),
             (&mut self.throughput, &other.throughput),
         ] {
             set_lane(own, i, lane(other, from));
         }
-        (self.bend[i], self.shininess[i]) = (other.bend[from], other.shininess[from]);
-        for (own, other) in self.albedos.iter_mut().zip(&other.albedos) {
-            own[i] = other[from];
-        }
-        (self.carried[i], self.medium[i]) = (other.carried[from], other.medium[from]);
+        self.bsdf.copy(i, &other.bsdf, from);
+        self.bend[i] = other.bend[from];
+        (self.roulette_throughput[i], self.medium[i]) = (other.roulette_throughput[from], other.medium[from]);
         (self.slot[i], self.path[i], self.place[i]) = (other.slot[from], other.path[from], other.place[from]);
         self.start[i] = other.start[from];
-        self.is_glossy |= other.is_glossy;
         self.is_bent |= other.is_bent;
         self.is_bounded |= (other.is_bounded >> from & 1) << i;
         self.lift_end[i] = other.lift_end[from];
         self.may_lift |= (other.may_lift >> from & 1) << i;
-        self.apart |= (other.apart >> from & 1) << i;
-        self.seen |= (other.seen >> from & 1) << i;
-        self.from_gloss |= (other.from_gloss >> from & 1) << i;
+        self.has_facet |= (other.has_facet >> from & 1) << i;
+        self.only_specular_before |= (other.only_specular_before >> from & 1) << i;
+        self.after_gloss |= (other.after_gloss >> from & 1) << i;
         self.used |= 1 << i;
     }
 
-    pub(super) fn put(
+    /// Sets a vertex, whose BSDF is of the row's kind.
+    pub fn put(
         &mut self,
         i: usize,
-        shot: &Shot<'_>,
-        lit: &LitVertex<'_>,
+        tile: &TileContext<'_>,
+        lit: &ShadingVertex<'_>,
         measure: Measure,
         medium: u32,
     ) {
-        let LitVertex { path, place, vertex, shading, bsdf } = lit;
-        let outlook = vertex.outlook(shot, path.history.is_seen);
-        set_lane(&mut self.from, i, outlook.point);
-        self.start[i] = outlook.start;
-        set_lane(&mut self.horizon, i, outlook.horizon.unwrap_or(Vec3::ZERO));
-        self.is_bounded |= u32::from(outlook.horizon.is_some()) << i;
-        if let Some(Lift { to, end }) = outlook.lift {
+        let ShadingVertex { path, place, vertex, shading, bsdf } = lit;
+        // Set the origin of light samples.
+        let shadow_origin = vertex.shadow_origin(tile, path.state.only_specular_before);
+        set_lane(&mut self.from, i, shadow_origin.point);
+        self.start[i] = shadow_origin.start;
+        set_lane(&mut self.horizon, i, shadow_origin.horizon.unwrap_or(Vec3::ZERO));
+        self.is_bounded |= u32::from(shadow_origin.horizon.is_some()) << i;
+        if let Some(Lift { to, end }) = shadow_origin.lift {
             set_lane(&mut self.lifted, i, to);
             self.lift_end[i] = end;
             self.may_lift |= 1 << i;
         }
+        // Set the surface and its normals.
         set_lane(&mut self.point, i, vertex.surface.point);
         set_lane(&mut self.facet, i, vertex.normal);
-        self.apart |= 1 << i;
-        self.seen |= u32::from(path.history.is_seen) << i;
-        self.from_gloss |= u32::from(path.history.is_from_gloss) << i;
+        self.has_facet |= 1 << i;
+        self.only_specular_before |= u32::from(path.state.only_specular_before) << i;
+        self.after_gloss |= u32::from(path.state.is_after_gloss) << i;
         set_lane(&mut self.normal, i, shading.normal);
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.bend[i] = shading.bend.unwrap_or(UNBENT);
-        set_lane(&mut self.mirrored_eye, i, shading.mirrored(vertex.to_eye));
-        let [diffuse, specular] = bsdf_parts(bsdf, measure);
-        set_lane(&mut self.diffuse, i, diffuse);
-        set_lane(&mut self.specular, i, specular);
-        self.shininess[i] = bsdf.shininess;
-        self.albedos[0][i] = bsdf.diffuse.max_element();
-        self.albedos[1][i] = bsdf.specular.max_element();
-        (self.carried[i], self.medium[i]) = (path.history.carried, medium);
+        // Set the BSDF.
+        self.bsdf.put(i, bsdf, measure.lobes(), shading.normal, vertex.to_eye);
+        // Copy the state of the path.
+        (self.roulette_throughput[i], self.medium[i]) = (path.state.roulette_throughput, medium);
         set_lane(&mut self.throughput, i, path.throughput);
         (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);
-        self.is_glossy |= bsdf.specular != Vec3::ZERO;
         self.is_bent |= shading.bend.is_some();
         self.used |= 1 << i;
-    }
-
-    /// The lobes of a vertex.
-    #[inline(always)]
-    pub fn lobes(&self, i: usize) -> Lobes {
-        Lobes {
-            normal: lane(&self.normal, i),
-            mirrored_eye: lane(&self.mirrored_eye, i),
-            diffuse: self.albedos[0][i],
-            specular: self.albedos[1][i],
-            shininess: self.shininess[i],
-        }
     }
 
     /// Response of the vertices to light from these directions.
@@ -267,21 +231,13 @@ impl LitRow {
                 cosines[i] *= terminator(cosines[i], smooth, self.bend[i]);
             }
         }
-        let (mut f, mut glosses) = (self.diffuse, [0.0; LANES]);
-        if self.is_glossy {
-            for i in 0..LANES {
-                let left = gloss(lane(&self.mirrored_eye, i), lane(directions, i), self.shininess[i]);
-                set_lane(&mut f, i, lane(&self.diffuse, i) + lane(&self.specular, i) * left);
-                glosses[i] = left;
-            }
-        }
-        Response { f, cosines, glosses }
+        Response { bsdf: self.bsdf.f(directions), cosines }
     }
 
     /// [`Ray::start`] of rays from the vertices in these directions: none of a ray that goes behind its facet.
     #[inline(always)]
-    pub(super) fn starts(&self, directions: &Lanes3) -> [u32; LANES] {
-        let apart = truths(self.apart);
+    pub fn starts(&self, directions: &Lanes3) -> [u32; LANES] {
+        let apart = truths(self.has_facet);
         let mut starts = self.start;
         for i in 0..LANES {
             let (facet, normal) = (lane(&self.facet, i), lane(&self.normal, i));
@@ -296,8 +252,8 @@ impl LitRow {
 
     /// Position of a vertex's surface, and the normal of its facet on the viewer's side.
     #[inline(always)]
-    pub(super) fn place_of(&self, i: usize) -> (Vec3, Vec3) {
-        if self.apart & 1 << i != 0 {
+    pub fn place_of(&self, i: usize) -> (Vec3, Vec3) {
+        if self.has_facet & 1 << i != 0 {
             (lane(&self.point, i), lane(&self.facet, i))
         } else {
             (lane(&self.from, i), lane(&self.normal, i))
@@ -307,8 +263,8 @@ impl LitRow {
     /// Weight of photons that land at a vertex: the cosine of the light's direction, times the terminator factor, over the cosine
     /// with the facet.
     #[inline(always)]
-    pub(super) fn landed(&self, i: usize, direction: Vec3) -> f32 {
-        if self.apart & 1 << i == 0 {
+    pub fn landed(&self, i: usize, direction: Vec3) -> f32 {
+        if self.has_facet & 1 << i == 0 {
             return 1.0;
         }
         let cosine = lane(&self.normal, i).dot(direction);
@@ -320,19 +276,19 @@ impl LitRow {
 
     /// Light of the vertices, times the throughput of the paths.
     #[inline(always)]
-    pub(super) fn carried_on(&self, light: &Lanes3) -> Lanes3 {
-        let mut carried = *light;
+    pub fn carried_on(&self, light: &Lanes3) -> Lanes3 {
+        let mut roulette_throughput = *light;
         for axis in 0..3 {
             for i in 0..LANES {
-                carried[axis][i] = light[axis][i] * self.throughput[axis][i];
+                roulette_throughput[axis][i] = light[axis][i] * self.throughput[axis][i];
             }
         }
-        carried
+        roulette_throughput
     }
 
     /// The first place, if there is a vertex in every lane and their places are consecutive. Otherwise `None`.
     #[inline(always)]
-    pub(super) fn run(&self) -> Option<u32> {
+    pub fn run(&self) -> Option<u32> {
         let mut is_run = self.used == ALL;
         for i in 0..LANES {
             is_run &= self.place[i] == self.place[0].wrapping_add(i as u32);
@@ -341,7 +297,7 @@ impl LitRow {
     }
 
     /// Whether any vertex is in glass.
-    pub(super) fn is_inside(&self) -> bool {
+    pub fn is_inside(&self) -> bool {
         lanes(self.used).any(|i| self.medium[i] != 0)
     }
 
@@ -361,28 +317,14 @@ impl LitRow {
 
 /// Response of vertices to light from directions.
 pub struct Response {
-    /// The BSDF in sr⁻¹, of the shown parts.
-    pub f: Lanes3,
+    /// BSDFs.
+    pub bsdf: BsdfValues,
     /// Cosines, times the terminator factor; not above 0 if nothing arrives.
     pub cosines: Lanes,
-    /// [`gloss`].
-    pub glosses: Lanes,
 }
 
 /// A bit for each lane.
-pub(super) const ALL: u32 = ((1_u64 << LANES) - 1) as u32;
-
-/// The diffuse part of f in sr⁻¹, and the glossy part at its peak, as far as they are shown.
-#[inline(always)]
-pub fn bsdf_parts(bsdf: &PhongBsdf, measure: Measure) -> [Vec3; 2] {
-    let Parts { diffuse, specular, .. } = match measure {
-        Measure::Radiance(parts) => parts,
-        Measure::Work => Parts::ALL,
-        Measure::ArrivingShare => return [Vec3::ONE, Vec3::ZERO],
-    };
-    let part = |is_taken: bool, value: Vec3| if is_taken { value } else { Vec3::ZERO };
-    [part(diffuse, bsdf.diffuse_value()), part(specular, bsdf.specular_peak())]
-}
+pub const ALL: u32 = ((1_u64 << LANES) - 1) as u32;
 
 /// Terminator factor: softens the edge at which bent normals lose the light of their surface, 0 behind the surface; 1
 /// without bent normals (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
@@ -401,21 +343,28 @@ mod tests {
     #[test]
     fn a_vertex_in_the_place_of_another_keeps_nothing_of_it() {
         // Row whose bits are set for all vertices, also for unused ones.
-        let noisy = LitRow {
+        let noisy = VertexBatch {
             used: ALL,
             is_bounded: ALL,
             may_lift: ALL,
-            apart: ALL,
-            seen: ALL,
-            from_gloss: ALL,
-            ..LitRow::EMPTY
+            has_facet: ALL,
+            only_specular_before: ALL,
+            after_gloss: ALL,
+            ..VertexBatch::EMPTY
         };
-        let plain = LitRow { used: ALL, ..LitRow::EMPTY };
+        let plain = VertexBatch { used: ALL, ..VertexBatch::EMPTY };
         let mut row = noisy;
         row.keep(0b11);
         row.copy(2, &plain, 7);
-        row.copy(3, &LitRow { seen: 1 << 9, ..plain }, 9);
-        let bits = [row.used, row.is_bounded, row.may_lift, row.apart, row.seen, row.from_gloss];
+        row.copy(3, &VertexBatch { only_specular_before: 1 << 9, ..plain }, 9);
+        let bits = [
+            row.used,
+            row.is_bounded,
+            row.may_lift,
+            row.has_facet,
+            row.only_specular_before,
+            row.after_gloss,
+        ];
         assert_eq!(bits, [0b1111, 0b11, 0b11, 0b11, 0b1011, 0b11]);
     }
 }

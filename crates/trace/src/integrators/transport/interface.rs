@@ -2,8 +2,8 @@
 
 use super::cone::Bend;
 use super::medium::{Medium, ior};
-use super::queues::PathRay;
-use super::vertices::{Shading, Vertex};
+use super::ray::PathRay;
+use super::vertex::{Shading, Vertex};
 use crate::materials::fresnel::{dielectric, refract};
 use crate::materials::mirror::reflect;
 use crate::math::Vec3;
@@ -27,7 +27,7 @@ pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflect
         ray: vertex.leaving(direction.normalize()),
         throughput: path.throughput * reflectance,
         path: path.next_path(REFLECTED),
-        history: path.history.mirrored(reflectance.max_element()),
+        state: path.state.mirrored(reflectance.max_element()),
         cone: vertex.bent_cone(Bend::Reflected),
         ..*path
     }
@@ -56,7 +56,7 @@ pub fn interface(
         ray: vertex.leaving(direction),
         path: path.next_path(REFRACTED),
         medium: far,
-        history: path.history.mirrored(1.0),
+        state: path.state.mirrored(1.0),
         cone: vertex.bent_cone(Bend::Refracted(eta)),
         ..*path
     });

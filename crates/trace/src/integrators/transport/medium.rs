@@ -73,6 +73,40 @@ impl Medium {
     }
 }
 
+/// Media of vertices, by number. Number 0 is air.
+#[derive(Debug, Default)]
+pub struct Media {
+    /// Media with glass, from number 1 on.
+    inside: Vec<Medium>,
+}
+
+impl Media {
+    /// Forgets all media.
+    pub fn clear(&mut self) {
+        self.inside.clear();
+    }
+
+    /// Whether all media are air.
+    pub fn are_air(&self) -> bool {
+        self.inside.is_empty()
+    }
+
+    /// The number of a medium, which it keeps.
+    pub fn number(&mut self, medium: Medium) -> u32 {
+        if medium.is_air() {
+            return 0;
+        }
+        self.inside.push(medium);
+        self.inside.len() as u32
+    }
+
+    /// The medium of a number.
+    #[inline]
+    pub fn get(&self, number: u32) -> Medium {
+        (number as usize).checked_sub(1).map_or(Medium::default(), |index| self.inside[index])
+    }
+}
+
 /// Transmittance of glass along a ray to its hit at `distance`.
 pub fn absorption(world: &World, medium: Medium, distance: f32) -> Vec3 {
     let glass = medium.glass().and_then(|inside| glass_of(world, inside));

@@ -1,13 +1,14 @@
 //! Direct light (next-event estimation) at vertices, in rows of sixteen: every light with its own shadow rays.
 
-use super::beside::Others;
-use super::lit_row::{LitRow, Response};
-use super::medium::{Medium, absorption};
-use super::shot::Shot;
-use super::view::Measure;
+use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
+use crate::integrators::transport::batch::{Response, VertexBatch};
+use crate::integrators::transport::medium::{Media, absorption};
+use crate::integrators::transport::tile::TileContext;
+use crate::integrators::view::Measure;
 use crate::lights::{EmissionTexture, Light, LightRow, Middle, Source, SourceRow};
+use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
@@ -17,15 +18,15 @@ use crate::world::Loops;
 
 /// Lights the vertices of a row whose bits are set. It is compiled without MIS weights for cases in which only light
 /// samples find lamps.
-pub(super) struct Lighting<'a, const WEIGHED: bool> {
-    pub(super) shot: &'a Shot<'a>,
-    pub(super) row: &'a LitRow,
-    pub(super) used: u32,
-    pub(super) measure: Measure,
+pub struct Lighting<'a, const WEIGHED: bool> {
+    pub tile: &'a TileContext<'a>,
+    pub row: &'a VertexBatch,
+    pub used: u32,
+    pub measure: Measure,
     /// Competing technique; unused if nothing is weighted.
-    pub(super) others: Others,
+    pub competing: CompetingTechnique,
     /// Media of the vertices. `None` if all are in air.
-    pub(super) media: Option<&'a [Medium]>,
+    pub media: Option<&'a Media>,
 }
 
 /// Rays for the direct light of vertices.
@@ -48,23 +49,23 @@ impl std::ops::AddAssign for LightRays {
 }
 
 /// Light that arrives at the vertices of a row and is reflected towards the camera.
-pub(super) struct Arrived {
+pub struct Arrived {
     /// Reflected light, before the throughput of the paths.
-    pub(super) light: Lanes3,
-    pub(super) rays: LightRays,
+    pub light: Lanes3,
+    pub rays: LightRays,
 }
 
 /// Sums over the lights.
-pub(super) struct Sums {
+pub struct Sums {
     /// Sum of the light that arrives.
-    pub(super) light: Lanes3,
+    pub light: Lanes3,
     /// Sum of the light that could arrive.
-    pub(super) total: Lanes,
-    pub(super) rays: LightRays,
+    pub total: Lanes,
+    pub rays: LightRays,
 }
 
 impl Sums {
-    pub(super) const NOTHING: Self = Self {
+    pub const NOTHING: Self = Self {
         light: [[0.0; LANES]; 3],
         total: [0.0; LANES],
         rays: LightRays { shadow: 0, scattered: 0, lookups: 0 },
@@ -72,7 +73,7 @@ impl Sums {
 
     /// The result of the sums.
     #[inline(always)]
-    pub(super) fn arrived(mut self, measure: Measure) -> Arrived {
+    pub fn arrived(mut self, measure: Measure) -> Arrived {
         if measure == Measure::ArrivingShare {
             for i in 0..LANES {
                 let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
@@ -103,11 +104,11 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
 impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// Adds the light of all lights that `takes` accepts.
     #[inline(always)]
-    pub(super) fn add_all(&self, takes: impl Fn(&Light) -> bool, sums: &mut Sums, folds: impl Folds) {
-        let render = &self.shot.settings.render;
+    pub fn add_all(&self, takes: impl Fn(&Light) -> bool, sums: &mut Sums, folds: impl Folds) {
+        let render = &self.tile.settings.render;
         let mut sampler = None;
-        for (number, light) in self.shot.world.lights.iter().filter(|(_, light)| takes(light)) {
-            if WEIGHED && self.shot.leaves_sky && light.is_from_all_around() {
+        for (number, light) in self.tile.world.lights.iter().filter(|(_, light)| takes(light)) {
+            if WEIGHED && self.tile.leaves_sky && light.is_from_all_around() {
                 continue;
             }
             // If one ray decides for the whole light, its light waits for that ray.
@@ -121,18 +122,18 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             if light.is_single() {
                 let nowhere = [[0.0; LANES]; 2];
                 let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &nowhere);
-                let (values, active) = self.values(&samples, 1.0, folds);
+                let (values, active, _) = self.values(&samples, 1.0, folds);
                 self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
             } else {
                 let count = render.shadow_samples;
                 if sampler.is_none() {
-                    sampler = Some(self.row.sampler(self.shot));
+                    sampler = Some(self.row.sampler(self.tile));
                 }
                 let Some(sampler) = &sampler else { continue };
                 for repetition in 0..count {
                     let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
                     let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
-                    let (mut values, active) = self.values(&samples, 1.0 / count as f32, folds);
+                    let (mut values, active, response) = self.values(&samples, 1.0 / count as f32, folds);
                     // Multiply by the emission texture.
                     if let Some(pattern) = light.emission_texture() {
                         values = self.tinted(pattern, &samples, active, values);
@@ -140,15 +141,20 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                     }
                     // Weight against the competing technique.
                     if WEIGHED {
-                        let leaves_gloss = self.shot.lobes_find_sky && light.is_from_all_around();
-                        let of_light = if leaves_gloss && self.others.are_lobes() {
+                        let leaves_gloss = self.tile.lobes_find_sky && light.is_from_all_around();
+                        let of_light = if leaves_gloss && self.competing.are_lobes() {
                             // Pretend that light samples hardly ever come, so that lobes bring all.
                             [f32::MAX; LANES]
                         } else {
                             light.inverse_densities(&samples)
                         };
-                        let others = self.others.to_each(count);
-                        values = self.others.left(self.row, &samples, values, (&of_light, others));
+                        let competing = self.competing.rays_per_sample(count);
+                        values = self.competing.weighted(
+                            self.row,
+                            (&samples, &response),
+                            values,
+                            (&of_light, competing),
+                        );
                     }
                     self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
                 }
@@ -163,12 +169,12 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// Multiplies values by the transmittance of glass around the vertices on the way to the samples.
     #[cold]
     #[inline(never)]
-    fn left_by_glass(&self, media: &[Medium], samples: &LightRow, mut values: Lanes3) -> Lanes3 {
+    fn left_by_glass(&self, media: &Media, samples: &LightRow, mut values: Lanes3) -> Lanes3 {
         for i in lanes(self.used) {
             let way = lane(&samples.targets, i) - lane(&self.row.from, i);
             let is_beyond = samples.beyond & 1 << i != 0;
             let distance = if is_beyond { f32::MAX } else { way.length() };
-            let left = absorption(self.shot.world, media[self.row.medium[i] as usize], distance);
+            let left = absorption(self.tile.world, media.get(self.row.medium[i]), distance);
             let value = lane(&values, i) * left;
             set_lane(&mut values, i, value);
         }
@@ -235,13 +241,15 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         sums: &mut Sums,
         folds: impl Folds,
     ) {
-        let is_untraced = self.shot.settings.render.shadows == Shadows::Off;
+        let is_untraced = self.tile.settings.render.shadows == Shadows::Off;
         if is_untraced && self.measure == Measure::Work {
             return;
         }
+        // Without shadows, all of it arrives.
         let Some((middle, source)) = middle.filter(|_| !is_untraced) else {
             return add_where(waiting.active, &waiting.light, &mut sums.light);
         };
+        // Aim a ray at the middle of the light.
         let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
         for i in 0..LANES {
             let from = lane(&self.row.from, i);
@@ -262,7 +270,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
 
     /// Adds the unoccluded light on the rays of `traced`; the others end below 0.
     #[inline(always)]
-    pub(super) fn add_seen(
+    pub fn add_seen(
         &self,
         (rays, ends, traced): (&RayRows, &Ends, u32),
         sources: &SourceRow,
@@ -272,16 +280,17 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     ) {
         sums.rays.shadow += u64::from(traced.count_ones());
         if self.measure == Measure::Work {
-            return add_work(self.shot, rays, ends, traced, &mut sums.light);
+            return add_work(self.tile, rays, ends, traced, &mut sums.light);
         }
-        let occluded = self.shot.world.geometry.occluded_rows(rays, ends, traced, sources, folds);
+        let occluded = self.tile.world.geometry.occluded_rows(rays, ends, traced, sources, folds);
         add_where(traced & !occluded, values, &mut sums.light);
     }
 
-    /// Contribution of each sample if it is not occluded, and a bit for each that is not 0.
+    /// Contribution of each sample if it is not occluded, a bit for each that is not 0, and the response of its vertex.
     #[inline(always)]
-    pub(super) fn values(&self, samples: &LightRow, share: f32, folds: impl Folds) -> (Lanes3, u32) {
-        let Response { f, cosines, .. } = self.row.response(&samples.directions);
+    pub fn values(&self, samples: &LightRow, share: f32, folds: impl Folds) -> (Lanes3, u32, Response) {
+        let response = self.row.response(&samples.directions);
+        let Response { bsdf: BsdfValues { f, .. }, cosines } = &response;
         let mut arriving = samples.weights;
         if self.measure == Measure::ArrivingShare {
             for i in 0..LANES {
@@ -289,9 +298,9 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 set_lane(&mut arriving, i, light);
             }
         }
-        let (mut values, mut active) = (f, [0; LANES]);
+        let (mut values, mut active) = (*f, [0; LANES]);
         for i in 0..LANES {
-            let value = lane(&f, i) * lane(&arriving, i) * (cosines[i] * share);
+            let value = lane(f, i) * lane(&arriving, i) * (cosines[i] * share);
             set_lane(&mut values, i, value);
             let brings = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
             active[i] = if brings { TRUE } else { 0 };
@@ -299,12 +308,12 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         if let Some(media) = self.media.filter(|_| self.measure != Measure::ArrivingShare) {
             values = self.left_by_glass(media, samples, values);
         }
-        (values, folds.bits(&active) & self.used)
+        (values, folds.bits(&active) & self.used, response)
     }
 
     /// The shadow rays of the samples in `active`; the other lanes have no end.
     #[inline(always)]
-    pub(super) fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayRows, Ends) {
+    pub fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayRows, Ends) {
         let (mut direction, mut ends) = (samples.directions, [-1.0; LANES]);
         for i in 0..LANES {
             let ray = Ray::segment(lane(&self.row.from, i), lane(&samples.targets, i));
@@ -322,9 +331,9 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
 /// Adds the work of the rays whose bits are set: what they visit in the trees, up to their ends.
 #[cold]
 #[inline(never)]
-pub(super) fn add_work(shot: &Shot<'_>, rays: &RayRows, ends: &Ends, traced: u32, sums: &mut Lanes3) {
+pub fn add_work(tile: &TileContext<'_>, rays: &RayRows, ends: &Ends, traced: u32, sums: &mut Lanes3) {
     for i in lanes(traced) {
-        let work = shot.world.geometry.work(&Ray { t_max: ends[i], ..rays.ray(i) });
+        let work = tile.world.geometry.work(&Ray { t_max: ends[i], ..rays.ray(i) });
         let sum = lane(sums, i) + Vec3::splat(work as f32);
         set_lane(sums, i, sum);
     }
@@ -332,7 +341,7 @@ pub(super) fn add_work(shot: &Shot<'_>, rays: &RayRows, ends: &Ends, traced: u32
 
 /// Adds the values of the lanes whose bits are set.
 #[inline(always)]
-pub(super) fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
+pub fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
     for axis in 0..3 {
         for i in 0..LANES {
             let is_added = bits & 1 << i != 0;

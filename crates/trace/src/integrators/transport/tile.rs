@@ -3,18 +3,17 @@
 use std::array;
 use std::ops::Range;
 
-use super::RenderSettings;
-use super::photons::PhotonMaps;
-use super::view::Measure;
 use crate::control::CancelToken;
 use crate::film::{Part, Pixels};
+use crate::integrators::RenderSettings;
+use crate::integrators::method::Behaviour;
 use crate::lights::{Environment, Receivers};
 use crate::sampling::PixelSampler;
-use crate::scene::description::{Integrator, Shadows};
+use crate::scene::description::Shadows;
 use crate::world::{PACKET, World};
 
 /// Context of a tile: a world, the settings, and the requested samples.
-pub struct Shot<'a> {
+pub struct TileContext<'a> {
     /// The scene.
     pub world: &'a World,
     /// The settings.
@@ -25,8 +24,8 @@ pub struct Shot<'a> {
     pub token: &'a CancelToken,
     /// Growth of a pixel's beam with the distance; 0 if nothing needs it, as without mip levels.
     pub pixel_spread: f32,
-    /// Photons of the samples. `None` if none are gathered.
-    pub photons: Option<&'a PhotonMaps>,
+    /// Behaviour of the rays.
+    pub behaviour: Behaviour,
     /// Whether paths find a constant environment without light samples: the ray that goes on anyway is at least as good as a
     /// sample, as only occluders tell one direction from another.
     pub leaves_sky: bool,
@@ -34,13 +33,14 @@ pub struct Shot<'a> {
     pub lobes_find_sky: bool,
 }
 
-impl<'a> Shot<'a> {
+impl<'a> TileContext<'a> {
     /// The context for these samples.
     pub fn new(
         world: &'a World,
         settings: &'a RenderSettings,
         block: &'a SampleBlock,
         token: &'a CancelToken,
+        behaviour: Behaviour,
     ) -> Self {
         let pixel_spread =
             if world.is_mipmapped() { world.camera.pixel_spread(settings.render.height) } else { 0.0 };
@@ -50,18 +50,13 @@ impl<'a> Shot<'a> {
             Some(Environment::Map { .. }) | None => false,
         };
         let leaves_sky = is_even
-            && render.integrator == Integrator::Path
-            && settings.view.shown().measure() != Measure::ArrivingShare
+            && behaviour.scatters
+            && !behaviour.gathers
             && render.shadows == Shadows::Soft
             && render.shadow_samples == 1
             && render.clamp == 0.0;
         let lobes_find_sky = is_even && world.lights.selection(Receivers::Eye).is_none();
-        Self { world, settings, block, token, pixel_spread, photons: None, leaves_sky, lobes_find_sky }
-    }
-
-    /// Purpose of the light samples at its vertices.
-    pub fn receivers(&self) -> Receivers {
-        receivers(self.settings, self.photons.is_some())
+        Self { world, settings, block, token, pixel_spread, behaviour, leaves_sky, lobes_find_sky }
     }
 
     /// The random numbers of a slot.
@@ -69,13 +64,6 @@ impl<'a> Shot<'a> {
         let (x, y, sample) = self.block.place(slot);
         PixelSampler::new(self.settings.render.seed, x, y, sample)
     }
-}
-
-/// Purpose of light samples, with photons or without. For the share of light that arrives, all light is sampled.
-pub fn receivers(settings: &RenderSettings, are_gathered: bool) -> Receivers {
-    let goes_on = are_gathered || settings.render.integrator == Integrator::Path;
-    let is_share = settings.view.shown().measure() == Measure::ArrivingShare;
-    if goes_on && !is_share { Receivers::Paths } else { Receivers::Eye }
 }
 
 /// The samples of a tile. A slot is the index of a sample among them: all of the first pixel, then all of the next.

@@ -1,21 +1,8 @@
 //! Choice of a photon. One photon of a kernel, chosen by its contribution, answers for all whether a wall is between them and the
 //! point, so that the light is right in the mean.
 
-use super::map::Look;
-use crate::geometry::Ray;
-use crate::lights::Source;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes};
-use crate::world::Geometry;
-
-/// Height of the way to a photon above the surface, in radii of the kernel: over the curvature of the surface itself.
-const ABOVE: f32 = 0.15;
-
-/// Height of the way if something hangs closer above the surface, such as a ball at rest on it.
-const BELOW: f32 = 0.02;
-
-/// Length, in radii, below which a way is free.
-const NEAR: f32 = 1e-3;
 
 /// Largest number below 1.
 const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
@@ -85,26 +72,6 @@ impl Choices {
     }
 }
 
-/// Whether something is between a point and a photon of its kernel: on the way above the surface, or, if one of them lacks that
-/// much room above it, on the way close to the surface.
-pub fn is_apart(geometry: &Geometry, look: &Look, photon: &Place, radius: f32) -> bool {
-    if (photon.point - look.point).length_squared() < (NEAR * radius) * (NEAR * radius) {
-        return false;
-    }
-    let lifted = |lift: f32| {
-        let above = lift * radius;
-        [look.point + above * look.normal, photon.point + above * photon.normal]
-    };
-    let is_blocked = |from, to| geometry.occluded(&Ray::segment(from, to), Source::Nothing);
-    let [from, to] = lifted(ABOVE);
-    if !is_blocked(from, to) {
-        return false;
-    }
-    let [low_from, low_to] = lifted(BELOW);
-    let has_room = !is_blocked(low_from, from) && !is_blocked(low_to, to);
-    has_room || is_blocked(low_from, low_to)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -128,8 +95,8 @@ mod tests {
         }
         for (weight, count) in weights.as_flattened().iter().zip(counts.as_flattened()) {
             let expected = f64::from(weight / total) * f64::from(DRAWS);
-            let apart = (f64::from(*count) - expected).abs();
-            assert!(apart <= 5.0 * expected.sqrt(), "{count} times where {expected} are expected");
+            let has_facet = (f64::from(*count) - expected).abs();
+            assert!(has_facet <= 5.0 * expected.sqrt(), "{count} times where {expected} are expected");
         }
         assert_eq!(Choices::new(0.3).chosen(0.5), None);
     }

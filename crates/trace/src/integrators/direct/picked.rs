@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use super::light::{Lighting, Sums, add_where};
-use super::pool::Pool;
-use super::view::Measure;
+use super::all_lights::{Lighting, Sums, add_where};
+use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::rows::lanes;
+use crate::integrators::view::Measure;
 use crate::lights::{Light, LightRow, LightTree, Lobe, Middle, Picks, Receiver, ReceiverRow, Selection};
+use crate::materials::bsdf::NarrowLobe;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
@@ -14,12 +15,12 @@ use crate::scene::description::Shadows;
 use crate::world::Loops;
 
 /// Lights the vertices of a row by picked lights.
-pub(super) struct Picking<'a, const WEIGHED: bool> {
-    pub(super) lighting: Lighting<'a, WEIGHED>,
-    pub(super) selection: Selection<'a>,
+pub struct Picking<'a, const WEIGHED: bool> {
+    pub lighting: Lighting<'a, WEIGHED>,
+    pub selection: Selection<'a>,
     /// Number of the row; then the pool for its rays.
-    pub(super) number: u32,
-    pub(super) pool: &'a mut Pool,
+    pub number: u32,
+    pub pool: &'a mut ShadowRayQueue,
 }
 
 /// One pick for each vertex of a row. The picks of one sample are in the order of the tree, so that rows of rays go to places
@@ -43,13 +44,13 @@ impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
     #[inline(always)]
     fn run(self, folds: impl Folds) -> Sums {
         let Self { lighting, selection, number, pool } = self;
-        let sampler = lighting.row.sampler(lighting.shot);
+        let sampler = lighting.row.sampler(lighting.tile);
         let mut sums = Sums::NOTHING;
         // Sample all lights beyond the scene, if the tree leaves them out.
         if selection.leaves_beyond {
             lighting.add_all(Light::is_beyond, &mut sums, folds);
         }
-        let samples = lighting.shot.settings.render.shadow_samples;
+        let samples = lighting.tile.settings.render.shadow_samples;
         let (each, tree) = (selection.picks.count, selection.tree);
         // With many samples, the rays of one row of picks already go to one place.
         let mut pool = (samples <= TOGETHER).then_some(pool);
@@ -70,7 +71,7 @@ struct Taking<'a> {
     tree: &'a LightTree,
     row: u32,
     /// Pool for the rays. `None` to trace rays at once.
-    pool: Option<&'a mut Pool>,
+    pool: Option<&'a mut ShadowRayQueue>,
     sums: &'a mut Sums,
 }
 
@@ -116,9 +117,10 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         samples: Range<u32>,
     ) -> Vec<PickRow> {
         let row = self.row;
-        let count = self.shot.settings.render.shadow_samples * way.count;
+        let count = self.tile.settings.render.shadow_samples * way.count;
         let group = way.count as usize;
         let (first, end) = (samples.start * way.count, samples.end * way.count);
+        // Sort the random numbers of each group of picks.
         let mut numbers = vec![[0.0; LANES]; (end - first) as usize];
         for k in first..end {
             let u = sampler.pairs(&row.path, Decision::Pick, k, count);
@@ -135,6 +137,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 numbers[place + parts[i] as usize][i] = digits[i];
             }
         }
+        // Pick lights by the numbers.
         let mut picks = vec![PickRow::NOTHING; numbers.len()];
         if tree.is_flat() {
             self.pick_flat(tree, &numbers, &mut picks);
@@ -151,15 +154,19 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     #[inline(always)]
     fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; LANES]], picks: &mut [PickRow]) {
         let row = self.row;
+        // Estimate the light of each lamp at each vertex, with glossy lobes and without.
         let plain = ReceiverRow::plain(&row.from, &row.normal);
         let mut glossy = plain.clone();
-        for i in lanes(if row.is_glossy { self.used } else { 0 }) {
+        for i in lanes(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
             if let Some(lobe) = self.lobe(i) {
                 glossy.set_lobe(i, &lobe);
             }
         }
-        let Some(shares) = tree.flat_shares(&glossy, row.is_glossy) else { return };
-        let without = (WEIGHED && row.is_glossy).then(|| tree.flat_shares(&plain, false)).flatten();
+        // Turn the estimates into probabilities.
+        let Some(shares) = tree.flat_shares(&glossy, row.bsdf.has_narrow_lobes()) else { return };
+        let without =
+            (WEIGHED && row.bsdf.has_narrow_lobes()).then(|| tree.flat_shares(&plain, false)).flatten();
+        // Pick by each row of numbers.
         for (numbers, pick) in numbers.iter().zip(picks) {
             let picked = shares.pick(numbers);
             pick.lights = picked.lights;
@@ -201,19 +208,15 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         }
     }
 
-    /// The glossy lobe of a vertex.
+    /// The narrow lobe of a vertex, relative to its wide ones.
     #[inline(always)]
     fn lobe(&self, i: usize) -> Option<Lobe> {
-        let lobes = self.row.lobes(i);
-        if !(lobes.specular > 0.0) {
-            return None;
-        }
-        let [diffuse, glossy] = [lobes.value(0.0), lobes.value(1.0) - lobes.value(0.0)];
-        let is_both = diffuse > 0.0;
+        let NarrowLobe { axis, exponent, peak, wide } = self.row.bsdf.narrow_lobe(i)?;
+        let is_both = wide > 0.0;
         Some(Lobe {
-            axis: lobes.mirrored_eye,
-            shininess: lobes.shininess,
-            peak: if is_both { glossy / diffuse } else { 1.0 },
+            axis,
+            shininess: exponent,
+            peak: if is_both { peak / wide } else { 1.0 },
             diffuse: if is_both { 1.0 } else { 0.0 },
         })
     }
@@ -229,23 +232,26 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         folds: impl Folds,
     ) {
         let Taking { tree, row: row_number, pool, sums } = taking;
-        let (row, render) = (self.row, &self.shot.settings.render);
+        let (row, render) = (self.row, &self.tile.settings.render);
         let (lights, used) = pick.lights();
+        // Sample a point on each picked light.
         let u = sampler.pairs(&row.path, Decision::Picked, number, count);
         let at = (&row.from, &row.normal);
-        let (mut samples, mut inverse, lookups) = self.shot.world.lights.sample_each(&lights, at, used, &u);
+        let (mut samples, mut inverse, lookups) = self.tile.world.lights.sample_each(&lights, at, used, &u);
         sums.rays.lookups += lookups;
         for i in 0..LANES {
             let weight = lane(&samples.weights, i) * pick.shares[i];
             set_lane(&mut samples.weights, i, weight);
             inverse[i] *= pick.weighed[i];
         }
-        let (mut values, active) = self.values(&samples, 1.0, folds);
+        // Compute what would arrive from it.
+        let (mut values, active, response) = self.values(&samples, 1.0, folds);
         let active = active & used;
         if WEIGHED {
             // Each group of picks has its own pdf, and as many rays in lobes as requested samples compete with all groups.
-            let others = self.others.to_each(render.shadow_samples) * render.shadow_samples as f32;
-            values = self.others.left(row, &samples, values, (&inverse, others));
+            let competing =
+                self.competing.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
+            values = self.competing.weighted(row, (&samples, &response), values, (&inverse, competing));
         }
         if active == 0 {
             return;
@@ -261,6 +267,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             Shadows::Hard => self.aim_at_middles(&mut samples, &lights, active),
             Shadows::Soft => {}
         }
+        // Trace shadow rays, or let them wait for others to the same lights.
         let traced = active & !row.hidden(&samples.directions, folds);
         let (rays, ends) = self.shadow_rays(&samples, traced);
         match pool {
@@ -279,7 +286,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// Aims rays at the middles of the lights that have one.
     fn aim_at_middles(&self, samples: &mut LightRow, lights: &[u32; LANES], active: u32) {
         for i in lanes(active) {
-            let Some((middle, source)) = self.shot.world.lights.get(lights[i]).middle() else { continue };
+            let Some((middle, source)) = self.tile.world.lights.get(lights[i]).middle() else { continue };
             let direction = match middle {
                 Middle::At(middle) => {
                     set_lane(&mut samples.targets, i, middle);

@@ -1,0 +1,171 @@
+//! The interface of rough BSDFs: lobes that are not δ, in rows of sixteen surfaces of one kind.
+//!
+//! A kind is a file that implements the three traits, and a line in the table of [`rough`](super::rough). No other file tells kinds
+//! apart: an integrator asks a [`BsdfRow`](super::BsdfRow) for `f`, `pdf` and `sample` of all lanes at once.
+//!
+//! A kind may have a narrow lobe beside its wide ones, whose light has rays of its own: see [`LobeSet::Narrow`].
+
+use std::sync::Arc;
+
+use super::footprint::TexturePoint;
+use super::texture::Texture;
+use crate::math::Vec3;
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Truths};
+
+/// Texture coordinates, side by side.
+pub type UvRow = [[f64; LANES]; 2];
+
+/// Lobes that a view shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShownLobes {
+    /// Lobes by their role.
+    Of {
+        /// The wide lobes.
+        diffuse: bool,
+        /// The narrow lobe.
+        specular: bool,
+    },
+    /// Not the surface's lobes, but f = 1 in sr⁻¹ for every direction.
+    Unit,
+}
+
+impl ShownLobes {
+    /// All lobes.
+    pub const ALL: Self = Self::Of { diffuse: true, specular: true };
+}
+
+/// Lobes from which directions are sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LobeSet {
+    /// All lobes, whatever lobes are shown.
+    All,
+    /// The narrow lobe alone.
+    Narrow,
+}
+
+/// The BSDFs of a row for one direction each.
+#[derive(Clone, Debug)]
+pub struct BsdfValues {
+    /// f in sr⁻¹ of the shown lobes.
+    pub f: Lanes3,
+    /// A number for each surface that f, pdf and the parts of f share; each kind has its own.
+    pub(super) shared: Lanes,
+}
+
+/// Shape of a narrow lobe, as far as the choice of lights needs it: a power of the cosine about an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NarrowLobe {
+    /// Unit direction of the axis.
+    pub axis: Vec3,
+    /// Exponent of the cosine.
+    pub exponent: f32,
+    /// f in sr⁻¹ at the peak, grey.
+    pub peak: f32,
+    /// f in sr⁻¹ of the wide lobes, grey.
+    pub wide: f32,
+}
+
+/// A rough material: its textures and numbers.
+pub trait RoughMaterial {
+    /// The material at one point.
+    type Point: RoughPoint;
+
+    /// Looks its textures up.
+    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Self::Point;
+
+    /// The material with white in place of its textures.
+    fn bleached(&self) -> Self::Point;
+
+    /// Its constant value. `None` if it has textures.
+    fn constant(&self) -> Option<Self::Point>;
+
+    /// Its main colour.
+    fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3;
+
+    /// Reflectance of ambient light.
+    fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3;
+
+    /// Its textures.
+    fn textures(&self) -> impl Iterator<Item = &Arc<Texture>>;
+
+    /// Whether rows are filled with it, at most by a look-up of [`RoughMaterial::row_texture`].
+    fn fills_rows(&self) -> bool;
+
+    /// The texture that rows look up. `None` if they look up nothing.
+    fn row_texture(&self) -> Option<&Texture>;
+}
+
+/// A rough material at one point.
+pub trait RoughPoint {
+    /// Whether it reflects nothing.
+    fn is_black(&self) -> bool;
+
+    /// Reflectance of ambient light.
+    fn ambient(&self) -> Vec3;
+}
+
+/// Rough surfaces of one kind, side by side. All functions run inside of loops for each instruction set.
+pub trait RoughRow: Clone {
+    /// The material.
+    type Material: RoughMaterial<Point = Self::Point>;
+    /// The material at one point.
+    type Point: RoughPoint;
+
+    /// A row of any content.
+    const EMPTY: Self;
+
+    /// Prepares the row for other surfaces.
+    fn reset(&mut self);
+
+    /// Sets a surface, for a direction to the viewer, by the unit shading normal on that side.
+    fn put(&mut self, i: usize, bsdf: &Self::Point, shown: ShownLobes, normal: Vec3, to_eye: Vec3);
+
+    /// Sets the surfaces of some lanes to a material, looked up at these texture coordinates, or bleached without them. Each entry
+    /// of `shown` replaces those before it. Returns a bit for each surface that reflects nothing.
+    fn fill(
+        &mut self,
+        material: &Self::Material,
+        uv: Option<&UvRow>,
+        shown: &[(u32, ShownLobes)],
+        folds: impl Folds,
+    ) -> u32;
+
+    /// Sets shading normals on the viewer's side, and directions from the viewer; in these lanes only, if any are given.
+    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3);
+
+    /// Takes a surface of another row.
+    fn copy(&mut self, i: usize, other: &Self, from: usize);
+
+    /// Evaluates the shown lobes for light from these directions.
+    fn f(&self, directions: &Lanes3) -> BsdfValues;
+
+    /// The parts of f: of the wide lobes, and of the narrow lobe.
+    fn parts(&self, values: &BsdfValues) -> [Lanes3; 2];
+
+    /// f in sr⁻¹ of all lobes, whatever lobes are shown, by the largest components of their colours.
+    fn grey(&self, values: &BsdfValues) -> Lanes;
+
+    /// Pdfs in sr⁻¹ of directions among the samples of lobes, with these normals for the cosine.
+    fn pdf(&self, lobes: LobeSet, normals: &Lanes3, directions: &Lanes3, values: &BsdfValues) -> Lanes;
+
+    /// Samples a unit direction for each surface; `choices` choose the lobes and `u` the directions in them, all in [0, 1).
+    fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3;
+
+    /// Whether any surface may have a narrow lobe; without one, [`RoughRow::sample`] ignores the choices.
+    fn has_narrow_lobes(&self) -> bool;
+
+    /// Whether a surface has a narrow lobe, shown or not.
+    fn has_narrow_lobe(&self, i: usize) -> bool;
+
+    /// The narrow lobe of a surface. `None` if it has none.
+    fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe>;
+
+    /// A bit for each surface with a narrow lobe that is at least as narrow as a cosine to this power.
+    fn narrower_than(&self, of: u32, exponent: f32) -> u32;
+
+    /// f in sr⁻¹ of the shown lobes of a surface, if it is the same for all directions.
+    fn even(&self, i: usize) -> Option<Vec3>;
+
+    /// f in sr⁻¹ of the shown lobes of a surface for light from a direction.
+    fn f_at(&self, i: usize, direction: Vec3) -> Vec3;
+}

@@ -1,0 +1,296 @@
+//! Phong surfaces in rows of sixteen.
+
+use super::lobes::{Lobes, gloss};
+use super::{Phong, PhongBsdf};
+use crate::materials::bsdf::{BsdfValues, LobeSet, NarrowLobe, RoughRow, ShownLobes, UvRow};
+use crate::math::Vec3;
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane, take, truths};
+
+/// Phong surfaces, side by side. The values of f that are shared are those of [`gloss`].
+#[derive(Clone, Debug)]
+pub struct PhongRow {
+    /// The direction to the viewer, mirrored.
+    mirrored_eye: Lanes3,
+    /// The diffuse part of f in sr⁻¹, as far as it is shown.
+    diffuse: Lanes3,
+    /// The glossy part of f in sr⁻¹ at its peak, as far as it is shown.
+    specular: Lanes3,
+    /// Exponent of the glossy lobe.
+    shininess: Lanes,
+    /// The largest components of kd and ks, whatever parts are shown.
+    albedos: [Lanes; 2],
+    /// Whether any surface has a glossy lobe.
+    is_glossy: bool,
+}
+
+impl PhongRow {
+    /// The lobes of a surface.
+    #[inline(always)]
+    fn lobes(&self, i: usize, normals: &Lanes3) -> Lobes {
+        Lobes {
+            normal: lane(normals, i),
+            mirrored_eye: lane(&self.mirrored_eye, i),
+            diffuse: self.albedos[0][i],
+            specular: self.albedos[1][i],
+            shininess: self.shininess[i],
+        }
+    }
+
+    /// The glossy lobe of a surface alone.
+    #[inline(always)]
+    fn glossy_lobe(&self, i: usize, normals: &Lanes3) -> Lobes {
+        Lobes { diffuse: 0.0, specular: 1.0, ..self.lobes(i, normals) }
+    }
+
+    /// Sets the lobes of some lanes.
+    #[inline(always)]
+    fn set(&mut self, of: u32, shown: ShownLobes, diffuse: &Lanes3, specular: Vec3, shininess: f32) {
+        let white = PhongBsdf { diffuse: Vec3::ONE, specular, shininess, ambient: Vec3::ZERO };
+        let [of_white, glossy] = shown_parts(&white, shown);
+        let (mut shown_diffuse, mut greatest) = ([[of_white.x; LANES]; 3], [0.0; LANES]);
+        if shown != ShownLobes::Unit {
+            for i in 0..LANES {
+                set_lane(&mut shown_diffuse, i, lane(diffuse, i) * of_white);
+            }
+        }
+        for i in 0..LANES {
+            greatest[i] = lane(diffuse, i).max_element();
+        }
+        let of = truths(of);
+        for axis in 0..3 {
+            take(&of, &shown_diffuse[axis], &mut self.diffuse[axis]);
+            take(&of, &[glossy[axis]; LANES], &mut self.specular[axis]);
+        }
+        take(&of, &[shininess; LANES], &mut self.shininess);
+        take(&of, &greatest, &mut self.albedos[0]);
+        take(&of, &[specular.max_element(); LANES], &mut self.albedos[1]);
+        self.is_glossy |= specular != Vec3::ZERO;
+    }
+}
+
+/// The diffuse part of f in sr⁻¹, and the glossy part at its peak, as far as they are shown.
+#[inline(always)]
+fn shown_parts(bsdf: &PhongBsdf, shown: ShownLobes) -> [Vec3; 2] {
+    let part = |is_taken: bool, value: Vec3| if is_taken { value } else { Vec3::ZERO };
+    match shown {
+        ShownLobes::Of { diffuse, specular } => {
+            [part(diffuse, bsdf.diffuse_value()), part(specular, bsdf.specular_peak())]
+        }
+        ShownLobes::Unit => [Vec3::ONE, Vec3::ZERO],
+    }
+}
+
+/// A bit for each black colour.
+#[inline(always)]
+fn black(colors: &Lanes3, folds: impl Folds) -> u32 {
+    let mut black = [0; LANES];
+    for i in 0..LANES {
+        let Vec3 { x, y, z } = lane(colors, i);
+        black[i] = if (x == 0.0) & (y == 0.0) & (z == 0.0) { TRUE } else { 0 };
+    }
+    folds.bits(&black)
+}
+
+impl RoughRow for PhongRow {
+    type Material = Phong;
+    type Point = PhongBsdf;
+
+    const EMPTY: Self = Self {
+        mirrored_eye: [[0.0; LANES]; 3],
+        diffuse: [[0.0; LANES]; 3],
+        specular: [[0.0; LANES]; 3],
+        shininess: [0.0; LANES],
+        albedos: [[0.0; LANES]; 2],
+        is_glossy: false,
+    };
+
+    #[inline(always)]
+    fn reset(&mut self) {
+        self.is_glossy = false;
+    }
+
+    #[inline(always)]
+    fn put(&mut self, i: usize, bsdf: &PhongBsdf, shown: ShownLobes, normal: Vec3, to_eye: Vec3) {
+        set_lane(&mut self.mirrored_eye, i, mirrored(normal, to_eye));
+        let [diffuse, specular] = shown_parts(bsdf, shown);
+        set_lane(&mut self.diffuse, i, diffuse);
+        set_lane(&mut self.specular, i, specular);
+        self.shininess[i] = bsdf.shininess;
+        self.albedos[0][i] = bsdf.diffuse.max_element();
+        self.albedos[1][i] = bsdf.specular.max_element();
+        self.is_glossy |= bsdf.specular != Vec3::ZERO;
+    }
+
+    #[inline(always)]
+    fn fill(
+        &mut self,
+        material: &Phong,
+        uv: Option<&UvRow>,
+        shown: &[(u32, ShownLobes)],
+        folds: impl Folds,
+    ) -> u32 {
+        let diffuse = match (material.diffuse.texture(), uv) {
+            (Some(texture), Some(uv)) => texture.lookup_row(uv),
+            (Some(_) | None, _) => {
+                let Vec3 { x, y, z } = material.diffuse.constant().unwrap_or(Vec3::ONE);
+                [[x; LANES], [y; LANES], [z; LANES]]
+            }
+        };
+        let specular = material.specular.constant().unwrap_or(Vec3::ONE);
+        for &(of, shown) in shown {
+            self.set(of, shown, &diffuse, specular, material.shininess);
+        }
+        if specular == Vec3::ZERO { black(&diffuse, folds) } else { 0 }
+    }
+
+    #[inline(always)]
+    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
+        let mut all = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            set_lane(&mut all, i, mirrored(lane(normals, i), -lane(directions, i)));
+        }
+        match of {
+            Some(of) => {
+                for axis in 0..3 {
+                    take(of, &all[axis], &mut self.mirrored_eye[axis]);
+                }
+            }
+            None => self.mirrored_eye = all,
+        }
+    }
+
+    #[inline(always)]
+    fn copy(&mut self, i: usize, other: &Self, from: usize) {
+        set_lane(&mut self.mirrored_eye, i, lane(&other.mirrored_eye, from));
+        set_lane(&mut self.diffuse, i, lane(&other.diffuse, from));
+        set_lane(&mut self.specular, i, lane(&other.specular, from));
+        self.shininess[i] = other.shininess[from];
+        for (own, other) in self.albedos.iter_mut().zip(&other.albedos) {
+            own[i] = other[from];
+        }
+        self.is_glossy |= other.is_glossy;
+    }
+
+    #[inline(always)]
+    fn f(&self, directions: &Lanes3) -> BsdfValues {
+        let (mut f, mut glosses) = (self.diffuse, [0.0; LANES]);
+        if self.is_glossy {
+            for i in 0..LANES {
+                let left = gloss(lane(&self.mirrored_eye, i), lane(directions, i), self.shininess[i]);
+                set_lane(&mut f, i, lane(&self.diffuse, i) + lane(&self.specular, i) * left);
+                glosses[i] = left;
+            }
+        }
+        BsdfValues { f, shared: glosses }
+    }
+
+    #[inline(always)]
+    fn parts(&self, values: &BsdfValues) -> [Lanes3; 2] {
+        let mut glossy = self.specular;
+        for axis in 0..3 {
+            for i in 0..LANES {
+                glossy[axis][i] = self.specular[axis][i] * values.shared[i];
+            }
+        }
+        [self.diffuse, glossy]
+    }
+
+    #[inline(always)]
+    fn grey(&self, values: &BsdfValues) -> Lanes {
+        let mut grey = [0.0; LANES];
+        for i in 0..LANES {
+            // The normal does not matter here.
+            grey[i] = self.lobes(i, &self.mirrored_eye).value(values.shared[i]);
+        }
+        grey
+    }
+
+    #[inline(always)]
+    fn pdf(&self, lobes: LobeSet, normals: &Lanes3, directions: &Lanes3, values: &BsdfValues) -> Lanes {
+        let mut densities = [0.0; LANES];
+        for i in 0..LANES {
+            let own = match lobes {
+                LobeSet::All => self.lobes(i, normals),
+                LobeSet::Narrow => self.glossy_lobe(i, normals),
+            };
+            densities[i] = own.density(lane(directions, i), values.shared[i]);
+        }
+        densities
+    }
+
+    #[inline(always)]
+    fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
+        let mut directions = [[0.0; LANES]; 3];
+        match lobes {
+            LobeSet::All if self.is_glossy => {
+                for i in 0..LANES {
+                    let direction = self.lobes(i, normals).sample(choices[i], [u[0][i], u[1][i]]);
+                    set_lane(&mut directions, i, direction);
+                }
+            }
+            LobeSet::All => {
+                for i in 0..LANES {
+                    let direction = self.lobes(i, normals).sample_diffuse([u[0][i], u[1][i]]);
+                    set_lane(&mut directions, i, direction);
+                }
+            }
+            LobeSet::Narrow => {
+                for i in 0..LANES {
+                    let direction = self.glossy_lobe(i, normals).sample(1.0, [u[0][i], u[1][i]]);
+                    set_lane(&mut directions, i, direction);
+                }
+            }
+        }
+        directions
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobes(&self) -> bool {
+        self.is_glossy
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobe(&self, i: usize) -> bool {
+        self.albedos[1][i] > 0.0
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
+        let lobes = self.lobes(i, &self.mirrored_eye);
+        if !(lobes.specular > 0.0) {
+            return None;
+        }
+        let (axis, exponent) = (lobes.mirrored_eye, lobes.shininess);
+        Some(NarrowLobe { axis, exponent, peak: lobes.value(1.0) - lobes.value(0.0), wide: lobes.value(0.0) })
+    }
+
+    #[inline(always)]
+    fn narrower_than(&self, of: u32, exponent: f32) -> u32 {
+        let mut narrow = 0;
+        for i in 0..LANES {
+            narrow |= u32::from(self.has_narrow_lobe(i) & (self.shininess[i] >= exponent)) << i;
+        }
+        narrow & of
+    }
+
+    #[inline(always)]
+    fn even(&self, i: usize) -> Option<Vec3> {
+        (lane(&self.specular, i) == Vec3::ZERO).then(|| lane(&self.diffuse, i))
+    }
+
+    #[inline(always)]
+    fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
+        let (mut f, specular) = (lane(&self.diffuse, i), lane(&self.specular, i));
+        if specular != Vec3::ZERO {
+            f += specular * gloss(lane(&self.mirrored_eye, i), direction, self.shininess[i]);
+        }
+        f
+    }
+}
+
+/// The direction to the viewer, mirrored: its cosine with a direction is that between the mirrored direction and the viewer's.
+#[inline(always)]
+fn mirrored(normal: Vec3, to_eye: Vec3) -> Vec3 {
+    // (2(n·l)n − l)·v = (2(n·v)n − v)·l.
+    normal * (2.0 * normal.dot(to_eye)) - to_eye
+}

@@ -1,0 +1,252 @@
+//! The table of rough BSDFs, and the sum of them all: an enum for a material, for a point, and for a row.
+
+use super::bsdf::{BsdfValues, LobeSet, NarrowLobe, RoughMaterial, RoughPoint, RoughRow, ShownLobes, UvRow};
+use super::footprint::TexturePoint;
+use super::phong::{Phong, PhongRow};
+use super::texture::Texture;
+use crate::math::Vec3;
+use crate::math::lanes::{Folds, Lanes, Lanes3, Truths};
+
+/// Makes the sums over all kinds of the three traits, whose functions have the same meaning.
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $kind:ident($material:ty, $row:ty)),+ $(,)?) => {
+        /// Kind of a rough BSDF.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum RoughKind { $($(#[$doc])* $kind),+ }
+
+        impl RoughKind {
+            /// All kinds.
+            pub const ALL: &[Self] = &[$(Self::$kind),+];
+        }
+
+        /// A rough material of any kind.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Rough { $($(#[$doc])* $kind($material)),+ }
+
+        /// A rough material of any kind at one point.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum RoughBsdf { $($(#[$doc])* $kind(<$material as RoughMaterial>::Point)),+ }
+
+        /// Rough surfaces of one kind, side by side.
+        #[derive(Clone, Debug)]
+        pub enum BsdfRow { $($(#[$doc])* $kind($row)),+ }
+
+        impl Rough {
+            /// Its kind.
+            #[inline(always)]
+            pub fn kind(&self) -> RoughKind {
+                match self { $(Self::$kind(_) => RoughKind::$kind),+ }
+            }
+
+            /// [`RoughMaterial::at`].
+            #[inline]
+            pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> RoughBsdf {
+                match self { $(Self::$kind(own) => RoughBsdf::$kind(own.at(at, lookups))),+ }
+            }
+
+            /// [`RoughMaterial::bleached`].
+            #[inline]
+            pub fn bleached(&self) -> RoughBsdf {
+                match self { $(Self::$kind(own) => RoughBsdf::$kind(own.bleached())),+ }
+            }
+
+            /// [`RoughMaterial::constant`].
+            #[inline]
+            pub fn constant(&self) -> Option<RoughBsdf> {
+                match self { $(Self::$kind(own) => own.constant().map(RoughBsdf::$kind)),+ }
+            }
+
+            /// [`RoughMaterial::albedo`].
+            #[inline]
+            pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+                match self { $(Self::$kind(own) => own.albedo(at, lookups)),+ }
+            }
+
+            /// [`RoughMaterial::ambient_at`].
+            #[inline]
+            pub fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+                match self { $(Self::$kind(own) => own.ambient_at(at, lookups)),+ }
+            }
+
+            /// Whether any of its textures has mip levels.
+            pub fn is_mipmapped(&self) -> bool {
+                match self { $(Self::$kind(own) => own.textures().any(|texture| texture.mipmaps.is_some())),+ }
+            }
+
+            /// [`RoughMaterial::fills_rows`].
+            #[inline]
+            pub fn fills_rows(&self) -> bool {
+                match self { $(Self::$kind(own) => own.fills_rows()),+ }
+            }
+
+            /// [`RoughMaterial::row_texture`].
+            #[inline]
+            pub fn row_texture(&self) -> Option<&Texture> {
+                match self { $(Self::$kind(own) => own.row_texture()),+ }
+            }
+        }
+
+        impl RoughBsdf {
+            /// Its kind.
+            #[inline(always)]
+            pub fn kind(&self) -> RoughKind {
+                match self { $(Self::$kind(_) => RoughKind::$kind),+ }
+            }
+
+            /// [`RoughPoint::is_black`].
+            #[inline]
+            pub fn is_black(&self) -> bool {
+                match self { $(Self::$kind(own) => own.is_black()),+ }
+            }
+
+            /// [`RoughPoint::ambient`].
+            #[inline]
+            pub fn ambient(&self) -> Vec3 {
+                match self { $(Self::$kind(own) => own.ambient()),+ }
+            }
+        }
+
+        // With a single kind, its pattern always fits.
+        #[allow(irrefutable_let_patterns)]
+        impl BsdfRow {
+            /// Its kind.
+            #[inline(always)]
+            pub fn kind(&self) -> RoughKind {
+                match self { $(Self::$kind(_) => RoughKind::$kind),+ }
+            }
+
+            /// Makes it a row of a kind, of any content.
+            #[inline(always)]
+            pub fn prepare(&mut self, kind: RoughKind) {
+                if self.kind() != kind {
+                    *self = match kind { $(RoughKind::$kind => Self::$kind(<$row as RoughRow>::EMPTY)),+ };
+                }
+            }
+
+            /// [`RoughRow::reset`].
+            #[inline(always)]
+            pub fn reset(&mut self) {
+                match self { $(Self::$kind(row) => row.reset()),+ }
+            }
+
+            /// [`RoughRow::put`], of a BSDF of the row's kind.
+            #[inline(always)]
+            pub fn put(&mut self, i: usize, bsdf: &RoughBsdf, shown: ShownLobes, normal: Vec3, to_eye: Vec3) {
+                $(if let (Self::$kind(row), RoughBsdf::$kind(bsdf)) = (&mut *self, bsdf) {
+                    row.put(i, bsdf, shown, normal, to_eye);
+                })+
+            }
+
+            /// [`RoughRow::fill`], with a material of the row's kind.
+            #[inline(always)]
+            pub fn fill(
+                &mut self,
+                material: &Rough,
+                uv: Option<&UvRow>,
+                shown: &[(u32, ShownLobes)],
+                folds: impl Folds,
+            ) -> u32 {
+                $(if let (Self::$kind(row), Rough::$kind(material)) = (&mut *self, material) {
+                    return row.fill(material, uv, shown, folds);
+                })+
+                0
+            }
+
+            /// [`RoughRow::orient`].
+            #[inline(always)]
+            pub fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
+                match self { $(Self::$kind(row) => row.orient(of, normals, directions)),+ }
+            }
+
+            /// [`RoughRow::copy`], from a row of the same kind.
+            #[inline(always)]
+            pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
+                $(if let (Self::$kind(row), Self::$kind(other)) = (&mut *self, other) {
+                    row.copy(i, other, from);
+                })+
+            }
+
+            /// [`RoughRow::f`].
+            #[inline(always)]
+            pub fn f(&self, directions: &Lanes3) -> BsdfValues {
+                match self { $(Self::$kind(row) => row.f(directions)),+ }
+            }
+
+            /// [`RoughRow::parts`].
+            #[inline(always)]
+            pub fn parts(&self, values: &BsdfValues) -> [Lanes3; 2] {
+                match self { $(Self::$kind(row) => row.parts(values)),+ }
+            }
+
+            /// [`RoughRow::grey`].
+            #[inline(always)]
+            pub fn grey(&self, values: &BsdfValues) -> Lanes {
+                match self { $(Self::$kind(row) => row.grey(values)),+ }
+            }
+
+            /// [`RoughRow::pdf`].
+            #[inline(always)]
+            pub fn pdf(
+                &self,
+                lobes: LobeSet,
+                normals: &Lanes3,
+                directions: &Lanes3,
+                values: &BsdfValues,
+            ) -> Lanes {
+                match self { $(Self::$kind(row) => row.pdf(lobes, normals, directions, values)),+ }
+            }
+
+            /// [`RoughRow::sample`].
+            #[inline(always)]
+            pub fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
+                match self { $(Self::$kind(row) => row.sample(lobes, normals, choices, u)),+ }
+            }
+
+            /// [`RoughRow::has_narrow_lobes`].
+            #[inline(always)]
+            pub fn has_narrow_lobes(&self) -> bool {
+                match self { $(Self::$kind(row) => row.has_narrow_lobes()),+ }
+            }
+
+            /// [`RoughRow::has_narrow_lobe`].
+            #[inline(always)]
+            pub fn has_narrow_lobe(&self, i: usize) -> bool {
+                match self { $(Self::$kind(row) => row.has_narrow_lobe(i)),+ }
+            }
+
+            /// [`RoughRow::narrow_lobe`].
+            #[inline(always)]
+            pub fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
+                match self { $(Self::$kind(row) => row.narrow_lobe(i)),+ }
+            }
+
+            /// [`RoughRow::narrower_than`].
+            #[inline(always)]
+            pub fn narrower_than(&self, of: u32, exponent: f32) -> u32 {
+                match self { $(Self::$kind(row) => row.narrower_than(of, exponent)),+ }
+            }
+
+            /// [`RoughRow::even`].
+            #[inline(always)]
+            pub fn even(&self, i: usize) -> Option<Vec3> {
+                match self { $(Self::$kind(row) => row.even(i)),+ }
+            }
+
+            /// [`RoughRow::f_at`].
+            #[inline(always)]
+            pub fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
+                match self { $(Self::$kind(row) => row.f_at(i, direction)),+ }
+            }
+        }
+    };
+}
+
+kinds! {
+    /// The normalised Phong model.
+    Phong(Phong, PhongRow),
+}
+
+impl BsdfRow {
+    /// A row of any content.
+    pub const EMPTY: Self = Self::Phong(PhongRow::EMPTY);
+}

@@ -1,0 +1,212 @@
+//! Techniques that find the light of lamps beside light samples, and the MIS weights of light samples and of these against each other
+//! (multiple importance sampling: Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
+
+use crate::geometry::{Ray, SurfacePoint};
+use crate::integrators::transport::batch::{Response, VertexBatch};
+use crate::integrators::transport::ray::PathRay;
+use crate::integrators::transport::tile::TileContext;
+use crate::lights::{LightHit, LightRow, Source};
+use crate::materials::TexturePoint;
+use crate::materials::bsdf::LobeSet;
+use crate::math::Vec3;
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::world::Hit;
+
+/// Technique that competes with light samples.
+#[derive(Clone, Copy)]
+pub enum CompetingTechnique {
+    /// No other technique.
+    Nothing,
+    /// The rays of paths that go on from the vertices.
+    Paths,
+    /// Rays in the glossy lobes of the vertices whose bits are set.
+    Lobes(u32),
+}
+
+impl CompetingTechnique {
+    /// The technique of rays in glossy lobes, if the bits of any vertices are set.
+    pub fn lobes(sharp: u32) -> Self {
+        if sharp == 0 { Self::Nothing } else { Self::Lobes(sharp) }
+    }
+
+    /// Whether these are rays in glossy lobes.
+    pub fn are_lobes(self) -> bool {
+        match self {
+            Self::Nothing | Self::Paths => false,
+            Self::Lobes(_) => true,
+        }
+    }
+
+    /// Number of rays by the BSDF for each of so many samples of a light.
+    #[inline(always)]
+    pub fn rays_per_sample(self, count: u32) -> f32 {
+        match self {
+            Self::Nothing => 0.0,
+            Self::Paths => 1.0 / count as f32,
+            Self::Lobes(_) => 1.0,
+        }
+    }
+
+    /// Multiplies `values`, the contributions of light samples at the vertices of a row, by their power-heuristic weights. The
+    /// inverse pdfs of the samples are given; `competing` rays by the BSDF come on each sample.
+    #[inline(always)]
+    pub fn weighted(
+        self,
+        row: &VertexBatch,
+        (samples, response): (&LightRow, &Response),
+        mut values: Lanes3,
+        (of_light, competing): (&Lanes, f32),
+    ) -> Lanes3 {
+        // Weight each sample against the lobes in which rays leave its vertex.
+        let (lobes, start) = match self {
+            Self::Nothing => return values,
+            Self::Paths => (LobeSet::All, !0),
+            Self::Lobes(sharp) => (LobeSet::Narrow, sharp),
+        };
+        let densities = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf);
+        let mut weights = [1.0; LANES];
+        for i in 0..LANES {
+            let weight = weight(densities[i] * of_light[i] * competing);
+            weights[i] = if start & 1 << i != 0 { weight } else { 1.0 };
+        }
+        // Apply the weights to the light of those lobes.
+        match lobes {
+            LobeSet::All => {
+                for i in 0..LANES {
+                    let value = lane(&values, i) * weights[i];
+                    set_lane(&mut values, i, value);
+                }
+            }
+            LobeSet::Narrow => {
+                let [wide, narrow] = row.bsdf.parts(&response.bsdf);
+                for i in 0..LANES {
+                    let left = left_of_narrow(lane(&wide, i), lane(&narrow, i), weights[i]);
+                    let value = lane(&values, i) * left;
+                    set_lane(&mut values, i, value);
+                }
+            }
+        }
+        values
+    }
+}
+
+/// Reflected light with its narrow part weighted. The weight applies to that part alone, as rays in a lobe bring no light of wide
+/// lobes. Thereby the parts of a picture add up to it.
+#[inline(always)]
+fn left_of_narrow(wide: Vec3, narrow: Vec3, weight: f32) -> Vec3 {
+    let part = |wide: f32, narrow: f32| {
+        let all = wide + narrow;
+        if all > 0.0 { (wide + narrow * weight) / all } else { 0.0 }
+    };
+    Vec3::new(part(wide.x, narrow.x), part(wide.y, narrow.y), part(wide.z, narrow.z))
+}
+
+/// MIS weight of a sample, if the other technique's pdf is so many times as high (the power heuristic).
+#[inline(always)]
+pub fn weight(ratio: f32) -> f32 {
+    1.0 / (1.0 + ratio * ratio)
+}
+
+impl TileContext<'_> {
+    /// MIS weight of a path that hits a lamp, against light samples.
+    pub fn lamp_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
+        let density = path.state.density;
+        if !(density > 0.0) {
+            return 1.0;
+        }
+        let normal = self.world.geometry.surface(&path.ray, hit).normal;
+        let samples = self.settings.render.shadow_samples as f32;
+        weight(self.sample_density(&path.ray, path.state.normal, (hit, normal)) * samples / density)
+    }
+
+    /// Weighted radiance from beyond the scene along a path; light samples bring the rest.
+    pub fn light_beyond(&self, path: &PathRay) -> Vec3 {
+        let environment = self.world.lights.environment();
+        self.light_beyond_with(environment.map(|environment| environment.arriving(path.ray.direction)), path)
+    }
+
+    /// [`TileContext::light_beyond`], given the radiance of the environment and its light-sampling pdf.
+    pub fn light_beyond_with(&self, sky: Option<(Vec3, f32)>, path: &PathRay) -> Vec3 {
+        let (lights, density) = (&self.world.lights, path.state.density);
+        let samples = self.settings.render.shadow_samples as f32;
+        if density.is_nan() || density <= 0.0 {
+            return lights.beyond_with(sky, path.ray.direction, |_, _| 1.0);
+        }
+        // No light sample finds the environment, so its light-sampling pdf is 0.
+        let sky = sky.map(|(radiance, of_sky)| (radiance, if self.leaves_sky { 0.0 } else { of_sky }));
+        let share = |of_light: f32| weight(of_light * samples / density);
+        self.shared_beyond(sky, &path.ray, path.state.normal, share)
+    }
+
+    /// [`TileContext::lamp_radiance`] for a ray in a glossy lobe that leaves the scene.
+    pub fn radiance_beyond(&self, ray: &Ray, normal: Vec3, density: f32) -> Vec3 {
+        let sky = self.world.lights.environment().map(|environment| environment.arriving(ray.direction));
+        // No light sample brings the part of it that lobes reflect.
+        let sky = sky.map(|(radiance, of_sky)| (radiance, if self.lobes_find_sky { 0.0 } else { of_sky }));
+        self.shared_beyond(sky, ray, normal, |of_light| weight(of_light / density))
+    }
+
+    /// Radiance that a ray sees which leaves the scene from a surface with this normal, given the radiance of the environment and
+    /// its light-sampling pdf. Each light is weighted by its light-sampling pdf.
+    fn shared_beyond(
+        &self,
+        sky: Option<(Vec3, f32)>,
+        ray: &Ray,
+        normal: Vec3,
+        share: impl Fn(f32) -> f32,
+    ) -> Vec3 {
+        let lights = &self.world.lights;
+        if !lights.are_beyond() {
+            return Vec3::ZERO;
+        }
+        let samples = lights.samples_at(self.behaviour.receivers, ray.origin, normal);
+        lights.beyond_with(sky, ray.direction, |number, density| share(density * samples.of(number)))
+    }
+
+    /// Light-sampling pdf in sr⁻¹ of a hit's direction, per requested sample, from a surface with this normal; 0 if the hit
+    /// is not on a light.
+    fn sample_density(&self, ray: &Ray, normal: Vec3, (hit, of_light): (&Hit, Vec3)) -> f32 {
+        let (direction, distance, primitive) = (ray.direction, hit.shape.t, hit.shape.primitive);
+        let met = LightHit { direction, distance, normal: of_light, primitive };
+        let lights = &self.world.lights;
+        lights.of_hit(hit.object, primitive).map_or(0.0, |(number, light)| {
+            light.pdf(ray.origin, normal, &met)
+                * lights.samples_at(self.behaviour.receivers, ray.origin, normal).of(number)
+        })
+    }
+
+    /// Weighted radiance that a ray in a lobe meets, from a surface with this normal; light samples, as many as there are such
+    /// rays, bring the rest.
+    pub fn lamp_radiance(
+        &self,
+        ray: &Ray,
+        from_normal: Vec3,
+        hit: &Hit,
+        density: f32,
+        lookups: &mut u64,
+    ) -> Vec3 {
+        let world = self.world;
+        let emission = &world.materials[world.material_index(hit)].emission;
+        if !emission.shines() {
+            return Vec3::ZERO;
+        }
+        let SurfacePoint { normal, uv, .. } = world.geometry.surface(ray, hit);
+        if !(normal.dot(ray.direction) < 0.0) {
+            return Vec3::ZERO;
+        }
+        let radiance = emission.at(&TexturePoint::sharp(uv), lookups);
+        radiance * weight(self.sample_density(ray, from_normal, (hit, normal)) / density)
+    }
+
+    /// [`TileContext::lamp_weight`] for a lamp that touches the glass which the path hits with it: the result of the light samples'
+    /// shadow rays decides whether they find it there.
+    pub fn touching_lamp_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
+        let Ray { origin, direction, .. } = path.ray;
+        let shadow = Ray::segment(origin, origin + direction * hit.shape.t);
+        if path.state.density > 0.0 && !self.world.geometry.occluded(&shadow, Source::Object(hit.object)) {
+            self.lamp_weight(path, hit)
+        } else {
+            1.0
+        }
+    }
+}

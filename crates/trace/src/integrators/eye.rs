@@ -1,0 +1,421 @@
+//! Camera rays, round by round over queues instead of recursion. In whitted they are split at glass and end at Phong surfaces,
+//! which get direct and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*, 1980). In path each ray stays
+//! one and goes on from all surfaces (Kajiya, *The Rendering Equation*, 1986); with photons, whitted also goes on from Phong
+//! surfaces so.
+
+use std::ops::Range;
+
+use super::RayCounters;
+use super::direct::queue::DirectLightQueue;
+use super::memory::Memory;
+use super::photons::PhotonMaps;
+use super::photons::gather::Gathering;
+use super::transport::accumulator::{Accumulator, Part};
+use super::transport::batch::VertexBatch;
+use super::transport::camera::CAMERA_ROWS;
+use super::transport::crossing::CrossingMemory;
+use super::transport::interface::{Interface, interface, reflected};
+use super::transport::medium::Medium;
+use super::transport::packet::{PacketHits, PacketSource};
+use super::transport::ray::PathRay;
+use super::transport::scatter::Continuation;
+use super::transport::scratch::Scratch;
+use super::transport::tile::TileContext;
+use super::transport::vertex::{ShadingVertex, Vertex};
+use super::transport::walk::{OpaqueHit, Reached};
+use super::view::Measure;
+use crate::control::Cancelled;
+use crate::geometry::rows::{RayRows, lanes};
+use crate::geometry::surface_rows::SurfaceRow;
+use crate::geometry::{Ray, SurfacePoint};
+use crate::materials::{Bsdf, Mirror, Rough};
+use crate::math::Vec3;
+use crate::math::lanes::lane as lane_of;
+use crate::scene::description::Shadows;
+use crate::world::{Hit, PACKET};
+
+/// Least contribution of the weaker part for which a ray is split in two; below it, one part is chosen at random.
+const LEAST_SPLIT: f32 = 0.01;
+
+/// Rays between two polls of the token.
+const POLL_INTERVAL: usize = 256;
+
+/// Follows the camera rays of some slots to the end; the accumulator takes the light that they see. `negative` gets the slots of
+/// negative weight.
+pub fn trace(
+    (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
+    slots: Range<u32>,
+    memory: &mut Memory,
+    accumulator: Accumulator<'_>,
+    counters: &mut RayCounters,
+    mut negative: impl FnMut(u32, u32),
+) -> Result<(), Cancelled> {
+    let Memory { scratch, direct } = memory;
+    let Scratch { rays, next, surfaces, crossing, camera, hits, by_object } = scratch;
+    next.clear();
+    let mut wavefront = Wavefront {
+        depth: 0,
+        continuation: None,
+        tile,
+        maps,
+        direct,
+        surfaces,
+        accumulator,
+        next,
+        crossing,
+        place: 0,
+        counters,
+    };
+    wavefront.begin_round();
+    wavefront.direct.expect(slots.len(), tile.pixel_spread > 0.0);
+    // Make and shade the camera rays, which are the first round.
+    for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
+        tile.camera_rows(start..slots.end, camera);
+        for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
+            negative(first, row.negative);
+            let count = (slots.end - first).min(PACKET as u32) as usize;
+            wavefront.shade_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
+        }
+    }
+    // Light their vertices, and give the light to the accumulator.
+    wavefront.light()?;
+    wavefront.direct.settle_run(slots.start, &mut wavefront.accumulator);
+    wavefront.next_round(rays);
+    // Follow the rays that go on, round by round.
+    while !rays.is_empty() {
+        wavefront.direct.expect(rays.len(), tile.pixel_spread > 0.0);
+        if tile.behaviour.scatters {
+            // Find all hits first, so that packets are of one object.
+            tile.closest_hits(rays, hits)?;
+            by_object.sort(hits);
+            for places in by_object.places().chunks(PACKET) {
+                wavefront.shade_packet(PacketSource::Traced(rays, hits, places))?;
+            }
+        } else {
+            for (paths, first) in rays.chunks(PACKET).zip((0..).step_by(PACKET)) {
+                wavefront.shade_packet(PacketSource::Paths(paths, first))?;
+            }
+        }
+        let slots: &[PathRay] = rays;
+        wavefront.light()?;
+        wavefront.direct.settle(
+            |place| (slots[place].slot, slots[place].state.only_specular_before),
+            &mut wavefront.accumulator,
+        );
+        wavefront.next_round(rays);
+    }
+    Ok(())
+}
+
+/// Work of a path's ray up to its hit.
+fn work(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
+    let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
+    tile.world.geometry.work(&Ray { t_max, ..path.ray })
+}
+
+/// One round of all rays of a batch.
+struct Wavefront<'a, 's> {
+    /// Number of scatterings before the hits of this round.
+    depth: u32,
+    /// Continuation of paths at Phong surfaces. `None` if they end there.
+    continuation: Option<Continuation>,
+    tile: &'a TileContext<'a>,
+    /// Photons of the samples. `None` if none are gathered.
+    maps: Option<&'a PhotonMaps>,
+    /// Vertices of this round that wait for direct light.
+    direct: &'a mut DirectLightQueue,
+    /// Surfaces at the hits of the current packet.
+    surfaces: &'a mut SurfaceRow,
+    accumulator: Accumulator<'s>,
+    /// Rays of the next round.
+    next: &'a mut Vec<PathRay>,
+    /// Place of the current path in the round's queue.
+    place: u32,
+    crossing: &'a mut CrossingMemory,
+    counters: &'a mut RayCounters,
+}
+
+impl Wavefront<'_, '_> {
+    fn light(&mut self) -> Result<(), Cancelled> {
+        let before = self.next.len();
+        let (tile, maps, depth, measure) = (self.tile, self.maps, self.depth, self.accumulator.measure);
+        let gather = |row: &VertexBatch| {
+            let maps = maps?;
+            Some(tile.world.geometry.instructions().run(Gathering { tile, row, maps, depth, measure }))
+        };
+        let rays = self.direct.light(tile, measure, self.continuation, gather, self.next)?;
+        self.counters.shadow_rays += rays.shadow;
+        self.counters.texture_lookups += rays.lookups;
+        self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
+        Ok(())
+    }
+
+    fn begin_round(&mut self) {
+        self.continuation = self.tile.behaviour.scatters.then(|| Continuation::new(self.tile, self.depth));
+    }
+
+    /// Makes the found rays those of the next round; the old ones stay as memory.
+    fn next_round(&mut self, rays: &mut Vec<PathRay>) {
+        std::mem::swap(rays, self.next);
+        self.next.clear();
+        self.depth += 1;
+        self.begin_round();
+    }
+
+    /// Shades the hits of a packet's rays.
+    fn shade_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
+        let tile = self.tile;
+        if (rays.place(0) as usize).is_multiple_of(POLL_INTERVAL) {
+            tile.token.check()?;
+        }
+        let are_lit = self.depth < tile.settings.render.max_depth && self.accumulator.takes_reflected();
+        let packet =
+            tile.intersect(rays, self.accumulator.measure, are_lit, (self.direct.spare(), self.surfaces));
+        self.counters.texture_lookups += packet.lookups;
+        // Count the work of the rays, if the view shows it.
+        if self.accumulator.measure == Measure::Work {
+            for lane in 0..rays.count() {
+                let path = packet.path(tile, &rays, lane);
+                self.accumulator.add_work(path.slot, work(tile, &path, packet.hit(lane)));
+            }
+        }
+        // Queue the plain vertices for direct light.
+        if are_lit {
+            self.direct.keep();
+            if tile.pixel_spread > 0.0 {
+                for (lane, hit) in lanes(packet.plain).filter_map(|lane| Some((lane, packet.hit(lane)?))) {
+                    let cone = packet.path(tile, &rays, lane).cone.after(hit.shape.t);
+                    self.direct.note_cone(rays.place(lane), cone);
+                }
+            }
+        }
+        // Select the rays that find light by themselves, and those that need shading one by one.
+        let render = &tile.settings.render;
+        let all = ((1_u64 << rays.count()) - 1) as u32;
+        let plain = if render.ambient == Vec3::ZERO { packet.shining } else { packet.plain };
+        let is_dark_beyond = render.background == Vec3::ZERO && !tile.world.lights.are_beyond();
+        let beyond = if is_dark_beyond { 0 } else { all & !packet.any };
+        let mut wanted = packet.any & !packet.plain;
+        match rays {
+            PacketSource::Camera(row, first, ..) => self.add_seen(&row.rays, first, &packet, (plain, beyond)),
+            PacketSource::Paths(..) | PacketSource::Traced(..) => wanted |= plain | beyond,
+        }
+        // Go in the order of the paths, as the contributions to a sample are added in that order.
+        for lane in lanes(wanted) {
+            let (of_camera, bit) = (rays.camera_path(tile, lane), 1 << lane);
+            let Some(path) = of_camera.as_ref().or_else(|| rays.of_queue(lane)) else { continue };
+            match packet.hit(lane) {
+                Some(hit) if packet.plain & bit != 0 => {
+                    self.add_own_light(path, &hit, packet.shining & bit != 0)
+                }
+                Some(hit) => {
+                    self.place = rays.place(lane);
+                    let surface = packet.surface(self.surfaces, lane);
+                    self.shade(*path, hit, surface);
+                }
+                None => {
+                    let sky = tile.world.lights.environment().map(|_| packet.sky(lane));
+                    self.add_beyond(path, tile.light_beyond_with(sky, path));
+                }
+            }
+        }
+        // Light the queued vertices while their data are in the cache.
+        if self.direct.is_full() {
+            self.light()?;
+        }
+        Ok(())
+    }
+
+    /// Adds the emission that camera rays see: of plain surfaces, and from beyond everything. It is all that the sample of each ray
+    /// gets before lamps.
+    fn add_seen(&mut self, rays: &RayRows, first: u32, packet: &PacketHits, (plain, beyond): (u32, u32)) {
+        let tile = self.tile;
+        let render = &tile.settings.render;
+        // Add the emission and ambient light of plain surfaces.
+        let mut known = None;
+        for lane in lanes(plain) {
+            let object = packet.object(lane);
+            if known.is_none_or(|(own, _)| own != object) {
+                known = tile.plain_rough(object).map(|plain| (object, plain));
+            }
+            let Some((_, (material, rough))) = known else { continue };
+            let slot = first + lane as u32;
+            if packet.shining & 1 << lane != 0 {
+                self.accumulator.add(slot, Part::Emitted, material.emission.scale);
+            }
+            if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
+                let Some(bsdf) = rough.constant() else { continue };
+                self.accumulator.add(slot, Part::Ambient, render.ambient * bsdf.ambient());
+            }
+        }
+        // Add the background and the lights beyond the scene.
+        let lights = &tile.world.lights;
+        for lane in lanes(beyond) {
+            let sky = lights.environment().map(|_| packet.sky(lane));
+            let beyond = lights.beyond_with(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
+            self.accumulator.add(first + lane as u32, Part::Emitted, render.background + beyond);
+        }
+    }
+
+    /// Adds the emission and ambient light of a plain surface.
+    fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
+        let Some((material, rough)) = self.tile.plain_rough(hit.object) else { return };
+        if is_shining {
+            self.add_emitted(path, material.emission.scale, self.tile.lamp_weight(path, hit));
+        }
+        let render = &self.tile.settings.render;
+        if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
+            let Some(bsdf) = rough.constant() else { return };
+            self.accumulator.add(path.slot, Part::Ambient, path.throughput * render.ambient * bsdf.ambient());
+        }
+    }
+
+    /// Adds the weighted emission that a path meets; light samples find the rest.
+    fn add_emitted(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
+        if self.is_gathered(path) {
+            return;
+        }
+        if path.state.only_specular_before {
+            self.accumulator.add(path.slot, Part::Emitted, path.throughput * radiance);
+        } else {
+            self.accumulator.add_met(path, path.throughput * radiance * weight);
+        }
+    }
+
+    /// Whether another technique finds the light that a path meets: photons, behind mirrors and glass, or light samples alone, for
+    /// hard shadows.
+    fn is_gathered(&self, path: &PathRay) -> bool {
+        let goes_on = self.tile.behaviour.gathers && !path.state.only_specular_before;
+        goes_on && !(path.state.density > 0.0 && self.tile.settings.render.shadows == Shadows::Soft)
+    }
+
+    fn leave(&mut self, path: &PathRay) {
+        self.add_beyond(path, self.tile.light_beyond(path));
+    }
+
+    /// Adds the light that a path meets beyond everything; the background illuminates nothing.
+    fn add_beyond(&mut self, path: &PathRay, beyond: Vec3) {
+        if path.state.only_specular_before {
+            let background = self.tile.settings.render.background;
+            self.accumulator.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
+        } else if beyond != Vec3::ZERO && !self.is_gathered(path) {
+            self.accumulator.add_met(path, path.throughput * beyond);
+        }
+    }
+
+    /// Follows a path to the first surface that is more than a change between parts of one glass, and shades that. `surface` is
+    /// that of the hit, if it is known.
+    fn shade(&mut self, path: PathRay, hit: Hit, surface: Option<SurfacePoint>) {
+        let tile = self.tile;
+        let accumulator = &mut self.accumulator;
+        let walk = tile.walk(path, (hit, surface), self.crossing, |path, next| {
+            if accumulator.measure == Measure::Work {
+                accumulator.add_work(path.slot, work(tile, path, next));
+            }
+        });
+        let path = walk.path;
+        match walk.reached {
+            Reached::Opaque(vertex, hit) => {
+                if self.arrive(&path, &vertex, hit) {
+                    match &vertex.material.bsdf {
+                        Bsdf::Rough(rough) => self.shade_rough(&path, &vertex, rough),
+                        Bsdf::Mirror(mirror) => self.shade_mirror(&path, &vertex, mirror),
+                        Bsdf::Glass(_) => {}
+                    }
+                }
+            }
+            Reached::Glass(vertex, far) if self.goes_on() => self.shade_glass(&path, &vertex, far),
+            Reached::Hidden if self.goes_on() => self.next.push(path),
+            Reached::Glass(..) | Reached::Hidden => {}
+            Reached::Nothing => self.leave(&path),
+        }
+    }
+
+    /// Whether paths may be scattered at the hits of this round.
+    fn goes_on(&self) -> bool {
+        self.depth < self.tile.settings.render.max_depth
+    }
+
+    /// Adds the emission of an opaque surface; returns whether the path may be scattered there.
+    fn arrive(&mut self, path: &PathRay, vertex: &Vertex<'_>, hit: OpaqueHit) -> bool {
+        if vertex.emits() {
+            let weight = match hit {
+                OpaqueHit::Own(hit) => self.tile.lamp_weight(path, &hit),
+                OpaqueHit::Touching(hit) => self.tile.touching_lamp_weight(path, &hit),
+            };
+            let radiance = vertex.emitted(path, self.counters);
+            self.add_emitted(path, radiance, weight);
+        }
+        self.goes_on()
+    }
+
+    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough) {
+        let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
+        let ambient = self.tile.settings.render.ambient;
+        let takes_ambient = ambient != Vec3::ZERO && self.accumulator.takes_ambient();
+        // Look up no more textures than the picture shows.
+        if !self.accumulator.takes_reflected() {
+            if takes_ambient {
+                let reflectance = rough.ambient_at(at, lookups);
+                self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * reflectance);
+            }
+            return;
+        }
+        let bsdf =
+            if self.accumulator.measure.is_colored() { rough.at(at, lookups) } else { rough.bleached() };
+        if takes_ambient {
+            self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient());
+        }
+        if bsdf.is_black() {
+            return;
+        }
+        let shading = vertex.shading(self.counters);
+        let lit = ShadingVertex { path, place: self.place, vertex, shading, bsdf };
+        let measure = if path.state.only_specular_before { self.accumulator.measure } else { Measure::ALL };
+        self.direct.push(self.tile, &lit, measure);
+    }
+
+    fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {
+        let shading = vertex.shading(self.counters);
+        self.push_reflected(reflected(path, vertex, &shading, mirror.reflectance));
+    }
+
+    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: Medium) {
+        let shading = vertex.shading(self.counters);
+        let Interface { reflectance, refracted } = interface(self.tile.world, path, vertex, &shading, far);
+        let mirrored = |weight: f32| reflected(path, vertex, &shading, Vec3::splat(weight));
+        let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
+        let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
+        let splits = self.tile.behaviour.splits && path.state.only_specular_before;
+        if weaker >= LEAST_SPLIT && splits {
+            self.push_reflected(mirrored(reflectance));
+            self.push_refracted(refracted, 1.0 - reflectance);
+        } else if self.tile.chooses_reflection(path, reflectance) {
+            self.push_reflected(mirrored(1.0));
+        } else {
+            self.push_refracted(refracted, 1.0);
+        }
+    }
+
+    fn push_reflected(&mut self, ray: PathRay) {
+        let Some(ray) = self.russian_roulette(ray) else { return };
+        self.counters.reflected_rays += 1;
+        self.next.push(ray);
+    }
+
+    fn push_refracted(&mut self, mut ray: PathRay, weight: f32) {
+        ray.throughput *= weight;
+        let Some(ray) = self.russian_roulette(ray) else { return };
+        self.counters.refracted_rays += 1;
+        self.next.push(ray);
+    }
+
+    fn russian_roulette(&self, ray: PathRay) -> Option<PathRay> {
+        match self.continuation {
+            Some(continuation) if !self.tile.behaviour.splits || !ray.state.only_specular_before => {
+                continuation.russian_roulette(self.tile, ray)
+            }
+            Some(_) | None => Some(ray),
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Scattering of paths at diffuse and glossy surfaces, sixteen at a time, and Russian roulette.
+
+use super::batch::{Response, VertexBatch};
+use super::cone::Cone;
+use super::interface::SCATTERED;
+use super::medium::Media;
+use super::ray::{PathRay, PathState};
+use super::tile::TileContext;
+use crate::geometry::Ray;
+use crate::geometry::rows::lanes;
+use crate::materials::bsdf::LobeSet;
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
+use crate::sampling::Decision;
+use crate::world::Loops;
+
+/// Continuation of the paths of a round.
+#[derive(Clone, Copy, Debug)]
+pub struct Continuation {
+    /// Whether paths go on, and would find anything: after the last scattering, only lamps.
+    pub leads_on: bool,
+    /// Whether Russian roulette applies.
+    pub is_risked: bool,
+}
+
+impl Continuation {
+    /// Scatterings before Russian roulette begins.
+    const SURE: u32 = 3;
+
+    /// The continuation from vertices after so many scatterings.
+    pub fn new(tile: &TileContext<'_>, depth: u32) -> Self {
+        let emits = || tile.world.materials.iter().any(|material| material.emission.shines());
+        let max_depth = tile.settings.render.max_depth;
+        let shines = || tile.world.lights.are_beyond() || emits();
+        let leads_on = depth + 1 < max_depth || depth + 1 == max_depth && shines();
+        Self { leads_on, is_risked: depth >= Self::SURE }
+    }
+
+    /// Survival probability of a path: the root of its throughput, as its part of the variance goes with the square of its
+    /// throughput (Bolin and Meyer, *An Error Metric for Monte Carlo Ray Tracing*, 1997).
+    #[inline(always)]
+    fn chance(self, roulette_throughput: f32) -> f32 {
+        if self.is_risked & (roulette_throughput < 1.0) { roulette_throughput.sqrt() } else { 1.0 }
+    }
+
+    /// Russian roulette for a path after a mirror or glass. `None` if it ends; survivors are reweighted.
+    pub fn russian_roulette(self, tile: &TileContext<'_>, mut path: PathRay) -> Option<PathRay> {
+        let chance = self.chance(path.state.roulette_throughput);
+        if chance < 1.0 {
+            if !(tile.sampler(path.slot).pair(path.path, Decision::Spared).x < chance) {
+                return None;
+            }
+            path.throughput /= chance;
+            path.state.roulette_throughput /= chance;
+        }
+        Some(path)
+    }
+}
+
+/// Scatters paths at the vertices of a row.
+pub struct BsdfSampling<'a> {
+    /// Context of the tile.
+    pub tile: &'a TileContext<'a>,
+    /// The vertices.
+    pub row: &'a VertexBatch,
+    /// A bit for each vertex at which paths go on.
+    pub used: u32,
+    /// Continuation of the paths.
+    pub continuation: Continuation,
+}
+
+/// Scattered directions at the vertices of a row.
+pub struct Scattered {
+    /// A bit for each path that goes on.
+    alive: u32,
+    /// Unit directions.
+    directions: Lanes3,
+    /// Their pdfs in sr⁻¹.
+    densities: Lanes,
+    /// Factors on the throughput.
+    factors: Lanes3,
+    /// Factors on [`PathState::roulette_throughput`].
+    roulette_throughput: Lanes,
+}
+
+impl BsdfSampling<'_> {
+    /// Adds the rays of the next round. `media` are those of the vertices; `cones` are the beams at the vertices, by place, if
+    /// beams are requested.
+    pub fn scatter(self, media: &Media, cones: &[Cone], next: &mut Vec<PathRay>) {
+        // Scatter the vertices side by side.
+        let row = self.row;
+        let scattered = self.tile.world.geometry.instructions().run(self);
+        let starts = row.starts(&scattered.directions);
+        let of_lobe = |density: f32| move |cone: &Cone| cone.scattered(density);
+        // Make a path of each that goes on.
+        next.extend(lanes(scattered.alive).map(|i| {
+            let mut path = PathRay {
+                ray: Ray::new(lane(&row.from, i), lane(&scattered.directions, i)).leaving(starts[i]),
+                throughput: lane(&row.throughput, i) * lane(&scattered.factors, i),
+                slot: row.slot[i],
+                path: row.path[i],
+                medium: media.get(row.medium[i]),
+                state: PathState {
+                    density: scattered.densities[i],
+                    normal: lane(&row.normal, i),
+                    roulette_throughput: scattered.roulette_throughput[i],
+                    only_specular_before: false,
+                    one_diffuse_before: row.only_specular_before & 1 << i != 0,
+                    is_after_gloss: row.bsdf.has_narrow_lobe(i),
+                },
+                cone: cones
+                    .get(row.place[i] as usize)
+                    .map_or(Cone::default(), of_lobe(scattered.densities[i])),
+            };
+            path.path = path.next_path(SCATTERED);
+            path
+        }));
+    }
+}
+
+impl Loops for BsdfSampling<'_> {
+    type Done = Scattered;
+
+    #[inline(always)]
+    fn run(self, folds: impl Folds) -> Scattered {
+        let Self { tile, row, used, continuation } = self;
+        let sampler = row.sampler(tile);
+        // Sample a direction for each vertex.
+        let u = sampler.pairs(&row.path, Decision::Direction, 0, 1);
+        let are_narrow = row.bsdf.has_narrow_lobes();
+        let [lobe, _] =
+            if are_narrow { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; LANES]; 2] };
+        let directions = row.bsdf.sample(LobeSet::All, &row.normal, &lobe, &u);
+        // Evaluate the BSDF and the pdf there.
+        let Response { bsdf, cosines } = row.response(&directions);
+        let densities = row.bsdf.pdf(LobeSet::All, &row.normal, &directions, &bsdf);
+        let grey = row.bsdf.grey(&bsdf);
+        let mut roulette_throughput = [0.0; LANES];
+        let mut factors = bsdf.f;
+        let mut alive = 0_u32;
+        for i in 0..LANES {
+            let share = cosines[i] / densities[i];
+            roulette_throughput[i] = row.roulette_throughput[i] * grey[i] * share;
+            let factor = lane(&bsdf.f, i) * share;
+            set_lane(&mut factors, i, factor);
+            let brings = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);
+            let bit = 1 << i;
+            alive |= if (cosines[i] > 0.0) & (densities[i] > 0.0) & brings { bit } else { 0 };
+        }
+        // Drop directions that certainly see nothing.
+        alive &= used & !row.hidden(&directions, folds);
+        // Apply Russian roulette.
+        if continuation.is_risked {
+            let [risk, _] = sampler.pairs(&row.path, Decision::Roulette, 0, 1);
+            for i in 0..LANES {
+                let chance = continuation.chance(roulette_throughput[i]);
+                let bit = 1 << i;
+                alive &= if risk[i] < chance { !0 } else { !bit };
+                let factor = lane(&factors, i) / chance;
+                set_lane(&mut factors, i, factor);
+                roulette_throughput[i] /= chance;
+            }
+        }
+        Scattered { alive, directions, densities, factors, roulette_throughput }
+    }
+}
