@@ -110,7 +110,10 @@ mod tests {
                 let (some, others) = rest.split_at(count);
                 let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
                 let radiance = some.iter().map(|value| Vec3::splat(*value)).collect();
-                film.add(0, &TileSamples { pixels: rect.into(), samples: count as u32, radiance, negative: None });
+                film.add(
+                    0,
+                    &TileSamples { pixels: rect.into(), samples: count as u32, radiance, negative: None },
+                );
                 rest = others;
             }
             let mean = film.tile(0).mean(0).expect("samples");

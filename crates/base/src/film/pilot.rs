@@ -3,6 +3,7 @@
 
 use super::noise::luminance;
 use super::{Film, Quantity, Rect, TileSamples};
+use crate::math::random::scrambled;
 
 /// Pixels of a pilot, unless the picture has fewer.
 const PIXELS: u64 = 4096;
@@ -60,13 +61,6 @@ impl Pilot {
     }
 }
 
-/// A number that looks random (the finaliser of `MurmurHash3`).
-fn scrambled(number: u64) -> u64 {
-    let mix = |x: u64, factor: u64| (x ^ (x >> 33)).wrapping_mul(factor);
-    let mixed = mix(mix(number.wrapping_add(1), 0xff51_afd7_ed55_8ccd), 0xc4ce_b9fe_1a85_ec53);
-    mixed ^ (mixed >> 33)
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::HashSet;
@@ -91,7 +85,8 @@ mod tests {
     fn a_film_and_single_pixels_tell_the_same_brightness() {
         let crop = Rect { x: 0, y: 0, width: 40, height: 3 };
         let film = Film::new(40, 3, None).expect("a film");
-        let value = |x: u32, y: u32, sample: u32| Vec3::new(x as f32 + 0.3, y as f32 * 0.7, sample as f32 / 3.0);
+        let value =
+            |x: u32, y: u32, sample: u32| Vec3::new(x as f32 + 0.3, y as f32 * 0.7, sample as f32 / 3.0);
         let samples = |rect: Rect| {
             let pixels = (0..rect.area() as u32).map(|i| (rect.x + i % rect.width, rect.y + i / rect.width));
             let radiance = pixels.flat_map(|(x, y)| (0..16).map(move |sample| value(x, y, sample))).collect();
@@ -106,6 +101,8 @@ mod tests {
             Pilot::luminance(samples(Rect { x, y, width: 1, height: 1 }))
         });
         assert_eq!(pilot.of_film(&film), apart);
-        assert!(apart.is_some() && Pilot::new(crop).of_film(&Film::new(40, 3, None).expect("a film")).is_none());
+        assert!(
+            apart.is_some() && Pilot::new(crop).of_film(&Film::new(40, 3, None).expect("a film")).is_none()
+        );
     }
 }

@@ -105,7 +105,9 @@ impl Film {
             return false;
         }
         let (signed, levels) = (tile.negative.is_some(), tile.steps.level_count());
-        [tile.earlier.len(), usize::from(signed), levels].map(|count| put(bytes, count as u32));
+        for count in [tile.earlier.len(), usize::from(signed), levels] {
+            put(bytes, count as u32);
+        }
         put_sums(bytes, &tile.sums, &tile.earlier);
         tile.counts.iter().for_each(|count| put(bytes, *count));
         if let Some(negative) = &tile.negative {
@@ -157,7 +159,7 @@ fn put(bytes: &mut Vec<u8>, word: u32) {
 
 fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[Vec<DVec3>]) {
     for sum in [sums].into_iter().chain(earlier.iter().map(Vec::as_slice)).flatten() {
-        sum.to_array().map(|part| bytes.extend_from_slice(&part.to_bits().to_le_bytes()));
+        sum.to_array().iter().for_each(|part| bytes.extend_from_slice(&part.to_bits().to_le_bytes()));
     }
 }
 

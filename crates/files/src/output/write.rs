@@ -55,6 +55,19 @@ pub fn atomic_until(
     guard: &Guard<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
+    atomic_by(path, &|file| stoppable::write_all(file, bytes, token), guard, token)
+}
+
+/// [`atomic_until`] of bytes that are made while they are written: `content` writes all of them, as often as it is called.
+///
+/// # Errors
+/// As [`atomic_until`], and the errors of `content`.
+pub fn atomic_by(
+    path: &Path,
+    content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
+    guard: &Guard<'_>,
+    token: &CancelToken,
+) -> Result<(), OutputError> {
     prepare_process();
     let named = |error| OutputError::file(path, error);
     match place::find(path)? {
@@ -69,7 +82,7 @@ pub fn atomic_until(
                     way_out: "change a copy of it",
                 });
             }
-            stoppable::or_cancelled(fill(&new, bytes, carried.as_ref(), token), named)?;
+            stoppable::or_cancelled(fill(&new, content, carried.as_ref()), named)?;
             (guard.may_replace)(&target.path)?;
             new.rename_to(&target.path).and_then(|()| sync_directory(target.directory())).map_err(named)?;
             if let (Losses::Told(tell), false) = (guard.losses, lost.is_empty()) {
@@ -79,7 +92,9 @@ pub fn atomic_until(
         }
         Place::InPlace(place) => {
             (guard.may_replace)(&place)?;
-            stoppable::or_cancelled(in_place(&place, bytes, token), named)
+            let mut bytes = Vec::new();
+            stoppable::or_cancelled(content(&mut bytes), named)?;
+            stoppable::or_cancelled(in_place(&place, &bytes, token), named)
         }
     }
 }
@@ -108,8 +123,12 @@ fn beside(target: &Target, guard: &Guard<'_>) -> io::Result<(Temporary, Option<C
     Ok((new, carried))
 }
 
-fn fill(new: &Temporary, bytes: &[u8], carried: Option<&Carried>, token: &CancelToken) -> io::Result<()> {
-    stoppable::write_all(&new.file, bytes, token)?;
+fn fill(
+    new: &Temporary,
+    content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
+    carried: Option<&Carried>,
+) -> io::Result<()> {
+    content(&mut &new.file)?;
     if let Some(carried) = carried {
         carried.permit(&new.file)?;
     }

@@ -12,6 +12,7 @@ mod cautions;
 mod check;
 mod engine;
 mod errands;
+mod identity;
 mod inputs;
 mod keys;
 mod pace;

@@ -39,6 +39,8 @@ pub(super) struct Tracer<'a> {
     pub(super) token: &'a CancelToken,
     /// Photon maps of all jobs' samples, if photons are gathered.
     pub(super) photons: Option<&'a PhotonMaps>,
+    /// Number in the whole picture of sample 0 of the jobs.
+    pub(super) first: u32,
 }
 
 /// Samples of one tile that are to be made.
@@ -66,8 +68,8 @@ impl Job {
 
 impl Tracer<'_> {
     fn trace(&self, job: &Job) -> Result<(TileSamples, Cost), Cancelled> {
-        let Self { kernel, world, settings, token, photons, .. } = *self;
-        let samples = job.samples.clone();
+        let Self { kernel, world, settings, token, photons, first, .. } = *self;
+        let samples = first + job.samples.start..first + job.samples.end;
         let begin = seconds_of_thread();
         let (samples, rays) = match photons {
             Some(_) => render_tile_by(photons, world, settings, job.pixels, samples, token),

@@ -31,8 +31,12 @@ pub(in crate::pipeline) fn render(
             true => Convergence::Photons,
             false => Convergence::Stratified,
         };
-        let state = || FilmState::new(key, rendering.plan, rendering.most_film_bytes, convergence);
-        films.put(state).map_err(Stop::work)?;
+        let (plan, most_bytes) = (rendering.plan, rendering.most_film_bytes);
+        let state = || FilmState::new(key, plan, most_bytes, convergence, rendering.share.clone());
+        let state = films.put(state).map_err(Stop::work)?;
+        if let Some(keeping) = rendering.keeping.filter(|_| !rendering.force) {
+            keeping.resume(state, wanted)?;
+        }
     }
     let Some(state) = films.current_mut() else { return Err(Stop::work("the film is gone")) };
     let budget = rendering.plan.time_seconds;
