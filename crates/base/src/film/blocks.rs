@@ -1,8 +1,8 @@
 //! Blocks of samples: a pixel's sum is the sum of its blocks, so that machines which render some blocks each get the same bits.
 
 use super::Film;
-use super::FilmError;
-use super::sums::{Tile, is_available};
+use super::sums::{Tile, bytes_needed, is_available};
+use super::{FilmError, Rect};
 use crate::math::DVec3;
 
 /// Samples of a block.
@@ -84,6 +84,13 @@ impl Film {
         }
         self.blocks = blocks;
         Ok(self)
+    }
+
+    /// Bytes for the sums of a crop whose samples are added up in this order, and for the finished picture of this size.
+    pub fn bytes_of((width, height): (u32, u32), crop: Rect, blocks: Blocks) -> (u64, u64) {
+        let more = crop.area() as u64 * (blocks.kept() * size_of::<DVec3>()) as u64;
+        let picture = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
+        (bytes_needed(width, height, crop) - picture + more, picture)
     }
 
     /// Order in which samples are added up.

@@ -109,11 +109,11 @@ impl Film {
             put(bytes, count as u32);
         }
         put_sums(bytes, &tile.sums, &tile.earlier);
-        tile.counts.iter().for_each(|count| put(bytes, *count));
+        put_all(bytes, tile.counts.iter().map(|count| count.to_le_bytes()));
         if let Some(negative) = &tile.negative {
             bytes.extend_from_slice(&negative.weight.to_bits().to_le_bytes());
             put_sums(bytes, &negative.sums, &negative.earlier);
-            negative.counts.iter().for_each(|count| put(bytes, *count));
+            put_all(bytes, negative.counts.iter().map(|count| count.to_le_bytes()));
         }
         tile.steps.words(&mut |word| put(bytes, word));
         true
@@ -158,8 +158,28 @@ fn put(bytes: &mut Vec<u8>, word: u32) {
 }
 
 fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[Vec<DVec3>]) {
-    for sum in [sums].into_iter().chain(earlier.iter().map(Vec::as_slice)).flatten() {
-        sum.to_array().iter().for_each(|part| bytes.extend_from_slice(&part.to_bits().to_le_bytes()));
+    for sums in [sums].into_iter().chain(earlier.iter().map(Vec::as_slice)) {
+        put_all(
+            bytes,
+            sums.iter().map(|sum| {
+                let mut number = [0; 24];
+                let (x, rest) = number.split_at_mut(8);
+                let (y, z) = rest.split_at_mut(8);
+                x.copy_from_slice(&sum.x.to_bits().to_le_bytes());
+                y.copy_from_slice(&sum.y.to_bits().to_le_bytes());
+                z.copy_from_slice(&sum.z.to_bits().to_le_bytes());
+                number
+            }),
+        );
+    }
+}
+
+/// Appends numbers of `N` bytes, which is much faster together than one after the other.
+fn put_all<const N: usize>(bytes: &mut Vec<u8>, numbers: impl ExactSizeIterator<Item = [u8; N]>) {
+    let start = bytes.len();
+    bytes.resize(start + N * numbers.len(), 0);
+    for (place, number) in bytes[start..].chunks_exact_mut(N).zip(numbers) {
+        place.copy_from_slice(&number);
     }
 }
 

@@ -466,7 +466,7 @@ fn rings(crop: Rect) -> Vec<usize> {
 const SUM_BYTES: usize = size_of::<DVec3>() + 3 * size_of::<f32>() + size_of::<u32>();
 
 /// Bytes for the sums of the crop, and for the whole picture as radiance and as sRGB.
-fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
+pub(super) fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
     let pixel = size_of::<Vec3>() + size_of::<[u8; 3]>();
     let whole = u64::from(width) * u64::from(height);
     (crop.area() as u64).saturating_mul(SUM_BYTES as u64).saturating_add(whole.saturating_mul(pixel as u64))

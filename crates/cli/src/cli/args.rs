@@ -187,6 +187,9 @@ pub struct RenderArgs {
     /// Keep the last checkpoint of a finished render, which --resume with more --samples extends
     #[arg(long, help_heading = "Long renders")]
     pub keep_checkpoint: bool,
+    /// Refuse a render that would need more memory than this, as in 8GiB or 500MB
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true, value_parser = memory, help_heading = "Long renders")]
+    pub memory: Option<u64>,
 
     /// Pixels across
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("width"), help_heading = "Picture")]
@@ -271,6 +274,7 @@ impl RenderArgs {
             threads: self.threads,
             bit_depth: self.bit_depth,
             shard: self.shard,
+            memory: self.memory,
             checkpoints: Checkpoints {
                 seconds: self.checkpoint,
                 resume: match (self.resume, self.once) {
@@ -411,6 +415,27 @@ fn pause(text: &str) -> Result<f64, String> {
         Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds, or 0 for no checkpoints".to_owned()),
     }
+}
+
+/// Reads a size in bytes, with a unit or without.
+fn memory(text: &str) -> Result<u64, String> {
+    let expected = || "expected a size, as in 8GiB, 500MB or 1000000".to_owned();
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let number: f64 = digits.trim().parse().map_err(|_| expected())?;
+    let unit: u64 = match text[digits.len()..].to_lowercase().as_str() {
+        "" | "b" => 1,
+        "k" | "kib" => 1 << 10,
+        "kb" => 1000,
+        "m" | "mib" => 1 << 20,
+        "mb" => 1_000_000,
+        "g" | "gib" => 1 << 30,
+        "gb" => 1_000_000_000,
+        "t" | "tib" => 1 << 40,
+        "tb" => 1_000_000_000_000,
+        _ => return Err(expected()),
+    };
+    let bytes = number * unit as f64;
+    if bytes >= 1.0 && bytes < 1e18 { Ok(bytes as u64) } else { Err(expected()) }
 }
 
 /// Reads a part of a picture: its number and the number of parts.

@@ -42,10 +42,7 @@ fn file(path: &Path) -> String {
 fn render(args: &FarmArgs, index: &str) -> String {
     let (scene, part) = (word(&file(&args.scene)), part(args, index));
     let options: String = args.options.iter().map(|option| format!(" {}", word(option))).collect();
-    format!(
-        "glimt {scene} --once -o {part} --shard {index}/{} --resume --progress plain{options}",
-        args.shards
-    )
+    format!("glimt {scene} --once -o {part} --shard {index}/{} --resume{options}", args.shards)
 }
 
 /// The file of one part.

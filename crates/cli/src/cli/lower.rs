@@ -110,7 +110,7 @@ mod tests {
             "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --error 0.02 --time 0.5 --max-depth 0 \
              --integrator path --shadows hard --clamp 2.5 --photons on --dof off --accel bvh --view normal --seed 7 \
              --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --force --progress json --color 256 --poll \
-             --nice 3 --checkpoint 5 --resume --keep-checkpoint",
+             --nice 3 --checkpoint 5 --resume --keep-checkpoint --memory 1.5GiB",
         )
         .expect("right");
         let expected = Overrides {
@@ -135,6 +135,7 @@ mod tests {
             crop: Some(Rect { x: 1, y: 2, width: 3, height: 4 }),
             threads: Some(2),
             bit_depth: Some(16),
+            memory: Some(3 << 29),
             checkpoints: Checkpoints { seconds: 5.0, resume: Resume::Asked, are_kept: true },
             ..Default::default()
         };
@@ -169,6 +170,10 @@ mod tests {
             "a.toml --nice 20",
             "a.toml --nice -1",
             "a.toml --checkpoint -1",
+            "a.toml --memory 0",
+            "a.toml --memory 5XB",
+            "a.toml --memory GiB",
+            "a.toml --memory inf",
             "a.toml --shard 1/2",
             "a.toml --once -o a.part --shard 0/2",
             "a.toml --once -o a.part --shard 3/2",

@@ -55,7 +55,16 @@ pub fn atomic_until(
     guard: &Guard<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
-    atomic_by(path, &|file| stoppable::write_all(file, bytes, token), guard, token)
+    atomic_by(path, &|file| stoppable::write_all(file, bytes, token), guard, (token, Durability::Power))
+}
+
+/// What a file is to outlive from the moment at which it has its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Durability {
+    /// The process: the system writes the bytes to the disk when it likes.
+    Process,
+    /// A loss of power: the bytes are on the disk.
+    Power,
 }
 
 /// [`atomic_until`] of bytes that are made while they are written: `content` writes all of them, as often as it is called.
@@ -66,7 +75,7 @@ pub fn atomic_by(
     path: &Path,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     guard: &Guard<'_>,
-    token: &CancelToken,
+    (token, durability): (&CancelToken, Durability),
 ) -> Result<(), OutputError> {
     prepare_process();
     let named = |error| OutputError::file(path, error);
@@ -82,9 +91,13 @@ pub fn atomic_by(
                     way_out: "change a copy of it",
                 });
             }
-            stoppable::or_cancelled(fill(&new, content, carried.as_ref()), named)?;
+            stoppable::or_cancelled(fill(&new, content, carried.as_ref(), durability), named)?;
             (guard.may_replace)(&target.path)?;
-            new.rename_to(&target.path).and_then(|()| sync_directory(target.directory())).map_err(named)?;
+            new.rename_to(&target.path).map_err(named)?;
+            match durability {
+                Durability::Process => {}
+                Durability::Power => sync_directory(target.directory()).map_err(named)?,
+            }
             if let (Losses::Told(tell), false) = (guard.losses, lost.is_empty()) {
                 tell(format!("{}: {} could not be kept", path.display(), lost.join(" and ")));
             }
@@ -127,12 +140,16 @@ fn fill(
     new: &Temporary,
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     carried: Option<&Carried>,
+    durability: Durability,
 ) -> io::Result<()> {
     content(&mut &new.file)?;
     if let Some(carried) = carried {
         carried.permit(&new.file)?;
     }
-    new.file.sync_all()
+    match durability {
+        Durability::Process => Ok(()),
+        Durability::Power => new.file.sync_all(),
+    }
 }
 
 /// Synchronises a directory, so that the rename survives a loss of power. Failures are ignored, as some file systems and

@@ -15,6 +15,7 @@ mod errands;
 mod identity;
 mod inputs;
 mod keys;
+mod memory;
 mod pace;
 mod plan;
 pub mod protocol;

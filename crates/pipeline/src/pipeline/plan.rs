@@ -35,6 +35,8 @@ pub(super) struct Plan {
     /// The part of the picture that is rendered, from 1, and the number of parts.
     pub(super) shard: Option<(u32, u32)>,
     pub(super) checkpoints: Checkpoints,
+    /// Most bytes that the render may need.
+    pub(super) memory: Option<u64>,
     pub(super) effective: Effective,
 }
 
@@ -95,6 +97,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         replaces_foreign: overrides.replaces_foreign,
         shard: overrides.shard,
         checkpoints: overrides.checkpoints,
+        memory: overrides.memory,
         scene: with_accel(scene, render.accel),
     })
 }

@@ -44,6 +44,8 @@ macro_rules! overrides {
             pub shard: Option<(u32, u32)>,
             /// Checkpoints of the render.
             pub checkpoints: Checkpoints,
+            /// Most bytes that the render may need.
+            pub memory: Option<u64>,
             $($(#[doc = $doc])* pub $name: Option<$type>,)*
         }
 

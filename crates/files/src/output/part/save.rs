@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::super::OutputError;
-use super::super::write::{Guard, atomic_by};
+use super::super::write::{Durability, Guard, atomic_by};
 use super::{Digest, END, End, Head, MARK, VERSION, digest};
 use crate::control::CancelToken;
 use crate::film::Film;
@@ -22,9 +22,9 @@ pub fn save(
     film: &Film,
     state: &Value,
     guard: &Guard<'_>,
-    token: &CancelToken,
+    (token, durability): (&CancelToken, Durability),
 ) -> Result<(), OutputError> {
-    atomic_by(path, &|file| write(file, head, film, state, token), guard, token)
+    atomic_by(path, &|file| write(file, head, film, state, token), guard, (token, durability))
 }
 
 /// Bytes that are put together before they are written.

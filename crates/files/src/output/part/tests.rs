@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use proptest::prelude::*;
 use serde_json::json;
 
-use super::super::write::Guard;
+use super::super::write::{Durability, Guard};
 use super::super::{BitDepth, Finish, Losses};
 use super::*;
 use crate::control::CancelToken;
@@ -46,7 +46,8 @@ const OPEN: Guard<'static> = Guard { is_kept: &|_| false, may_replace: &|_| Ok((
 
 fn put(folder: &Path, name: &str, head: &Head, film: &Film) -> PathBuf {
     let path = folder.join(name);
-    save(&path, head, film, &json!({ "a": 1 }), &OPEN, &CancelToken::new()).expect("saved");
+    save(&path, head, film, &json!({ "a": 1 }), &OPEN, (&CancelToken::new(), Durability::Process))
+        .expect("saved");
     path
 }
 

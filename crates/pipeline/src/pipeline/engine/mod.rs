@@ -27,6 +27,7 @@ use super::errands::{AtHand, Errand};
 use super::identity::Depends;
 use super::inputs::Inputs;
 use super::keys;
+use super::memory::Foretold;
 use super::pace::Stopwatch;
 use super::plan::{NamedBy, Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing};
@@ -342,6 +343,7 @@ impl Engine {
         }
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
+        Foretold::of_picture(&plan).check(&plan)?;
         let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(cautions);
         let own = Eye::new(&plan.scene, parsed.orbiter, &CameraChange::default());
@@ -363,6 +365,7 @@ impl Engine {
         let reading = Reading { sink: table.sink, token, contents, pool: &pool };
         let lookups = plan.settings.lookups();
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
+        Foretold::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).check(&plan)?;
         self.inputs = inputs(&parsed, &meshes, findings);
         self.look_for_conflicts(request, &plan, findings, table.sink)?;
         let generation = request.generation;

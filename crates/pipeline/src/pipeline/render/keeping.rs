@@ -14,7 +14,7 @@ use crate::integrators::RayCounters;
 use crate::output::part::{
     self, Head, Kind, PartError, PartFile, PictureHead, ShareHead, Trait, differences,
 };
-use crate::output::write::Guard;
+use crate::output::write::{Durability, Guard};
 use crate::output::{Finish, Losses, OutputError};
 use crate::pipeline::inputs::Inputs;
 use crate::pipeline::protocol::CheckpointNews;
@@ -254,7 +254,7 @@ impl<'a> Keeping<'a> {
             return;
         }
         let begin = Instant::now();
-        self.write(state, rays, seconds);
+        self.write(state, rays, seconds, Durability::Power);
         let pause = Duration::from_secs_f64(self.settings.seconds.min(1e9)).max(begin.elapsed() * TIME_SHARE);
         self.due.set(Instant::now() + pause);
     }
@@ -262,7 +262,8 @@ impl<'a> Keeping<'a> {
     /// Writes the checkpoint of a render that is cancelled, if it is to be gone on with.
     pub(in crate::pipeline) fn at_the_end(&self, state: &FilmState, rays: RayCounters, seconds: f64) {
         if (self.is_suspended)() && state.is_begun() {
-            self.write(state, rays, seconds);
+            // Whoever sent the signal waits: the disk may take longer than that.
+            self.write(state, rays, seconds, Durability::Process);
         }
     }
 
@@ -270,7 +271,7 @@ impl<'a> Keeping<'a> {
     /// samples are kept all the same.
     pub(in crate::pipeline) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
         if !is_written || self.settings.are_kept {
-            return self.write(state, rays, state.render_seconds);
+            return self.write(state, rays, state.render_seconds, Durability::Power);
         }
         // One of another picture is somebody else's.
         let head = PartFile::head(&self.path);
@@ -280,11 +281,11 @@ impl<'a> Keeping<'a> {
         }
     }
 
-    fn write(&self, state: &FilmState, rays: RayCounters, seconds: f64) {
+    fn write(&self, state: &FilmState, rays: RayCounters, seconds: f64, durability: Durability) {
         let head = head(Kind::Checkpoint, state, self.identity().to_vec(), self.finish);
         let written = serde_json::to_value(State::of(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
-            .and_then(|value| save(&self.path, &head, &state.film, &value, self.inputs));
+            .and_then(|value| save(&self.path, &head, &state.film, &value, (self.inputs, durability)));
         match written {
             Ok(()) => self.tell(CheckpointNews::Written { path: self.path.clone() }),
             Err(error) => {
@@ -306,7 +307,7 @@ fn save(
     head: &Head,
     film: &Film,
     state: &serde_json::Value,
-    inputs: &Inputs,
+    (inputs, durability): (&Inputs, Durability),
 ) -> Result<(), OutputError> {
     let may_replace = |at: &Path| match at.symlink_metadata() {
         Ok(_) if !part::is_part(at) || inputs.contain(at) => {
@@ -321,5 +322,5 @@ fn save(
         losses: Losses::Told(&|_| ()),
     };
     // Nobody cancels this: a signal that ends the render is its reason.
-    part::save(path, head, film, state, &guard, &CancelToken::new())
+    part::save(path, head, film, state, &guard, (&CancelToken::new(), durability))
 }

@@ -42,11 +42,16 @@ pub(in crate::pipeline) fn render(
     let budget = rendering.plan.time_seconds;
     let finished = state.is_complete(wanted) || (budget.is_some() && state.ended_by == budget);
     let had = state.samples(wanted);
+    let is_resumed = state.before.seconds > 0.0;
     let mut scheduler = Scheduler::new(state, rendering);
     if finished {
         scheduler.show();
-        let why = if is_other { "its film was kept" } else { "nothing that it shows changed" };
-        return Ok(Staged::reused(RayCounters::default(), why));
+        let why = match (is_resumed, is_other) {
+            (true, _) => "the checkpoint has all samples",
+            (false, true) => "its film was kept",
+            (false, false) => "nothing that it shows changed",
+        };
+        return Ok(Staged::reused(scheduler.rays, why));
     }
     scheduler.state.ended_by = None;
     scheduler.state.is_passing = rendering.is_moved;

@@ -20,7 +20,7 @@ use crate::film::RadianceImage;
 use crate::film::SampleStats;
 use crate::integrators::{Measure, Shown};
 use crate::output::part::{self, Kind};
-use crate::output::write::Guard;
+use crate::output::write::{Durability, Guard};
 use crate::output::{self, BitDepth, Finish, Format, OutputError};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
@@ -210,7 +210,9 @@ fn write_part(
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
     let head = head(Kind::Part, canvas, canvas.identity.clone().unwrap_or_default(), &finish(plan));
-    let save = |guard: &Guard<'_>| part::save(path, &head, &canvas.film, &Value::Null, guard, token);
+    let save = |guard: &Guard<'_>| {
+        part::save(path, &head, &canvas.film, &Value::Null, guard, (token, Durability::Power))
+    };
     guarded(plan, inputs, path, sink, save)?;
     Ok(path.metadata().map_or(0, |found| found.len()))
 }
