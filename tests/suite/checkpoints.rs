@@ -20,6 +20,12 @@ fn begin(desk: &Desk, line: &str) -> Child {
     desk.glimt(line).stderr(Stdio::null()).spawn().expect("it runs")
 }
 
+/// Runs it with an exit code; returns what it says as one line, as messages are wrapped.
+#[track_caller]
+fn said(desk: &Desk, line: &str, code: i32) -> String {
+    desk.expect(line, code).split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 fn end(mut child: Child, signal: Signal) -> Option<i32> {
     kill(Pid::from_raw(child.id() as i32), signal).expect("it runs still, or waits for its parent");
     child.wait().expect("a child").code()
@@ -76,7 +82,7 @@ fn killed_while_it_writes_a_checkpoint_is_the_one_before_or_the_new_one() {
         end(child, Signal::SIGKILL);
         if desk.path("out.exr.checkpoint").exists() {
             // A whole one is of another seed; one that is not would be called damaged.
-            let said = desk.expect("room.toml --once -o out.exr --seed 9 --resume", 2);
+            let said = self::said(&desk, "room.toml --once -o out.exr --seed 9 --resume", 2);
             assert!(said.contains("seed is 0 there and 9 here"), "{number}: {said}");
         }
     }
@@ -132,7 +138,7 @@ fn a_finished_render_is_extended_to_the_pixels_of_a_longer_one() {
         }
     }
     kept(&desk, "--samples 8");
-    let said = desk.expect("room.toml --once -o out.exr --resume --samples 4", 2);
+    let said = self::said(&desk, "room.toml --once -o out.exr --resume --samples 4", 2);
     assert!(said.contains("it has more samples than the 4 that are asked for"), "{said}");
 }
 
@@ -142,7 +148,7 @@ fn a_checkpoint_of_another_picture_is_named_and_left_alone() {
     kept(&desk, "");
     let (image, checkpoint) = (desk.bytes("out.exr"), desk.bytes("out.exr.checkpoint"));
     let refused = |options: &str, words: &str| {
-        let said = desk.expect(&format!("room.toml --once -o out.exr --resume {options}"), 2);
+        let said = self::said(&desk, &format!("room.toml --once -o out.exr --resume {options}"), 2);
         assert!(said.contains(words) && said.contains("out.exr.checkpoint"), "{options}: {said}");
         assert!(desk.bytes("out.exr") == image);
     };
@@ -188,7 +194,7 @@ fn a_damaged_checkpoint_is_refused_and_the_image_stays() {
             bytes[index] ^= 1 << (number / 2 % 8);
         }
         desk.write("out.exr.checkpoint", bytes);
-        let said = desk.expect("room.toml --once -o out.exr --resume", 2);
+        let said = self::said(&desk, "room.toml --once -o out.exr --resume", 2);
         assert!(said.contains("out.exr.checkpoint: "), "{said}");
         assert!(desk.bytes("out.exr") == image);
     }
@@ -197,10 +203,10 @@ fn a_damaged_checkpoint_is_refused_and_the_image_stays() {
 #[test]
 fn what_is_not_asked_for_is_said_and_not_done() {
     let desk = desk();
-    let said = desk.expect("room.toml --once -o out.exr --resume", 0);
+    let said = self::said(&desk, "room.toml --once -o out.exr --resume", 0);
     assert!(said.contains("there is no out.exr.checkpoint: starting from the beginning"), "{said}");
     kept(&desk, "");
-    let said = desk.expect("room.toml --once -o out.exr", 0);
+    let said = self::said(&desk, "room.toml --once -o out.exr", 0);
     assert!(said.contains("out.exr.checkpoint is of this picture, and is not used"), "{said}");
     assert!(!desk.path("out.exr.checkpoint").exists(), "the picture is done");
     // One of another picture stays, as does what is no checkpoint.
@@ -208,7 +214,7 @@ fn what_is_not_asked_for_is_said_and_not_done() {
     desk.expect("room.toml --once --progress none -o out.exr --seed 3", 0);
     assert!(desk.path("out.exr.checkpoint").exists());
     desk.write("out.exr.checkpoint", "notes of somebody");
-    let said = desk.expect("room.toml --once -o out.exr --keep-checkpoint", 0);
+    let said = self::said(&desk, "room.toml --once -o out.exr --keep-checkpoint", 0);
     assert!(said.contains("the file of this name is no checkpoint"), "{said}");
     assert_eq!(desk.bytes("out.exr.checkpoint"), b"notes of somebody");
     let child = begin(&desk, "room.toml --once --progress none -o other.exr --samples 100000 --checkpoint 0");
@@ -238,6 +244,6 @@ fn parts_have_checkpoints_too() {
     let child = begin(&desk, "room.toml --once --progress none -o a.part --shard 1/2 --samples 100000");
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
-    let said = desk.expect("room.toml --once -o a.part --shard 2/2 --samples 100000 --resume", 2);
+    let said = self::said(&desk, "room.toml --once -o a.part --shard 2/2 --samples 100000 --resume", 2);
     assert!(said.contains("it is of part 1/2 and this call of part 2/2"), "{said}");
 }

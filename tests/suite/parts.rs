@@ -139,7 +139,7 @@ fn what_does_not_belong_together_is_named_and_nothing_is_written() {
     refused("1.part 3.part", "1 of 3 parts are missing: 2/3");
     refused("1.part 2.part 2.part 3.part", "both are part 2/3");
     refused("1.part 2.part none.part", "none.part: ");
-    refused("1.part 2.part room.toml", "room.toml: this is no part");
+    refused("1.part 2.part room.toml", "room.toml: this is neither a part");
     let other = |options: &str, words: &str| {
         desk.expect(&format!("room.toml --once --progress none -o other.part {options}"), 0);
         refused("1.part other.part 3.part", words);

@@ -6,6 +6,7 @@
 //! All threads of the caller's pool work on large pictures; outside of a pool the caller works alone. The caller
 //! chooses the number of threads.
 
+mod block_sums;
 mod blocks;
 mod curves;
 mod noise;

@@ -147,7 +147,7 @@ impl Film {
         self.tile(cell / CELLS).count((y * tile.width + x) as usize)
     }
 
-    /// Counts samples that were not finite, of tiles that were restored.
+    /// Adds to [`Film::non_finite_samples`] those of restored tiles.
     pub fn add_non_finite(&self, samples: u64) {
         self.non_finite_samples.fetch_add(samples, Ordering::Relaxed);
     }

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::blocks::Blocks;
+use super::blocks::{Blocks, total};
 use super::noise::{Convergence, Steps, luminance};
 use super::part::Part;
 use super::{Quantity, RadianceImage, Rect, TileSamples};
@@ -119,16 +119,6 @@ impl Negative {
     }
 }
 
-/// Sum over a pixel's finished blocks, in their order, and the one that is not finished.
-fn total(earlier: &[Vec<DVec3>], sums: &[DVec3], index: usize) -> DVec3 {
-    match earlier {
-        [] => sums[index],
-        [first, others @ ..] => {
-            others.iter().fold(first[index], |sum, block| sum + block[index]) + sums[index]
-        }
-    }
-}
-
 impl Tile {
     /// Mean of a pixel's samples, weighted by sign if the filter has negative lobes. `None` if the pixel has no sample.
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
@@ -151,8 +141,9 @@ impl Tile {
     }
 
     /// Sum of a pixel's samples outside negative lobes.
+    #[inline(always)]
     fn sum(&self, index: usize) -> DVec3 {
-        total(&self.earlier, &self.sums, index)
+        if self.earlier.is_empty() { self.sums[index] } else { total(&self.earlier, &self.sums, index) }
     }
 
     /// Makes room for the tile's pixels. Cannot fail: the memory was reserved when the film was made.
@@ -177,7 +168,10 @@ impl Tile {
         while !rest.is_empty() {
             // Add up to the next count at which the mean is noted or a block ends.
             let to_note = Steps::samples_to_next(self.counts[index]);
-            let left = to_note.min(blocks.samples_to_end(self.counts[index]));
+            let left = match blocks {
+                Blocks::Whole => to_note,
+                Blocks::Added | Blocks::Apart(_) => to_note.min(blocks.samples_to_end(self.counts[index])),
+            };
             let part = rest.start..rest.end.min(rest.start + left);
             non_finite += match lobes {
                 None => add_up(&mut self.sums[index], &radiances[part.clone()]),
@@ -192,7 +186,9 @@ impl Tile {
             {
                 self.steps.note((index, cell, half), self.counts[index], luminance(mean));
             }
-            blocks.close(self, index);
+            if blocks != Blocks::Whole {
+                self.close_block(index, blocks);
+            }
         }
         non_finite
     }

@@ -67,16 +67,17 @@ fn slurm(args: &FarmArgs) -> String {
         "\
 #!/bin/sh
 # Renders in {count} parts and joins them. Give this to a shell in the folder where the paths hold.
-# A job that is preempted or runs out of time saves a checkpoint; requeued, it goes on from there.
+# A job that is preempted or near its time limit saves a checkpoint, is queued again, and goes on from there.
 set -eu
-parts=$(sbatch --parsable --job-name=glimt --array=1-{count} --requeue --signal=B:TERM@30 <<'JOB'
+parts=$(sbatch --parsable --job-name=glimt --array=1-{count} --requeue --signal=B:USR1@60 <<'JOB'
 #!/bin/sh
 {render} &
 trap 'kill -TERM $!; wait $!' TERM
+trap 'kill -TERM $!; wait $!; scontrol requeue ${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID' USR1
 wait $!
 JOB
 )
-merge=$(sbatch --parsable --job-name=glimt-merge --dependency=afterok:\"${{parts%%;*}}\" <<'JOB'
+merge=$(sbatch --parsable --job-name=glimt-merge --kill-on-invalid-dep=yes --dependency=afterok:\"${{parts%%;*}}\" <<'JOB'
 #!/bin/sh
 {merge}
 JOB
@@ -87,13 +88,16 @@ echo \"parts: job $parts; merge: job $merge\"
 }
 
 fn parallel(args: &FarmArgs) -> String {
-    let (count, render, merge) = (args.shards, render(args, "{}"), merge(args, ""));
+    let (count, merge) = (args.shards, merge(args, ""));
+    // A part appears under its name when it is whole.
+    let render = format!("test -e {} || {}", part(args, "{}"), render(args, "{}"));
     let hosts: String = args.hosts.iter().map(|host| format!(" --sshlogin {}", word(host))).collect();
-    let way = if args.hosts.is_empty() { "" } else { " --workdir ." };
+    let way = if args.hosts.is_empty() { "" } else { " --workdir \"$PWD\"" };
     format!(
         "\
 #!/bin/sh
-# Renders in {count} parts, one at a time on each machine, and joins them. Called again, it goes on where it was.
+# Renders in {count} parts, one at a time on each machine, and joins them. Called again, it goes on where it was;
+# remove the parts of another scene first.
 set -eu
 seq {count} | parallel --jobs 1 --halt soon,fail=1{way}{hosts} {}
 {merge}

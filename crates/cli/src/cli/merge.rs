@@ -72,7 +72,7 @@ impl Merge<'_> {
         Ok(Exit::DONE)
     }
 
-    /// What can be said before the work: whether the output can be written, and is none of the parts.
+    /// Checks before the work that the output can be written, and is none of the parts.
     fn check_output(&self) -> Result<Format, Exit> {
         let out = &self.args.out;
         let format = Format::of(out).map_err(|error| self.console.fail(Exit::WRONG, &error.to_string()))?;
@@ -252,7 +252,7 @@ impl Bar {
     }
 
     fn at(&mut self, done: usize, total: usize) {
-        /// Steps that are said.
+        /// Most steps to report.
         const STEPS: usize = 100;
         let step = done * STEPS / total.max(1);
         if step == self.said {

@@ -8,7 +8,7 @@ use crate::film::{Film, Quantity, RadianceImage, SampleStats};
 /// Settings that turn a film into a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finish {
-    /// What the picture shows of the film.
+    /// Quantity of the film that the picture shows.
     pub quantity: Quantity,
     /// Tone mapping, before it knows the range of the picture.
     pub tone: ToneMapping,

@@ -12,7 +12,7 @@ use super::watch::content::{Content, FileRead};
 use crate::choice::Choice;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::output::part::Trait;
-use crate::scene::description::{CameraChange, Render, Scene};
+use crate::scene::description::{CameraChange, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// Everything that a picture depends on.
@@ -89,10 +89,7 @@ impl Depends<'_> {
             scene.mesh_files.iter().map(|file| key(&self.content_of(&file.value))).collect();
         let of = keys::referents(&scene, &meshes, orbiter.as_deref());
         let world = keys::world(&keys::surfaces(&scene, &of, &[]), &eye.camera, &of);
-        // Whoever divides a picture has another number of samples, which is no part of this.
-        let settings =
-            RenderSettings { render: Render { ..self.plan.settings.render }, ..self.plan.settings };
-        keys::render(world, &settings, self.plan.crop)
+        keys::render(world, &self.plan.settings, self.plan.crop)
     }
 
     /// The scene with contents in the place of the paths of files.

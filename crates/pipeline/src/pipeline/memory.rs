@@ -27,7 +27,7 @@ type Item = (&'static str, u64);
 pub(super) struct Foretold(Vec<Item>);
 
 impl Foretold {
-    /// What the picture takes, before any file is read.
+    /// Memory of the picture, before any file is read.
     pub(super) fn of_picture(plan: &Plan) -> Self {
         let render = &plan.settings.render;
         let whole = Rect { x: 0, y: 0, width: render.width, height: render.height };

@@ -17,7 +17,8 @@ Exit codes: 0 done; 1 the picture could not be written; 2 a part is missing, dou
 or of another version: it is named, and nothing is written.";
 
 pub(super) const FARM_HELP: &str = "\
-Options behind -- go to every render: glimt farm room.toml -o room.exr --shards 8 --engine slurm -- --samples 4096
+Options behind -- go to every render:
+  glimt farm room.toml -o room.exr --shards 8 --engine slurm -- --samples 4096
 
 Nothing is submitted: look at the script, then give it to a shell (slurm, parallel) or to kubectl apply -f -.
 The scene, its files and the output must have the same paths on all machines.";
@@ -30,7 +31,7 @@ pub struct MergeArgs {
     /// The parts, in any order
     #[arg(required = true, value_name = "PART")]
     pub parts: Vec<PathBuf>,
-    /// Join what is there, and list what is missing
+    /// Join the parts that are there; list the missing ones
     #[arg(long)]
     pub partial: bool,
     /// Show the picture as parts arrive, and join them when all are there
@@ -56,7 +57,7 @@ choice! {
     }
 }
 
-/// What is rendered in parts, and by which program.
+/// A render in parts, and the program that spreads it.
 #[derive(Clone, Debug, clap::Args)]
 pub struct FarmArgs {
     /// The scene file

@@ -1,4 +1,4 @@
-//! What is wrong with parts, each with the way out.
+//! Errors of parts and checkpoints, each with the way out.
 
 use std::io;
 use std::path::PathBuf;
@@ -26,7 +26,7 @@ pub enum PartError {
         source: io::Error,
     },
     /// The file is something else.
-    #[error("{}: this is no part and no checkpoint of glimt", path.display())]
+    #[error("{}: this is neither a part nor a checkpoint of glimt", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
@@ -46,27 +46,27 @@ pub enum PartError {
     Damaged {
         /// The file.
         path: PathBuf,
-        /// Where, in words.
+        /// The place, in words.
         why: String,
     },
-    /// It is a checkpoint where a part is asked for, or the other way round.
+    /// A checkpoint in the place of a part, or the other way round.
     #[error("{}: it is a {found}, not a {wanted}", path.display())]
     Kind {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// Kind of the file.
         found: &'static str,
-        /// What was asked for.
+        /// Requested kind.
         wanted: &'static str,
     },
     /// It is of another picture.
-    #[error("{}: it is of another picture than {other}: {}", path.display(), differences.join("; "))]
+    #[error("{}: it does not fit {other}: {}", path.display(), differences.join("; "))]
     Other {
         /// The file.
         path: PathBuf,
         /// The one that it is compared with.
         other: String,
-        /// What differs, a phrase for each.
+        /// Differences, a phrase for each.
         differences: Vec<String>,
     },
     /// Two files are the same part.

@@ -15,7 +15,7 @@ pub struct Head {
     pub kind: Kind,
     /// Everything that the picture depends on, by names that a person knows.
     pub identity: Vec<Trait>,
-    /// Which part it is.
+    /// The part of the picture.
     pub share: ShareHead,
     /// The picture.
     pub picture: PictureHead,
@@ -50,7 +50,7 @@ pub struct Trait {
     pub value: String,
 }
 
-/// Which part of a picture a file holds.
+/// Part of a picture that a file holds.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShareHead {
     /// From 1.
@@ -74,7 +74,7 @@ pub struct PictureHead {
     pub crop: [u32; 4],
     /// Whether its noise falls as that of photons.
     pub is_by_photons: bool,
-    /// What it shows: `radiance`, `samples` or `error`.
+    /// Quantity that it shows: `radiance`, `samples` or `error`.
     pub quantity: String,
     /// Tone mapping.
     pub tone: ToneHead,
@@ -173,7 +173,7 @@ impl PictureHead {
     }
 }
 
-/// What differs between two identities, a phrase for each; `here` and `there` name the two.
+/// Differences between two identities, a phrase for each; `here` and `there` name the two.
 pub fn differences(own: &[Trait], other: &[Trait], (here, there): (&str, &str)) -> Vec<String> {
     let value_of =
         |all: &[Trait], name: &str| all.iter().find(|one| one.name == name).map(|one| one.value.clone());

@@ -18,8 +18,7 @@ pub struct Merged {
     pub count: u32,
 }
 
-/// Looks whether parts belong together, and returns the numbers of those that are missing. Nothing is said of whether they are
-/// enough.
+/// Checks that parts belong together; returns the numbers of the missing parts.
 ///
 /// # Errors
 /// The first that is something else, is of another picture, or is there twice.
@@ -43,7 +42,7 @@ pub fn check(parts: &[PartFile]) -> Result<Vec<u32>, PartError> {
     Ok((1..=count).filter(|index| !found.contains_key(index)).collect())
 }
 
-/// What makes two heads those of different pictures, or of different cuts of one.
+/// Differences between the pictures of two heads, or between their cuts of one picture.
 fn unlike(own: &Head, other: &Head) -> Vec<String> {
     let mut unlike = differences(&own.identity, &other.identity, ("here", "there"));
     let counts = (own.share.count, other.share.count);

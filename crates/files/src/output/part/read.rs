@@ -190,7 +190,7 @@ impl Reader<'_> {
         Ok(u32::from_le_bytes(bytes))
     }
 
-    /// As many bytes as a number in the file says: none are reserved beyond the end of the file.
+    /// Reads as many bytes as a number in the file says; reserves none beyond the end of the file.
     fn bytes(&mut self, length: u32, into: &mut Vec<u8>) -> Result<(), PartError> {
         if u64::from(length) > self.size - self.at {
             return Err(self.damaged(&format!("it ends at byte {}, before its end", self.size)));

@@ -1,7 +1,8 @@
 //! Writing a part: tile after tile, so that no more than a tile is in memory beside the film.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::Path;
+use std::sync::mpsc::{self, SyncSender};
 
 use serde_json::Value;
 
@@ -30,6 +31,7 @@ pub fn save(
 /// Bytes that are put together before they are written.
 const TOGETHER: usize = 1 << 20;
 
+/// Makes the bytes on a thread of their own while this one writes those before them.
 fn write(
     file: &mut dyn Write,
     head: &Head,
@@ -37,7 +39,49 @@ fn write(
     state: &Value,
     token: &CancelToken,
 ) -> io::Result<()> {
-    let mut file = BufWriter::with_capacity(TOGETHER, file);
+    let (sender, chunks) = mpsc::sync_channel(4);
+    std::thread::scope(|scope| {
+        let named = std::thread::Builder::new().name("glimt-part".to_owned());
+        let make = move || {
+            make(&mut Chunks { sender, bytes: Vec::with_capacity(TOGETHER) }, head, film, state, token)
+        };
+        let making = named.spawn_scoped(scope, make)?;
+        // If this fails, nobody takes further bytes, and the other thread ends.
+        for chunk in chunks {
+            file.write_all(&chunk)?;
+        }
+        making.join().map_err(|_| io::Error::other("the thread that makes the bytes gave up"))?
+    })
+}
+
+/// Collects bytes and hands them to the thread that writes.
+struct Chunks {
+    sender: SyncSender<Vec<u8>>,
+    bytes: Vec<u8>,
+}
+
+impl Write for Chunks {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.bytes.extend_from_slice(bytes);
+        if self.bytes.len() >= TOGETHER {
+            self.flush()?;
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let chunk = std::mem::replace(&mut self.bytes, Vec::with_capacity(TOGETHER));
+        self.sender.send(chunk).map_err(|_| io::ErrorKind::BrokenPipe.into())
+    }
+}
+
+fn make(
+    file: &mut impl Write,
+    head: &Head,
+    film: &Film,
+    state: &Value,
+    token: &CancelToken,
+) -> io::Result<()> {
     // The head, with its digest.
     let text = serde_json::to_vec(head)?;
     let length = (text.len() as u32).to_le_bytes();
@@ -51,14 +95,14 @@ fn write(
         token.check().map_err(io::Error::other)?;
         bytes.clear();
         if film.store(tile, &mut bytes) {
-            records.update(&record(&mut file, &of_head, tile as u32, &bytes)?);
+            records.update(&record(file, &of_head, tile as u32, &bytes)?);
             tiles += 1;
         }
     }
     // The end.
     let records = records.finalize().to_hex().to_string();
     let end = End { tiles, non_finite: film.non_finite_samples(), records, state: state.clone() };
-    record(&mut file, &of_head, END, &serde_json::to_vec(&end)?)?;
+    record(file, &of_head, END, &serde_json::to_vec(&end)?)?;
     file.flush()
 }
 

@@ -25,7 +25,7 @@ use crate::pipeline::stages::Stop;
 /// A checkpoint takes at most one part in so many of the time.
 const TIME_SHARE: u32 = 100;
 
-/// What the file of a checkpoint is called beyond the name of the output.
+/// Ending of a checkpoint's name, behind that of the output.
 const ENDING: &str = ".checkpoint";
 
 /// State of a render beside its film.
@@ -137,7 +137,7 @@ pub(in crate::pipeline) struct Keeping<'a> {
     is_suspended: &'a dyn Fn() -> bool,
     identity: OnceCell<Vec<Trait>>,
     due: Cell<Instant>,
-    /// Whether a failure was told: each further one has the same cause.
+    /// Whether glimt has reported a failure: each further one has the same cause.
     is_failure_told: Cell<bool>,
 }
 
@@ -234,7 +234,7 @@ impl<'a> Keeping<'a> {
         Ok(())
     }
 
-    /// What makes a head that of another render.
+    /// Differences between a head and this render.
     fn unlike(&self, head: &Head, state: &FilmState) -> Vec<String> {
         let mut unlike = differences(&head.identity, self.identity(), ("there", "here"));
         let share = share_head(state.share.as_ref());
@@ -267,11 +267,16 @@ impl<'a> Keeping<'a> {
         }
     }
 
-    /// Ends it when the picture is written: the checkpoint goes, or the last one stays. If the picture could not be written, its
-    /// samples are kept all the same.
+    /// Ends it when the picture is written: the checkpoint goes, or the last one stays. If a long render's picture could not be
+    /// written, its samples are kept all the same.
     pub(in crate::pipeline) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
-        if !is_written || self.settings.are_kept {
-            return self.write(state, rays, state.render_seconds, Durability::Power);
+        let was_long = state.render_seconds >= self.settings.seconds;
+        match (is_written, self.settings.are_kept) {
+            (false, false) if !was_long => return,
+            (false, _) | (true, true) => {
+                return self.write(state, rays, state.render_seconds, Durability::Power);
+            }
+            (true, false) => {}
         }
         // One of another picture is somebody else's.
         let head = PartFile::head(&self.path);

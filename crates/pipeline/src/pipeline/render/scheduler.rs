@@ -189,7 +189,8 @@ impl<'a> Scheduler<'a> {
     fn judge_what_is_there(&mut self, part: Option<Rect>) {
         let Render { samples, error, .. } = self.rendering.plan.settings.render;
         let done = self.state.samples_in(part, samples);
-        if error > 0.0 && done.is_power_of_two() && done < samples {
+        // Nothing is decided by fewer samples.
+        if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
             self.rendering.tracer.pool.install(|| self.state.judge(done, error.into()));
         }
     }

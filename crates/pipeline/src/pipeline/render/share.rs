@@ -80,7 +80,7 @@ impl Share {
         if self.blocks.is_some() { self.samples.div_ceil(BLOCK) } else { 0 }
     }
 
-    /// Which of so many tiles are its own.
+    /// Whether each of so many tiles is its own.
     pub(in crate::pipeline) fn tiles(&self, count: usize) -> Vec<bool> {
         let (place, of) = self.of_tiles;
         let mut own = vec![false; count];
@@ -96,7 +96,7 @@ impl Share {
     }
 }
 
-/// So many things in the order in which they are dealt.
+/// Numbers below `count` in the order in which they are dealt.
 fn dealt(count: u32) -> Vec<u32> {
     let mut order: Vec<u32> = (0..count).collect();
     order.sort_by_key(|number| (scrambled(u64::from(*number)), *number));
