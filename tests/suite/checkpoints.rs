@@ -172,11 +172,10 @@ fn a_checkpoint_of_another_picture_is_named_and_left_alone() {
     assert!(desk.bytes("out.exr.checkpoint") == checkpoint);
     // What does not change the picture is no other picture.
     desk.write("room.toml", format!("# a comment\n{ROOM}\n[materials.unused]\n"));
-    desk.expect(
-        "room.toml --once --progress none -o out.exr --resume --threads 1 --set render.exposure=2",
-        0,
-    );
+    desk.expect("room.toml --once --progress none -o out.exr --resume --threads 1 --keep-checkpoint", 0);
     assert!(desk.bytes("out.exr") == image);
+    let said = desk.expect("room.toml --once -o out.exr --resume --set render.exposure=2", 0);
+    assert!(said.contains("the checkpoint has all samples"), "{said}");
 }
 
 #[test]

@@ -296,7 +296,7 @@ mod tests {
                 for (of, block) in [(&outer, 0), (&inner, 0), (&outer, 1)] {
                     sum.add_block(of, block).expect("a block");
                 }
-                [&outer, &inner].map(|of| sum.add_counts(of));
+                [&outer, &inner].into_iter().for_each(|of| sum.add_counts(of));
                 merged.restore(tile, sum).expect("a tile");
             }
             assert_eq!(merged.radiance().pixels, whole.radiance().pixels);

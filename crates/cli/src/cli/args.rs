@@ -435,7 +435,7 @@ fn memory(text: &str) -> Result<u64, String> {
         _ => return Err(expected()),
     };
     let bytes = number * unit as f64;
-    if bytes >= 1.0 && bytes < 1e18 { Ok(bytes as u64) } else { Err(expected()) }
+    if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err(expected()) }
 }
 
 /// Reads a part of a picture: its number and the number of parts.

@@ -131,7 +131,7 @@ fn follow(
         match event {
             Event::Written { path, .. } => written.pictures.push(path),
             Event::Checkpoint { news: CheckpointNews::Written { path }, .. } => {
-                written.checkpoint = Some(path)
+                written.checkpoint = Some(path);
             }
             // The report, or one of several pictures; the last picture that cannot be written fails the request.
             Event::WriteFailed { message, .. } => unwritten.push(message),

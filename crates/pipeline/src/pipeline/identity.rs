@@ -34,7 +34,7 @@ impl Depends<'_> {
         let scene_path = &self.parsed.loaded.path;
         let others = self.files.iter().filter(|file| file.path != *scene_path);
         traits.extend(others.map(|file| Trait::file(&short(&file.path, scene_path), content(file))));
-        traits.push(Trait::everything(self.everything()));
+        traits.push(Trait::everything(self.everything().to_string()));
         traits
     }
 

@@ -219,17 +219,17 @@ const FILE: &str = "file ";
 
 impl Trait {
     /// A setting.
-    pub fn setting(name: &str, value: impl ToString) -> Self {
-        Self { name: name.to_owned(), value: value.to_string() }
+    pub fn setting(name: &str, value: impl Into<String>) -> Self {
+        Self { name: name.to_owned(), value: value.into() }
     }
 
     /// A file, by its name and the fingerprint of its content.
-    pub fn file(name: &str, content: impl ToString) -> Self {
-        Self { name: format!("{FILE}{name}"), value: content.to_string() }
+    pub fn file(name: &str, content: impl Into<String>) -> Self {
+        Self { name: format!("{FILE}{name}"), value: content.into() }
     }
 
     /// The fingerprint of all that the picture depends on.
-    pub fn everything(key: impl ToString) -> Self {
-        Self { name: EVERYTHING.to_owned(), value: key.to_string() }
+    pub fn everything(key: impl Into<String>) -> Self {
+        Self { name: EVERYTHING.to_owned(), value: key.into() }
     }
 }

@@ -36,7 +36,7 @@ fn finish() -> Finish {
 fn head(index: u32, count: u32, film: &Film) -> Head {
     Head {
         kind: Kind::Part,
-        identity: vec![Trait::setting("seed", 7), Trait::file("knot.obj", "12ab"), Trait::everything("ff")],
+        identity: vec![Trait::setting("seed", "7"), Trait::file("knot.obj", "12ab"), Trait::everything("ff")],
         share: ShareHead { index, count, block_count: 0, blocks: Vec::new() },
         picture: PictureHead::new(film, &finish()),
     }
