@@ -100,7 +100,7 @@
 //! film        -> math choice
 //! integrators -> world scene materials lights geometry sampling film math choice control
 //! compare     -> assets film math control
-//! output      -> film math control system
+//! output      -> film math choice control system
 //! pipeline    -> integrators world assets scene film output lights materials math choice control system
 //! bench       -> pipeline compare output scene film math choice control
 //! tui         -> pipeline scene film math choice system

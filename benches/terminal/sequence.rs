@@ -62,6 +62,7 @@ pub(crate) fn render(
             | Event::Written { .. }
             | Event::WriteFailed { .. }
             | Event::NotKept { .. }
+            | Event::Checkpoint { .. }
             | Event::WritePostponed { .. }
             | Event::Edited { .. }
             | Event::Warnings { .. }

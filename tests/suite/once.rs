@@ -380,15 +380,24 @@ fn signals_end_it_with_their_code_and_leave_the_picture() {
         assert!(killed.expect("kill runs").success());
         assert_eq!(child.wait().expect("it ends").code(), Some(code), "{name}");
         assert_eq!(fs::read(desk.path("ball.png")).expect("there"), b"the old one");
-        assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 2, "no temporary file");
+        assert!(desk.path("ball.png.checkpoint").is_file());
+        assert_eq!(fs::read_dir(desk.0.path()).expect("a folder").count(), 3, "no temporary file");
     }
 }
 
 #[test]
 fn an_end_by_a_signal_is_said() {
     for (name, code, words) in [
-        ("INT", 130, "ended by SIGINT: no picture was written\n"),
-        ("TERM", 143, "ended by SIGTERM: no picture was written\n"),
+        (
+            "INT",
+            130,
+            "ended by SIGINT: ball.png.checkpoint has what was rendered; --resume goes on from it\n",
+        ),
+        (
+            "TERM",
+            143,
+            "ended by SIGTERM: ball.png.checkpoint has what was rendered; --resume goes on from it\n",
+        ),
         ("HUP", 129, ""),
     ] {
         for progress in ["plain", "none"] {

@@ -244,7 +244,8 @@ fn wrong_values_are_answered_with_what_is_expected() {
         ("chekc ball.toml", "there is no command \"chekc\", nor a scene of that name: did you mean `check`?"),
         (
             "render ball.toml",
-            "there is no command \"render\", nor a scene of that name: there are check, new, compare, bench",
+            "there is no command \"render\", nor a scene of that name: there are check, new, compare, bench, merge, \
+             farm",
         ),
     ] {
         let stderr = desk.expect(call, 2);
@@ -330,7 +331,7 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
             "there is no command \"schema\", nor a scene of that name: there are check, new, compare, bench",
         ),
         ("man", "there is no command \"man\", nor a scene of that name"),
-        ("merge out.png a.png b.png", "there is no command \"merge\", nor a scene of that name"),
+        ("import a.pbrt", "there is no command \"import\", nor a scene of that name"),
         ("completions zsh", "there is no command \"completions\", nor a scene of that name"),
         ("chek --once", "did you mean `check`?"),
         ("--once compar", "did you mean `compare`?"),

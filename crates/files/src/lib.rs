@@ -5,5 +5,5 @@ pub mod compare;
 pub mod output;
 
 // The rooms below, under the names that they have in the whole house.
-use glimt_base::{control, film, math, system};
+use glimt_base::{choice, control, film, math, system};
 use glimt_kernel::{geometry, materials};

@@ -12,7 +12,7 @@ use super::{Block, Page, pages, root};
 /// Programs that pages name and this test does not start.
 const OTHERS: [&str; 3] = ["cargo", "ssh", "tmux"];
 /// Commands of glimt other than rendering.
-const COMMANDS: [&str; 5] = ["check", "new", "compare", "bench", "help"];
+const COMMANDS: [&str; 7] = ["check", "new", "compare", "bench", "merge", "farm", "help"];
 
 #[test]
 fn the_commands_of_every_page_run() {
@@ -29,8 +29,9 @@ fn the_commands_of_every_page_run() {
                 .unwrap_or_else(|said| panic!("{}:{line}\n{script}\n{said}", page.name));
         }
     }
-    for name in ["README.md", "docs/tutorial.md", "docs/light.md", "docs/command-line.md", "docs/accuracy.md"]
-    {
+    let names =
+        ["README.md", "docs/tutorial.md", "docs/light.md", "docs/command-line.md", "docs/accuracy.md"];
+    for name in names.into_iter().chain(["docs/long-renders.md"]) {
         assert!(with_commands.contains(name), "{name}: no command was run");
     }
 }

@@ -120,6 +120,33 @@ fn a_whole_picture_reaches_the_disk_whatever_key_comes_while_it_is_written() {
 }
 
 #[test]
+fn after_a_dropped_line_it_goes_on_where_it_was() {
+    let folder = Folder::new();
+    let slow = SCENE.replace("samples = 4", "samples = 4000");
+    folder.write("scene.toml", &slow);
+    let terminal = folder.terminal();
+    terminal.wait_for("ETA");
+    terminal.signal(Signal::SIGHUP);
+    assert_eq!(terminal.end(), 129);
+    let checkpoint = folder.path("scene.png.checkpoint");
+    assert!(checkpoint.is_file(), "what was rendered is kept");
+    // Another scene leaves it alone and begins anew.
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 4000\nseed = 7"));
+    let mut terminal = folder.terminal();
+    terminal.wait_for("ETA");
+    terminal.press("q");
+    assert_eq!(terminal.end(), 0);
+    assert!(checkpoint.is_file());
+    // The same one goes on, ends with the same pixels, and clears up.
+    folder.write("scene.toml", &slow);
+    let terminal = folder.terminal();
+    terminal.wait_for("going on from");
+    terminal.wait_for_render(1);
+    assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
+    terminal.wait("the checkpoint to go", |_| !checkpoint.exists());
+}
+
+#[test]
 fn ctrl_z_goes_to_the_shell_and_fg_comes_back() {
     let folder = Folder::new();
     let mut terminal = folder.terminal_with(&["/bin/sh", "-i"], &[("PS1", "shell> ")]);

@@ -6,25 +6,32 @@
 //! All threads of the caller's pool work on large pictures; outside of a pool the caller works alone. The caller
 //! chooses the number of threads.
 
+mod block_sums;
+mod blocks;
 mod curves;
 mod noise;
 mod part;
+mod pilot;
 mod preview;
 mod quantity;
 mod resample;
 mod section;
 mod srgb;
 mod steps;
+mod stored;
 pub mod stretch;
 mod sums;
 pub mod tone;
 
+pub use blocks::{BLOCK, Blocks};
 pub use noise::{HalfNoise, PictureNoise, samples_by};
 pub use part::{Part, Pixels};
+pub use pilot::{PILOT_SAMPLES, Pilot};
 pub use preview::Previewer;
 pub use quantity::Quantity;
 pub use srgb::linear_to_srgb8;
 pub use steps::Convergence;
+pub use stored::{Malformed, StoredTile};
 pub use sums::{Film, FilmError, SampleStats};
 
 use crate::math::Vec3;

@@ -77,6 +77,45 @@ impl Steps {
         self.levels.len()
     }
 
+    /// Gives all numbers as words of 32 bits, in the order in which [`Steps::read`] takes them.
+    pub(super) fn words(&self, put: &mut impl FnMut(u32)) {
+        for values in [&self.last, &self.half_way, &self.recent] {
+            values.iter().for_each(|value| put(value.to_bits()));
+        }
+        for sums in self.levels.iter().flatten().flatten() {
+            let LevelSums { outer, inner, outer_squares, relative, relative_inner } = *sums;
+            for bits in [outer, inner, outer_squares, relative, relative_inner].map(f64::to_bits) {
+                put(bits as u32);
+                put((bits >> 32) as u32);
+            }
+        }
+    }
+
+    /// The steps of these words, for so many pixels and doublings.
+    pub(super) fn read<E>(
+        area: usize,
+        levels: usize,
+        word: &mut impl FnMut() -> Result<u32, E>,
+    ) -> Result<Self, E> {
+        let mut steps = Self::default();
+        for values in [&mut steps.last, &mut steps.half_way, &mut steps.recent] {
+            *values = (0..area).map(|_| word().map(f32::from_bits)).collect::<Result<_, _>>()?;
+        }
+        steps.levels = vec![[[LevelSums::default(); 2]; CELLS]; levels];
+        for sums in steps.levels.iter_mut().flatten().flatten() {
+            let mut number = || {
+                let low = u64::from(word()?);
+                Ok(f64::from_bits(low | u64::from(word()?) << 32))
+            };
+            sums.outer = number()?;
+            sums.inner = number()?;
+            sums.outer_squares = number()?;
+            sums.relative = number()?;
+            sums.relative_inner = number()?;
+        }
+        Ok(steps)
+    }
+
     /// Square of a pixel's last step.
     pub(super) fn square(&self, pixel: usize) -> f64 {
         self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
+use super::blocks::{Blocks, total};
 use super::part::Part;
 use super::steps::{Convergence, Steps, luminance};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
@@ -67,9 +68,10 @@ pub struct Film {
     crop: Rect,
     tiles: Vec<Mutex<Tile>>,
     order: OnceLock<Vec<usize>>,
-    non_finite_samples: AtomicU64,
+    pub(super) non_finite_samples: AtomicU64,
     id: u64,
     pub(super) convergence: Convergence,
+    pub(super) blocks: Blocks,
 }
 
 /// Sums of one tile, in rows; empty until its first samples come, so that the thread that renders the tile is the first
@@ -78,8 +80,10 @@ pub struct Film {
 pub(super) struct Tile {
     pub(super) sums: Vec<DVec3>,
     pub(super) counts: Vec<u32>,
+    /// Sums of finished blocks of samples: none, one for all of them, or one for each; see [`Blocks`].
+    pub(super) earlier: Vec<Vec<DVec3>>,
     /// Sums of the samples in the filter's negative lobes. `None` before the first of them.
-    negative: Option<Negative>,
+    pub(super) negative: Option<Negative>,
     pub(super) steps: Steps,
     /// Counter that grows whenever the tile changes.
     pub(super) revision: u64,
@@ -87,10 +91,20 @@ pub(super) struct Tile {
 
 /// Sums of the samples in a filter's negative lobes, which are in no other sum.
 #[derive(Debug)]
-struct Negative {
-    weight: f64,
-    sums: Vec<DVec3>,
-    counts: Vec<u32>,
+pub(super) struct Negative {
+    pub(super) weight: f64,
+    pub(super) sums: Vec<DVec3>,
+    pub(super) counts: Vec<u32>,
+    /// Sums of finished blocks, as those of the tile.
+    pub(super) earlier: Vec<Vec<DVec3>>,
+}
+
+impl Negative {
+    /// Empty sums of a tile whose film keeps the sums of so many blocks apart.
+    pub(super) fn new(weight: f64, area: usize, blocks: usize) -> Self {
+        let (sums, counts) = (vec![DVec3::ZERO; area], vec![0; area]);
+        Self { weight, earlier: vec![sums.clone(); blocks], sums, counts }
+    }
 }
 
 impl Tile {
@@ -99,14 +113,14 @@ impl Tile {
         let count = self.count(index);
         let negative = self.negative.as_ref().filter(|negative| negative.counts[index] > 0);
         let Some(negative) = negative else {
-            return (count > 0).then(|| self.sums[index] / f64::from(count));
+            return (count > 0).then(|| self.sum(index) / f64::from(count));
         };
-        let below = negative.sums[index] / f64::from(negative.counts[index]);
+        let below = total(&negative.earlier, &negative.sums, index) / f64::from(negative.counts[index]);
         let positive_count = count - negative.counts[index];
         if positive_count == 0 {
             return Some(below);
         }
-        let above = self.sums[index] / f64::from(positive_count);
+        let above = self.sum(index) / f64::from(positive_count);
         Some(above + (above - below) * negative.weight)
     }
 
@@ -114,9 +128,16 @@ impl Tile {
         self.counts.get(index).copied().unwrap_or(0)
     }
 
+    /// Sum of a pixel's samples outside negative lobes.
+    #[inline(always)]
+    fn sum(&self, index: usize) -> DVec3 {
+        if self.earlier.is_empty() { self.sums[index] } else { total(&self.earlier, &self.sums, index) }
+    }
+
     /// Makes room for the tile's pixels. Cannot fail: the memory was reserved when the film was made.
-    fn fill(&mut self, area: usize) {
+    pub(super) fn fill(&mut self, area: usize) {
         self.sums.resize(area, DVec3::ZERO);
+        self.earlier.iter_mut().for_each(|sums| sums.resize(area, DVec3::ZERO));
         self.counts.resize(area, 0);
         self.steps.fill(area);
     }
@@ -128,12 +149,17 @@ impl Tile {
         (index, cell, half): (usize, usize, usize),
         radiances: &[Vec3],
         lobes: Option<(f64, &[bool])>,
+        blocks: Blocks,
     ) -> u64 {
         let mut non_finite = 0;
         let mut rest = 0..radiances.len();
         while !rest.is_empty() {
-            // Add up to the next count at which the mean is noted.
-            let left = Steps::samples_to_next(self.counts[index]);
+            // Add up to the next count at which the mean is noted or a block ends.
+            let to_note = Steps::samples_to_next(self.counts[index]);
+            let left = match blocks {
+                Blocks::Whole => to_note,
+                Blocks::Added | Blocks::Apart(_) => to_note.min(blocks.samples_to_end(self.counts[index])),
+            };
             let part = rest.start..rest.end.min(rest.start + left);
             non_finite += match lobes {
                 None => add_up(&mut self.sums[index], &radiances[part.clone()]),
@@ -143,22 +169,21 @@ impl Tile {
             };
             self.counts[index] += part.len() as u32;
             rest.start = part.end;
-            if part.len() == left
+            if part.len() == to_note
                 && let Some(mean) = self.mean(index)
             {
                 self.steps.note((index, cell, half), self.counts[index], luminance(mean));
+            }
+            if blocks != Blocks::Whole {
+                self.close_block(index, blocks);
             }
         }
         non_finite
     }
 
     fn add_signed(&mut self, index: usize, weight: f64, radiances: &[Vec3], is_negative: &[bool]) -> u64 {
-        let area = self.sums.len();
-        let negative = self.negative.get_or_insert_with(|| Negative {
-            weight,
-            sums: vec![DVec3::ZERO; area],
-            counts: vec![0; area],
-        });
+        let (area, blocks) = (self.sums.len(), self.earlier.len());
+        let negative = self.negative.get_or_insert_with(|| Negative::new(weight, area, blocks));
         let mut non_finite = 0;
         for (radiance, &is_negative) in radiances.iter().zip(is_negative) {
             let sum = if is_negative { &mut negative.sums[index] } else { &mut self.sums[index] };
@@ -221,6 +246,7 @@ impl Film {
             non_finite_samples: AtomicU64::new(0),
             id: IDS.fetch_add(1, Ordering::Relaxed),
             convergence: Convergence::default(),
+            blocks: Blocks::default(),
         })
     }
 
@@ -272,7 +298,8 @@ impl Film {
     /// Bytes that its sums take.
     pub fn memory_bytes(&self) -> u64 {
         let tile = size_of::<Mutex<Tile>>() + size_of::<usize>();
-        (self.crop.area() * SUM_BYTES + self.tiles.len() * tile) as u64
+        let pixel = SUM_BYTES + self.blocks.kept() * size_of::<DVec3>();
+        (self.crop.area() * pixel + self.tiles.len() * tile) as u64
     }
 
     /// Adds samples to a tile, each by itself and in their order. A sample with a NaN or an infinity counts as black
@@ -294,7 +321,7 @@ impl Film {
             let lobes = samples.negative.as_ref();
             let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
             let half = index_in(inside, x, y).map_or(0, |index| Part::half_of(index as u32, inside));
-            non_finite += tile.add((index, cell, half), pixel, lobes);
+            non_finite += tile.add((index, cell, half), pixel, lobes, self.blocks);
         }
         tile.revision += 1;
         drop(guard);
@@ -384,14 +411,14 @@ fn rings(crop: Rect) -> Vec<usize> {
 const SUM_BYTES: usize = size_of::<DVec3>() + 3 * size_of::<f32>() + size_of::<u32>();
 
 /// Bytes for the sums of the crop, and for the whole picture as radiance and as sRGB.
-fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
+pub(super) fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
     let pixel = size_of::<Vec3>() + size_of::<[u8; 3]>();
     let whole = u64::from(width) * u64::from(height);
     (crop.area() as u64).saturating_mul(SUM_BYTES as u64).saturating_add(whole.saturating_mul(pixel as u64))
 }
 
 /// Whether so many bytes can be had at once.
-fn is_available(bytes: u64) -> bool {
+pub(super) fn is_available(bytes: u64) -> bool {
     usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
 }
 

@@ -1,6 +1,7 @@
 //! Arguments of the command line.
 
 mod bench;
+mod parts;
 
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
@@ -10,10 +11,11 @@ use clap::builder::styling::{AnsiColor, Styles};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 pub use self::bench::BenchArgs;
+pub use self::parts::{Engine, FarmArgs, MergeArgs};
 use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
-use crate::pipeline::settings::{Overrides, View};
+use crate::pipeline::settings::{Checkpoints, Overrides, Resume, View};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
@@ -26,6 +28,8 @@ Examples:
   glimt check ball.toml                   find errors without rendering
   glimt compare a.exr reference.exr       the error of one picture against another
   glimt bench ball.toml --plot plot.svg   measure the error of each method against its seconds
+  glimt ball.toml --once -o 1.part --shard 1/2    render the first half, as another machine the second
+  glimt merge a.png 1.part 2.part         join both
 
 The scene that `glimt new` writes has every key, with comments.
 A scene that is named like a command is given with its folder: glimt ./check
@@ -59,6 +63,8 @@ impl Args {
             Some(Subcommand::Check { color, .. }) => *color,
             Some(Subcommand::Bench(bench)) => bench.color,
             Some(Subcommand::Compare(compare)) => compare.color,
+            Some(Subcommand::Merge(merge)) => merge.color,
+            Some(Subcommand::Farm(farm)) => farm.color,
             Some(Subcommand::New { .. }) | None => self.render.color,
         }
     }
@@ -89,6 +95,12 @@ pub enum Subcommand {
     /// Benchmark error against time: the error of methods against their seconds, over several seeds
     #[command(after_help = bench::HELP)]
     Bench(Box<BenchArgs>),
+    /// Join the parts of a picture that --shard wrote
+    #[command(after_help = parts::MERGE_HELP)]
+    Merge(MergeArgs),
+    /// Print the job script that renders a picture in parts on several machines
+    #[command(after_help = parts::FARM_HELP)]
+    Farm(Box<FarmArgs>),
 }
 
 const COMPARE_HELP: &str = "\
@@ -162,6 +174,22 @@ pub struct RenderArgs {
     /// Let the report and the default picture replace a file that glimt did not write, too
     #[arg(long, help_heading = "Output")]
     pub force: bool,
+
+    /// Render part I of N with --once; -o names its file, and `glimt merge` joins the parts
+    #[arg(long, value_name = "I/N", allow_hyphen_values = true, value_parser = shard, help_heading = "Long renders")]
+    pub shard: Option<(u32, u32)>,
+    /// Seconds between two checkpoints, beside the output as FILE.checkpoint; 0: none
+    #[arg(long, value_name = "SECONDS", default_value = "60", allow_negative_numbers = true, value_parser = pause, help_heading = "Long renders")]
+    pub checkpoint: f64,
+    /// Go on from the checkpoint of an interrupted render
+    #[arg(long, help_heading = "Long renders")]
+    pub resume: bool,
+    /// Keep the last checkpoint of a finished render, which --resume with more --samples extends
+    #[arg(long, help_heading = "Long renders")]
+    pub keep_checkpoint: bool,
+    /// Refuse a render that would need more memory than this, as in 8GiB or 500MB
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true, value_parser = memory, help_heading = "Long renders")]
+    pub memory: Option<u64>,
 
     /// Pixels across
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("width"), help_heading = "Picture")]
@@ -245,6 +273,18 @@ impl RenderArgs {
             crop: self.crop,
             threads: self.threads,
             bit_depth: self.bit_depth,
+            shard: self.shard,
+            memory: self.memory,
+            checkpoints: Checkpoints {
+                seconds: self.checkpoint,
+                resume: match (self.resume, self.once) {
+                    (true, _) => Resume::Asked,
+                    (false, true) => Resume::No,
+                    // A dropped line is no reason to begin anew.
+                    (false, false) => Resume::IfSame,
+                },
+                are_kept: self.keep_checkpoint,
+            },
             ..Overrides::default()
         };
         macro_rules! copy {
@@ -366,6 +406,47 @@ fn seconds(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds > 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds above 0".to_owned()),
+    }
+}
+
+/// Reads seconds, or 0 for never.
+fn pause(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
+        _ => Err("expected a number of seconds, or 0 for no checkpoints".to_owned()),
+    }
+}
+
+/// Reads a size in bytes, with a unit or without.
+fn memory(text: &str) -> Result<u64, String> {
+    let expected = || "expected a size, as in 8GiB, 500MB or 1000000".to_owned();
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let number: f64 = digits.trim().parse().map_err(|_| expected())?;
+    let unit: u64 = match text[digits.len()..].to_lowercase().as_str() {
+        "" | "b" => 1,
+        "k" | "kib" => 1 << 10,
+        "kb" => 1000,
+        "m" | "mib" => 1 << 20,
+        "mb" => 1_000_000,
+        "g" | "gib" => 1 << 30,
+        "gb" => 1_000_000_000,
+        "t" | "tib" => 1 << 40,
+        "tb" => 1_000_000_000_000,
+        _ => return Err(expected()),
+    };
+    let bytes = number * unit as f64;
+    if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err(expected()) }
+}
+
+/// Reads a part of a picture: its number and the number of parts.
+fn shard(text: &str) -> Result<(u32, u32), String> {
+    let numbers =
+        text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
+    match numbers {
+        Some((index, count)) if (1..=count).contains(&index) && count <= parts::MOST => Ok((index, count)),
+        _ => {
+            Err(format!("expected I/N, the part and the number of parts, as in 1/8; at most {}", parts::MOST))
+        }
     }
 }
 

@@ -64,6 +64,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
                 | Command::KeepCamera(_)
                 | Command::Pick(_)
                 | Command::Cancel
+                | Command::Suspend
                 | Command::Pause(_) => {}
             }
             remote.send(command);
@@ -167,6 +168,7 @@ impl Writes {
             | Event::Progress { .. }
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
+            | Event::Checkpoint { .. }
             | Event::Edited { .. }
             | Event::CameraKept { .. }
             | Event::Picked { .. }

@@ -33,7 +33,14 @@ pub(super) struct Order {
 /// # Errors
 /// What is wrong with them, in words with the way out.
 pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
-    check_outputs(&args.outputs)?;
+    match args.shard {
+        Some(_) if !args.once => {
+            return Err("--shard needs --once: the terminal shows whole pictures".to_owned());
+        }
+        // A part may have any name.
+        Some(_) => {}
+        None => check_outputs(&args.outputs)?,
+    }
     let mut overrides = args.overrides();
     if overrides.report.as_deref() == Some(Path::new(STANDARD)) {
         if !args.once {
@@ -74,7 +81,7 @@ mod tests {
     use super::*;
     use crate::choice::Choice;
     use crate::film::Rect;
-    use crate::pipeline::settings::View;
+    use crate::pipeline::settings::{Checkpoints, Resume, View};
     use crate::scene::description::{self, KeyRange};
 
     fn lowered(line: &str) -> Result<Order, String> {
@@ -90,7 +97,10 @@ mod tests {
     #[test]
     fn nothing_said_changes_nothing() {
         let order = lowered("a.toml").expect("right");
-        assert_eq!(order.overrides, Overrides::default());
+        let checkpoints = Checkpoints { seconds: 60.0, resume: Resume::IfSame, are_kept: false };
+        assert_eq!(order.overrides, Overrides { checkpoints, ..Overrides::default() });
+        let once = lowered("a.toml --once").expect("right").overrides.checkpoints;
+        assert_eq!(once, Checkpoints { resume: Resume::No, ..checkpoints });
         assert!(!order.is_once && !order.poll);
     }
 
@@ -100,7 +110,7 @@ mod tests {
             "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --error 0.02 --time 0.5 --max-depth 0 \
              --integrator path --shadows hard --clamp 2.5 --photons on --dof off --accel bvh --view normal --seed 7 \
              --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --force --progress json --color 256 --poll \
-             --nice 3",
+             --nice 3 --checkpoint 5 --resume --keep-checkpoint --memory 1.5GiB",
         )
         .expect("right");
         let expected = Overrides {
@@ -125,6 +135,8 @@ mod tests {
             crop: Some(Rect { x: 1, y: 2, width: 3, height: 4 }),
             threads: Some(2),
             bit_depth: Some(16),
+            memory: Some(3 << 29),
+            checkpoints: Checkpoints { seconds: 5.0, resume: Resume::Asked, are_kept: true },
             ..Default::default()
         };
         assert_eq!(order.overrides, expected);
@@ -157,6 +169,15 @@ mod tests {
             "a.toml --seed -1",
             "a.toml --nice 20",
             "a.toml --nice -1",
+            "a.toml --checkpoint -1",
+            "a.toml --memory 0",
+            "a.toml --memory 5XB",
+            "a.toml --memory GiB",
+            "a.toml --memory inf",
+            "a.toml --shard 1/2",
+            "a.toml --once -o a.part --shard 0/2",
+            "a.toml --once -o a.part --shard 3/2",
+            "a.toml --once -o a.part --shard 1",
         ] {
             assert!(lowered(wrong).is_err(), "{wrong}");
         }

@@ -8,8 +8,10 @@ mod check;
 mod compare;
 mod console;
 mod exit;
+mod farm;
 mod live;
 mod lower;
+mod merge;
 mod new;
 mod once;
 mod progress;
@@ -43,6 +45,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::New { file }) => new::run(&file, &console),
         Some(Subcommand::Compare(args)) => compare::run(&args, &console),
         Some(Subcommand::Bench(args)) => bench::run(&args, &console),
+        Some(Subcommand::Merge(args)) => merge::run(&args, &console),
+        Some(Subcommand::Farm(args)) => farm::run(&args, &console),
         None => match lower::lower(args.render) {
             Ok(order) => match no_command(&order.scene) {
                 Some(message) => console.fail(Exit::WRONG, &message),

@@ -9,7 +9,7 @@ use super::exit::Exit;
 use super::lower::Order;
 use super::progress::{self, Reporter};
 use super::signals;
-use crate::pipeline::protocol::{Command, Event, Failure, Report, Request, Writing};
+use crate::pipeline::protocol::{CheckpointNews, Command, Event, Failure, Report, Request, Writing};
 use crate::pipeline::settings::{Effective, Overrides};
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -29,7 +29,10 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         Err(error) => return console.fail(Exit::FAILED, &not_started("a thread", false, &error)),
     };
     let remote = worker.remote();
-    let ended = match signals::catch(move || remote.send(Command::Cancel)) {
+    let ended = match signals::catch(move || {
+        remote.send(Command::Suspend);
+        remote.send(Command::Cancel);
+    }) {
         Ok(ended) => ended,
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
     };
@@ -44,7 +47,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     })));
     let mut reporter = progress::reporter(order.progress, order.overrides.time_seconds, console);
     let mut deadline = Deadline::default();
-    let mut written = Vec::new();
+    let mut written = Written::default();
     let exit = follow(&worker, order, console, &mut *reporter, &mut written, || {
         ended.by().is_some() && deadline.is_over(Instant::now())
     });
@@ -59,13 +62,24 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
 }
 
 /// Words about the pictures when a signal ends the program.
-fn outcome(exit: Exit, written: &[PathBuf]) -> String {
-    let names: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
+fn outcome(exit: Exit, written: &Written) -> String {
+    let names: Vec<_> = written.pictures.iter().map(|path| path.display().to_string()).collect();
     match names.as_slice() {
-        [] => "no picture was written".to_owned(),
+        [] => match &written.checkpoint {
+            Some(path) => format!("{} has what was rendered; --resume goes on from it", path.display()),
+            None => "no picture was written".to_owned(),
+        },
         _ if exit == Exit::DONE => "everything was written before".to_owned(),
         names => format!("only {} was written", names.join(", ")),
     }
+}
+
+/// Files that were written.
+#[derive(Debug, Default)]
+struct Written {
+    pictures: Vec<PathBuf>,
+    /// The last checkpoint.
+    checkpoint: Option<PathBuf>,
 }
 
 /// When the program ends whatever the worker is at: [`PATIENCE`] after it was first asked for.
@@ -89,7 +103,7 @@ fn follow(
     order: &Order,
     console: &Console,
     reporter: &mut dyn Reporter,
-    written: &mut Vec<PathBuf>,
+    written: &mut Written,
     mut is_over: impl FnMut() -> bool,
 ) -> Exit {
     let mut unwritten: Vec<String> = Vec::new();
@@ -105,7 +119,9 @@ fn follow(
         };
         // Warnings about the call come with those about the scene.
         if let Event::Settings { settings, .. } = &event {
-            of_call = without_effect(&order.overrides, settings);
+            of_call.extend(without_effect(&order.overrides, settings));
+        } else if let Event::Checkpoint { news, .. } = &event {
+            hear(news, &mut of_call, reporter, console);
         } else if let Event::NotKept { message, .. } = &event {
             of_call.push(warning(message, "another name with -o FILE leaves the old file as it is"));
         } else if let Event::Done { warnings, .. } = &mut event {
@@ -113,7 +129,10 @@ fn follow(
         }
         reporter.event(&event);
         match event {
-            Event::Written { path, .. } => written.push(path),
+            Event::Written { path, .. } => written.pictures.push(path),
+            Event::Checkpoint { news: CheckpointNews::Written { path }, .. } => {
+                written.checkpoint = Some(path);
+            }
             // The report, or one of several pictures; the last picture that cannot be written fails the request.
             Event::WriteFailed { message, .. } => unwritten.push(message),
             Event::Done { report, warnings, .. } => {
@@ -121,7 +140,7 @@ fn follow(
                 if !reporter.says_diagnostics() {
                     console.diagnostics(&warnings);
                 }
-                return done(&report, written, &unwritten, console, reporter);
+                return done(&report, &written.pictures, &unwritten, console, reporter);
             }
             Event::Failed { failure, .. } => {
                 reporter.end();
@@ -143,9 +162,35 @@ fn follow(
             | Event::NotKept { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
+            | Event::Checkpoint { .. }
             | Event::Edited { .. }
             | Event::CameraKept { .. }
             | Event::Picked { .. } => {}
+        }
+    }
+}
+
+/// Says what a person wants to know about checkpoints.
+fn hear(news: &CheckpointNews, of_call: &mut Vec<Diagnostic>, reporter: &dyn Reporter, console: &Console) {
+    let say = |text: String| {
+        if reporter.says_results() {
+            console.say(&text);
+        }
+    };
+    match news {
+        CheckpointNews::Written { .. } => {}
+        CheckpointNews::Failed { message } => {
+            of_call.push(warning(message, "--checkpoint 0 renders without checkpoints"));
+        }
+        CheckpointNews::Resumed { path, samples } => {
+            say(format!("going on from {}, after {samples} samples", path.display()));
+        }
+        CheckpointNews::Absent { path } => {
+            say(format!("there is no {}: starting from the beginning", path.display()));
+        }
+        CheckpointNews::Ignored { path } => {
+            let message = format!("{} is of this picture, and is not used", path.display());
+            of_call.push(warning(&message, "--resume goes on from it"));
         }
     }
 }

@@ -6,6 +6,7 @@
 mod attributes;
 mod error;
 mod exr;
+mod finish;
 #[cfg(target_os = "linux")]
 mod flags;
 mod format;
@@ -14,6 +15,7 @@ mod identity;
 mod jpeg;
 pub mod json;
 mod origin;
+pub mod part;
 mod place;
 mod png;
 mod ppm;
@@ -27,6 +29,7 @@ use std::path::Path;
 pub use attributes::Losses;
 pub use error::OutputError;
 pub use exr::mean_luminance_error;
+pub use finish::Finish;
 pub use format::{BitDepth, Format};
 pub use identity::FileIdentity;
 pub use origin::{Replaced, replaced_json, replaced_picture, replaced_plot, replaced_table, signed};

@@ -55,6 +55,28 @@ pub fn atomic_until(
     guard: &Guard<'_>,
     token: &CancelToken,
 ) -> Result<(), OutputError> {
+    atomic_by(path, &|file| stoppable::write_all(file, bytes, token), guard, (token, Durability::Power))
+}
+
+/// What a file is to outlive from the moment at which it has its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Durability {
+    /// The process: the system writes the bytes to the disk when it likes.
+    Process,
+    /// A loss of power: the bytes are on the disk.
+    Power,
+}
+
+/// [`atomic_until`] of bytes that are made while they are written: `content` writes all of them, as often as it is called.
+///
+/// # Errors
+/// As [`atomic_until`], and the errors of `content`.
+pub fn atomic_by(
+    path: &Path,
+    content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
+    guard: &Guard<'_>,
+    (token, durability): (&CancelToken, Durability),
+) -> Result<(), OutputError> {
     prepare_process();
     let named = |error| OutputError::file(path, error);
     match place::find(path)? {
@@ -69,9 +91,13 @@ pub fn atomic_until(
                     way_out: "change a copy of it",
                 });
             }
-            stoppable::or_cancelled(fill(&new, bytes, carried.as_ref(), token), named)?;
+            stoppable::or_cancelled(fill(&new, content, carried.as_ref(), durability), named)?;
             (guard.may_replace)(&target.path)?;
-            new.rename_to(&target.path).and_then(|()| sync_directory(target.directory())).map_err(named)?;
+            new.rename_to(&target.path).map_err(named)?;
+            match durability {
+                Durability::Process => {}
+                Durability::Power => sync_directory(target.directory()).map_err(named)?,
+            }
             if let (Losses::Told(tell), false) = (guard.losses, lost.is_empty()) {
                 tell(format!("{}: {} could not be kept", path.display(), lost.join(" and ")));
             }
@@ -79,7 +105,9 @@ pub fn atomic_until(
         }
         Place::InPlace(place) => {
             (guard.may_replace)(&place)?;
-            stoppable::or_cancelled(in_place(&place, bytes, token), named)
+            let mut bytes = Vec::new();
+            stoppable::or_cancelled(content(&mut bytes), named)?;
+            stoppable::or_cancelled(in_place(&place, &bytes, token), named)
         }
     }
 }
@@ -108,12 +136,20 @@ fn beside(target: &Target, guard: &Guard<'_>) -> io::Result<(Temporary, Option<C
     Ok((new, carried))
 }
 
-fn fill(new: &Temporary, bytes: &[u8], carried: Option<&Carried>, token: &CancelToken) -> io::Result<()> {
-    stoppable::write_all(&new.file, bytes, token)?;
+fn fill(
+    new: &Temporary,
+    content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
+    carried: Option<&Carried>,
+    durability: Durability,
+) -> io::Result<()> {
+    content(&mut &new.file)?;
     if let Some(carried) = carried {
         carried.permit(&new.file)?;
     }
-    new.file.sync_all()
+    match durability {
+        Durability::Process => Ok(()),
+        Durability::Power => new.file.sync_all(),
+    }
 }
 
 /// Synchronises a directory, so that the rename survives a loss of power. Failures are ignored, as some file systems and

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::settings::{Effective, Overrides, View};
+use super::settings::{Checkpoints, Effective, Overrides, View};
 use crate::film::stretch::{Kind, Stretch};
 use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
@@ -32,6 +32,11 @@ pub(super) struct Plan {
     pub(super) named_by: NamedBy,
     pub(super) report: Option<PathBuf>,
     pub(super) replaces_foreign: bool,
+    /// The part of the picture that is rendered, from 1, and the number of parts.
+    pub(super) shard: Option<(u32, u32)>,
+    pub(super) checkpoints: Checkpoints,
+    /// Most bytes that the render may need.
+    pub(super) memory: Option<u64>,
     pub(super) effective: Effective,
 }
 
@@ -69,7 +74,14 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
     let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
-    outputs.iter().try_for_each(|path| check_format(path, (render.width, render.height), bit_depth))?;
+    match overrides.shard {
+        // A part has no format of pictures.
+        Some(_) => check_shard(&settings, overrides)?,
+        None => {
+            let check = |path: &PathBuf| check_format(path, (render.width, render.height), bit_depth);
+            outputs.iter().try_for_each(check)?;
+        }
+    }
     Ok(Plan {
         name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         settings,
@@ -83,6 +95,9 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         named_by,
         report: overrides.report.clone(),
         replaces_foreign: overrides.replaces_foreign,
+        shard: overrides.shard,
+        checkpoints: overrides.checkpoints,
+        memory: overrides.memory,
         scene: with_accel(scene, render.accel),
     })
 }
@@ -146,6 +161,44 @@ fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Dia
         })),
         _ => Ok(()),
     }
+}
+
+/// Whether a picture with these settings can be divided, and whether it is known where the part goes.
+fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), Box<Diagnostic>> {
+    let refused = |message: &str, help: &str| {
+        let (message, help) = (message.to_owned(), Some(help.to_owned()));
+        Err(Box::new(Diagnostic {
+            severity: Severity::Error,
+            message,
+            path: PathBuf::new(),
+            place: None,
+            help,
+        }))
+    };
+    if overrides.outputs.len() != 1 {
+        return refused(
+            "--shard writes one part, and -o must name its file",
+            "name it, as in -o night.1.part",
+        );
+    }
+    if overrides.time_seconds.is_some() {
+        return refused(
+            "--shard and --time exclude each other: machines differ in speed",
+            "give --samples or --error",
+        );
+    }
+    if settings.gathers() && settings.render.error > 0.0 {
+        let message =
+            "--shard cannot divide photons with a noise threshold: each pass needs the whole picture";
+        return refused(message, "give --error 0 and --samples, or --photons off");
+    }
+    if settings.gathers() && settings.view.shown() == Shown::Film(Quantity::Error) {
+        return refused(
+            "--shard cannot divide the view `error` of photons",
+            "render it in one, or with --photons off",
+        );
+    }
+    Ok(())
 }
 
 /// Whether a file of this ending can hold such a picture.

@@ -37,6 +37,8 @@ pub enum Command {
     Pick(Spot),
     /// Stop the render under way.
     Cancel,
+    /// Stop the render under way, and keep a checkpoint of it.
+    Suspend,
     /// Hold the work, or let it go on: that of the newest request, whether it has begun or not. A request that comes
     /// later is not held.
     Pause(bool),
@@ -188,6 +190,13 @@ pub enum Event {
         /// One for each such file, with the way out.
         conflicts: Vec<Diagnostic>,
     },
+    /// Something about the checkpoint of the render.
+    Checkpoint {
+        /// Number of the request.
+        generation: u64,
+        /// What.
+        news: CheckpointNews,
+    },
     /// [`Command::Write`] waits until every pixel has a sample.
     WritePostponed {
         /// Number of the request.
@@ -229,6 +238,38 @@ pub enum Event {
     Cancelled {
         /// Number of the request.
         generation: u64,
+    },
+}
+
+/// News about a checkpoint.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum CheckpointNews {
+    /// It was written.
+    Written {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It could not be written; the render goes on.
+    Failed {
+        /// The file and the reason.
+        message: String,
+    },
+    /// The render goes on from it.
+    Resumed {
+        /// The file.
+        path: PathBuf,
+        /// Samples that every pixel has which is to have more.
+        samples: u32,
+    },
+    /// The render was to go on from it, and begins anew: it is not there.
+    Absent {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It is of this picture, and the call does not ask for it.
+    Ignored {
+        /// The file.
+        path: PathBuf,
     },
 }
 

@@ -77,6 +77,10 @@ impl Orders for NoOrders {
     fn take_errand(&self) -> Option<Errand> {
         None
     }
+
+    fn is_suspended(&self) -> bool {
+        false
+    }
 }
 
 #[cfg(test)]

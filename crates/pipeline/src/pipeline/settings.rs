@@ -40,6 +40,12 @@ macro_rules! overrides {
             pub threads: Option<usize>,
             /// Bits per channel of PNG files: 8 or 16.
             pub bit_depth: Option<u8>,
+            /// The part of the picture that this process renders, from 1, and the number of parts.
+            pub shard: Option<(u32, u32)>,
+            /// Checkpoints of the render.
+            pub checkpoints: Checkpoints,
+            /// Most bytes that the render may need.
+            pub memory: Option<u64>,
             $($(#[doc = $doc])* pub $name: Option<$type>,)*
         }
 
@@ -53,6 +59,29 @@ macro_rules! overrides {
 }
 
 render_keys!(overrides, changed);
+
+/// Checkpoints of a render, beside its output.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Checkpoints {
+    /// Seconds between two of them; 0 for none.
+    pub seconds: f64,
+    /// Whether a render goes on from one.
+    pub resume: Resume,
+    /// Whether the last one stays when the picture is written.
+    pub are_kept: bool,
+}
+
+/// Whether a render goes on from a checkpoint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Resume {
+    /// It begins anew.
+    #[default]
+    No,
+    /// It goes on from the checkpoint that is there; one of another picture is an error.
+    Asked,
+    /// It goes on from a checkpoint of the same picture, and leaves others alone.
+    IfSame,
+}
 
 /// The settings a request renders with, for status lines.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]

@@ -7,7 +7,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, Event, LatestPreview, PreviewSlot, RenderProgress, Section, StageReport,
+    AssetProgress, CheckpointNews, Event, LatestPreview, PreviewSlot, RenderProgress, Section, StageReport,
 };
 use super::watch::content::FileRead;
 use crate::film::Picture;
@@ -48,6 +48,10 @@ impl Sink {
 
     pub(super) fn not_kept(&self, message: String) {
         self.send(Event::NotKept { generation: self.generation, message });
+    }
+
+    pub(super) fn checkpoint(&self, news: CheckpointNews) {
+        self.send(Event::Checkpoint { generation: self.generation, news });
     }
 
     pub(super) fn refused(&self, conflicts: Vec<Diagnostic>) {

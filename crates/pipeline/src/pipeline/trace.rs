@@ -40,6 +40,8 @@ pub(super) struct Tracer<'a> {
     pub(super) token: &'a CancelToken,
     /// Photon maps of all jobs' samples, if photons are gathered.
     pub(super) photons: Option<&'a PhotonMaps>,
+    /// Number in the whole picture of sample 0 of the jobs.
+    pub(super) first: u32,
 }
 
 /// Samples of one tile that are to be made.
@@ -67,8 +69,8 @@ impl Job {
 
 impl Tracer<'_> {
     fn trace(&self, job: &Job) -> Result<(TileSamples, Cost), Cancelled> {
-        let Self { kernel, world, settings, token, photons, .. } = *self;
-        let samples = job.samples.clone();
+        let Self { kernel, world, settings, token, photons, first, .. } = *self;
+        let samples = first + job.samples.start..first + job.samples.end;
         let begin = seconds_of_thread();
         let (samples, rays) = kernel(photons, world, settings, job.pixels, samples, token)?;
         Ok((samples, Cost { rays, seconds: seconds_of_thread() - begin }))

@@ -124,6 +124,8 @@ struct Mailbox {
     errands: VecDeque<Errand>,
     /// Whether the newest request is held.
     paused: bool,
+    /// Whether the render under way is stopped to be gone on with later.
+    suspended: bool,
     quit: bool,
     /// Token of the request under way.
     token: CancelToken,
@@ -170,6 +172,10 @@ impl Remote {
                 mailbox.writing.cancel();
                 let dropped = mailbox.request.take();
                 self.say_cancelled(dropped);
+            }
+            Command::Suspend => {
+                mailbox.suspended = true;
+                mailbox.token.cancel();
             }
             Command::Pause(paused) => {
                 mailbox.paused = paused;
@@ -272,6 +278,10 @@ impl Orders for Remote {
 
     fn take_errand(&self) -> Option<Errand> {
         self.lock().errands.pop_front()
+    }
+
+    fn is_suspended(&self) -> bool {
+        self.lock().suspended
     }
 }
 

@@ -136,6 +136,10 @@ impl Ui {
         while end.is_none() {
             end = self.present().or_else(|| self.wait());
         }
+        // What a signal or a dropped line ends is gone on with later.
+        if matches!(&end, Some(End::Quit(status)) if *status != ExitStatus::QUIT) {
+            (self.commands)(Command::Suspend);
+        }
         (self.commands)(Command::Quit);
         let status = match end {
             // Whoever sends SIGHUP by hand still has the terminal and wants it back.

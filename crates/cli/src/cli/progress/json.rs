@@ -6,6 +6,7 @@
 //! | `asset` | `name`, `fraction` |
 //! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples`, `noise` (or null: `now`, and `next` with `level`, `seconds`, or null) |
 //! | `written` | `path`, `bytes` |
+//! | `checkpoint` | `status` (`written`, `failed`, `resumed`, `absent`, `ignored`), `path`, `message`, `samples`, or null |
 //! | `write_failed` | `message`: the report, or one of several pictures, could not be written |
 //! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
 //! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
@@ -21,7 +22,7 @@ use serde_json::{Value, json};
 
 use super::Reporter;
 use crate::output::json::in_a_line;
-use crate::pipeline::protocol::{Event, Failure};
+use crate::pipeline::protocol::{CheckpointNews, Event, Failure};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::report::line_and_column;
 
@@ -76,6 +77,7 @@ fn value(event: &Event) -> Option<Value> {
             "event": "done", "unchanged": unchanged, "seconds": report.seconds,
             "complete": report.image.complete, "diagnostics": diagnostics(warnings),
         }),
+        Event::Checkpoint { news, .. } => checkpoint(news),
         Event::WriteFailed { message, .. } => json!({ "event": "write_failed", "message": message }),
         Event::Failed { failure, .. } => failed(failure),
         Event::Cancelled { .. } => json!({ "event": "cancelled" }),
@@ -92,6 +94,18 @@ fn value(event: &Event) -> Option<Value> {
         | Event::CameraKept { .. }
         | Event::Picked { .. } => return None,
     })
+}
+
+fn checkpoint(news: &CheckpointNews) -> Value {
+    let (status, path, message, samples) = match news {
+        CheckpointNews::Written { path } => ("written", Some(path), None, None),
+        CheckpointNews::Failed { message } => ("failed", None, Some(message), None),
+        CheckpointNews::Resumed { path, samples } => ("resumed", Some(path), None, Some(samples)),
+        CheckpointNews::Absent { path } => ("absent", Some(path), None, None),
+        CheckpointNews::Ignored { path } => ("ignored", Some(path), None, None),
+    };
+    let path = path.map(|path| path.to_string_lossy());
+    json!({ "event": "checkpoint", "status": status, "path": path, "message": message, "samples": samples })
 }
 
 fn failed(failure: &Failure) -> Value {

@@ -24,16 +24,20 @@ use super::assembly::{Eye, Keyed, world};
 use super::cache::{Memo, Pool};
 use super::cautions::cautions;
 use super::errands::{AtHand, Errand};
+use super::identity::Depends;
 use super::inputs::Inputs;
 use super::keys;
+use super::memory::Foretold;
 use super::pace::Stopwatch;
 use super::plan::{NamedBy, Plan, cores, plan};
-use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status};
+use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing};
 use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
 use super::render::first_picture::FirstPictures;
+use super::render::keeping::Keeping;
 use super::render::preview::Screen;
 use super::render::scheduler::Rendering;
+use super::render::share::Share;
 use super::report::finish::{Finished, report};
 use super::settings::Overrides;
 use super::sink::Sink;
@@ -45,7 +49,7 @@ use super::stages::parse::{Parsed, parse};
 use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::render::render;
 use super::stages::textures::{Needed, TextureCache, Textures, add_declared, needed, textures};
-use super::stages::write::{Destination, Written, check_targets, write_by_hand};
+use super::stages::write::{Destination, Written, check_targets, finish, write_by_hand};
 use super::stages::{Findings, Reading, Staged, Stop};
 use super::table::StageTable;
 use super::targets::conflicts;
@@ -55,6 +59,7 @@ use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
+use crate::output::part::Trait;
 use crate::scene::changes;
 use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
@@ -123,6 +128,8 @@ struct Ready {
     origin: DVec3,
     texels_loaded: u64,
     texture_memory_bytes: u64,
+    /// The share of the picture that is rendered. `None` for all of it.
+    share: Option<Share>,
 }
 
 impl Engine {
@@ -237,13 +244,26 @@ impl Engine {
         let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: false };
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let reading = (&snapshot, meanwhile.token);
-        let ready = self.prepare(request, &mut table, reading, findings)?;
+        let mut ready = self.prepare(request, &mut table, reading, findings)?;
         let photons = self.light(request, &ready, &mut table, sink, meanwhile)?;
+        let share = self.share(&ready.plan, photons);
+        // A share of blocks has fewer samples than the picture.
+        if let Some(share) = &share {
+            ready.plan.settings.render.samples = share.own_samples();
+        }
+        ready.share = share;
         let rays = table.run(Stage::Render, || self.render(request, &ready, photons, sink, meanwhile))?;
         // Links and files may have changed during the render.
         self.look_for_conflicts(request, &ready.plan, findings, sink)?;
-        let is_written = table
-            .run(Stage::Write, || self.write(request, &ready.plan, findings, sink, meanwhile.writing))?;
+        let written =
+            table.run(Stage::Write, || self.write(request, &ready.plan, findings, sink, meanwhile.writing));
+        let is_written = written.as_ref().is_ok_and(|is_written| *is_written);
+        self.with_keeping(request, &ready, (sink, meanwhile), |keeping, engine| {
+            if let (Some(keeping), Some(canvas)) = (keeping, engine.films.current()) {
+                keeping.finish(canvas, rays, is_written);
+            }
+        });
+        let is_written = written?;
         let pool = self.pool(ready.plan.threads)?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
         let finished = Finished {
@@ -323,6 +343,7 @@ impl Engine {
         }
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
+        Foretold::of_picture(&plan).check(&plan)?;
         let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(cautions);
         let own = Eye::new(&plan.scene, parsed.orbiter, &CameraChange::default());
@@ -344,6 +365,7 @@ impl Engine {
         let reading = Reading { sink: table.sink, token, contents, pool: &pool };
         let lookups = plan.settings.lookups();
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
+        Foretold::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).check(&plan)?;
         self.inputs = inputs(&parsed, &meshes, findings);
         self.look_for_conflicts(request, &plan, findings, table.sink)?;
         let generation = request.generation;
@@ -387,7 +409,47 @@ impl Engine {
             origin,
             texels_loaded,
             texture_memory_bytes,
+            share: None,
         })
+    }
+
+    /// The share of the picture that this process renders. `None` for all of it.
+    fn share(&self, plan: &Plan, photons: Option<Key>) -> Option<Share> {
+        let are_sent = photons.and_then(|key| self.photons.get(key)).is_some_and(PhotonStore::are_sent);
+        plan.shard.map(|shard| Share::new(shard, are_sent, plan.settings.render.samples))
+    }
+
+    /// Does something with the checkpoints of a request, if it has any.
+    fn with_keeping<T>(
+        &self,
+        request: &Request,
+        ready: &Ready,
+        (sink, meanwhile): (&Sink, &Meanwhile<'_>),
+        work: impl FnOnce(Option<&Keeping<'_>>, &Self) -> T,
+    ) -> T {
+        let (plan, checkpoints) = (&ready.plan, ready.plan.checkpoints);
+        let Some(output) = plan.outputs.first().filter(|_| self.keeps(request, plan)) else {
+            return work(None, self);
+        };
+        let finish = finish(plan);
+        let name = || self.identity(request, ready);
+        let is_suspended = || meanwhile.orders.is_suspended();
+        let keeping = Keeping::new(output, checkpoints, &finish, (&self.inputs, sink), &name, &is_suspended);
+        work(Some(&keeping), self)
+    }
+
+    /// Whether a request has checkpoints: its picture is written to a file, and they are not switched off.
+    fn keeps(&self, request: &Request, plan: &Plan) -> bool {
+        let is_file =
+            plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
+        request.write != Writing::No && plan.checkpoints.seconds > 0.0 && is_file
+    }
+
+    /// Names and values of all that a picture depends on.
+    fn identity(&self, request: &Request, ready: &Ready) -> Vec<Trait> {
+        let divided = ready.share.as_ref().map(|share| share.samples);
+        let (parsed, plan, camera) = (&ready.parsed, &ready.plan, &request.overrides.camera);
+        Depends { parsed, plan, camera, files: &self.assets, divided }.traits()
     }
 
     /// All files that the scene names; every one is tried before the first error ends it.
@@ -427,8 +489,12 @@ impl Engine {
     ) -> Result<Staged<RayCounters>, Stop> {
         let pool = self.pool(ready.plan.threads)?;
         let (plan, orders) = (&ready.plan, meanwhile.orders);
+        let key = keys::render(ready.world.0, &plan.settings, plan.crop);
+        let watch = Stopwatch::start(meanwhile.token);
+        // What the stage changes is apart from what it reads.
+        let (mut films, written) = (std::mem::take(&mut self.films), std::mem::take(&mut self.written));
+        let written = std::cell::RefCell::new(written);
         let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
-        let written = std::cell::RefCell::new(&mut self.written);
         let pulse = |canvas: &FilmState, is_covered: bool| {
             if !is_covered {
                 meanwhile.postpone_write(sink);
@@ -439,23 +505,31 @@ impl Engine {
                 meanwhile.run_errand(at_hand, Some(canvas), &self.inputs, sink);
             }
         };
-        let rendering = Rendering {
-            tracer: tracer(self.means.kernel, &pool, ready, meanwhile.token),
-            plan,
-            photons: photons.and_then(|key| self.photons.get(key)),
-            preview: request.preview,
-            most_film_bytes: self.means.most_film_bytes,
-            force: request.force,
-            first: request.first,
-            sink,
-            pulse: &pulse,
-            take_preview: &|| orders.take_preview(),
-            is_moved: request.overrides.camera.is_any(),
-            coarse_rate: &self.coarse_rate,
-        };
-        let key = keys::render(ready.world.0, &plan.settings, plan.crop);
-        let watch = Stopwatch::start(meanwhile.token);
-        let rendered = render(key, &mut self.films, &rendering);
+        let rendered = self.with_keeping(request, ready, (sink, meanwhile), |keeping, engine| {
+            let rendering = Rendering {
+                tracer: tracer(engine.means.kernel, &pool, ready, meanwhile.token),
+                plan,
+                photons: photons.and_then(|key| engine.photons.get(key)),
+                preview: request.preview,
+                most_film_bytes: engine.means.most_film_bytes,
+                force: request.force,
+                first: request.first,
+                sink,
+                pulse: &pulse,
+                take_preview: &|| orders.take_preview(),
+                is_moved: request.overrides.camera.is_any(),
+                coarse_rate: &engine.coarse_rate,
+                share: ready.share.clone(),
+                keeping,
+            };
+            render(key, &mut films, &rendering)
+        });
+        if ready.share.is_some()
+            && let Some(canvas) = films.current_mut()
+        {
+            canvas.identity = Some(self.identity(request, ready));
+        }
+        (self.films, self.written) = (films, written.into_inner());
         let is_reused = rendered.as_ref().is_ok_and(|staged| staged.status == Status::Reused);
         if let Some(canvas) = self.films.current_mut().filter(|canvas| canvas.key == key && !is_reused) {
             canvas.render_seconds += watch.seconds();
@@ -534,7 +608,15 @@ impl Engine {
 
 /// Tracer of a scene, without photons.
 fn tracer<'a>(kernel: Kernel, pool: &'a ThreadPool, ready: &'a Ready, token: &'a CancelToken) -> Tracer<'a> {
-    Tracer { kernel, pool, world: &ready.world.1, settings: &ready.plan.settings, token, photons: None }
+    Tracer {
+        kernel,
+        pool,
+        world: &ready.world.1,
+        settings: &ready.plan.settings,
+        token,
+        photons: None,
+        first: 0,
+    }
 }
 
 /// All files that the scene names, and what else was read.

@@ -19,6 +19,8 @@ pub(in crate::pipeline) trait Orders {
     fn take_preview(&self) -> Option<Option<PreviewSize>>;
     /// The next question about the current picture.
     fn take_errand(&self) -> Option<Errand>;
+    /// Whether a render that is cancelled is to be gone on with later.
+    fn is_suspended(&self) -> bool;
 }
 
 /// Tokens and orders of a request while it is under way.

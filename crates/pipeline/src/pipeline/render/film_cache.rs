@@ -110,7 +110,8 @@ mod tests {
     fn canvas(name: &str) -> FilmState {
         let scene = loaded_of("[render]\nwidth = 64\nheight = 32\n").scene;
         let plan = plan(&scene, Path::new("a.toml"), &Default::default()).expect("a plan");
-        let mut canvas = FilmState::new(key(name), &plan, u64::MAX, Convergence::Stratified).expect("a film");
+        let mut canvas =
+            FilmState::new(key(name), &plan, u64::MAX, Convergence::Stratified, None).expect("a film");
         canvas.done.fill([1; 2]);
         canvas
     }

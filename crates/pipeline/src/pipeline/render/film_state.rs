@@ -6,9 +6,14 @@ use std::sync::Arc;
 
 use super::forecast::cost::{CellCost, JobCost, PixelShare};
 use super::forecast::samples::ExpectedSamples;
-use crate::film::{CELLS, Convergence, Film, FilmError, Part, Pixels, Previewer, RadianceImage, Rect};
+use crate::film::{
+    Blocks, CELLS, Convergence, Film, FilmError, Part, Pixels, Previewer, RadianceImage, Rect,
+};
+use crate::integrators::RayCounters;
+use crate::output::part::Trait;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::render::noise_goals::Goals;
+use crate::pipeline::render::share::Share;
 use crate::pipeline::trace::{Cost, Job};
 use crate::scene::fingerprint::Key;
 
@@ -22,7 +27,7 @@ pub(in crate::pipeline) struct FilmState {
     /// Rays of each cell.
     pub(in crate::pipeline) rays: Vec<u64>,
     /// Seconds of a processor that all of them took.
-    seconds: f64,
+    pub(super) seconds: f64,
     /// Recent cost of the samples in each cell.
     costs: Vec<CellCost>,
     /// Cost of a pixel in a job, beside its samples.
@@ -41,6 +46,23 @@ pub(in crate::pipeline) struct FilmState {
     pub(in crate::pipeline) ended_by: Option<f64>,
     /// Seconds that it was rendered for, by all requests.
     pub(in crate::pipeline) render_seconds: f64,
+    /// The share of a picture that it is. `None` for all of it.
+    pub(in crate::pipeline) share: Option<Share>,
+    /// Tiles of the share. `None` for all of them.
+    own: Option<Vec<bool>>,
+    /// What was done before by the process whose checkpoint this goes on from.
+    pub(in crate::pipeline) before: Before,
+    /// Names of all that the picture depends on, once they were asked for.
+    pub(in crate::pipeline) identity: Option<Vec<Trait>>,
+}
+
+/// Work of an earlier process.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::pipeline) struct Before {
+    /// Rays and look-ups.
+    pub(in crate::pipeline) rays: RayCounters,
+    /// Seconds of its render stage.
+    pub(in crate::pipeline) seconds: f64,
 }
 
 impl FilmState {
@@ -53,13 +75,22 @@ impl FilmState {
         plan: &Plan,
         most_bytes: u64,
         convergence: Convergence,
+        share: Option<Share>,
     ) -> Result<Self, FilmError> {
+        let blocks = match (&share, convergence) {
+            (Some(share), _) => share.sums(),
+            (None, Convergence::Photons) => Blocks::Added,
+            (None, Convergence::Stratified) => Blocks::Whole,
+        };
         let film =
             Film::within(most_bytes, plan.settings.render.width, plan.settings.render.height, plan.crop)?
-                .converging(convergence);
+                .converging(convergence)
+                .in_blocks(blocks)?;
         let film_cells = film.cell_count();
         let goals = Goals::none(film_cells);
-        let none = |cell| if film.cell_rect(cell).is_some() { [0; 2] } else { [u32::MAX; 2] };
+        let own = share.as_ref().map(|share| share.tiles(film.tile_count()));
+        let is_own = |cell: usize| own.as_ref().is_none_or(|own| own[cell / CELLS]);
+        let none = |cell| if film.cell_rect(cell).is_some() && is_own(cell) { [0; 2] } else { [u32::MAX; 2] };
         let done = (0..film.cell_count()).map(none).collect();
         Ok(Self {
             key,
@@ -76,7 +107,32 @@ impl FilmState {
             is_passing: false,
             ended_by: None,
             render_seconds: 0.0,
+            share,
+            own,
+            before: Before::default(),
+            identity: None,
         })
+    }
+
+    /// Whether a tile is to be rendered here.
+    fn is_own(&self, tile: usize) -> bool {
+        self.own.as_ref().is_none_or(|own| own[tile])
+    }
+
+    /// Numbers in the whole picture of the first of these samples, as many as follow each other there.
+    pub(in crate::pipeline) fn numbers(&self, samples: Range<u32>) -> Range<u32> {
+        match &self.share {
+            Some(share) => share.numbers(samples),
+            None => samples,
+        }
+    }
+
+    /// Takes over how many samples the film has in each half of a cell.
+    pub(super) fn count_again(&mut self) {
+        let halves: Vec<_> = self.halves().collect();
+        for (cell, half) in halves {
+            self.done[cell][half] = self.film.half_samples(cell, half);
+        }
     }
 
     /// Whether every pixel has this many samples, or those that it is to have.
@@ -129,7 +185,8 @@ impl FilmState {
 
     fn halves(&self) -> impl Iterator<Item = (usize, usize)> {
         let halves = (0..self.done.len()).flat_map(|cell| [(cell, 0), (cell, 1)]);
-        halves.filter(|(cell, half)| self.film.half_pixel_count(*cell, *half) > 0)
+        halves
+            .filter(|(cell, half)| self.is_own(cell / CELLS) && self.film.half_pixel_count(*cell, *half) > 0)
     }
 
     /// Bytes that it takes.
@@ -157,7 +214,8 @@ impl FilmState {
             self.done[cell][half]..self.goals.of(cell, half).min(target(cell, half))
         };
         let mut jobs = Vec::new();
-        for &tile in self.film.tile_order().iter().filter(|tile| self.is_in(part, CELLS * **tile)) {
+        let is_wanted = |tile: &&usize| self.is_own(**tile) && self.is_in(part, CELLS * **tile);
+        for &tile in self.film.tile_order().iter().filter(is_wanted) {
             let cells = (CELLS * tile..CELLS * (tile + 1))
                 .filter_map(|cell| Some((cell, self.film.cell_rect(cell)?)));
             let cells = cells.map(|(cell, rect)| (rect, [0, 1].map(|half| missing(cell, half))));
@@ -234,7 +292,8 @@ impl FilmState {
     /// mean.
     pub(in crate::pipeline) fn seconds_to_come(&self, most: u32, jobs: impl Fn(u32, u32) -> u32) -> f64 {
         let (mut seconds, mut known, mut worth, mut others) = (0.0, 0.0, 0.0, 0.0);
-        for cell in (0..self.done.len()).filter(|cell| self.film.cell_rect(*cell).is_some()) {
+        let is_there = |cell: &usize| self.is_own(cell / CELLS) && self.film.cell_rect(*cell).is_some();
+        for cell in (0..self.done.len()).filter(is_there) {
             let lacks = |half: usize| {
                 let (done, end) = (self.done[cell][half], self.to_come(cell, half, most));
                 let pixels = self.film.half_pixel_count(cell, half) as f64;
@@ -291,7 +350,6 @@ fn common(cells: &[(Rect, [Range<u32>; 2])]) -> Option<&Range<u32>> {
 mod tests {
     use super::*;
     use crate::film::TileSamples;
-    use crate::integrators::RayCounters;
     use crate::math::Vec3;
     use crate::scene::fingerprint::Fingerprint;
 
@@ -314,6 +372,10 @@ mod tests {
             is_passing: false,
             ended_by: None,
             render_seconds: 0.0,
+            share: None,
+            own: None,
+            before: Before::default(),
+            identity: None,
         }
     }
 

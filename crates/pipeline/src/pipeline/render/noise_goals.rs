@@ -5,10 +5,10 @@
 //! samples are independent and about as noisy. A tenth of the bias is left, as a half that has stopped tells the other no more;
 //! at worst that is a thirtieth of the noise.
 
-use crate::film::{CELLS, Convergence, Film, HalfNoise, samples_by};
+use crate::film::{CELLS, Convergence, Film, HalfNoise, PILOT_SAMPLES, Pilot, samples_by};
 
 /// Samples before which noise is not asked for.
-pub(in crate::pipeline) const LEAST: u32 = 16;
+pub(in crate::pipeline) const LEAST: u32 = PILOT_SAMPLES;
 
 /// The part of the noise asked for that is aimed at: what is measured low by chance stops early.
 pub(in crate::pipeline) const AIM: f64 = 0.85;
@@ -26,15 +26,17 @@ const LEAST_BRIGHTNESS: f64 = 0.01;
 #[derive(Debug)]
 pub(in crate::pipeline) struct Goals {
     /// Decided goals; [`u32::MAX`] while undecided.
-    decided: Vec<[u32; 2]>,
-    /// Mean luminance of the picture, when noise was first asked for.
-    brightness: Option<f64>,
+    pub(super) decided: Vec<[u32; 2]>,
+    /// Samples at which each tile was judged last: once for each number.
+    pub(super) judged: Vec<u32>,
+    /// Mean luminance of the picture's [`Pilot`], when noise was first asked for.
+    pub(super) brightness: Option<f64>,
 }
 
 impl Goals {
     /// For so many cells, of which nothing is known.
     pub(in crate::pipeline) fn none(cells: usize) -> Self {
-        Self { decided: vec![[u32::MAX; 2]; cells], brightness: None }
+        Self { decided: vec![[u32::MAX; 2]; cells], judged: vec![0; cells.div_ceil(CELLS)], brightness: None }
     }
 
     /// Samples that a half of a cell is to have at most.
@@ -44,7 +46,7 @@ impl Goals {
 
     /// Bytes that they take.
     pub(in crate::pipeline) fn memory_bytes(&self) -> usize {
-        size_of_val(self.decided.as_slice())
+        size_of_val(self.decided.as_slice()) + size_of_val(self.judged.as_slice())
     }
 
     /// Whether any half gets fewer samples than these.
@@ -62,13 +64,18 @@ impl Goals {
         samples: u32,
         error: f64,
     ) -> Option<Judgement> {
+        let is_time = samples >= LEAST && !self.lacks_least(done);
+        if is_time && self.brightness.is_none() {
+            self.brightness = Pilot::new(film.crop()).of_film(film);
+        }
         let brightness = self.brightness.or_else(|| film.mean_luminance())?;
         let aim = Aim { error, brightness, convergence: film.convergence() };
-        let noise =
-            film.of_tiles(|tile| self.is_open(tile, done, samples).then(|| TileNoise::of(film, tile)));
-        if samples >= LEAST && !self.lacks_least(done) {
-            self.brightness = Some(brightness);
+        let is_open = |tile: usize| self.judged[tile] < samples && self.is_open(tile, done, samples);
+        let noise = film.of_tiles(|tile| is_open(tile).then(|| TileNoise::of(film, tile)));
+        if is_time {
             self.decide(&noise, done, samples, &aim);
+            let judged = self.judged.iter_mut().zip(&noise).filter(|(_, noise)| noise.is_some());
+            judged.for_each(|(judged, _)| *judged = samples);
         }
         Some(Judgement { noise, samples, aim })
     }

@@ -5,13 +5,15 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::film_state::FilmState;
+use super::film_state::{Before, FilmState};
 use super::first_picture::FirstPictures;
 use super::forecast::{Forecast, Moment};
+use super::keeping::Keeping;
 use super::noise_goals::LEAST;
 use super::preview::Screen;
+use super::share::Share;
 use super::time_budget::next_round;
-use crate::film::{Rect, TILE_SIZE, TileSamples};
+use crate::film::{PILOT_SAMPLES, Pilot, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
 use crate::pipeline::pace::Clock;
 use crate::pipeline::plan::Plan;
@@ -51,6 +53,10 @@ pub(in crate::pipeline) struct Rendering<'a> {
     pub(in crate::pipeline) is_moved: bool,
     /// Pixels of first pictures that are traced in a second, as the last one was.
     pub(in crate::pipeline) coarse_rate: &'a Cell<Option<f64>>,
+    /// The share of the picture that is rendered. `None` for all of it.
+    pub(in crate::pipeline) share: Option<Share>,
+    /// Checkpoints, if there are any.
+    pub(in crate::pipeline) keeping: Option<&'a Keeping<'a>>,
 }
 
 /// One run of the stage: passes and rounds over a film, with progress and previews between the tiles.
@@ -65,6 +71,8 @@ pub(in crate::pipeline) struct Scheduler<'a> {
     /// Units of earlier renders.
     units_before: u64,
     pub(in crate::pipeline) rays: RayCounters,
+    /// Seconds of the process whose checkpoint this goes on from.
+    seconds_before: f64,
     /// Whether some pixels have no sample yet: until they have, nothing but a cancel ends the render.
     is_first: bool,
     is_over_time: bool,
@@ -77,6 +85,7 @@ impl<'a> Scheduler<'a> {
         let units = state.units();
         let bounds = (rendering.take_preview)().unwrap_or(rendering.preview);
         let forecast = Forecast::new(state, rendering.plan.settings.render.samples);
+        let Before { rays, seconds: seconds_before } = std::mem::take(&mut state.before);
         Self {
             is_first: !state.is_covered(),
             state,
@@ -86,7 +95,8 @@ impl<'a> Scheduler<'a> {
             forecast,
             units,
             units_before: units,
-            rays: RayCounters::default(),
+            rays,
+            seconds_before,
             is_over_time: false,
             next_progress: Instant::now(),
             next_preview: Instant::now(),
@@ -98,6 +108,20 @@ impl<'a> Scheduler<'a> {
     /// # Errors
     /// Cancelled. The film keeps what it has.
     pub(in crate::pipeline) fn run(&mut self) -> Result<(), Stop> {
+        let ran = self.go();
+        if let (Some(keeping), Err(Stop::Cancelled)) = (self.rendering.keeping, &ran) {
+            let seconds = self.seconds();
+            keeping.at_the_end(self.state, self.rays, seconds);
+        }
+        ran
+    }
+
+    /// Seconds of rendering, those of an earlier process too.
+    pub(in crate::pipeline) fn seconds(&mut self) -> f64 {
+        self.seconds_before + self.clock.seconds(self.rendering.tracer.token.is_paused())
+    }
+
+    fn go(&mut self) -> Result<(), Stop> {
         self.report_progress(false);
         if self.is_first {
             if self.state.base.is_none() {
@@ -114,6 +138,9 @@ impl<'a> Scheduler<'a> {
             self.tick();
         }
         let Render { samples, error, .. } = self.rendering.plan.settings.render;
+        if error > 0.0 && samples >= LEAST && self.state.share.is_some() {
+            self.pilot()?;
+        }
         if let Some(first) = self.first() {
             // Noise is held against the brightness of the whole picture, which is known then.
             let of_all = if error > 0.0 { LEAST.min(samples) } else { 1 };
@@ -132,9 +159,46 @@ impl<'a> Scheduler<'a> {
         self.rendering.first.map(|section| section.pixels((width, height)))
     }
 
+    /// Renders the pilot of the picture, of which this process has a share.
+    fn pilot(&mut self) -> Result<(), Stop> {
+        if self.state.goals.brightness.is_some() {
+            return Ok(());
+        }
+        let pilot = Pilot::new(self.state.film.crop());
+        let job = |number: u64| {
+            let (x, y) = pilot.place(number);
+            let pixels = Rect { x, y, width: 1, height: 1 }.into();
+            // The job's number stands for its tile.
+            Job { tile: number as usize, pixels, samples: 0..PILOT_SAMPLES }
+        };
+        let jobs: Vec<Job> = (0..pilot.count()).map(job).collect();
+        let mut luminances = vec![None; jobs.len()];
+        let keep = |_: &Job, samples: TileSamples| Pilot::luminance(samples);
+        self.rendering.tracer.run(&jobs, keep, |result| {
+            if let Some((job, luminance, cost)) = result {
+                luminances[job.tile] = luminance;
+                self.rays += cost.rays;
+            }
+            true
+        })?;
+        self.state.goals.brightness = pilot.mean(|number| luminances[number as usize]);
+        Ok(())
+    }
+
+    /// Judges the noise that a checkpoint or a cancelled request has left unjudged.
+    fn judge_what_is_there(&mut self, part: Option<Rect>) {
+        let Render { samples, error, .. } = self.rendering.plan.settings.render;
+        let done = self.state.samples_in(part, samples);
+        // Nothing is decided by fewer samples.
+        if error > 0.0 && (LEAST..samples).contains(&done) && done.is_power_of_two() {
+            self.rendering.tracer.pool.install(|| self.state.judge(done, error.into()));
+        }
+    }
+
     /// Pass after pass until a part (none: all) has so many samples, or those that it is to have.
     fn passes(&mut self, part: Option<Rect>, samples: u32) -> Result<(), Stop> {
         let Render { samples: most, error, .. } = self.rendering.plan.settings.render;
+        self.judge_what_is_there(part);
         while !self.state.is_complete_in(part, samples) && !self.is_over_time {
             if let Some(goals) = self.next_round().filter(|_| part.is_none()) {
                 self.round(&goals)?;
@@ -157,20 +221,22 @@ impl<'a> Scheduler<'a> {
 
     /// All tiles of a part that have fewer samples than `target`.
     fn pass(&mut self, part: Option<Rect>, target: u32) -> Result<(), Stop> {
-        let Some(photons) = self.rendering.photons else { return self.pass_by(part, |_, _| target, None) };
+        let Some(photons) = self.rendering.photons else { return self.pass_by(part, |_, _| target, None, 0) };
         while !self.state.is_complete_in(part, target) && !self.is_over_time {
             let samples = self.state.samples_in(part, target);
-            let end = target.min(samples.saturating_add(photons.at_once()));
+            let at_once = samples..target.min(samples.saturating_add(photons.at_once()));
+            let numbers = self.state.numbers(at_once);
+            let end = samples + numbers.len() as u32;
             // Photons that no time is left for are not sent, nor gathered.
             self.tick();
             if self.is_over_time {
                 break;
             }
-            let maps = self.maps(photons, samples..end)?;
+            let maps = self.maps(photons, numbers.clone())?;
             if self.is_over_time {
                 break;
             }
-            self.pass_by(part, |_, _| end, Some(&maps))?;
+            self.pass_by(part, |_, _| end, Some(&maps), numbers.start - samples)?;
         }
         Ok(())
     }
@@ -215,6 +281,7 @@ impl<'a> Scheduler<'a> {
                 None,
                 |cell, half| goals[cell][half].min(done[cell][half].saturating_add(most)),
                 None,
+                0,
             )?;
         }
         Ok(())
@@ -225,9 +292,10 @@ impl<'a> Scheduler<'a> {
         part: Option<Rect>,
         target: impl Fn(usize, usize) -> u32,
         photons: Option<&PhotonMaps>,
+        first: u32,
     ) -> Result<(), Stop> {
         let jobs = self.state.jobs(part, target);
-        let tracer = Tracer { photons, ..self.rendering.tracer };
+        let tracer = Tracer { photons, first, ..self.rendering.tracer };
         let film = Arc::clone(&self.state.film);
         let keep = |job: &Job, samples: TileSamples| film.add(job.tile, &samples);
         tracer.run(&jobs, keep, |result| {
@@ -255,7 +323,10 @@ impl<'a> Scheduler<'a> {
             self.next_preview = Instant::now() + PREVIEW_INTERVAL.max(now.elapsed() * PREVIEW_SHARE);
         }
         (self.rendering.pulse)(self.state, !self.is_first);
-        let seconds = self.clock.seconds(self.rendering.tracer.token.is_paused());
+        let seconds = self.seconds();
+        if let Some(keeping) = self.rendering.keeping {
+            keeping.tick(self.state, self.rays, seconds);
+        }
         let budget = self.rendering.plan.time_seconds;
         self.is_over_time = !self.is_first && budget.is_some_and(|budget| seconds >= budget);
     }

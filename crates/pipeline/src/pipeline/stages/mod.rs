@@ -44,6 +44,13 @@ impl Stop {
     pub(super) fn work(message: impl ToString) -> Self {
         Self::Failed(Failure::Work(message.to_string()))
     }
+
+    /// Something is wrong with the call, which has no place in the scene.
+    pub(super) fn wrong_call(message: String, help: &str) -> Self {
+        let (severity, help) = (Severity::Error, Some(help.to_owned()));
+        let path = std::path::PathBuf::new();
+        Self::Failed(Failure::Scene(vec![Diagnostic { severity, message, path, place: None, help }]))
+    }
 }
 
 /// Result of a stage, and how it came about.

@@ -31,18 +31,27 @@ pub(in crate::pipeline) fn render(
             true => Convergence::Photons,
             false => Convergence::Stratified,
         };
-        let state = || FilmState::new(key, rendering.plan, rendering.most_film_bytes, convergence);
-        films.put(state).map_err(Stop::work)?;
+        let (plan, most_bytes) = (rendering.plan, rendering.most_film_bytes);
+        let state = || FilmState::new(key, plan, most_bytes, convergence, rendering.share.clone());
+        let state = films.put(state).map_err(Stop::work)?;
+        if let Some(keeping) = rendering.keeping.filter(|_| !rendering.force) {
+            keeping.resume(state, wanted)?;
+        }
     }
     let Some(state) = films.current_mut() else { return Err(Stop::work("the film is gone")) };
     let budget = rendering.plan.time_seconds;
     let finished = state.is_complete(wanted) || (budget.is_some() && state.ended_by == budget);
     let had = state.samples(wanted);
+    let is_resumed = state.before.seconds > 0.0;
     let mut scheduler = Scheduler::new(state, rendering);
     if finished {
         scheduler.show();
-        let why = if is_other { "its film was kept" } else { "nothing that it shows changed" };
-        return Ok(Staged::reused(RayCounters::default(), why));
+        let why = match (is_resumed, is_other) {
+            (true, _) => "the checkpoint has all samples",
+            (false, true) => "its film was kept",
+            (false, false) => "nothing that it shows changed",
+        };
+        return Ok(Staged::reused(scheduler.rays, why));
     }
     scheduler.state.ended_by = None;
     scheduler.state.is_passing = rendering.is_moved;

@@ -3,10 +3,13 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
+
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
 use super::super::protocol::{Failure, Writing};
 use super::super::render::film_state::FilmState;
+use super::super::render::keeping::head;
 use super::super::sink::Sink;
 use super::super::targets::{conflicts, guarded};
 use super::super::watch::content::{Content, Contents};
@@ -15,9 +18,10 @@ use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::film::SampleStats;
-use crate::film::stretch::Range;
 use crate::integrators::{Measure, Shown};
-use crate::output::{self, BitDepth, EncodeOptions, Format, OutputError};
+use crate::output::part::{self, Kind};
+use crate::output::write::{Durability, Guard};
+use crate::output::{self, BitDepth, Finish, Format, OutputError};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// Files that glimt wrote, with the picture's key and the file's content at that time.
@@ -85,7 +89,11 @@ fn find_targets(
             BitDepth::try_from(plan.bit_depth)?,
         )
     };
-    plan.outputs.iter().try_for_each(check)?;
+    match plan.shard {
+        // A part has any ending.
+        Some(_) => plan.outputs.iter().try_for_each(|path| place(path))?,
+        None => plan.outputs.iter().try_for_each(check)?,
+    }
     plan.report.iter().try_for_each(|path| place(path))
 }
 
@@ -134,9 +142,15 @@ pub(in crate::pipeline) fn write(
         {
             continue;
         }
-        let image = radiance.get_or_insert_with(|| canvas.film.image(plan.settings.view.quantity()));
-        token.check()?;
-        match write_one(image, canvas, to, path, token) {
+        let wrote = match canvas.share {
+            Some(_) => write_part(canvas, to, path, token),
+            None => {
+                let image = radiance.get_or_insert_with(|| canvas.film.image(plan.settings.view.quantity()));
+                token.check()?;
+                write_one(image, canvas, to, path, token)
+            }
+        };
+        match wrote {
             Ok(bytes) => {
                 count += 1;
                 // The picture is on disk: a cancel from here on does not undo that. Look at the content before anybody hears of
@@ -183,25 +197,42 @@ fn write_one(
     path: &Path,
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let tone = plan.tone.of_picture(image);
-    let metadata = metadata(canvas, plan, tone.stretch.range());
-    let is_light = matches!(plan.settings.view.shown(), Shown::Light(Measure::Radiance(_)));
-    let mean_luminance_error = if is_light { canvas.film.mean_luminance_error() } else { None };
-    let bit_depth = BitDepth::try_from(plan.bit_depth)?;
-    let options = EncodeOptions { tone, bit_depth, metadata, mean_luminance_error };
-    let bytes = output::encode(image, &options, Format::of(path)?, token)?;
+    let bytes = finish(plan).encode(&canvas.film, image, Format::of(path)?, token)?;
     guarded(plan, inputs, path, sink, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
     Ok(bytes.len() as u64)
 }
 
-/// Metadata of a picture: enough to make it again.
-fn metadata(canvas: &FilmState, plan: &Plan, range: Option<Range>) -> Vec<(String, String)> {
+/// Writes the part of a picture that this process rendered.
+fn write_part(
+    canvas: &FilmState,
+    Destination { plan, inputs, sink, .. }: Destination<'_>,
+    path: &Path,
+    token: &CancelToken,
+) -> Result<u64, OutputError> {
+    let head = head(Kind::Part, canvas, canvas.identity.clone().unwrap_or_default(), &finish(plan));
+    let save = |guard: &Guard<'_>| {
+        part::save(path, &head, &canvas.film, &Value::Null, guard, (token, Durability::Power))
+    };
+    guarded(plan, inputs, path, sink, save)?;
+    Ok(path.metadata().map_or(0, |found| found.len()))
+}
+
+/// Settings that turn a film into the files of a plan.
+pub(in crate::pipeline) fn finish(plan: &Plan) -> Finish {
+    Finish {
+        quantity: plan.settings.view.quantity(),
+        tone: plan.tone,
+        bit_depth: BitDepth::try_from(plan.bit_depth).unwrap_or_default(),
+        metadata: metadata(plan),
+        is_light: matches!(plan.settings.view.shown(), Shown::Light(Measure::Radiance(_))),
+    }
+}
+
+/// Metadata of a picture: enough to make it again, beside what its film tells.
+fn metadata(plan: &Plan) -> Vec<(String, String)> {
     let settings = &plan.effective;
-    let SampleStats { min, mean, max } = canvas.film.samples();
-    let samples = if min == max { min.to_string() } else { format!("{min} to {max}, {mean:.2} on average") };
     let pairs = [
         ("glimt:scene", plan.name.clone()),
-        ("glimt:samples", samples),
         ("glimt:integrator", settings.integrator.name().to_owned()),
         ("glimt:shadows", settings.shadows.name().to_owned()),
         ("glimt:max_depth", plan.settings.render.max_depth.to_string()),
@@ -210,8 +241,7 @@ fn metadata(canvas: &FilmState, plan: &Plan, range: Option<Range>) -> Vec<(Strin
         ("glimt:seed", settings.seed.to_string()),
         ("glimt:exposure", plan.tone.exposure_stops.to_string()),
     ];
-    let range = range.map(|range| ("glimt:range", format!("{} to {}", range.least, range.greatest)));
-    pairs.into_iter().chain(range).map(|(key, value)| (key.to_owned(), value)).collect()
+    pairs.map(|(key, value)| (key.to_owned(), value)).to_vec()
 }
 
 fn key(canvas: &FilmState, plan: &Plan, path: &Path) -> Key {

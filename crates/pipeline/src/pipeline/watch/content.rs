@@ -33,6 +33,11 @@ pub enum Content {
 }
 
 impl Content {
+    /// Whether a file is too long to be hashed, so that its time stamps stand for its content.
+    pub(in crate::pipeline) fn is_by_stamp(self, path: &Path) -> bool {
+        self != Self::Missing && fs::metadata(path).is_ok_and(|metadata| metadata.len() > MOST_HASHED)
+    }
+
     /// Add it to what a stage read.
     pub(in crate::pipeline) fn add_to(self, key: &mut Fingerprint) {
         match self {

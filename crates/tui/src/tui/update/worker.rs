@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use super::request::resized_preview;
 use super::say::say;
 use super::{camera, history, pointer};
-use crate::pipeline::protocol::{AssetProgress, Event, Failure, Report, Stage, StageReport, Status};
+use crate::pipeline::protocol::{
+    AssetProgress, CheckpointNews, Event, Failure, Report, Stage, StageReport, Status,
+};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
 use crate::tui::event::{Effect, Unwritten, Written};
@@ -63,6 +65,15 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
                 Some(Unwritten { why: message, generation: state.request.generation });
         }
         Event::NotKept { message, .. } => say(state, format!("warning: {}", visible(&message))),
+        Event::Checkpoint { news, .. } => match news {
+            CheckpointNews::Failed { message } => say(state, format!("warning: {}", visible(&message))),
+            CheckpointNews::Resumed { path, .. } => {
+                say(state, format!("going on from {}", visible(&path.to_string_lossy())));
+            }
+            CheckpointNews::Written { .. }
+            | CheckpointNews::Absent { .. }
+            | CheckpointNews::Ignored { .. } => {}
+        },
         Event::Refused { conflicts, .. } => refused(state, conflicts),
         Event::Edited { what, .. } => state.picture.history.describe_edit(what),
         Event::WritePostponed { .. } => {
@@ -92,6 +103,7 @@ fn generation(event: &Event) -> u64 {
         | Event::WriteFailed { generation, .. }
         | Event::NotKept { generation, .. }
         | Event::Refused { generation, .. }
+        | Event::Checkpoint { generation, .. }
         | Event::WritePostponed { generation }
         | Event::Edited { generation, .. }
         | Event::Files { generation, .. }

@@ -1,0 +1,100 @@
+//! Sums of blocks in a film: their memory, and the end of a block.
+
+use super::Rect;
+use super::blocks::Blocks;
+use super::sums::{Film, FilmError, Tile, bytes_needed, is_available};
+use crate::math::DVec3;
+
+impl Tile {
+    /// Puts the sum of a pixel's block aside if that has all its samples.
+    pub(super) fn close_block(&mut self, pixel: usize, blocks: Blocks) {
+        let Some(block) = blocks.finished(self.counts[pixel]) else { return };
+        let put = |earlier: &mut [Vec<DVec3>], sums: &mut [DVec3]| {
+            if let Some(block) = earlier.get_mut(block) {
+                block[pixel] += std::mem::take(&mut sums[pixel]);
+            }
+        };
+        put(&mut self.earlier, &mut self.sums);
+        if let Some(negative) = &mut self.negative {
+            put(&mut negative.earlier, &mut negative.sums);
+        }
+    }
+}
+
+impl Film {
+    /// The same empty film, whose samples are added up in this order.
+    ///
+    /// # Errors
+    /// There is no memory for the sums of the blocks.
+    pub fn in_blocks(mut self, blocks: Blocks) -> Result<Self, FilmError> {
+        let (crop, kept) = (self.crop(), blocks.kept());
+        let more = crop.area() as u64 * (kept * size_of::<DVec3>()) as u64;
+        let (width, height, bytes) = (self.width(), self.height(), self.memory_bytes() + more);
+        let lacks = || FilmError::Memory { width, height, bytes, crop_helps: true };
+        if !is_available(more) {
+            return Err(lacks());
+        }
+        for tile in 0..self.tile_count() {
+            let area = self.tile_rect(tile).map_or(0, |rect| rect.area());
+            let mut earlier = Vec::with_capacity(kept);
+            for _ in 0..kept {
+                let mut sums = Vec::new();
+                sums.try_reserve_exact(area).map_err(|_| lacks())?;
+                earlier.push(sums);
+            }
+            self.tile(tile).earlier = earlier;
+        }
+        self.blocks = blocks;
+        Ok(self)
+    }
+
+    /// Bytes for the sums of a crop whose samples are added up in this order, and for the finished picture of this size.
+    pub fn bytes_of((width, height): (u32, u32), crop: Rect, blocks: Blocks) -> (u64, u64) {
+        let more = crop.area() as u64 * (blocks.kept() * size_of::<DVec3>()) as u64;
+        let picture = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
+        (bytes_needed(width, height, crop) - picture + more, picture)
+    }
+
+    /// Order in which samples are added up.
+    pub fn blocks(&self) -> Blocks {
+        self.blocks
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{Quantity, TileSamples};
+    use crate::math::Vec3;
+    use crate::math::random::unit;
+
+    #[test]
+    fn a_sum_is_that_of_its_blocks_however_the_samples_come() {
+        let mut next = unit(3);
+        let values: Vec<f32> = (0..41).map(|_| next() * 1e3).collect();
+        let add = |blocks: Blocks, counts: &[usize]| {
+            let film = Film::new(1, 1, None).and_then(|film| film.in_blocks(blocks)).expect("a film");
+            let mut rest = &values[..];
+            for &count in counts {
+                let (some, others) = rest.split_at(count);
+                let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
+                let radiance = some.iter().map(|value| Vec3::splat(*value)).collect();
+                film.add(
+                    0,
+                    &TileSamples { pixels: rect.into(), samples: count as u32, radiance, negative: None },
+                );
+                rest = others;
+            }
+            let mean = film.tile(0).mean(0).expect("samples");
+            assert_eq!(film.pixel(Quantity::Samples, 0, 0), Some(Vec3::splat(41.0)));
+            mean.x
+        };
+        let sum = |values: &[f32]| values.iter().fold(0.0, |sum, value| sum + f64::from(*value));
+        let exact = ((sum(&values[..16]) + sum(&values[16..32])) + sum(&values[32..])) / 41.0;
+        for counts in [&[41][..], &[1; 41], &[16, 16, 9], &[7, 20, 14]] {
+            assert_eq!(add(Blocks::Added, counts).to_bits(), exact.to_bits(), "{counts:?}");
+            assert_eq!(add(Blocks::Apart(2), counts).to_bits(), exact.to_bits(), "{counts:?}");
+            assert_eq!(add(Blocks::Whole, counts).to_bits(), (sum(&values) / 41.0).to_bits());
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! The pilot of a picture: a few fixed pixels whose first samples say how bright it is. Noise is held against that brightness, and
+//! each machine that renders some tiles of the picture knows it from the same pixels.
+
+use super::steps::luminance;
+use super::{Film, Quantity, Rect, TileSamples};
+use crate::math::random::scrambled;
+
+/// Pixels of a pilot, unless the picture has fewer.
+const PIXELS: u64 = 4096;
+
+/// Samples of each pixel of a pilot.
+pub const PILOT_SAMPLES: u32 = 16;
+
+/// The pilot of a picture or a crop.
+#[derive(Clone, Copy, Debug)]
+pub struct Pilot {
+    crop: Rect,
+}
+
+impl Pilot {
+    /// The pilot for these pixels.
+    pub fn new(crop: Rect) -> Self {
+        Self { crop }
+    }
+
+    /// Number of its pixels.
+    pub fn count(&self) -> u64 {
+        PIXELS.min(self.crop.area() as u64)
+    }
+
+    /// Column and row of a pixel: one at random in each of equal runs of the pixels, row after row.
+    pub fn place(&self, number: u64) -> (u32, u32) {
+        let (area, count) = (self.crop.area() as u64, self.count().max(1));
+        let (start, end) = (number * area / count, (number + 1) * area / count);
+        let index = start + scrambled(number) % (end - start).max(1);
+        let width = u64::from(self.crop.width.max(1));
+        (self.crop.x + (index % width) as u32, self.crop.y + (index / width) as u32)
+    }
+
+    /// Mean luminance of the pilot by the first samples of a film. `None` if one of its pixels has no sample.
+    pub fn of_film(&self, film: &Film) -> Option<f64> {
+        self.mean(|number| {
+            let (x, y) = self.place(number);
+            film.pixel(Quantity::Radiance, x, y).map(|radiance| luminance(radiance.as_dvec3()))
+        })
+    }
+
+    /// Mean of the luminances of its pixels.
+    pub fn mean(&self, luminance_of: impl Fn(u64) -> Option<f64>) -> Option<f64> {
+        let sum: Option<f64> = (0..self.count()).map(luminance_of).sum();
+        sum.map(|sum| sum / self.count() as f64)
+    }
+
+    /// Luminance of a pixel of the pilot by its samples alone, as a film has it. `None` without samples.
+    pub fn luminance(mut samples: TileSamples) -> Option<f64> {
+        let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
+        samples.pixels = rect.into();
+        let film = Film::new(1, 1, None).ok()?;
+        film.add(0, &samples);
+        film.pixel(Quantity::Radiance, 0, 0).map(|radiance| luminance(radiance.as_dvec3()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+    use crate::math::Vec3;
+
+    #[test]
+    fn its_pixels_are_spread_over_the_picture() {
+        for crop in [(4096, 2048), (97, 501), (64, 64), (3, 5)] {
+            let pilot = Pilot::new(Rect { x: 7, y: 9, width: crop.0, height: crop.1 });
+            let places: HashSet<_> = (0..pilot.count()).map(|number| pilot.place(number)).collect();
+            assert_eq!(places.len() as u64, u64::from(crop.0 * crop.1).min(4096));
+            let inside = |&(x, y): &(u32, u32)| (7..7 + crop.0).contains(&x) && (9..9 + crop.1).contains(&y);
+            assert!(places.iter().all(inside));
+            let left = places.iter().filter(|(x, _)| x - 7 < crop.0 / 2).count() as f64 / places.len() as f64;
+            assert!((left - 0.5).abs() < 0.1 || crop.0 < 10, "{crop:?}: {left} of it is on the left");
+        }
+    }
+
+    #[test]
+    fn a_film_and_single_pixels_tell_the_same_brightness() {
+        let crop = Rect { x: 0, y: 0, width: 40, height: 3 };
+        let film = Film::new(40, 3, None).expect("a film");
+        let value =
+            |x: u32, y: u32, sample: u32| Vec3::new(x as f32 + 0.3, y as f32 * 0.7, sample as f32 / 3.0);
+        let samples = |rect: Rect| {
+            let pixels = (0..rect.area() as u32).map(|i| (rect.x + i % rect.width, rect.y + i / rect.width));
+            let radiance = pixels.flat_map(|(x, y)| (0..16).map(move |sample| value(x, y, sample))).collect();
+            TileSamples { pixels: rect.into(), samples: 16, radiance, negative: None }
+        };
+        for tile in 0..film.tile_count() {
+            film.add(tile, &samples(film.tile_rect(tile).expect("a tile")));
+        }
+        let pilot = Pilot::new(crop);
+        let apart = pilot.mean(|number| {
+            let (x, y) = pilot.place(number);
+            Pilot::luminance(samples(Rect { x, y, width: 1, height: 1 }))
+        });
+        assert_eq!(pilot.of_film(&film), apart);
+        assert!(
+            apart.is_some() && Pilot::new(crop).of_film(&Film::new(40, 3, None).expect("a film")).is_none()
+        );
+    }
+}

@@ -1,0 +1,321 @@
+//! Tiles of a film as bytes, from which the same film can be made again: little-endian numbers, one pixel after the other.
+
+use std::sync::atomic::Ordering;
+
+use super::steps::Steps;
+use super::sums::{Negative, Tile};
+use super::{CELLS, Film, Part};
+use crate::math::DVec3;
+
+/// Bytes that are no tile of such a film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("these bytes are no tile of the picture")]
+pub struct Malformed;
+
+/// A tile that was read back, whose blocks may be added to those of others.
+#[derive(Debug, Default)]
+pub struct StoredTile {
+    tile: Tile,
+}
+
+impl StoredTile {
+    /// Reads a tile of so many pixels.
+    ///
+    /// # Errors
+    /// [`Malformed`] if there are too few bytes, too many, or numbers that no tile has.
+    pub fn read(bytes: &[u8], area: usize) -> Result<Self, Malformed> {
+        let mut from = Bytes(bytes);
+        let (blocks, is_signed, levels) = (from.count()?, from.count()? == 1, from.count()?);
+        // Nothing is reserved for numbers that are not there.
+        if blocks.checked_mul(area * size_of::<DVec3>()).is_none_or(|all| all > bytes.len()) || levels > 32 {
+            return Err(Malformed);
+        }
+        let mut tile = Tile { sums: from.vectors(area)?, ..Tile::default() };
+        tile.earlier = (0..blocks).map(|_| from.vectors(area)).collect::<Result<_, _>>()?;
+        tile.counts = from.counts(area)?;
+        if is_signed {
+            let weight = f64::from_bits(from.u64()?);
+            let sums = from.vectors(area)?;
+            let earlier = (0..blocks).map(|_| from.vectors(area)).collect::<Result<_, _>>()?;
+            tile.negative = Some(Negative { weight, sums, counts: from.counts(area)?, earlier });
+        }
+        tile.steps = Steps::read(area, levels, &mut || from.u32())?;
+        if from.0.is_empty() { Ok(Self { tile }) } else { Err(Malformed) }
+    }
+
+    /// Sums of blocks that it holds: finished ones, and one that is not if a pixel has samples of it.
+    pub fn block_count(&self) -> usize {
+        self.tile.earlier.len() + 1
+    }
+
+    /// Adds one of the blocks of a tile of as many pixels to this one, which is a sum of blocks.
+    ///
+    /// # Errors
+    /// [`Malformed`] if the tiles have not as many pixels, or the block is not there.
+    pub fn add_block(&mut self, of: &Self, block: usize) -> Result<(), Malformed> {
+        let area = of.tile.sums.len();
+        if self.tile.sums.is_empty() {
+            self.tile.fill(area);
+        }
+        if self.tile.sums.len() != area {
+            return Err(Malformed);
+        }
+        let sums = block_of(&of.tile.earlier, &of.tile.sums, block).ok_or(Malformed)?;
+        let is_first = self.tile.earlier.is_empty();
+        if is_first {
+            self.tile.earlier = vec![sums.to_vec()];
+        } else {
+            add_up(&mut self.tile.earlier[0], sums);
+        }
+        if let Some(negative) = &of.tile.negative {
+            let sums = block_of(&negative.earlier, &negative.sums, block).ok_or(Malformed)?;
+            let own = self.tile.negative.get_or_insert_with(|| Negative::new(negative.weight, area, 1));
+            add_up(&mut own.earlier[0], sums);
+        }
+        Ok(())
+    }
+
+    /// Counts the samples of a tile, of whose blocks those that count were added.
+    pub fn add_counts(&mut self, of: &Self) {
+        self.tile.counts.iter_mut().zip(&of.tile.counts).for_each(|(own, other)| *own += other);
+        if let (Some(own), Some(other)) = (&mut self.tile.negative, &of.tile.negative) {
+            own.counts.iter_mut().zip(&other.counts).for_each(|(own, other)| *own += other);
+        }
+    }
+}
+
+/// Sums of one of the blocks.
+fn block_of<'a>(earlier: &'a [Vec<DVec3>], sums: &'a [DVec3], block: usize) -> Option<&'a [DVec3]> {
+    match block.cmp(&earlier.len()) {
+        std::cmp::Ordering::Less => Some(&earlier[block]),
+        std::cmp::Ordering::Equal => Some(sums),
+        std::cmp::Ordering::Greater => None,
+    }
+}
+
+fn add_up(sums: &mut [DVec3], others: &[DVec3]) {
+    sums.iter_mut().zip(others).for_each(|(sum, other)| *sum += *other);
+}
+
+impl Film {
+    /// Appends all that a tile holds; returns whether it has samples.
+    pub fn store(&self, tile: usize, bytes: &mut Vec<u8>) -> bool {
+        let tile = self.tile(tile);
+        if tile.counts.is_empty() {
+            return false;
+        }
+        let (signed, levels) = (tile.negative.is_some(), tile.steps.level_count());
+        for count in [tile.earlier.len(), usize::from(signed), levels] {
+            put(bytes, count as u32);
+        }
+        put_sums(bytes, &tile.sums, &tile.earlier);
+        put_all(bytes, tile.counts.iter().map(|count| count.to_le_bytes()));
+        if let Some(negative) = &tile.negative {
+            bytes.extend_from_slice(&negative.weight.to_bits().to_le_bytes());
+            put_sums(bytes, &negative.sums, &negative.earlier);
+            put_all(bytes, negative.counts.iter().map(|count| count.to_le_bytes()));
+        }
+        tile.steps.words(&mut |word| put(bytes, word));
+        true
+    }
+
+    /// Puts a tile in the place of its own.
+    ///
+    /// # Errors
+    /// [`Malformed`] if it is no tile of this film.
+    pub fn restore(&self, tile: usize, stored: StoredTile) -> Result<(), Malformed> {
+        let area = self.tile_rect(tile).ok_or(Malformed)?.area();
+        let Tile { sums, earlier, counts, negative, steps, .. } = stored.tile;
+        if sums.len() != area || earlier.len() != self.blocks().kept() {
+            return Err(Malformed);
+        }
+        let mut own = self.tile(tile);
+        let revision = own.revision + 1;
+        *own = Tile { sums, earlier, counts, negative, steps, revision };
+        own.fill(area);
+        Ok(())
+    }
+
+    /// Samples that each pixel of a half of a cell has; 0 for a half without pixels.
+    pub fn half_samples(&self, cell: usize, half: usize) -> u32 {
+        let (Some(tile), Some(rect)) = (self.tile_rect(cell / CELLS), self.cell_rect(cell)) else { return 0 };
+        if Part::Half(half).count(rect.area()) == 0 {
+            return 0;
+        }
+        let index = Part::Half(half).index(0, rect);
+        let (x, y) = (rect.x + index % rect.width - tile.x, rect.y + index / rect.width - tile.y);
+        self.tile(cell / CELLS).count((y * tile.width + x) as usize)
+    }
+
+    /// Adds to [`Film::non_finite_samples`] those of restored tiles.
+    pub fn add_non_finite(&self, samples: u64) {
+        self.non_finite_samples.fetch_add(samples, Ordering::Relaxed);
+    }
+}
+
+fn put(bytes: &mut Vec<u8>, word: u32) {
+    bytes.extend_from_slice(&word.to_le_bytes());
+}
+
+fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[Vec<DVec3>]) {
+    for sums in [sums].into_iter().chain(earlier.iter().map(Vec::as_slice)) {
+        put_all(
+            bytes,
+            sums.iter().map(|sum| {
+                let mut number = [0; 24];
+                let (x, rest) = number.split_at_mut(8);
+                let (y, z) = rest.split_at_mut(8);
+                x.copy_from_slice(&sum.x.to_bits().to_le_bytes());
+                y.copy_from_slice(&sum.y.to_bits().to_le_bytes());
+                z.copy_from_slice(&sum.z.to_bits().to_le_bytes());
+                number
+            }),
+        );
+    }
+}
+
+/// Appends numbers of `N` bytes, which is much faster together than one after the other.
+fn put_all<const N: usize>(bytes: &mut Vec<u8>, numbers: impl ExactSizeIterator<Item = [u8; N]>) {
+    let start = bytes.len();
+    bytes.resize(start + N * numbers.len(), 0);
+    for (place, number) in bytes[start..].chunks_exact_mut(N).zip(numbers) {
+        place.copy_from_slice(&number);
+    }
+}
+
+/// The rest of the bytes that are read.
+struct Bytes<'a>(&'a [u8]);
+
+impl Bytes<'_> {
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], Malformed> {
+        let (head, rest) = self.0.split_first_chunk().ok_or(Malformed)?;
+        self.0 = rest;
+        Ok(*head)
+    }
+
+    fn u32(&mut self) -> Result<u32, Malformed> {
+        self.take().map(u32::from_le_bytes)
+    }
+
+    fn u64(&mut self) -> Result<u64, Malformed> {
+        self.take().map(u64::from_le_bytes)
+    }
+
+    fn count(&mut self) -> Result<usize, Malformed> {
+        self.u32().map(|count| count as usize)
+    }
+
+    fn counts(&mut self, area: usize) -> Result<Vec<u32>, Malformed> {
+        (0..area).map(|_| self.u32()).collect()
+    }
+
+    fn vectors(&mut self, area: usize) -> Result<Vec<DVec3>, Malformed> {
+        let mut number = || self.u64().map(f64::from_bits);
+        (0..area).map(|_| Ok(DVec3::new(number()?, number()?, number()?))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::{BLOCK, Blocks, NegativeLobes, Rect, TileSamples};
+    use crate::math::Vec3;
+    use crate::math::random::unit;
+
+    /// Adds samples `range` of a fixed random sequence for each pixel to a film of 40 × 33 pixels.
+    fn add(film: &Film, range: std::ops::Range<u32>, is_signed: bool) {
+        for tile in 0..film.tile_count() {
+            let rect = film.tile_rect(tile).expect("a tile");
+            let (mut radiance, mut is_negative) = (Vec::new(), Vec::new());
+            for i in 0..rect.area() as u64 {
+                let mut next = unit(1 + i + 5000 * tile as u64);
+                for sample in 0..range.end {
+                    let value = Vec3::new(next(), next(), next() * 1e4);
+                    if range.contains(&sample) {
+                        is_negative.push(value.x > 0.8);
+                        radiance.push(value);
+                    }
+                }
+            }
+            let negative = is_signed.then_some(NegativeLobes { weight: 0.1, is_negative });
+            let samples = range.end - range.start;
+            film.add(tile, &TileSamples { pixels: rect.into(), samples, radiance, negative });
+        }
+    }
+
+    fn film(blocks: Blocks) -> Film {
+        let crop = Some(Rect { x: 5, y: 2, width: 40, height: 33 });
+        Film::new(64, 64, crop).and_then(|film| film.in_blocks(blocks)).expect("a film")
+    }
+
+    fn stored(film: &Film, tile: usize) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        assert!(film.store(tile, &mut bytes));
+        bytes
+    }
+
+    #[test]
+    fn a_film_goes_on_from_what_was_stored() {
+        for (blocks, is_signed) in
+            [(Blocks::Whole, false), (Blocks::Whole, true), (Blocks::Added, true), (Blocks::Apart(2), true)]
+        {
+            let (whole, first, second) = (film(blocks), film(blocks), film(blocks));
+            add(&whole, 0..37, is_signed);
+            add(&first, 0..21, is_signed);
+            for tile in 0..first.tile_count() {
+                let area = first.tile_rect(tile).expect("a tile").area();
+                let read = StoredTile::read(&stored(&first, tile), area).expect("a tile");
+                second.restore(tile, read).expect("the same film");
+            }
+            assert_eq!((second.half_samples(0, 1), second.half_samples(1, 0)), (21, 21));
+            add(&second, 21..37, is_signed);
+            assert_eq!(second.radiance().pixels, whole.radiance().pixels);
+            assert_eq!(second.noise(), whole.noise());
+            for tile in 0..whole.tile_count() {
+                assert_eq!(stored(&second, tile), stored(&whole, tile), "{blocks:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_that_are_added_are_the_whole() {
+        for is_signed in [false, true] {
+            let whole = film(Blocks::Added);
+            add(&whole, 0..2 * BLOCK + 5, is_signed);
+            // One machine has the first and the last block, another the one between them.
+            let (outer, inner) = (film(Blocks::Apart(1)), film(Blocks::Apart(1)));
+            add(&outer, 0..BLOCK, is_signed);
+            add(&outer, 2 * BLOCK..2 * BLOCK + 5, is_signed);
+            add(&inner, BLOCK..2 * BLOCK, is_signed);
+            let merged = film(Blocks::Added);
+            for tile in 0..whole.tile_count() {
+                let area = whole.tile_rect(tile).expect("a tile").area();
+                let [outer, inner] =
+                    [&outer, &inner].map(|of| StoredTile::read(&stored(of, tile), area).expect("a tile"));
+                let mut sum = StoredTile::default();
+                for (of, block) in [(&outer, 0), (&inner, 0), (&outer, 1)] {
+                    sum.add_block(of, block).expect("a block");
+                }
+                [&outer, &inner].into_iter().for_each(|of| sum.add_counts(of));
+                merged.restore(tile, sum).expect("a tile");
+            }
+            assert_eq!(merged.radiance().pixels, whole.radiance().pixels);
+            assert_eq!(merged.samples(), whole.samples());
+        }
+    }
+
+    #[test]
+    fn what_is_cut_or_longer_is_no_tile() {
+        let film = film(Blocks::Added);
+        add(&film, 0..9, true);
+        let (bytes, area) = (stored(&film, 0), film.tile_rect(0).expect("a tile").area());
+        for length in (0..bytes.len()).step_by(997).chain([bytes.len() - 1]) {
+            assert_eq!(StoredTile::read(&bytes[..length], area).err(), Some(Malformed), "{length}");
+        }
+        assert!(StoredTile::read(&[&bytes[..], &[0]].concat(), area).is_err());
+        assert!(StoredTile::read(&bytes, area + 1).is_err());
+        let mut huge = bytes;
+        huge[..4].fill(255);
+        assert!(StoredTile::read(&huge, area).is_err());
+    }
+}

@@ -1,0 +1,277 @@
+//! `glimt merge`: parts to a picture.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use indicatif::ProgressBar;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde_json::json;
+
+use super::args::{MergeArgs, Progress};
+use super::console::Console;
+use super::exit::Exit;
+use super::progress::{json_line, style};
+use super::signals::{self, Ended};
+use crate::control::CancelToken;
+use crate::film::Film;
+use crate::film::tone::develop;
+use crate::output::part::{self, Merged, PartError, PartFile};
+use crate::output::write::{Guard, atomic_until};
+use crate::output::{self, FileIdentity, Finish, Format, Losses, OutputError};
+use crate::system::threads::not_started;
+use crate::tui::{Named, printed};
+
+/// Between two looks for parts that arrive.
+const PAUSE: Duration = Duration::from_millis(500);
+
+pub(super) fn run(args: &MergeArgs, console: &Console) -> Exit {
+    let pool = match ThreadPoolBuilder::new().build() {
+        Ok(pool) => pool,
+        Err(error) => return console.fail(Exit::FAILED, &not_started("threads", false, &error)),
+    };
+    let token = CancelToken::new();
+    let cancel = token.clone();
+    let ended = match signals::catch(move || cancel.cancel()) {
+        Ok(ended) => ended,
+        Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
+    };
+    let exit = Merge { args, console, token: &token, pool: &pool }.run();
+    ended.by().map_or(exit, |number| say_end(&ended, number, console))
+}
+
+fn say_end(_ended: &Ended, number: i32, console: &Console) -> Exit {
+    if let Some(signal) = signals::name(number) {
+        console.say(&format!("ended by {signal}: nothing was written"));
+    }
+    Exit::signal(number)
+}
+
+/// One call.
+struct Merge<'a> {
+    args: &'a MergeArgs,
+    console: &'a Console,
+    token: &'a CancelToken,
+    pool: &'a ThreadPool,
+}
+
+impl Merge<'_> {
+    fn run(&self) -> Exit {
+        self.try_run().unwrap_or_else(|exit| exit)
+    }
+
+    fn try_run(&self) -> Result<Exit, Exit> {
+        let format = self.check_output()?;
+        let parts = if self.args.watch { self.watched()? } else { self.opened()? };
+        let merged = self.merged(&parts, self.args.partial, "merge")?;
+        let Some(finish) = parts.first().and_then(|part| part.head.picture.finish()) else {
+            return Err(self.console.fail(Exit::WRONG, "the parts do not say how their picture is finished"));
+        };
+        self.write(format, &finish, &merged)?;
+        self.say_missing(&merged);
+        Ok(Exit::DONE)
+    }
+
+    /// Checks before the work that the output can be written, and is none of the parts.
+    fn check_output(&self) -> Result<Format, Exit> {
+        let out = &self.args.out;
+        let format = Format::of(out).map_err(|error| self.console.fail(Exit::WRONG, &error.to_string()))?;
+        let kept = self.args.parts.iter().find(|part| is_one_file(part, out));
+        if kept.is_some() || part::is_part(out) {
+            let message = format!(
+                "cannot write {}: it is a part; name the picture first, then the parts",
+                out.display()
+            );
+            return Err(self.console.fail(Exit::WRONG, &message));
+        }
+        output::check_target(out).map_err(|error| self.console.fail(Exit::FAILED, &error.to_string()))?;
+        Ok(format)
+    }
+
+    /// Opens all parts; every one that is wrong is named.
+    fn opened(&self) -> Result<Vec<PartFile>, Exit> {
+        let mut bar = Bar::new(self.args.progress, self.console, "read");
+        let (mut parts, mut wrong) = (Vec::new(), Vec::new());
+        for (index, path) in self.args.parts.iter().enumerate() {
+            match PartFile::open(path, self.token) {
+                Ok(part) => parts.push(part),
+                Err(PartError::Unreadable { source, .. })
+                    if self.args.partial && source.kind() == std::io::ErrorKind::NotFound => {}
+                Err(PartError::Cancelled(_)) => return Err(Exit::FAILED),
+                Err(error) => wrong.push(error),
+            }
+            bar.at(index + 1, self.args.parts.len());
+        }
+        bar.end();
+        wrong.iter().for_each(|error| self.console.say(&format!("error: {error}")));
+        match (wrong.is_empty(), parts.is_empty()) {
+            (false, _) => Err(Exit::WRONG),
+            (true, true) => Err(self.console.fail(Exit::WRONG, "none of the parts is there")),
+            (true, false) => Ok(parts),
+        }
+    }
+
+    /// Waits until all parts are there, and shows what is there.
+    fn watched(&self) -> Result<Vec<PartFile>, Exit> {
+        let mut parts: Vec<PartFile> = Vec::new();
+        let mut waiting: Vec<PathBuf> = self.args.parts.clone();
+        let mut is_said = false;
+        loop {
+            let before = parts.len();
+            let mut rest = Vec::new();
+            for path in waiting {
+                // A part appears under its name when it is whole.
+                if !path.exists() {
+                    rest.push(path);
+                    continue;
+                }
+                parts.push(PartFile::open(&path, self.token).map_err(|error| self.refuse(&error))?);
+            }
+            waiting = rest;
+            if parts.len() > before || !is_said {
+                is_said = true;
+                self.show(&parts)?;
+            }
+            if waiting.is_empty() {
+                return Ok(parts);
+            }
+            self.pause()?;
+        }
+    }
+
+    fn pause(&self) -> Result<(), Exit> {
+        let end = Instant::now() + PAUSE;
+        while Instant::now() < end {
+            if self.token.is_cancelled() {
+                return Err(Exit::FAILED);
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        Ok(())
+    }
+
+    /// Shows the picture of these parts, on a terminal, and how many there are.
+    fn show(&self, parts: &[PartFile]) -> Result<(), Exit> {
+        let (count, all) = (parts.len(), self.args.parts.len());
+        match self.args.progress {
+            Progress::None => {}
+            Progress::Json => json_line(&json!({ "event": "parts", "parts": count, "total": all })),
+            Progress::Auto | Progress::Plain => self.console.say(&format!("{count} of {all} parts")),
+        }
+        let is_terminal = std::io::stdout().is_terminal();
+        let finish = parts.first().and_then(|part| part.head.picture.finish());
+        let Some(finish) = finish.filter(|_| is_terminal) else {
+            // Parts that do not fit are named as soon as they are there.
+            return part::check(parts).map(drop).map_err(|error| self.refuse(&error));
+        };
+        let merged = self.merged(parts, true, "show")?;
+        let lines = self.pool.install(|| {
+            let image = finish.image(&merged.film);
+            let picture = develop(&image, &finish.tone.of_picture(&image));
+            printed(&[Named { name: format!("{count} of {all} parts"), picture }], self.args.color, true)
+        });
+        self.console.text(&format!("{lines}\n"));
+        Ok(())
+    }
+
+    fn merged(&self, parts: &[PartFile], is_partial: bool, what: &'static str) -> Result<Merged, Exit> {
+        let mut bar = Bar::new(self.args.progress, self.console, what);
+        let tell = |tile: usize, film: &Film| bar.at(tile, film.tile_count());
+        let merged = part::merge(parts, is_partial, self.token, tell);
+        bar.end();
+        merged.map_err(|error| self.refuse(&error))
+    }
+
+    fn refuse(&self, error: &PartError) -> Exit {
+        match error {
+            PartError::Cancelled(_) => Exit::FAILED,
+            PartError::Film(_) => self.console.fail(Exit::FAILED, &error.to_string()),
+            PartError::Unreadable { .. }
+            | PartError::Foreign { .. }
+            | PartError::Version { .. }
+            | PartError::Damaged { .. }
+            | PartError::Kind { .. }
+            | PartError::Other { .. }
+            | PartError::Doubled { .. }
+            | PartError::Missing { .. } => self.console.fail(Exit::WRONG, &error.to_string()),
+        }
+    }
+
+    fn write(&self, format: Format, finish: &Finish, merged: &Merged) -> Result<(), Exit> {
+        let (out, token) = (&self.args.out, self.token);
+        let film = &merged.film;
+        let may_replace = |real: &Path| match self.args.parts.iter().any(|part| is_one_file(part, real)) {
+            true => {
+                Err(OutputError::Refused { reason: format!("cannot write {}: it is a part", out.display()) })
+            }
+            false => Ok(()),
+        };
+        let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_one_file(part, path));
+        let tell = |what: String| self.console.say(&format!("warning: {what}"));
+        let guard = Guard { is_kept: &is_kept, may_replace: &may_replace, losses: Losses::Told(&tell) };
+        let bytes = self.pool.install(|| finish.encode(film, &finish.image(film), format, token));
+        let written = bytes.and_then(|bytes| atomic_until(out, &bytes, &guard, token));
+        written.map_err(|error| match error {
+            OutputError::Cancelled(_) => Exit::FAILED,
+            other => self.console.fail(Exit::FAILED, &other.to_string()),
+        })?;
+        if self.args.progress != Progress::None {
+            let (width, height) = (film.width(), film.height());
+            self.console.say(&format!("wrote {} ({width}×{height})", out.display()));
+        }
+        Ok(())
+    }
+
+    fn say_missing(&self, merged: &Merged) {
+        if !merged.missing.is_empty() {
+            let (missing, count) = (merged.missing.clone(), merged.count);
+            self.console.say(&format!("warning: {}", PartError::Missing { missing, count }));
+        }
+    }
+}
+
+fn is_one_file(one: &Path, other: &Path) -> bool {
+    let identity = FileIdentity::of(one);
+    identity.is_some() && identity == FileIdentity::of(other)
+}
+
+/// Progress of one step of the work.
+struct Bar {
+    what: &'static str,
+    bar: Option<ProgressBar>,
+    is_json: bool,
+    said: usize,
+}
+
+impl Bar {
+    fn new(progress: Progress, console: &Console, what: &'static str) -> Self {
+        let template = "  {wide_bar} {percent:>3}% {msg}";
+        let has_bar = progress == Progress::Auto && console.is_terminal;
+        let bar = has_bar.then(|| ProgressBar::new(1).with_style(style(template)).with_message(what));
+        Self { what, bar, is_json: progress == Progress::Json, said: 0 }
+    }
+
+    fn at(&mut self, done: usize, total: usize) {
+        /// Most steps to report.
+        const STEPS: usize = 100;
+        let step = done * STEPS / total.max(1);
+        if step == self.said {
+            return;
+        }
+        self.said = step;
+        if let Some(bar) = &self.bar {
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+        }
+        if self.is_json {
+            let fraction = done as f64 / total.max(1) as f64;
+            json_line(&json!({ "event": "progress", "stage": self.what, "fraction": fraction }));
+        }
+    }
+
+    fn end(&mut self) {
+        if let Some(bar) = self.bar.take() {
+            bar.finish_and_clear();
+        }
+    }
+}

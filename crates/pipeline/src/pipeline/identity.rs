@@ -1,0 +1,149 @@
+//! The identity of a picture: names and values of all that it depends on, the same on every machine and in every folder. Keys of
+//! stages hold paths and time stamps; here files count by what is in them.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use super::assembly::Eye;
+use super::keys;
+use super::plan::Plan;
+use super::stages::parse::Parsed;
+use super::watch::content::{Content, FileRead};
+use crate::choice::Choice;
+use crate::integrators::{PhotonSettings, RenderSettings};
+use crate::output::part::Trait;
+use crate::scene::description::{CameraChange, Scene};
+use crate::scene::fingerprint::{Fingerprint, Key};
+
+/// Everything that a picture depends on.
+pub(super) struct Depends<'a> {
+    pub(super) parsed: &'a Parsed,
+    pub(super) plan: &'a Plan,
+    pub(super) camera: &'a CameraChange,
+    /// The files that were read, with the scene itself.
+    pub(super) files: &'a [FileRead],
+    /// Samples of the whole picture if it is divided: its parts must agree about these, and about how it becomes a file.
+    pub(super) divided: Option<u32>,
+}
+
+impl Depends<'_> {
+    /// Names and values.
+    pub(super) fn traits(&self) -> Vec<Trait> {
+        let mut traits = vec![Trait::setting("glimt", env!("CARGO_PKG_VERSION"))];
+        self.add_settings(&mut traits);
+        let scene_path = &self.parsed.loaded.path;
+        let others = self.files.iter().filter(|file| file.path != *scene_path);
+        traits.extend(others.map(|file| Trait::file(&short(&file.path, scene_path), content(file))));
+        traits.push(Trait::everything(self.everything().to_string()));
+        traits
+    }
+
+    fn add_settings(&self, traits: &mut Vec<Trait>) {
+        let RenderSettings { render, dof, view, photons } = self.plan.settings.effective();
+        let mut add = |name: &str, value: String| traits.push(Trait::setting(name, value));
+        add("width", render.width.to_string());
+        add("height", render.height.to_string());
+        add("error", render.error.to_string());
+        add("shadow_samples", render.shadow_samples.to_string());
+        add("max_depth", render.max_depth.to_string());
+        add("integrator", render.integrator.name().to_owned());
+        add("shadows", render.shadows.name().to_owned());
+        add("clamp", render.clamp.to_string());
+        add("ambient", render.ambient.to_string());
+        add("background", render.background.to_string());
+        add("filter", render.filter.name().to_owned());
+        add("seed", render.seed.to_string());
+        add("depth of field", if dof { "on" } else { "off" }.to_owned());
+        add("view", view.sampled().name().to_owned());
+        add(
+            "photons",
+            match photons {
+                Some(PhotonSettings { count, radius, bounces }) => {
+                    format!("on (count {count}, radius {radius}, bounces {bounces})")
+                }
+                None => "off".to_owned(),
+            },
+        );
+        add(
+            "crop",
+            match self.plan.crop {
+                Some(rect) => format!("{},{},{},{}", rect.x, rect.y, rect.width, rect.height),
+                None => "none".to_owned(),
+            },
+        );
+        if let Some(samples) = self.divided {
+            add("samples", samples.to_string());
+            add("view", self.plan.settings.view.name().to_owned());
+            add("exposure", self.plan.tone.exposure_stops.to_string());
+            add("tonemap", self.plan.tone.curve.name().to_owned());
+            add("bits per channel", self.plan.bit_depth.to_string());
+        }
+    }
+
+    /// Fingerprint of shapes, materials, lights, camera and settings.
+    fn everything(&self) -> Key {
+        let scene = self.without_paths();
+        let eye = Eye::new(&scene, self.parsed.orbiter, self.camera);
+        let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
+        let meshes: Vec<Key> =
+            scene.mesh_files.iter().map(|file| key(&self.content_of(&file.value))).collect();
+        let of = keys::referents(&scene, &meshes, orbiter.as_deref());
+        let world = keys::world(&keys::surfaces(&scene, &of, &[]), &eye.camera, &of);
+        keys::render(world, &self.plan.settings, self.plan.crop)
+    }
+
+    /// The scene with contents in the place of the paths of files.
+    fn without_paths(&self) -> Scene {
+        let mut scene = Scene::clone(&self.plan.scene);
+        for texture in &mut scene.textures {
+            texture.file.value = self.content_of(&texture.file.value).into();
+        }
+        if let Some(file) = scene.environment.as_mut().and_then(|environment| environment.file.as_mut()) {
+            file.value = self.content_of(&file.value).into();
+        }
+        scene
+    }
+
+    /// Content of a file, in words. A file that was not read counts by its name: the picture does not show it.
+    fn content_of(&self, path: &Path) -> String {
+        match self.files.iter().find(|file| file.path == path) {
+            Some(file) => content(file),
+            None => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        }
+    }
+}
+
+fn key(content: &str) -> Key {
+    Fingerprint::new("content").text(content).finish()
+}
+
+/// Name of a file as seen from the scene's folder, or alone.
+fn short(path: &Path, scene: &Path) -> String {
+    let folder = scene.parent().unwrap_or(Path::new(""));
+    let inside = path.strip_prefix(folder).ok().map(Path::to_owned);
+    let name = || path.file_name().map(PathBuf::from).unwrap_or_default();
+    inside.unwrap_or_else(name).to_string_lossy().into_owned()
+}
+
+/// The content of a file: digits of its hash, or why it has none.
+fn content(file: &FileRead) -> String {
+    match file.content {
+        Content::Missing => "missing".to_owned(),
+        Content::Unusable => "not readable".to_owned(),
+        Content::Hash(hash) => {
+            let known = || hash.iter().map(|byte| format!("{byte:02x}")).collect();
+            if file.content.is_by_stamp(&file.path) {
+                whole_hash(&file.path).unwrap_or_else(known)
+            } else {
+                known()
+            }
+        }
+    }
+}
+
+/// Hash of all bytes of a file.
+fn whole_hash(path: &Path) -> Option<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(File::open(path).ok()?).ok()?;
+    Some(hasher.finalize().to_hex().to_string())
+}

@@ -1,0 +1,248 @@
+//! Checkpoints: whatever ends a render, --resume brings the pixels of the one that was never stopped.
+
+use std::fs;
+use std::process::{Child, Stdio};
+use std::time::Duration;
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+
+use crate::desk::Desk;
+use crate::parts::{METHODS, ROOM, desk};
+
+/// Random numbers below one.
+fn random(seed: u64) -> impl FnMut() -> f64 {
+    let mut next = glimt::math::random::unit(seed);
+    move || f64::from(next())
+}
+
+fn begin(desk: &Desk, line: &str) -> Child {
+    desk.glimt(line).stderr(Stdio::null()).spawn().expect("it runs")
+}
+
+/// Runs it with an exit code; returns what it says as one line, as messages are wrapped.
+#[track_caller]
+fn said(desk: &Desk, line: &str, code: i32) -> String {
+    desk.expect(line, code).split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn end(mut child: Child, signal: Signal) -> Option<i32> {
+    kill(Pid::from_raw(child.id() as i32), signal).expect("it runs still, or waits for its parent");
+    child.wait().expect("a child").code()
+}
+
+/// No temporary file of a killed writer is left once somebody has written there again.
+fn assert_no_leftovers(desk: &Desk) {
+    let names =
+        fs::read_dir(desk.0.path()).expect("a folder").map(|entry| entry.expect("an entry").file_name());
+    let left: Vec<_> = names.filter(|name| name.to_string_lossy().ends_with(".tmp")).collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+/// Renders that last some seconds in small pictures.
+const LONG: [(&str, &str); 4] = [
+    ("whitted", "--samples 4096"),
+    ("path", "--integrator path --samples 1024"),
+    ("error", "--integrator path --samples 2048 --error 0.03"),
+    ("photons", "--photons on --samples 250 --set photons.count=20000"),
+];
+
+#[test]
+fn killed_at_any_time_the_old_image_is_whole_and_the_next_one_has_the_same_pixels() {
+    let desk = desk();
+    let mut next = random(3);
+    for (method, options) in LONG {
+        desk.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
+        desk.write("out.exr", "the image before");
+        let line =
+            format!("room.toml --once --progress none -o out.exr --resume --checkpoint 0.02 {options}");
+        for _ in 0..5 {
+            let child = begin(&desk, &line);
+            std::thread::sleep(Duration::from_secs_f64(0.05 + 0.5 * next()));
+            end(child, Signal::SIGKILL);
+            let bytes = desk.bytes("out.exr");
+            assert!(bytes == b"the image before" || bytes == desk.bytes("one.exr"), "{method}: neither");
+        }
+        desk.expect(&line, 0);
+        assert!(desk.bytes("out.exr") == desk.bytes("one.exr"), "{method}");
+        assert!(!desk.path("out.exr.checkpoint").exists(), "{method}: the render is done");
+        assert_no_leftovers(&desk);
+    }
+}
+
+/// Writes checkpoints all the time: the kill meets a write.
+#[test]
+fn killed_while_it_writes_a_checkpoint_is_the_one_before_or_the_new_one() {
+    let desk = desk();
+    let mut next = random(5);
+    let line = "room.toml --once --progress none -o out.exr --checkpoint 0.000001 --samples 100000 --resume";
+    for number in 0..60 {
+        let child = begin(&desk, line);
+        std::thread::sleep(Duration::from_secs_f64(0.02 + 0.1 * next()));
+        end(child, Signal::SIGKILL);
+        if desk.path("out.exr.checkpoint").exists() {
+            // A whole one is of another seed; one that is not would be called damaged.
+            let said = self::said(&desk, "room.toml --once -o out.exr --seed 9 --resume", 2);
+            assert!(said.contains("seed is 0 there and 9 here"), "{number}: {said}");
+        }
+    }
+    assert!(desk.path("out.exr.checkpoint").exists());
+}
+
+#[test]
+fn signals_leave_a_checkpoint_and_the_image_comes_out_the_same() {
+    let desk = desk();
+    for ((method, options), (signal, code)) in LONG.into_iter().zip([
+        (Signal::SIGTERM, 143),
+        (Signal::SIGHUP, 129),
+        (Signal::SIGINT, 130),
+        (Signal::SIGTERM, 143),
+    ]) {
+        desk.expect(&format!("room.toml --once --progress none -o one.exr --checkpoint 0 {options}"), 0);
+        let line = format!("room.toml --once --progress none -o out.exr {options}");
+        let child = begin(&desk, &line);
+        // Wait until there is something to keep: a signal before that leaves nothing.
+        std::thread::sleep(Duration::from_millis(300));
+        let ended = end(child, signal);
+        if desk.path("out.exr").exists() {
+            // The machine was faster.
+            assert_eq!(ended, Some(code).filter(|code| ended == Some(*code)).or(Some(0)));
+        } else {
+            assert_eq!(ended, Some(code), "{method}");
+        }
+        desk.expect(&format!("{line} --resume"), 0);
+        assert!(desk.bytes("out.exr") == desk.bytes("one.exr"), "{method}");
+        fs::remove_file(desk.path("out.exr")).expect("removed");
+    }
+}
+
+/// A finished render whose checkpoint stays.
+fn kept(desk: &Desk, options: &str) {
+    desk.expect(&format!("room.toml --once --progress none -o out.exr --keep-checkpoint {options}"), 0);
+    assert!(desk.path("out.exr.checkpoint").exists());
+}
+
+#[test]
+fn a_finished_render_is_extended_to_the_pixels_of_a_longer_one() {
+    let desk = desk();
+    for (method, options) in METHODS {
+        let (head, samples) = options.split_once("--samples ").expect("samples");
+        let (samples, rest) = samples.split_once(' ').unwrap_or((samples, ""));
+        let samples: u32 = samples.parse().expect("a number");
+        for before in [1, samples / 2, samples - 1].into_iter().filter(|before| *before > 0) {
+            kept(&desk, &format!("{head} --samples {before} {rest}"));
+            desk.expect(&format!("room.toml --once --progress none -o out.exr --resume {options}"), 0);
+            desk.expect(&format!("room.toml --once --progress none -o one.exr {options}"), 0);
+            assert!(desk.bytes("out.exr") == desk.bytes("one.exr"), "{method} after {before}");
+            assert!(!desk.path("out.exr.checkpoint").exists());
+        }
+    }
+    kept(&desk, "--samples 8");
+    let said = self::said(&desk, "room.toml --once -o out.exr --resume --samples 4", 2);
+    assert!(said.contains("it has more samples than the 4 that are asked for"), "{said}");
+}
+
+#[test]
+fn a_checkpoint_of_another_picture_is_named_and_left_alone() {
+    let desk = desk();
+    kept(&desk, "");
+    let (image, checkpoint) = (desk.bytes("out.exr"), desk.bytes("out.exr.checkpoint"));
+    let refused = |options: &str, words: &str| {
+        let said = self::said(&desk, &format!("room.toml --once -o out.exr --resume {options}"), 2);
+        assert!(said.contains(words) && said.contains("out.exr.checkpoint"), "{options}: {said}");
+        assert!(desk.bytes("out.exr") == image);
+    };
+    refused("--seed 4", "seed is 0 there and 4 here");
+    refused("--width 60", "width is 70 there and 60 here");
+    refused("--crop 1,1,5,5", "crop is none there and 1,1,5,5 here");
+    refused("--photons on", "photons is off there and on");
+    refused("--set sphere.1.radius=0.3", "shapes, materials, lights or camera");
+    for (name, text) in [
+        ("room.toml", ROOM),
+        ("step.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
+        ("tiles.ppm", "P3\n1 1\n255\n9 9 9\n"),
+    ] {
+        let before = desk.bytes(name);
+        let changed =
+            if name == "room.toml" { text.replace("[6, 5, 4]", "[6, 5, 5]") } else { text.to_owned() };
+        desk.write(name, changed);
+        refused("", if name == "room.toml" { "shapes, materials, lights or camera" } else { name });
+        desk.write(name, before);
+    }
+    assert!(desk.bytes("out.exr.checkpoint") == checkpoint);
+    // What does not change the picture is no other picture.
+    desk.write("room.toml", format!("# a comment\n{ROOM}\n[materials.unused]\n"));
+    desk.expect("room.toml --once --progress none -o out.exr --resume --threads 1 --keep-checkpoint", 0);
+    assert!(desk.bytes("out.exr") == image);
+    let said = desk.expect("room.toml --once -o out.exr --resume --set render.exposure=2", 0);
+    assert!(said.contains("the checkpoint has all samples"), "{said}");
+}
+
+#[test]
+fn a_damaged_checkpoint_is_refused_and_the_image_stays() {
+    let desk = desk();
+    kept(&desk, "");
+    let (image, checkpoint) = (desk.bytes("out.exr"), desk.bytes("out.exr.checkpoint"));
+    let mut next = random(8);
+    for number in 0..40 {
+        let index = (next() * checkpoint.len() as f64) as usize;
+        let mut bytes = checkpoint.clone();
+        if number % 2 == 0 {
+            bytes.truncate(index);
+        } else {
+            bytes[index] ^= 1 << (number / 2 % 8);
+        }
+        desk.write("out.exr.checkpoint", bytes);
+        let said = self::said(&desk, "room.toml --once -o out.exr --resume", 2);
+        assert!(said.contains("out.exr.checkpoint: "), "{said}");
+        assert!(desk.bytes("out.exr") == image);
+    }
+}
+
+#[test]
+fn what_is_not_asked_for_is_said_and_not_done() {
+    let desk = desk();
+    let said = self::said(&desk, "room.toml --once -o out.exr --resume", 0);
+    assert!(said.contains("there is no out.exr.checkpoint: starting from the beginning"), "{said}");
+    kept(&desk, "");
+    let said = self::said(&desk, "room.toml --once -o out.exr", 0);
+    assert!(said.contains("out.exr.checkpoint is of this picture, and is not used"), "{said}");
+    assert!(!desk.path("out.exr.checkpoint").exists(), "the picture is done");
+    // One of another picture stays, as does what is no checkpoint.
+    kept(&desk, "");
+    desk.expect("room.toml --once --progress none -o out.exr --seed 3", 0);
+    assert!(desk.path("out.exr.checkpoint").exists());
+    desk.write("out.exr.checkpoint", "notes of somebody");
+    let said = self::said(&desk, "room.toml --once -o out.exr --keep-checkpoint", 0);
+    assert!(said.contains("the file of this name is no checkpoint"), "{said}");
+    assert_eq!(desk.bytes("out.exr.checkpoint"), b"notes of somebody");
+    let child = begin(&desk, "room.toml --once --progress none -o other.exr --samples 100000 --checkpoint 0");
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(end(child, Signal::SIGTERM), Some(143));
+    assert!(!desk.path("other.exr.checkpoint").exists(), "0 is never");
+}
+
+#[test]
+fn parts_have_checkpoints_too() {
+    let desk = desk();
+    let options = "--photons on --samples 100 --set photons.count=2000";
+    desk.expect(&format!("room.toml --once --progress none -o one.exr {options}"), 0);
+    for index in 1..=2 {
+        let line =
+            format!("room.toml --once --progress none -o {index}.part --shard {index}/2 --resume {options}");
+        for _ in 0..3 {
+            let child = begin(&desk, &format!("{line} --checkpoint 0.02"));
+            std::thread::sleep(Duration::from_millis(150));
+            end(child, Signal::SIGKILL);
+        }
+        desk.expect(&line, 0);
+    }
+    desk.expect("merge joined.exr 1.part 2.part --progress none", 0);
+    assert!(desk.bytes("joined.exr") == desk.bytes("one.exr"));
+    // That of one part is none of another.
+    let child = begin(&desk, "room.toml --once --progress none -o a.part --shard 1/2 --samples 100000");
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(end(child, Signal::SIGTERM), Some(143));
+    let said = self::said(&desk, "room.toml --once -o a.part --shard 2/2 --samples 100000 --resume", 2);
+    assert!(said.contains("it is of part 1/2 and this call of part 2/2"), "{said}");
+}
