@@ -109,6 +109,7 @@ impl Negative {
 
 impl Tile {
     /// Mean of a pixel's samples, weighted by sign if the filter has negative lobes. `None` if the pixel has no sample.
+    #[inline]
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
         let count = self.count(index);
         let negative = self.negative.as_ref().filter(|negative| negative.counts[index] > 0);

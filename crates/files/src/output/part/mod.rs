@@ -7,7 +7,7 @@
 //! | 4, n | the length of the head, and the head: [`Head`] as JSON |
 //! | 16 | the digest of all before |
 //! | 4, 4, n, 16 | for each tile that has samples: its number, the length of its bytes, its bytes, a digest |
-//! | 4, 4, n, 16 | the end in the same form, with a number that no tile has: [`End`] as JSON |
+//! | 4, 4, n, 16 | the end in the same form, with a number that no tile has: counts, the digest of all records, the state of the render |
 //!
 //! All numbers are little-endian. Each digest (BLAKE3, of which 16 bytes are kept) is of that of the head and of its own record, so
 //! that no record passes for one of another file. The end holds the digest of all records: nothing can be missing before it, and
