@@ -14,6 +14,7 @@ use crate::world::World;
 
 /// A kernel as the real one, but slow: a tile takes until its token is cancelled.
 fn endless(
+    _: Option<&PhotonMaps>,
     _: &World,
     _: &RenderSettings,
     _: Pixels,
@@ -104,7 +105,7 @@ fn breaks_first(
     token: &CancelToken,
 ) -> Result<(TileSamples, RayCounters), Cancelled> {
     assert!(TILES.fetch_add(1, Ordering::SeqCst) != 0, "the first tile broke");
-    slow(world, settings, pixels, samples, token)
+    slow(photons, world, settings, pixels, samples, token)
 }
 
 #[test]
