@@ -206,7 +206,7 @@ impl Wavefront<'_, '_> {
             let Some(path) = of_camera.as_ref().or_else(|| rays.of_queue(lane)) else { continue };
             match packet.hit(lane) {
                 Some(hit) if packet.plain & bit != 0 => {
-                    self.add_own_light(path, &hit, packet.shining & bit != 0)
+                    self.add_own_light(path, &hit, packet.shining & bit != 0);
                 }
                 Some(hit) => {
                     self.place = rays.place(lane);
