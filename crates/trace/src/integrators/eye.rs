@@ -22,12 +22,12 @@ use super::transport::scatter::Continuation;
 use super::transport::scratch::Scratch;
 use super::transport::tile::TileContext;
 use super::transport::vertex::{ShadingVertex, Vertex};
-use super::transport::walk::{OpaqueHit, Reached};
+use super::transport::walk::{OpaqueHit, Reached, Walker, walk};
 use super::view::Measure;
 use crate::control::Cancelled;
+use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::geometry::surface_rows::SurfaceRow;
-use crate::geometry::{Ray, SurfacePoint};
 use crate::materials::{Bsdf, Mirror, Rough};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
@@ -135,6 +135,41 @@ struct Wavefront<'a, 's> {
     counters: &'a mut RayCounters,
 }
 
+impl<'a> Walker<'a> for Wavefront<'a, '_> {
+    fn tile(&self) -> &'a TileContext<'a> {
+        self.tile
+    }
+
+    fn crossing(&mut self) -> &mut CrossingMemory {
+        self.crossing
+    }
+
+    fn pass(&mut self, path: &PathRay, next: Option<Hit>) {
+        if self.accumulator.measure == Measure::Work {
+            self.accumulator.add_work(path.slot, work(self.tile, path, next));
+        }
+    }
+
+    #[inline(always)]
+    fn reach(&mut self, path: &PathRay, reached: Reached<'_, 'a>, _has_passed: bool) {
+        match reached {
+            Reached::Opaque(vertex, hit) => {
+                if self.arrive(path, vertex, hit) {
+                    match &vertex.material.bsdf {
+                        Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough),
+                        Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
+                        Bsdf::Glass(_) => {}
+                    }
+                }
+            }
+            Reached::Glass(vertex, far) if self.goes_on() => self.shade_glass(path, vertex, far),
+            Reached::Hidden if self.goes_on() => self.next.push(*path),
+            Reached::Glass(..) | Reached::Hidden => {}
+            Reached::Nothing => self.leave(path),
+        }
+    }
+}
+
 impl Wavefront<'_, '_> {
     fn light(&mut self) -> Result<(), Cancelled> {
         let before = self.next.len();
@@ -211,7 +246,7 @@ impl Wavefront<'_, '_> {
                 Some(hit) => {
                     self.place = rays.place(lane);
                     let surface = packet.surface(self.surfaces, lane);
-                    self.shade(*path, hit, surface);
+                    walk(self, *path, (hit, surface));
                 }
                 None => {
                     let sky = tile.world.lights.environment().map(|_| packet.sky(lane));
@@ -300,34 +335,6 @@ impl Wavefront<'_, '_> {
             self.accumulator.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
         } else if beyond != Vec3::ZERO && !self.is_gathered(path) {
             self.accumulator.add_met(path, path.throughput * beyond);
-        }
-    }
-
-    /// Follows a path to the first surface that is more than a change between parts of one glass, and shades that. `surface` is
-    /// that of the hit, if it is known.
-    fn shade(&mut self, path: PathRay, hit: Hit, surface: Option<SurfacePoint>) {
-        let tile = self.tile;
-        let accumulator = &mut self.accumulator;
-        let walk = tile.walk(path, (hit, surface), self.crossing, |path, next| {
-            if accumulator.measure == Measure::Work {
-                accumulator.add_work(path.slot, work(tile, path, next));
-            }
-        });
-        let path = walk.path;
-        match walk.reached {
-            Reached::Opaque(vertex, hit) => {
-                if self.arrive(&path, &vertex, hit) {
-                    match &vertex.material.bsdf {
-                        Bsdf::Rough(rough) => self.shade_rough(&path, &vertex, rough),
-                        Bsdf::Mirror(mirror) => self.shade_mirror(&path, &vertex, mirror),
-                        Bsdf::Glass(_) => {}
-                    }
-                }
-            }
-            Reached::Glass(vertex, far) if self.goes_on() => self.shade_glass(&path, &vertex, far),
-            Reached::Hidden if self.goes_on() => self.next.push(path),
-            Reached::Glass(..) | Reached::Hidden => {}
-            Reached::Nothing => self.leave(&path),
         }
     }
 

@@ -20,7 +20,7 @@ use crate::integrators::transport::ray::{PathRay, PathState};
 use crate::integrators::transport::scatter::{BsdfSampling, Continuation};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, Vertex};
-use crate::integrators::transport::walk::{MOST_HIDDEN, Reached, Walk};
+use crate::integrators::transport::walk::{MOST_HIDDEN, Reached, Walker, walk};
 use crate::integrators::view::Measure;
 use crate::integrators::{PACKET, RayCounters};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
@@ -139,6 +139,30 @@ struct PhotonWavefront<'a> {
     counters: RayCounters,
 }
 
+impl<'a> Walker<'a> for PhotonWavefront<'a> {
+    fn tile(&self) -> &'a TileContext<'a> {
+        self.tracing.tile
+    }
+
+    fn crossing(&mut self) -> &mut CrossingMemory {
+        &mut self.crossing
+    }
+
+    fn pass(&mut self, _: &PathRay, _: Option<Hit>) {}
+
+    #[inline(always)]
+    fn reach(&mut self, path: &PathRay, reached: Reached<'_, 'a>, has_passed: bool) {
+        match reached {
+            Reached::Opaque(vertex, _) => {
+                let lacks_photons = self.depth == 0 && !has_passed;
+                self.shade_surface(path, vertex, lacks_photons);
+            }
+            Reached::Glass(vertex, far) => self.shade_glass(path, vertex, far),
+            Reached::Nothing | Reached::Hidden => {}
+        }
+    }
+}
+
 impl PhotonWavefront<'_> {
     /// Emits photons at the lights.
     fn start(&mut self, count: u32, rays: &mut Vec<PathRay>) {
@@ -197,7 +221,7 @@ impl PhotonWavefront<'_> {
         // Shade other surfaces one by one.
         for i in lanes(packet.any & !packet.plain) {
             if let Some(hit) = packet.hit(i) {
-                self.shade(rays[i], hit, packet.surface(surfaces, i));
+                walk(self, rays[i], (hit, packet.surface(surfaces, i)));
             }
         }
     }
@@ -209,21 +233,6 @@ impl PhotonWavefront<'_> {
         let kept =
             if path.state.only_specular_before { &mut self.shots.caustic } else { &mut self.shots.bounced };
         kept.push(photon);
-    }
-
-    /// Follows a photon to the first surface that is more than a change between parts of one glass, and shades that. `surface` is
-    /// that of the hit, if it is known.
-    fn shade(&mut self, path: PathRay, hit: Hit, surface: Option<SurfacePoint>) {
-        let Walk { path, reached, has_passed } =
-            self.tracing.tile.walk(path, (hit, surface), &mut self.crossing, |_, _| {});
-        match reached {
-            Reached::Opaque(vertex, _) => {
-                let lacks_photons = self.depth == 0 && !has_passed;
-                self.shade_surface(&path, &vertex, lacks_photons);
-            }
-            Reached::Glass(vertex, far) => self.shade_glass(&path, &vertex, far),
-            Reached::Nothing | Reached::Hidden => {}
-        }
     }
 
     fn shade_surface(&mut self, path: &PathRay, vertex: &Vertex<'_>, lacks_photons: bool) {

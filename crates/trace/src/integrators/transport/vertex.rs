@@ -123,9 +123,9 @@ impl<'a> Vertex<'a> {
         self.material.emission.at(&at, &mut counters.texture_lookups)
     }
 
-    /// The vertex, with these starts of rays that leave.
-    pub fn between(self, sides: Sides) -> Self {
-        Self { sides: Some(sides), ..self }
+    /// Sets the starts of rays that leave.
+    pub fn start_between(&mut self, sides: Sides) {
+        self.sides = Some(sides);
     }
 
     /// The interpolated normal, bent by a normal map, on the front side.

@@ -1,5 +1,5 @@
-//! Walk of a ray through changes between parts of one glass, up to the first surface that is more than that. Paths from the eye
-//! and photons walk alike; each decides by itself what it leaves at the surface, and how it goes on.
+//! Walk of a ray to the first surface where the glass around it changes, or which is opaque. Paths from the eye and photons walk
+//! alike; a [`Walker`] decides what happens at that surface.
 
 use super::crossing::{Crossing, CrossingMemory};
 use super::medium::{Medium, absorption};
@@ -13,26 +13,32 @@ use crate::world::Hit;
 /// Most surfaces without a change of glass that a ray passes in one walk.
 pub const MOST_HIDDEN: usize = 64;
 
-/// A walk that has ended.
-pub struct Walk<'a> {
-    /// The path with the ray that arrives, in the medium before the surface, after absorption by glass on the way.
-    pub path: PathRay,
-    /// Place to which it came.
-    pub reached: Reached<'a>,
-    /// Whether it passed any surface before.
-    pub has_passed: bool,
-}
-
-/// Place to which a walk came.
-pub enum Reached<'a> {
+/// Surface at which a walk ends.
+pub enum Reached<'v, 'a> {
     /// An opaque surface.
-    Opaque(Vertex<'a>, OpaqueHit),
+    Opaque(&'v Vertex<'a>, OpaqueHit),
     /// A change of glass, and the medium beyond it.
-    Glass(Vertex<'a>, Medium),
-    /// Nothing: the ray leaves the scene.
+    Glass(&'v Vertex<'a>, Medium),
+    /// None: the ray leaves the scene.
     Nothing,
     /// One more surface within glass, after [`MOST_HIDDEN`] of them.
     Hidden,
+}
+
+/// What walks: paths from the eye, or photons.
+pub trait Walker<'a> {
+    /// Context of the tile.
+    fn tile(&self) -> &'a TileContext<'a>;
+
+    /// Memory for the surfaces near a hit of glass.
+    fn crossing(&mut self) -> &mut CrossingMemory;
+
+    /// Takes note of a surface that changed nothing: the path goes on behind it, to the next hit.
+    fn pass(&mut self, path: &PathRay, next: Option<Hit>);
+
+    /// Goes on where the walk ends. The path's ray is the one that arrives, in the medium before the surface, with the absorption on
+    /// the way in its throughput. `has_passed` tells whether any surface was passed.
+    fn reach(&mut self, path: &PathRay, reached: Reached<'_, 'a>, has_passed: bool);
 }
 
 /// Hit of an opaque surface.
@@ -44,60 +50,57 @@ pub enum OpaqueHit {
     Touching(Hit),
 }
 
-impl<'a> TileContext<'a> {
-    /// Walks from the hit of a path's ray; `surface` is that of the hit, if it is known. `passed` gets the path after each surface
-    /// that it passes, with its next hit.
-    // Inlined, as vertices are large to move.
-    #[inline(always)]
-    pub fn walk(
-        &self,
-        mut path: PathRay,
-        (mut hit, mut surface): (Hit, Option<SurfacePoint>),
-        crossing: &mut CrossingMemory,
-        mut passed: impl FnMut(&PathRay, Option<Hit>),
-    ) -> Walk<'a> {
-        for number in 0..MOST_HIDDEN {
-            let has_passed = number > 0;
-            let vertex = match surface.take() {
-                Some(surface) => Vertex::on(self, &path, &hit, surface),
-                None => Vertex::to_shade(self, &path, &hit),
-            };
-            // Stop at an opaque surface.
-            if vertex.material.bsdf.glass().is_none() {
-                path.throughput *= absorption(self.world, path.medium, hit.shape.t);
-                path.medium = self.without_open(path.medium);
-                let reached = Reached::Opaque(vertex, OpaqueHit::Own(hit));
-                return Walk { path, reached, has_passed };
-            }
-            // At glass, find all surfaces that touch here.
-            let Crossing { sides, arrived, near, far, opaque } =
-                self.crossing(&path, &vertex, &hit, crossing);
-            path.throughput *= absorption(self.world, arrived, hit.shape.t);
-            path.medium = near;
-            if let Some(touching) = opaque {
-                let vertex = Vertex::touching(self, &path, (sides, &touching), hit.shape.t);
-                let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
-                let reached = Reached::Opaque(vertex, OpaqueHit::Touching(touched));
-                return Walk { path, reached, has_passed };
-            }
-            // Stop at a change of glass.
-            if near.glass() != far.glass() {
-                return Walk { path, reached: Reached::Glass(vertex.between(sides), far), has_passed };
-            }
-            // Pass on, as nothing changes here.
-            (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
-            path.state = path.state.hidden();
-            path.cone = path.cone.after(hit.shape.t);
-            let next = self.world.geometry.closest(&path.ray);
-            passed(&path, next);
-            match next {
-                Some(next) => hit = next,
-                None => return Walk { path, reached: Reached::Nothing, has_passed: true },
-            }
+/// Walks from the hit of a path's ray; `surface` is that of the hit, if it is known. Vertices stay where they are made, as they are
+/// large.
+#[inline(always)]
+pub fn walk<'a, W: Walker<'a>>(
+    walker: &mut W,
+    mut path: PathRay,
+    (mut hit, mut surface): (Hit, Option<SurfacePoint>),
+) {
+    let tile = walker.tile();
+    for number in 0..MOST_HIDDEN {
+        let has_passed = number > 0;
+        let mut vertex = match surface.take() {
+            Some(surface) => Vertex::on(tile, &path, &hit, surface),
+            None => Vertex::to_shade(tile, &path, &hit),
+        };
+        // Stop at an opaque surface.
+        if vertex.material.bsdf.glass().is_none() {
+            path.throughput *= absorption(tile.world, path.medium, hit.shape.t);
+            path.medium = tile.without_open(path.medium);
+            return walker.reach(&path, Reached::Opaque(&vertex, OpaqueHit::Own(hit)), has_passed);
         }
-        Walk { path, reached: Reached::Hidden, has_passed: true }
+        // At glass, find all surfaces that touch here.
+        let Crossing { sides, arrived, near, far, opaque } =
+            tile.crossing(&path, &vertex, &hit, walker.crossing());
+        path.throughput *= absorption(tile.world, arrived, hit.shape.t);
+        path.medium = near;
+        if let Some(touching) = opaque {
+            let vertex = Vertex::touching(tile, &path, (sides, &touching), hit.shape.t);
+            let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
+            return walker.reach(&path, Reached::Opaque(&vertex, OpaqueHit::Touching(touched)), has_passed);
+        }
+        // Stop at a change of glass.
+        if near.glass() != far.glass() {
+            vertex.start_between(sides);
+            return walker.reach(&path, Reached::Glass(&vertex, far), has_passed);
+        }
+        // Pass on, as nothing changes here.
+        (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
+        path.state = path.state.hidden();
+        path.cone = path.cone.after(hit.shape.t);
+        let next = tile.world.geometry.closest(&path.ray);
+        walker.pass(&path, next);
+        match next {
+            Some(next) => hit = next,
+            None => return walker.reach(&path, Reached::Nothing, true),
+        }
     }
+    walker.reach(&path, Reached::Hidden, true);
+}
 
+impl TileContext<'_> {
     /// Whether chance chooses reflection, which has this probability, at a path's vertex.
     #[inline]
     pub fn chooses_reflection(&self, path: &PathRay, reflectance: f32) -> bool {

@@ -54,6 +54,9 @@ pub fn any<V: Lanes>(
                         }
                         let hits = packet.hits(pack, lane, t_max);
                         let mut rest = (hits.hit | hits.doubtful) & all & !found;
+                        if rest != 0 {
+                            rest &= !packet.starting_on(pack.ids[lane]);
+                        }
                         while rest != 0 {
                             let ray = rest.trailing_zeros() as usize % SIZE;
                             rest &= rest - 1;

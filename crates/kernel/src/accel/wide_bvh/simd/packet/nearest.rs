@@ -32,6 +32,8 @@ impl<V: Lanes> Nearest<V> {
         if hits.hit | hits.doubtful == 0 {
             return 0;
         }
+        let others = !packet.starting_on(pack.ids[lane]);
+        let hits = triangle::Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits };
         self.keep(&hits, pack, lane, rays)
     }
 

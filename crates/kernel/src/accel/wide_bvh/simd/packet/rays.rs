@@ -104,13 +104,17 @@ impl<V: Lanes> Packet<V> {
         V::bits(near.le(far)) != 0
     }
 
-    /// Tests the triangle in a lane of a pack against all rays that do not start on it.
+    /// Tests the triangle in a lane of a pack against all rays, even those that start on it.
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, lane: usize, t_max: V) -> triangle::Hits<V> {
         let (a, b, c) = (self.corner(pack, 0, lane), self.corner(pack, 3, lane), self.corner(pack, 6, lane));
-        let hits = triangle::hits(&[a, b, c], self.shear[2], t_max, false);
-        let others = !V::bits(self.start.eq(self.start.like(f32::from_bits(pack.ids[lane]))));
-        triangle::Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits }
+        triangle::hits(&[a, b, c], self.shear[2], t_max, false)
+    }
+
+    /// A bit for each ray that starts on the triangle of this number.
+    #[inline(always)]
+    pub fn starting_on(&self, triangle: u32) -> u32 {
+        V::bits(self.start.eq(self.start.like(f32::from_bits(triangle))))
     }
 
     /// A corner in each ray's sheared coordinates; `row` is the corner's first row.
