@@ -136,8 +136,8 @@ impl Ui {
         while end.is_none() {
             end = self.present().or_else(|| self.wait());
         }
-        // What a signal or a dropped line ends is gone on with later.
-        if matches!(&end, Some(End::Quit(status)) if *status != ExitStatus::QUIT) {
+        // What the person did not end is gone on with later: a signal came, or the terminal is gone or broken.
+        if !matches!(&end, Some(End::Quit(ExitStatus::QUIT))) {
             (self.commands)(Command::Suspend);
         }
         (self.commands)(Command::Quit);

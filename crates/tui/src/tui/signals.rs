@@ -81,6 +81,9 @@ impl Drop for Listener {
     }
 }
 
+/// Whether the line has dropped: then the program ends within [`GRACE`], whatever else comes.
+static HUNG_UP: AtomicBool = AtomicBool::new(false);
+
 /// Whether signals that keys send are a child's.
 static KEYS_OF_CHILD: AtomicBool = AtomicBool::new(false);
 
@@ -172,6 +175,16 @@ impl Ear {
             return;
         }
         if self.over.load(Ordering::Acquire) {
+            // The hangup of a line that has dropped must not cut short what is still written. It comes after the loop has met the
+            // dropped line itself, or once more from the shell.
+            if number == SIGHUP {
+                if HUNG_UP.load(Ordering::Acquire) {
+                    return;
+                }
+                if !terminal::is_there() {
+                    return self.tell(Signal::Hangup);
+                }
+            }
             // Those of Linux alone are not known to it.
             if low_level::emulate_default_handler(number).is_err() {
                 low_level::exit(128 + number);
@@ -206,6 +219,9 @@ impl Ear {
     }
 
     fn tell(&self, signal: Signal) {
+        if signal == Signal::Hangup {
+            HUNG_UP.store(true, Ordering::Release);
+        }
         if let Some(status) = ends(signal) {
             if let Ok(number) = Number::try_from(number(signal)) {
                 end_child(number);

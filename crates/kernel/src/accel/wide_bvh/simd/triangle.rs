@@ -20,8 +20,8 @@ pub struct Hits<V: Lanes> {
     pub v: V,
 }
 
-/// Tests all lanes; `shear_z` is t for each unit of z. `is_single` saves the division and the error bound for triangles that the
-/// ray misses, and for those behind its start or beyond its end, which most packs have.
+/// Tests all lanes; `shear_z` is t for each unit of z. The division and the error bound are saved if no ray passes through a
+/// triangle. `is_single` saves them for triangles behind the ray's start or beyond its end, too, which most packs have.
 #[inline(always)]
 pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: bool) -> Hits<V> {
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *corners;
@@ -33,11 +33,13 @@ pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: boo
     let determinant = wa + wb + wc;
     let along = (wa * az + wb * bz + wc * cz) * shear_z;
     let none = Hits { hit: 0, doubtful: 0, t: zero, u: zero, v: zero };
-    if is_single {
-        let candidate = on_edge | may_count(corners, determinant, shear_z, along, t_max);
-        if V::bits(V::without(candidate, outside)) == 0 {
-            return none;
-        }
+    let candidate = if is_single {
+        on_edge | may_count(corners, determinant, shear_z, along, t_max)
+    } else {
+        zero.le(zero)
+    };
+    if V::bits(V::without(candidate, outside)) == 0 {
+        return none;
     }
     let inverse = ax.like(1.0).over(determinant);
     let t = along * inverse;
