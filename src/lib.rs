@@ -55,9 +55,10 @@
 //! 2. `tui/run.rs` receives it as an event (`tui/event.rs`); `tui/update/mod.rs` notes the change.
 //! 3. `tui/update/request.rs` makes a request; `tui/run.rs` sends it.
 //! 4. `pipeline/worker.rs`: the mailbox of one request; a newer request cancels the render under way.
-//! 5. `pipeline/engine/mod.rs`: `stages/parse.rs`, `plan.rs`, then meshes, textures, accel, lights and photons, each reused
+//! 5. `pipeline/engine/mod.rs`: `pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes, textures, accel, lights and photons, each reused
 //!    if its key in `keys.rs` is that of before.
-//! 6. `pipeline/render/scheduler.rs` starts passes; `render/first_picture.rs` comes first, `trace.rs` renders tiles on the pool.
+//! 6. `pipeline/render/scheduler.rs` starts passes; `render/first_picture.rs` comes first, `pipeline/trace.rs`
+//!    renders tiles on the pool.
 //! 7. `integrators/mod.rs` renders a tile: see below. `pipeline/render/film_state.rs` adds its samples to the film.
 //! 8. `pipeline/render/preview.rs` puts a preview into the slot and says so.
 //! 9. `tui/presenter.rs` takes it when its time comes, `tui/view/preview.rs` makes cells of it, `tui/paint/mod.rs` the cheapest
@@ -117,8 +118,8 @@
 //! - A scene's coordinates are `f64`. Tracing uses `f32` relative to an origin near the camera's target (`world::origin`); each
 //!   mesh has an origin of its own.
 //! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
-//! - Only `assets`, `output`, `scene` (the scene, and whether the files that it names exist), `pipeline::watch`, `bench::cache` and
-//!   `cli::new` access files.
+//! - Only `assets`, `output`, `scene` (the scene, and whether the files that it names exist), `pipeline::watch`,
+//!   `pipeline::identity`, `pipeline::render::keeping` (checkpoints), `bench::cache` and `cli::new` access files.
 //! - `unsafe` code is in `accel::wide_bvh::simd`, with a portable twin that gives the same bits, and in `system::abort`, which
 //!   restores the terminal if an allocation fails.
 //! - `tui` does not know `world`; `world` does not know pixels or time.
