@@ -208,6 +208,17 @@ fn what_is_not_asked_for_is_said_and_not_done() {
     let said = self::said(&desk, "room.toml --once -o out.exr", 0);
     assert!(said.contains("out.exr.checkpoint is of this picture, and is not used"), "{said}");
     assert!(!desk.path("out.exr.checkpoint").exists(), "the picture is done");
+    // A render that took longer is not lost to one that was begun without --resume.
+    let line = "room.toml --once --progress none -o out.exr --samples 100000";
+    let child = begin(&desk, line);
+    std::thread::sleep(Duration::from_millis(2500));
+    assert_eq!(end(child, Signal::SIGTERM), Some(143));
+    let longer = desk.bytes("out.exr.checkpoint");
+    let child = begin(&desk, line);
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(end(child, Signal::SIGTERM), Some(143));
+    assert!(desk.bytes("out.exr.checkpoint") == longer);
+    fs::remove_file(desk.path("out.exr.checkpoint")).expect("removed");
     // One of another picture stays, as does what is no checkpoint.
     kept(&desk, "");
     desk.expect("room.toml --once --progress none -o out.exr --seed 3", 0);

@@ -190,7 +190,14 @@ fn hear(news: &CheckpointNews, of_call: &mut Vec<Diagnostic>, reporter: &dyn Rep
         }
         CheckpointNews::Ignored { path } => {
             let message = format!("{} is of this picture, and is not used", path.display());
-            of_call.push(warning(&message, "--resume goes on from it"));
+            let help = "--resume goes on from it; it stays until this render has taken longer";
+            let warning = warning(&message, help);
+            // At once, while the checkpoint is there.
+            if reporter.says_diagnostics() {
+                of_call.push(warning);
+            } else {
+                console.diagnostics(&[warning]);
+            }
         }
     }
 }

@@ -139,6 +139,8 @@ pub(in crate::pipeline) struct Keeping<'a> {
     due: Cell<Instant>,
     /// Whether glimt has reported a failure: each further one has the same cause.
     is_failure_told: Cell<bool>,
+    /// Seconds of the render whose checkpoint is there and is not used: a shorter one does not replace it.
+    seconds_there: Cell<f64>,
 }
 
 impl<'a> Keeping<'a> {
@@ -162,6 +164,7 @@ impl<'a> Keeping<'a> {
             identity: OnceCell::new(),
             due: Cell::new(Instant::now() + Duration::from_secs_f64(settings.seconds.min(1e9))),
             is_failure_told: Cell::new(false),
+            seconds_there: Cell::new(0.0),
         }
     }
 
@@ -187,6 +190,7 @@ impl<'a> Keeping<'a> {
         let unlike = PartFile::head(&self.path).map(|head| self.unlike(&head, state));
         match (resume, &unlike) {
             (Resume::No, Ok(unlike)) if unlike.is_empty() => {
+                self.seconds_there.set(self.seconds_there());
                 self.tell(CheckpointNews::Ignored { path: self.path.clone() });
                 return Ok(());
             }
@@ -206,6 +210,13 @@ impl<'a> Keeping<'a> {
                 "leave --resume out to start from the beginning, or name another file with -o",
             )),
         }
+    }
+
+    /// Seconds of the render whose checkpoint is there; 0 if it cannot be read.
+    fn seconds_there(&self) -> f64 {
+        let file = PartFile::open(&self.path, &CancelToken::new()).ok();
+        file.and_then(|file| serde_json::from_value::<State>(file.state).ok())
+            .map_or(0.0, |state| state.seconds)
     }
 
     fn restore(
@@ -271,6 +282,9 @@ impl<'a> Keeping<'a> {
     /// written, its samples are kept all the same.
     pub(in crate::pipeline) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
         let was_long = state.render_seconds >= self.settings.seconds;
+        if is_written {
+            self.seconds_there.set(0.0);
+        }
         match (is_written, self.settings.are_kept) {
             (false, false) if !was_long => return,
             (false, _) | (true, true) => {
@@ -287,6 +301,9 @@ impl<'a> Keeping<'a> {
     }
 
     fn write(&self, state: &FilmState, rays: RayCounters, seconds: f64, durability: Durability) {
+        if seconds < self.seconds_there.get() {
+            return;
+        }
         let head = head(Kind::Checkpoint, state, self.identity().to_vec(), self.finish);
         let written = serde_json::to_value(State::of(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
