@@ -11,8 +11,7 @@
 //! Begin to read at [`geometry::Shape`] (what a shape tells), at the page of [`lights`] (what a light tells), at
 //! [`materials::Material`] (what a surface is made of) and at the page of [`accel`] (which tree does what).
 //!
-//! What is hot has a form for sixteen lanes side by side, beside the form for a single ray: files and methods called `row` or
-//! `rows`. The map of the house is in the crate `glimt`.
+//! Hot code has a form for sixteen lanes side by side, beside the form for a single ray: files and methods called `row` or `rows`. The map of the house is in the crate `glimt`.
 
 pub mod accel;
 pub mod geometry;

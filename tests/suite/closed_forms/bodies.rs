@@ -382,7 +382,7 @@ fn a_sheet_between_opaque_walls_closes_with_them() {
 
 #[test]
 fn an_opaque_surface_that_is_curved_closes_what_ends_on_it() {
-    // A label in a ball of glass: where it is, the ball has no triangles.
+    // A label in a ball of glass; the ball has no triangles under it.
     let ball = lat_long_sphere(12, 20, 0.7, v(0.0, 0.0, 0.9));
     let middle = |i: usize| ball.corners(i as u32).iter().sum::<Vec3>() / 3.0;
     let is_label = |i: usize| middle(i).x > 0.4;

@@ -70,7 +70,7 @@ impl Transform {
         self.inverse_linear * v
     }
 
-    /// By how much distances grow at most on the way from the outside.
+    /// Greatest factor by which distances grow on the way from the outside.
     pub fn inverse_growth(&self) -> f64 {
         let DMat3 { x_axis, y_axis, z_axis } = self.inverse_linear.transpose();
         let lengths = DVec3::new(x_axis.length(), y_axis.length(), z_axis.length());

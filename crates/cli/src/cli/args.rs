@@ -178,7 +178,7 @@ pub struct RenderArgs {
     /// Render part I of N with --once; -o names its file, and `glimt merge` joins the parts
     #[arg(long, value_name = "I/N", allow_hyphen_values = true, value_parser = shard, help_heading = "Long renders")]
     pub shard: Option<(u32, u32)>,
-    /// Seconds between two checkpoints, beside the output as FILE.checkpoint; 0: none
+    /// Seconds between two checkpoints, beside the output as FILE.checkpoint; 0 keeps none
     #[arg(long, value_name = "SECONDS", default_value = "60", allow_negative_numbers = true, value_parser = pause, help_heading = "Long renders")]
     pub checkpoint: f64,
     /// Go on from the checkpoint of an interrupted render

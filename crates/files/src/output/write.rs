@@ -58,10 +58,10 @@ pub fn atomic_until(
     atomic_by(path, &|file| stoppable::write_all(file, bytes, token), guard, (token, Durability::Power))
 }
 
-/// What a file is to outlive from the moment at which it has its name.
+/// Events that a file survives from the moment at which it has its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Durability {
-    /// The process: the system writes the bytes to the disk when it likes.
+    /// The end of the process: the system writes the bytes to the disk when it likes.
     Process,
     /// A loss of power: the bytes are on the disk.
     Power,

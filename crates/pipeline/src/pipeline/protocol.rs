@@ -194,7 +194,7 @@ pub enum Event {
     Checkpoint {
         /// Number of the request.
         generation: u64,
-        /// What.
+        /// Message about it.
         news: CheckpointNews,
     },
     /// [`Command::Write`] waits until every pixel has a sample.

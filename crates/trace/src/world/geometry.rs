@@ -327,26 +327,10 @@ fn lowered(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assets::LoadedMesh;
-    use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::ray::offset_origin;
     use crate::math::Vec3;
     use crate::math::random::signed as random;
-    use crate::scene::description::Accel;
-
-    /// A mesh of random triangles.
-    fn mesh(seed: u64, count: u32) -> Arc<MeshTree> {
-        let mut next = random(seed);
-        let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
-        let mut mesh = TriangleMesh::default();
-        for i in 0..count {
-            let place = vector(1.0);
-            mesh.positions.extend([place, place + vector(0.5), place + vector(0.5)]);
-            mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
-        }
-        let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-        Arc::new(MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels"))
-    }
+    use crate::world::merged::tests::mesh;
 
     /// Merged meshes, meshes of few triangles, and large ones with trees of their own, some of them moved.
     fn geometry() -> Geometry {

@@ -183,7 +183,7 @@ fn may_be_merged(object: &Object) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::sync::Arc;
 
     use super::*;
@@ -198,7 +198,7 @@ mod tests {
     use crate::world::{Geometry, Hit, MeshTree};
 
     /// A mesh of random triangles, some of which occur twice.
-    fn mesh(seed: u64, count: u32) -> Arc<MeshTree> {
+    pub(in crate::world) fn mesh(seed: u64, count: u32) -> Arc<MeshTree> {
         let mut next = random(seed);
         let mut vector = |scale: f32| Vec3::new(next(), next(), next()) * scale;
         let mut mesh = TriangleMesh::default();

@@ -175,8 +175,8 @@ impl Ear {
             return;
         }
         if self.over.load(Ordering::Acquire) {
-            // The hangup of a line that has dropped must not cut short what is still written. It comes after the loop has met the
-            // dropped line itself, or once more from the shell.
+            // After the line has dropped, a hangup must not cut short the checkpoint under way: it may come after the loop has met
+            // the dropped line itself, or once more from the shell.
             if number == SIGHUP {
                 if HUNG_UP.load(Ordering::Acquire) {
                     return;

@@ -26,7 +26,7 @@ pub const MOST_TARGETS: usize = 32;
 
 /// Directional distribution of the light that a point emits.
 pub enum Sends<'a> {
-    /// That of a light without extent.
+    /// Distribution of a light without extent.
     Light {
         /// The light.
         light: &'a dyn DeltaLight,

@@ -50,9 +50,9 @@ pub(in crate::pipeline) struct FilmState {
     pub(in crate::pipeline) share: Option<Share>,
     /// Tiles of the share. `None` for all of them.
     own: Option<Vec<bool>>,
-    /// What was done before by the process whose checkpoint this goes on from.
+    /// Work of the process whose checkpoint this render continues.
     pub(in crate::pipeline) before: Before,
-    /// Names of all that the picture depends on, once they were asked for.
+    /// Names of all that the picture depends on. `None` before the first request for them.
     pub(in crate::pipeline) identity: Option<Vec<Trait>>,
 }
 

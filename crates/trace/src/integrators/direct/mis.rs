@@ -141,7 +141,7 @@ impl TileContext<'_> {
     /// [`TileContext::lamp_radiance`] for a ray in a glossy lobe that leaves the scene.
     pub fn radiance_beyond(&self, ray: &Ray, normal: Vec3, density: f32) -> Vec3 {
         let sky = self.world.lights.environment().map(|environment| environment.arriving(ray.direction));
-        // No light sample brings the part of it that lobes reflect.
+        // Light samples leave out the light of the sky if rays in lobes find it.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.lobes_find_sky { 0.0 } else { of_sky }));
         self.shared_beyond(sky, ray, normal, |of_light| weight(of_light / density))
     }

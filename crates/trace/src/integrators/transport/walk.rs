@@ -25,7 +25,7 @@ pub enum Reached<'v, 'a> {
     Hidden,
 }
 
-/// What walks: paths from the eye, or photons.
+/// Owner of walking paths: the wavefront of the eye, or that of the photons.
 pub trait Walker<'a> {
     /// Context of the tile.
     fn tile(&self) -> &'a TileContext<'a>;
@@ -50,8 +50,7 @@ pub enum OpaqueHit {
     Touching(Hit),
 }
 
-/// Walks from the hit of a path's ray; `surface` is that of the hit, if it is known. Vertices stay where they are made, as they are
-/// large.
+/// Walks from the hit of a path's ray; `surface` is that of the hit, if it is known. No vertex is moved, as vertices are large.
 #[inline(always)]
 pub fn walk<'a, W: Walker<'a>>(
     walker: &mut W,
