@@ -217,6 +217,15 @@ fn what_is_not_asked_for_is_said_and_not_done() {
     let child = begin(&desk, line);
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
+    assert!(desk.bytes("out.exr.checkpoint.before") == longer);
+    // Nor to another picture, which has less aside.
+    let child = begin(&desk, &format!("{line} --seed 5"));
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(end(child, Signal::SIGTERM), Some(143));
+    assert!(desk.bytes("out.exr.checkpoint.before") == longer);
+    fs::rename(desk.path("out.exr.checkpoint.before"), desk.path("out.exr.checkpoint")).expect("moved");
+    // Nor to a draft that is done.
+    desk.expect("room.toml --once --progress none -o out.exr --samples 1", 0);
     assert!(desk.bytes("out.exr.checkpoint") == longer);
     fs::remove_file(desk.path("out.exr.checkpoint")).expect("removed");
     // One of another picture stays, as does what is no checkpoint.

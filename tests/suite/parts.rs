@@ -56,6 +56,30 @@ pub(crate) fn desk() -> Desk {
     desk
 }
 
+#[test]
+fn an_output_replaces_no_part_but_its_own_and_no_checkpoint() {
+    let desk = desk();
+    let first = "room.toml --once --progress none -o out.part --samples 2 --shard 1/2";
+    desk.expect(first, 0);
+    let part = desk.bytes("out.part");
+    let said = desk.expect("room.toml --once --progress none --samples 2 -o out.part --shard 2/2", 2);
+    assert!(said.contains("it is part 1/2 of a render") && said.contains("--force"), "{said}");
+    assert!(desk.bytes("out.part") == part);
+    // The same part again may, and one of another number.
+    desk.expect("room.toml --once --progress none -o out.part --samples 2 --shard 1/3", 0);
+    desk.expect(first, 0);
+    // A picture replaces neither.
+    fs::rename(desk.path("out.part"), desk.path("out.exr")).expect("moved");
+    let said = desk.expect("room.toml --once --progress none -o out.exr --samples 2", 2);
+    assert!(said.contains("it is part 1/2 of a render"), "{said}");
+    let keep = "room.toml --once --progress none -o kept.exr --samples 2 --keep-checkpoint";
+    desk.expect(keep, 0);
+    fs::rename(desk.path("kept.exr.checkpoint"), desk.path("kept.exr")).expect("moved");
+    let said = desk.expect(keep, 2);
+    assert!(said.contains("kept.exr: it is a checkpoint"), "{said}");
+    desk.expect(&format!("{keep} --force"), 0);
+}
+
 /// Methods, with a number of samples for each.
 pub(crate) const METHODS: [(&str, &str); 5] = [
     ("whitted", "--samples 3"),

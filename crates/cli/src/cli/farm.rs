@@ -11,8 +11,10 @@ pub(super) fn run(args: &FarmArgs, console: &Console) -> Exit {
     if let Err(error) = Format::of(&args.output) {
         return console.fail(Exit::WRONG, &error.to_string());
     }
-    let all = [args.scene.to_str(), args.output.to_str()];
-    if all.contains(&None) || args.options.iter().chain(&args.hosts).any(|word| word.contains(['\n', '\0'])) {
+    let paths = [args.scene.to_str(), args.output.to_str()];
+    let words = args.options.iter().chain(&args.hosts).map(String::as_str).chain(paths.into_iter().flatten());
+    // A line of a name could end a document in the script.
+    if paths.contains(&None) || words.into_iter().any(|word| word.contains(['\n', '\0'])) {
         return console
             .fail(Exit::WRONG, "a script cannot hold this name: use names of letters, digits, - and _");
     }
@@ -89,8 +91,12 @@ echo \"parts: job $parts; merge: job $merge\"
 
 fn parallel(args: &FarmArgs) -> String {
     let (count, merge) = (args.shards, merge(args, ""));
-    // A part appears under its name when it is whole.
-    let render = format!("test -e {} || {}", part(args, "{}"), render(args, "{}"));
+    // A part appears under its name when it is whole. Each line that parallel reads is a command: in a template it would take
+    // parts of names for its own.
+    let index = "\u{0}";
+    let render = format!("test -e {} || {}", part(args, index), render(args, index));
+    let render: Vec<String> = render.split(index).map(word).collect();
+    let (format, render) = ("%s".repeat(2 * render.len() - 1), render.join(" \"$index\" "));
     let hosts: String = args.hosts.iter().map(|host| format!(" --sshlogin {}", word(host))).collect();
     let way = if args.hosts.is_empty() { "" } else { " --workdir \"$PWD\"" };
     format!(
@@ -99,10 +105,10 @@ fn parallel(args: &FarmArgs) -> String {
 # Renders in {count} parts, one at a time on each machine, and joins them. Called again, it goes on where it was;
 # remove the parts of another scene first.
 set -eu
-seq {count} | parallel --jobs 1 --halt soon,fail=1{way}{hosts} {}
+seq {count} | while read -r index; do printf '{format}\\n' {render}; done |
+    parallel --jobs 1 --halt soon,fail=1{way}{hosts}
 {merge}
-",
-        word(&render)
+"
     )
 }
 
@@ -175,6 +181,20 @@ mod tests {
         assert_eq!(&words[words.len() - 2..], ["--samples", "8"]);
         let joined = shlex::split(&merge(&args, "")).expect("words");
         assert!(joined.contains(&"it's 5%% $HOME.exr.%.0f.part".to_owned()), "{joined:?}");
+    }
+
+    #[test]
+    fn parallel_reads_whole_commands() {
+        let name = "{= `touch pwned` =}{}{1} it's.toml";
+        let args = args(&format!("{} -o 'a {{}}.exr' --shards 2 --engine parallel", word(name)));
+        let script = parallel(&args);
+        let lines = script.lines().find(|line| line.starts_with("seq 2 | while")).expect("the commands");
+        let lines = lines.strip_suffix(" |").expect("a pipe");
+        let printed = std::process::Command::new("sh").args(["-c", lines]).output().expect("a shell");
+        let printed = String::from_utf8(printed.stdout).expect("text");
+        let second = shlex::split(printed.lines().nth(1).expect("two parts")).expect("words");
+        assert_eq!(&second[..4], ["test", "-e", "a {}.exr.2.part", "||"]);
+        assert_eq!(&second[5..], [name, "--once", "-o", "a {}.exr.2.part", "--shard", "2/2", "--resume"]);
     }
 
     #[test]

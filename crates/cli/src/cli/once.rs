@@ -170,18 +170,23 @@ fn follow(
     }
 }
 
-/// Says what a person wants to know about checkpoints.
+/// Says what a person wants to know about checkpoints, at once: warnings as well, while something can be done.
 fn hear(news: &CheckpointNews, of_call: &mut Vec<Diagnostic>, reporter: &dyn Reporter, console: &Console) {
     let say = |text: String| {
         if reporter.says_results() {
             console.say(&text);
         }
     };
+    let mut warn = |message: &str, help: &str| {
+        if reporter.says_diagnostics() {
+            of_call.push(warning(message, help));
+        } else {
+            console.diagnostics(&[warning(message, help)]);
+        }
+    };
     match news {
         CheckpointNews::Written { .. } => {}
-        CheckpointNews::Failed { message } => {
-            of_call.push(warning(message, "--checkpoint 0 renders without checkpoints"));
-        }
+        CheckpointNews::Failed { message } => warn(message, "--checkpoint 0 renders without checkpoints"),
         CheckpointNews::Resumed { path, samples } => {
             say(format!("going on from {}, after {samples} samples", path.display()));
         }
@@ -190,14 +195,10 @@ fn hear(news: &CheckpointNews, of_call: &mut Vec<Diagnostic>, reporter: &dyn Rep
         }
         CheckpointNews::Ignored { path } => {
             let message = format!("{} is of this picture, and is not used", path.display());
-            let help = "--resume goes on from it; it stays until this render has taken longer";
-            let warning = warning(&message, help);
-            // At once, while the checkpoint is there.
-            if reporter.says_diagnostics() {
-                of_call.push(warning);
-            } else {
-                console.diagnostics(&[warning]);
-            }
+            warn(&message, "--resume goes on from it");
+        }
+        CheckpointNews::SetAside { path } => {
+            say(format!("the checkpoint of another render is {}", path.display()));
         }
     }
 }

@@ -271,6 +271,11 @@ pub enum CheckpointNews {
         /// The file.
         path: PathBuf,
     },
+    /// That of another render made way for this one's.
+    SetAside {
+        /// Its new name.
+        path: PathBuf,
+    },
 }
 
 /// Why a request could not be done.

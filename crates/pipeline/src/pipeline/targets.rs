@@ -8,6 +8,7 @@ use super::inputs::{Input, Inputs};
 use super::plan::{NamedBy, Plan};
 use super::report::Marks;
 use super::sink::Sink;
+use crate::output::part::{self, PartFile};
 use crate::output::write::Guard;
 use crate::output::{FileIdentity, Losses, OutputError, replaced_json, replaced_picture};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -87,7 +88,7 @@ fn conflict(
             return Some(is_twin(target, twin.path));
         }
     }
-    if plan.replaces_foreign { None } else { is_foreign(target, at) }
+    if plan.replaces_foreign { None } else { is_foreign(plan, target, at) }
 }
 
 fn is_input(target: Target<'_>, input: &Input) -> Diagnostic {
@@ -111,7 +112,7 @@ fn is_twin(target: Target<'_>, twin: &Path) -> Diagnostic {
 }
 
 /// A file that exists already and that glimt did not write.
-fn is_foreign(target: Target<'_>, at: &Path) -> Option<Diagnostic> {
+fn is_foreign(plan: &Plan, target: Target<'_>, at: &Path) -> Option<Diagnostic> {
     let (name, way_out) = (target.path.display(), way_out(target.kind));
     let (replaced, help) = match target.kind {
         Kind::Picture(NamedBy::Nobody) => {
@@ -121,9 +122,28 @@ fn is_foreign(target: Target<'_>, at: &Path) -> Option<Diagnostic> {
             let replaced = replaced_json(at, "a report", Marks::have_all_stages);
             (replaced, format!("{way_out}; --force replaces it"))
         }
-        Kind::Picture(NamedBy::Call | NamedBy::Scene) => return None,
+        Kind::Picture(NamedBy::Call | NamedBy::Scene) => return is_other_part(plan, target, at),
     };
     Some(of_call(format!("cannot write {name}: {}", replaced.why_kept()?), Some(help)))
+}
+
+/// A checkpoint, or another part of as many: hours of work that look like an output. Parts of another number are those of a
+/// render before.
+fn is_other_part(plan: &Plan, target: Target<'_>, at: &Path) -> Option<Diagnostic> {
+    if !part::is_part(at) {
+        return None;
+    }
+    let head = PartFile::head(at).ok();
+    let what = match head.as_ref().map(|head| (head.kind, head.share.index, head.share.count)) {
+        Some((part::Kind::Part, index, count)) => match plan.shard {
+            Some((own, of)) if of != count || own == index => return None,
+            Some(_) | None => format!("part {index}/{count} of a render"),
+        },
+        Some((part::Kind::Checkpoint, ..)) => "a checkpoint".to_owned(),
+        None => "a part or a checkpoint of another version of glimt".to_owned(),
+    };
+    let message = format!("cannot write {}: it is {what}", target.path.display());
+    Some(of_call(message, Some(format!("{}; --force replaces it", way_out(target.kind)))))
 }
 
 fn way_out(kind: Kind) -> &'static str {

@@ -6,7 +6,7 @@
 //! | `asset` | `name`, `fraction` |
 //! | `progress` | `stage` (`render`), `fraction`, `elapsed_seconds`, `eta_seconds` (or null), `samples`, `total_samples`, `noise` (or null: `now`, and `next` with `level`, `seconds`, or null) |
 //! | `written` | `path`, `bytes` |
-//! | `checkpoint` | `status` (`written`, `failed`, `resumed`, `absent`, `ignored`), `path`, `message`, `samples`, or null |
+//! | `checkpoint` | `status` (`written`, `failed`, `resumed`, `absent`, `ignored`, `set_aside`), `path`, `message`, `samples`, or null |
 //! | `write_failed` | `message`: the report, or one of several pictures, could not be written |
 //! | `done` | `unchanged`, `seconds`, `complete`, `diagnostics` |
 //! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
@@ -103,6 +103,7 @@ fn checkpoint(news: &CheckpointNews) -> Value {
         CheckpointNews::Resumed { path, samples } => ("resumed", Some(path), None, Some(samples)),
         CheckpointNews::Absent { path } => ("absent", Some(path), None, None),
         CheckpointNews::Ignored { path } => ("ignored", Some(path), None, None),
+        CheckpointNews::SetAside { path } => ("set_aside", Some(path), None, None),
     };
     let path = path.map(|path| path.to_string_lossy());
     json!({ "event": "checkpoint", "status": status, "path": path, "message": message, "samples": samples })

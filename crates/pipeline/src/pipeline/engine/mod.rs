@@ -11,6 +11,7 @@ mod unfinished;
 
 use std::cell::Cell;
 use std::collections::HashSet;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -65,7 +66,7 @@ use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
-use crate::system::threads::not_started;
+use crate::system::threads::{check_room, not_started};
 use crate::world::{Bodies, Lookups, World};
 
 /// Means of an engine; tests replace some of them.
@@ -546,15 +547,13 @@ impl Engine {
         let name = |index| format!("glimt-{index}");
         let nice = self.means.nice;
         let begin = move |_| priority::give_way_alone(nice);
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .thread_name(name)
-            .start_handler(begin)
-            .build()
-            .map_err(|error| match threads {
-                1 => Stop::work(not_started("a thread", false, &error)),
-                _ => Stop::work(not_started(&format!("{threads} threads"), true, &error)),
-            })?;
+        let failed = |error: &dyn Display| match threads {
+            1 => Stop::work(not_started("a thread", false, &error)),
+            _ => Stop::work(not_started(&format!("{threads} threads"), true, &error)),
+        };
+        check_room(threads).map_err(|error| failed(&error))?;
+        let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(name).start_handler(begin);
+        let pool = builder.build().map_err(|error| failed(&error))?;
         Ok(self.pool.insert(Arc::new(pool)).clone())
     }
 

@@ -68,11 +68,14 @@ impl State {
         }
     }
 
-    /// Puts it into a film's state. `None` if it is of another film.
+    /// Puts it into a film's state. `None`, and nothing is changed, if it is of another film.
     fn put(self, state: &mut FilmState) -> Option<()> {
         let fits = self.goals.len() == state.done.len()
             && self.cell_rays.len() == state.done.len()
             && self.judged.len() == state.film.tile_count();
+        if !fits {
+            return None;
+        }
         let [camera_rays, shadow_rays, reflected_rays, refracted_rays, scattered_rays, texture_lookups] =
             self.rays;
         let rays = RayCounters {
@@ -90,7 +93,7 @@ impl State {
         state.before = Before { rays, seconds: self.seconds };
         state.render_seconds = self.seconds;
         state.seconds = self.processor_seconds;
-        fits.then_some(())
+        Some(())
     }
 }
 
@@ -117,6 +120,9 @@ fn share_head(share: Option<&Share>) -> ShareHead {
     }
 }
 
+/// Ending of a checkpoint that made way for that of another render.
+const ASIDE: &str = ".before";
+
 /// The file of an output's checkpoint.
 pub(in crate::pipeline) fn path_of(output: &Path) -> PathBuf {
     let mut name = output.as_os_str().to_owned();
@@ -139,8 +145,8 @@ pub(in crate::pipeline) struct Keeping<'a> {
     due: Cell<Instant>,
     /// Whether glimt has reported a failure: each further one has the same cause.
     is_failure_told: Cell<bool>,
-    /// Seconds of the render whose checkpoint is there and is not used: a shorter one does not replace it.
-    seconds_there: Cell<f64>,
+    /// Whether the checkpoint that is there is of this render.
+    is_own: Cell<bool>,
 }
 
 impl<'a> Keeping<'a> {
@@ -164,7 +170,7 @@ impl<'a> Keeping<'a> {
             identity: OnceCell::new(),
             due: Cell::new(Instant::now() + Duration::from_secs_f64(settings.seconds.min(1e9))),
             is_failure_told: Cell::new(false),
-            seconds_there: Cell::new(0.0),
+            is_own: Cell::new(false),
         }
     }
 
@@ -187,10 +193,12 @@ impl<'a> Keeping<'a> {
             }
             Resume::No | Resume::Asked | Resume::IfSame => {}
         }
+        if resume != Resume::Asked && !part::is_part(&self.path) {
+            self.tell_failure(&format!("{}: the file of this name is no checkpoint", self.path.display()));
+        }
         let unlike = PartFile::head(&self.path).map(|head| self.unlike(&head, state));
         match (resume, &unlike) {
             (Resume::No, Ok(unlike)) if unlike.is_empty() => {
-                self.seconds_there.set(self.seconds_there());
                 self.tell(CheckpointNews::Ignored { path: self.path.clone() });
                 return Ok(());
             }
@@ -201,6 +209,7 @@ impl<'a> Keeping<'a> {
         }
         match self.restore(unlike, state, samples) {
             Ok(()) => {
+                self.is_own.set(true);
                 let (path, samples) = (self.path.clone(), state.samples(samples));
                 self.tell(CheckpointNews::Resumed { path, samples });
                 Ok(())
@@ -212,11 +221,34 @@ impl<'a> Keeping<'a> {
         }
     }
 
-    /// Seconds of the render whose checkpoint is there; 0 if it cannot be read.
-    fn seconds_there(&self) -> f64 {
-        let file = PartFile::open(&self.path, &CancelToken::new()).ok();
-        file.and_then(|file| serde_json::from_value::<State>(file.state).ok())
-            .map_or(0.0, |state| state.seconds)
+    /// Moves the checkpoint of another render out of the way, unless this one has all that it has. Of several, the one that took
+    /// longest stays aside.
+    ///
+    /// # Errors
+    /// It cannot be moved: the reason.
+    fn set_aside(&self, state: &FilmState, rays: RayCounters) -> Result<(), String> {
+        let Some((head, there)) = kept_in(&self.path) else { return Ok(()) };
+        if self.has_all_of(&head, &there, state, rays) {
+            return Ok(());
+        }
+        let mut aside = self.path.as_os_str().to_owned();
+        aside.push(ASIDE);
+        let aside = PathBuf::from(aside);
+        if kept_in(&aside).is_some_and(|(_, before)| before.seconds >= there.seconds) {
+            return Ok(());
+        }
+        if aside.symlink_metadata().is_ok() && !part::is_part(&aside) {
+            return Err(format!("{} is in the way of the one that was there", aside.display()));
+        }
+        std::fs::rename(&self.path, &aside).map_err(|error| format!("{}: {error}", self.path.display()))?;
+        self.tell(CheckpointNews::SetAside { path: aside });
+        Ok(())
+    }
+
+    /// Whether a checkpoint is of this picture, and this render has traced as much as it has.
+    fn has_all_of(&self, head: &Head, there: &State, state: &FilmState, rays: RayCounters) -> bool {
+        let [camera_rays, ..] = there.rays;
+        self.unlike(head, state).is_empty() && camera_rays <= rays.camera_rays
     }
 
     fn restore(
@@ -278,13 +310,10 @@ impl<'a> Keeping<'a> {
         }
     }
 
-    /// Ends it when the picture is written: the checkpoint goes, or the last one stays. If a long render's picture could not be
-    /// written, its samples are kept all the same.
+    /// Removes the checkpoint of a picture that is written, or writes a last one if checkpoints are kept. If a long render's picture
+    /// could not be written, its samples are kept all the same.
     pub(in crate::pipeline) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
         let was_long = state.render_seconds >= self.settings.seconds;
-        if is_written {
-            self.seconds_there.set(0.0);
-        }
         match (is_written, self.settings.are_kept) {
             (false, false) if !was_long => return,
             (false, _) | (true, true) => {
@@ -292,35 +321,49 @@ impl<'a> Keeping<'a> {
             }
             (true, false) => {}
         }
-        // One of another picture is somebody else's.
-        let head = PartFile::head(&self.path);
-        if head.is_ok_and(|head| self.unlike(&head, state).is_empty()) {
+        // One of another picture, or of more samples, is somebody else's.
+        let is_done = |(head, there)| self.has_all_of(&head, &there, state, rays);
+        if self.is_own.get() || kept_in(&self.path).is_some_and(is_done) {
             // What cannot be removed is in nobody's way.
             let _ = std::fs::remove_file(&self.path);
         }
     }
 
     fn write(&self, state: &FilmState, rays: RayCounters, seconds: f64, durability: Durability) {
-        if seconds < self.seconds_there.get() {
-            return;
+        if !self.is_own.get()
+            && let Err(why) = self.set_aside(state, rays)
+        {
+            return self.tell_failure(&why);
         }
         let head = head(Kind::Checkpoint, state, self.identity().to_vec(), self.finish);
         let written = serde_json::to_value(State::of(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
             .and_then(|value| save(&self.path, &head, &state.film, &value, (self.inputs, durability)));
         match written {
-            Ok(()) => self.tell(CheckpointNews::Written { path: self.path.clone() }),
-            Err(error) => {
-                if !self.is_failure_told.replace(true) {
-                    self.tell(CheckpointNews::Failed { message: format!("no checkpoint: {error}") });
-                }
+            Ok(()) => {
+                self.is_own.set(true);
+                self.tell(CheckpointNews::Written { path: self.path.clone() });
             }
+            Err(error) => self.tell_failure(&error.to_string()),
+        }
+    }
+
+    fn tell_failure(&self, why: &str) {
+        if !self.is_failure_told.replace(true) {
+            self.tell(CheckpointNews::Failed { message: format!("no checkpoint: {why}") });
         }
     }
 
     fn tell(&self, news: CheckpointNews) {
         self.sink.checkpoint(news);
     }
+}
+
+/// The head and the state of a whole checkpoint.
+fn kept_in(path: &Path) -> Option<(Head, State)> {
+    let file = PartFile::open(path, &CancelToken::new()).ok()?;
+    file.check_kind(Kind::Checkpoint).ok()?;
+    Some((file.head, serde_json::from_value(file.state).ok()?))
 }
 
 /// Writes a checkpoint; never over something else.
@@ -343,6 +386,6 @@ fn save(
         may_replace: &may_replace,
         losses: Losses::Told(&|_| ()),
     };
-    // Nobody cancels this: a signal that ends the render is its reason.
+    // Nobody cancels this: it is short, and a signal may be its reason.
     part::save(path, head, film, state, &guard, (&CancelToken::new(), durability))
 }

@@ -70,6 +70,12 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             CheckpointNews::Resumed { path, .. } => {
                 say(state, format!("going on from {}", visible(&path.to_string_lossy())));
             }
+            CheckpointNews::SetAside { path } => {
+                say(
+                    state,
+                    format!("the checkpoint of another render is {}", visible(&path.to_string_lossy())),
+                );
+            }
             CheckpointNews::Written { .. }
             | CheckpointNews::Absent { .. }
             | CheckpointNews::Ignored { .. } => {}

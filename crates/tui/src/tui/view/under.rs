@@ -39,7 +39,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
             put(
                 buffer,
                 area,
-                &[("the last good picture stays until the file is whole", Tone::Faint)],
+                &[("the last good picture stays until the errors are mended", Tone::Faint)],
                 state.display.depth,
             );
         }
