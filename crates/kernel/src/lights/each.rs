@@ -77,7 +77,12 @@ impl Lights {
                     |i: usize, point| lights[i].plain_sample(point, lane(normals, i), [u[0][i], u[1][i]]);
                 LightRow::one_by_one(points, of, sample)
             };
-            row.take_lanes(of, &found);
+            // Most rows pick lights of one kind.
+            if of == used {
+                row = found;
+            } else {
+                row.take_lanes(of, &found);
+            }
             left &= !of;
         }
         let mut inverse = [0.0; LANES];

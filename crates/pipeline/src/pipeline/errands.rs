@@ -77,7 +77,10 @@ impl AtHand {
         let object = loaded.scene.objects.get(hit.object as usize)?;
         let material = match object.material.map(|index| &loaded.scene.materials[index]) {
             Some(material) => format!("{} {}", material.kind.name(), material.name),
-            None => "of the file".to_owned(),
+            None => match world.own_material_name(&hit) {
+                Some(name) => format!("{name}, of the file"),
+                None => "none of the file".to_owned(),
+            },
         };
         let is_front = surface.shading_normal.dot(ray.direction) <= 0.0;
         Some(Thing {

@@ -269,9 +269,10 @@ impl Wavefront<'_, '_> {
         // Add the emission and ambient light of plain surfaces.
         let mut known = None;
         for lane in lanes(plain) {
-            let object = packet.object(lane);
-            if known.is_none_or(|(own, _)| own != object) {
-                known = tile.plain_rough(object).map(|plain| (object, plain));
+            let Some(hit) = packet.hit(lane) else { continue };
+            let index = tile.world.material_index(&hit);
+            if known.is_none_or(|(own, _)| own != index) {
+                known = tile.plain_rough(index).map(|plain| (index, plain));
             }
             let Some((_, (material, rough))) = known else { continue };
             let slot = first + lane as u32;
@@ -294,7 +295,8 @@ impl Wavefront<'_, '_> {
 
     /// Adds the emission and ambient light of a plain surface.
     fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
-        let Some((material, rough)) = self.tile.plain_rough(hit.object) else { return };
+        let index = self.tile.world.material_index(hit);
+        let Some((material, rough)) = self.tile.plain_rough(index) else { return };
         if is_shining {
             self.add_emitted(path, material.emission.scale, self.tile.lamp_weight(path, hit));
         }

@@ -261,11 +261,11 @@ impl Geometry {
         }
     }
 
-    /// The material that a mesh file gives the triangle of a hit, by the file's own count.
-    pub fn file_material(&self, hit: &Hit) -> Option<u32> {
-        let mesh = self.objects[hit.object as usize].mesh()?;
+    /// The material that a mesh file gives a triangle of an object, by the file's own count.
+    pub fn file_material(&self, object: u32, triangle: u32) -> Option<u32> {
+        let mesh = self.objects[object as usize].mesh()?;
         let materials = &mesh.tree.loaded().mesh.materials;
-        materials.get(hit.shape.primitive as usize).copied().filter(|&own| own != u32::MAX)
+        materials.get(triangle as usize).copied().filter(|&own| own != u32::MAX)
     }
 
     /// Bytes of the objects and of the tree over them, without those of meshes.

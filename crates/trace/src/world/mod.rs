@@ -41,6 +41,7 @@ pub use textures::{
 };
 
 use crate::assets::OrbiterCamera;
+use crate::geometry::rows::lanes;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
 use crate::materials::{Bsdf, Material, Mipmaps, Rough};
@@ -116,10 +117,17 @@ impl World {
         match self.object_materials[hit.object as usize] {
             ObjectMaterial::One(index) => index as usize,
             ObjectMaterial::OfFile { first, fallback } => {
-                let own = self.geometry.file_material(hit);
+                let own = self.geometry.file_material(hit.object, hit.shape.primitive);
                 own.map_or(fallback, |own| first + own) as usize
             }
         }
+    }
+
+    /// Name of the material that a mesh file gives the triangle of a hit. `None` if it gives none.
+    pub fn own_material_name(&self, hit: &Hit) -> Option<&str> {
+        let own = self.geometry.file_material(hit.object, hit.shape.primitive)?;
+        let mesh = self.geometry.objects()[hit.object as usize].mesh()?;
+        mesh.tree.loaded().materials.get(own as usize).map(|material| material.name.as_str())
     }
 
     /// The materials that an object may have anywhere.
@@ -134,30 +142,32 @@ impl World {
         self.materials[first as usize..][..count].iter().chain(self.materials.get(one as usize))
     }
 
-    /// The material of an object and its rough BSDF. `None` if anything bends its normals, its emission is textured, or rows are
-    /// not filled with the BSDF.
-    pub fn plain_rough(&self, object: u32) -> Option<(&Material, &Rough)> {
-        let material = match self.object_materials[object as usize] {
-            ObjectMaterial::One(index) => &self.materials[index as usize],
-            ObjectMaterial::OfFile { .. } => return None,
-        };
+    /// Indices of the materials at some lanes of a row that hit one object; any index for other lanes.
+    #[inline(always)]
+    pub fn row_of_materials(&self, object: u32, of: u32, primitives: &[u32; PACKET]) -> [u32; PACKET] {
+        match self.object_materials[object as usize] {
+            ObjectMaterial::One(index) => [index; PACKET],
+            ObjectMaterial::OfFile { first, fallback } => {
+                let mut materials = [fallback; PACKET];
+                for lane in lanes(of) {
+                    let own = self.geometry.file_material(object, primitives[lane]);
+                    materials[lane] = own.map_or(fallback, |own| first + own);
+                }
+                materials
+            }
+        }
+    }
+
+    /// A material and its rough BSDF. `None` if anything bends its normals, its emission is textured, or rows are not filled with
+    /// the BSDF.
+    pub fn plain_rough(&self, material: usize) -> Option<(&Material, &Rough)> {
+        let material = &self.materials[material];
         if material.normal_map.is_some() || material.emission.texture.is_some() {
             return None;
         }
         match &material.bsdf {
             Bsdf::Rough(rough) => rough.fills_rows().then_some((material, rough)),
             Bsdf::Mirror(_) | Bsdf::Glass(_) => None,
-        }
-    }
-
-    /// The material of all of an object. `None` if it needs more of a surface than rows of surfaces hold: texture coordinates or
-    /// tangents.
-    pub fn untextured(&self, object: u32) -> Option<&Material> {
-        match self.object_materials[object as usize] {
-            ObjectMaterial::One(index) => {
-                Some(&self.materials[index as usize]).filter(|material| !material.is_textured())
-            }
-            ObjectMaterial::OfFile { .. } => None,
         }
     }
 

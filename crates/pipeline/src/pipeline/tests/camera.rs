@@ -241,3 +241,16 @@ fn a_render_under_way_answers_and_goes_on() {
     bench.worker.send(Command::Cancel);
     bench.until_end(of);
 }
+
+#[test]
+fn a_material_of_a_mesh_file_is_named() {
+    let mut bench =
+        Bench::new("[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\n[[mesh]]\nfile = \"two.obj\"\n");
+    bench.write("two.mtl", "newmtl chalk\nKd 1 1 1\n");
+    let half = |x: i32, own: &str| format!("v {x} -1 0\nv 0 -1 0\nv 0 1 0\n{own}\nf -3 -2 -1\n");
+    bench.write("two.obj", &format!("mtllib two.mtl\n{}{}", half(1, ""), half(-1, "usemtl chalk")));
+    bench.done();
+    let mut material = |x| pick(&mut bench, x, 0.6).thing.expect("a half").material;
+    assert_eq!(material(0.45), "chalk, of the file");
+    assert_eq!(material(0.55), "none of the file");
+}

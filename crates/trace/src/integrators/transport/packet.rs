@@ -1,6 +1,8 @@
 //! Hits of a packet of rays, and rows of plain surfaces with all that direct light needs: one vertex at a time would cost more
 //! than the light.
 
+use arrayvec::ArrayVec;
+
 use super::batch::{UNBENT, VertexBatch};
 use super::camera::CameraRow;
 use super::ray::PathRay;
@@ -117,11 +119,6 @@ impl PacketHits {
         })
     }
 
-    /// The object that a ray hits; a number that no object has if it hits nothing.
-    pub fn object(&self, lane: usize) -> u32 {
-        self.object[lane]
-    }
-
     /// The path of a lane.
     pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
@@ -157,17 +154,17 @@ impl TileContext<'_> {
         })
     }
 
-    /// Whether rows of surfaces hold everything for shading an object that is not plain.
+    /// Whether rows of surfaces hold everything for shading with a material that is not plain: no texture coordinates or tangents.
     #[inline(always)]
-    fn is_held_by_rows(&self, object: u32) -> bool {
+    fn is_held_by_rows(&self, material: usize) -> bool {
         // Beams need tangents and curvatures.
-        self.pixel_spread == 0.0 && self.world.untextured(object).is_some()
+        self.pixel_spread == 0.0 && !self.world.materials[material].is_textured()
     }
 
-    /// The material of an object, and its rough BSDF. `None` if the object is not plain.
+    /// A material and its rough BSDF. `None` if its surfaces are not plain.
     #[inline(always)]
-    pub fn plain_rough(&self, object: u32) -> Option<(&Material, &Rough)> {
-        let (material, rough) = self.world.plain_rough(object)?;
+    pub fn plain_rough(&self, material: usize) -> Option<(&Material, &Rough)> {
+        let (material, rough) = self.world.plain_rough(material)?;
         // Ambient light needs look-ups for each surface by itself.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
         (!has_ambient || rough.constant().is_some()).then_some((material, rough))
@@ -280,21 +277,36 @@ impl PacketIntersection<'_> {
         let Self { tile, measure, are_lit, row, surface, .. } = self;
         let mut plain = Plain { all: 0, shining: 0, lookups: 0 };
         while left != 0 {
-            let (id, of) = first_object(object, left, folds);
-            left &= !of;
-            // Leave out objects that are not plain. The first plain one decides the kind of all BSDFs.
-            let Some((material, rough)) = tile.plain_rough(id) else { continue };
-            if plain.all == 0 {
-                row.bsdf.prepare(rough.kind());
-            } else if row.bsdf.kind() != rough.kind() {
+            let (id, of_object) = first_alike(object, left, folds);
+            left &= !of_object;
+            // Leave out materials that are not plain. The first plain one decides the kind of all BSDFs.
+            let materials = tile.world.row_of_materials(id, of_object, &hits.primitive);
+            let (mut of, mut has_uv) = (0, false);
+            let mut groups = ArrayVec::<(&Rough, u32), PACKET>::new();
+            let mut waiting = of_object;
+            while waiting != 0 {
+                let (material, alike) = first_alike(&materials, waiting, folds);
+                waiting &= !alike;
+                let Some((material, rough)) = tile.plain_rough(material as usize) else { continue };
+                if plain.all | of == 0 {
+                    row.bsdf.prepare(rough.kind());
+                } else if row.bsdf.kind() != rough.kind() {
+                    continue;
+                }
+                of |= alike;
+                has_uv |= rough.row_texture().is_some() && *are_lit && measure.is_colored();
+                plain.shining |= if material.emission.shines() { alike } else { 0 };
+                groups.push((rough, alike));
+            }
+            if of == 0 {
                 continue;
             }
             // Compute the surfaces.
-            let has_uv = rough.row_texture().is_some() && *are_lit && measure.is_colored();
             match &tile.world.geometry.objects()[id as usize] {
                 Object::Shape(shape) => {
                     row.set_starts(of, &[Ray::NO_TRIANGLE; PACKET]);
                     if !surface.fill(shape, rows, hits, of) {
+                        plain.shining &= !of;
                         continue;
                     }
                     if has_uv {
@@ -307,27 +319,29 @@ impl PacketIntersection<'_> {
                 }
             }
             plain.all |= of;
-            plain.shining |= if material.emission.shines() { of } else { 0 };
-            // Look the material up. Beyond the vertices that the camera sees, all lobes count.
-            plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
-            let shown = [(of, measure.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
-            let shown = if *measure == Measure::ALL { &shown[..1] } else { &shown };
-            let black = row.bsdf.fill(rough, has_uv.then_some(&surface.uv), shown, folds);
-            row.used |= of & !black;
+            // Look the materials up. Beyond the vertices that the camera sees, all lobes count.
+            for (rough, of) in groups {
+                let has_uv = has_uv && rough.row_texture().is_some();
+                plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
+                let shown = [(of, measure.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
+                let shown = if *measure == Measure::ALL { &shown[..1] } else { &shown };
+                let black = row.bsdf.fill(rough, has_uv.then_some(&surface.uv), shown, folds);
+                row.used |= of & !black;
+            }
         }
         plain
     }
 }
 
-/// The object that the first of the lanes in `left` hits, and a bit for each of these lanes that hits it.
+/// The index in the first of the lanes of `left`, and a bit for each of these lanes that has it.
 #[inline(always)]
-fn first_object(object: &[u32; PACKET], left: u32, folds: impl Folds) -> (u32, u32) {
-    let id = object[left.trailing_zeros() as usize % PACKET];
+fn first_alike(indices: &[u32; PACKET], left: u32, folds: impl Folds) -> (u32, u32) {
+    let index = indices[left.trailing_zeros() as usize % PACKET];
     let mut of = [0; PACKET];
     for lane in 0..PACKET {
-        of[lane] = if object[lane] == id { TRUE } else { 0 };
+        of[lane] = if indices[lane] == index { TRUE } else { 0 };
     }
-    (id, folds.bits(&of) & left)
+    (index, folds.bits(&of) & left)
 }
 
 /// The hits of the rays at some places of a queue, side by side.
@@ -356,12 +370,17 @@ impl TileContext<'_> {
     ) -> u32 {
         let mut found = 0;
         while left != 0 {
-            let (id, of) = first_object(object, left, folds);
-            left &= !of;
-            if !self.is_held_by_rows(id) {
-                continue;
+            let (id, of_object) = first_alike(object, left, folds);
+            left &= !of_object;
+            let Object::Mesh(mesh) = &self.world.geometry.objects()[id as usize] else { continue };
+            let materials = self.world.row_of_materials(id, of_object, &hits.primitive);
+            let (mut of, mut waiting) = (0, of_object);
+            while waiting != 0 {
+                let (material, alike) = first_alike(&materials, waiting, folds);
+                waiting &= !alike;
+                of |= if self.is_held_by_rows(material as usize) { alike } else { 0 };
             }
-            if let Object::Mesh(mesh) = &self.world.geometry.objects()[id as usize] {
+            if of != 0 {
                 mesh.fill_surfaces(surface, rows, hits, of, false);
                 found |= of;
             }
