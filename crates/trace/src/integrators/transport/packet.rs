@@ -189,6 +189,8 @@ struct Plain {
     all: u32,
     /// A bit for each that emits, on either side.
     shining: u32,
+    /// A bit for each whose both sides emit alike.
+    two_sided: u32,
     /// Look-ups of their textures.
     lookups: u64,
 }
@@ -262,7 +264,7 @@ impl Loops for PacketIntersection<'_> {
             Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
             Some(_) | None => ([[0.0; PACKET]; 3], [0.0; PACKET]),
         };
-        let (shining, lookups) = (plain.shining & front, plain.lookups);
+        let (shining, lookups) = (plain.shining & (front | plain.two_sided), plain.lookups);
         PacketHits { hits, object, any, plain: plain.all, shining, found, lookups, sky }
     }
 }
@@ -278,7 +280,7 @@ impl PacketIntersection<'_> {
         folds: impl Folds,
     ) -> Plain {
         let Self { tile, measure, are_lit, row, surface, .. } = self;
-        let mut plain = Plain { all: 0, shining: 0, lookups: 0 };
+        let mut plain = Plain { all: 0, shining: 0, two_sided: 0, lookups: 0 };
         while left != 0 {
             let (id, of) = first_object(object, left, folds);
             left &= !of;
@@ -308,6 +310,7 @@ impl PacketIntersection<'_> {
             }
             plain.all |= of;
             plain.shining |= if material.emission.shines() { of } else { 0 };
+            plain.two_sided |= if material.emission.is_two_sided() { of } else { 0 };
             // Look the material up. Beyond the vertices that the camera sees, all lobes count.
             plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
             let shown = [(of, measure.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
