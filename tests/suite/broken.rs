@@ -95,6 +95,10 @@ const BROKEN: &[(&str, &[Said])] = &[
     ("emissive_plane", &[(10, 12, "an infinite plane cannot be a light; this material has `emission`")]),
     ("empty_list", &[(10, 12, "`material` must be the name of a material; found 7")]),
     (
+        "encodings",
+        &[(6, 11, r#"the texture "leaf" is used for colours and for numbers; it needs `encoding`"#)],
+    ),
+    (
         "endings",
         &[
             (3, 10, "`output`: .webp files are not available in this version"),
@@ -332,6 +336,27 @@ const BROKEN: &[(&str, &[Said])] = &[
             (21, 13, "`scale` must not be 0; found 0"),
             (26, 9, "`scale` must not be 0; found 0.0"),
             (27, 10, "`smooth` must be true or false; found 1"),
+        ],
+    ),
+    (
+        "surfaces",
+        &[
+            (8, 10, r#"`rotate` must be a number; found the string "half""#),
+            (9, 10, "`offset` must be two numbers, [u, v]; found an array of 1 value"),
+            (10, 6, "`uv` must be 0: the mesh files of this version have one set of texture coordinates"),
+            (17, 18, r#"`emission_sides` cannot be "back""#),
+            (18, 11, r#"`opacity` must be a number, or { texture = "name" }; found the name of a texture"#),
+            (19, 18, "`opacity_cutoff` must be between 0 and 1; found 2"),
+            (22, 43, r#"`channel` cannot be "alpha""#),
+            (26, 1, "`opacity` is for surfaces, and this glass fills its shape"),
+            (30, 8, "`thin` must be true or false; found 1"),
+            (31, 11, "`opacity` must be between 0 and 1; found -1"),
+            (36, 1, "`scale` and `matrix` exclude each other"),
+            (42, 10, "the last row of `matrix` must be 0, 0, 0, 1; it is 0, 0, 0, 2"),
+            (47, 10, "`matrix` makes the mesh flat; its determinant is 0e0"),
+            (52, 41, "`matrix` must be a finite number; found nan"),
+            (57, 10, "`matrix` must be 16 numbers, row by row; found an array of 9 values"),
+            (58, 17, r#"`vertex_colors` must be true or false; found the string "red""#),
         ],
     ),
     (

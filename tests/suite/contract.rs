@@ -73,6 +73,9 @@ const TABLES: &[(&str, &[Key])] = &[
             ("filter", "\"bilinear\"", Default),
             ("wrap", "\"repeat\"", Default),
             ("repeat", "[1, 1]", Default),
+            ("rotate", "0.0", Default),
+            ("offset", "[0, 0]", Default),
+            ("uv", "0", Default),
             ("encoding", "\"auto\"", Default),
         ],
     ),
@@ -85,14 +88,38 @@ const TABLES: &[(&str, &[Key])] = &[
             ("shininess", "32.0", Default),
             ("ambient", "[1, 1, 1]", Other),
             ("emission", "[0, 0, 0]", Default),
+            ("emission_sides", "\"front\"", Default),
+            ("normal_map", "\"bumps\"", Other),
+            ("normal_strength", "1.0", Default),
+            ("opacity", "1.0", Default),
+            ("opacity_cutoff", "0.0", Default),
+        ],
+    ),
+    (
+        "[materials.steel]",
+        &[
+            ("type", "\"mirror\"", Other),
+            ("reflectance", "[0.9, 0.9, 0.9]", Default),
+            ("emission", "[0, 0, 0]", Default),
+            ("emission_sides", "\"front\"", Default),
+            ("normal_map", "\"bumps\"", Other),
+            ("normal_strength", "1.0", Default),
+            ("opacity", "1.0", Default),
+            ("opacity_cutoff", "0.0", Default),
+        ],
+    ),
+    (
+        "[materials.crystal]",
+        &[
+            ("type", "\"glass\"", Other),
+            ("ior", "1.5", Default),
+            ("tint", "[1, 1, 1]", Default),
+            ("thin", "false", Default),
+            ("emission", "[0, 0, 0]", Default),
+            ("emission_sides", "\"front\"", Default),
             ("normal_map", "\"bumps\"", Other),
             ("normal_strength", "1.0", Default),
         ],
-    ),
-    ("[materials.steel]", &[("type", "\"mirror\"", Other), ("reflectance", "[0.9, 0.9, 0.9]", Default)]),
-    (
-        "[materials.crystal]",
-        &[("type", "\"glass\"", Other), ("ior", "1.5", Default), ("tint", "[1, 1, 1]", Default)],
     ),
     (
         "[[sphere]]",
@@ -185,6 +212,7 @@ const TABLES: &[(&str, &[Key])] = &[
             ("rotate", "[0, 0, 0]", Default),
             ("translate", "[0, 0, 0]", Default),
             ("smooth", "true", Default),
+            ("vertex_colors", "false", Default),
         ],
     ),
     (
@@ -335,6 +363,23 @@ fn the_camera_may_be_an_orbiter() {
 }
 
 #[test]
+fn a_mesh_may_be_placed_by_a_matrix() {
+    let (_folder, path) = folder();
+    let scene = |placed: &str| {
+        let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[materials.a]\n";
+        let text = format!("{camera}[[mesh]]\nfile = \"../assets/knot.obj\"\nmaterial = \"a\"\n{placed}\n");
+        let outcome = parse(text.into(), &path);
+        assert_eq!(errors(&outcome.diagnostics), [""; 0], "{placed}");
+        outcome.scene.expect("a scene")
+    };
+    let transform = |placed: &str| scene(placed).objects[0].shape.mesh().expect("a mesh").placed.transform();
+    let by_matrix = transform("matrix = [0, -2, 0, 5, 1, 0, 0, 6, 0, 0, -3, 7, 0, 0, 0, 1]");
+    let by_steps = transform("scale = [1, 2, -3]\nrotate = [0, 0, 90]\ntranslate = [5, 6, 7]");
+    assert_eq!(by_matrix, by_steps);
+    assert!(by_matrix.mirrors());
+}
+
+#[test]
 fn every_word_that_this_version_has_is_known() {
     let (_folder, path) = folder();
     let camera = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
@@ -347,6 +392,7 @@ fn every_word_that_this_version_has_is_known() {
         ("[textures.bumps]\nfile = \"textures/bumps.png\"\nwrap", &["repeat", "clamp", "mirror"]),
         ("[textures.bumps]\nfile = \"textures/bumps.png\"\nencoding", &["auto", "srgb", "linear"]),
         ("[materials.a]\ntype", &["phong", "mirror", "glass"]),
+        ("[materials.a]\nemission_sides", &["front", "both"]),
         ("[[light]]\nfalloff", &["square", "none"]),
     ];
     for (key, words) in words {
@@ -378,6 +424,10 @@ fn the_ends_of_the_promised_ranges_are_in_them() {
         "[render]\nbackground = [0, 1, 1000.5]",
         "[photons]\nradius = 0.5\nbounces = 0",
         "[materials.a]\ntype = \"glass\"\nior = 0.75",
+        "[materials.a]\ntype = \"glass\"\nthin = true\nopacity = 0.5",
+        "[materials.a]\nopacity = 0\nopacity_cutoff = 1",
+        "[materials.a]\nopacity = { texture = \"b\", channel = \"a\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
+        "[textures.b]\nfile = \"textures/bumps.png\"\noffset = [-0.5, 7]\nrotate = -720\nuv = 0",
         "[materials.a]\nambient = { texture = \"b\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
         "[environment]",
         "[environment]\ncolor = [1, 1, 1]",
@@ -397,6 +447,10 @@ fn the_ends_of_the_promised_ranges_are_in_them() {
         "[environment]\nfile = \"textures/brick.png\"",
         "[environment]\nfile = \"sky.txt\"",
         "[environment]\nrotate = \"left\"",
+        "[materials.a]\nopacity = 1.1",
+        "[materials.a]\nopacity_cutoff = -0.1",
+        "[materials.a]\ntype = \"glass\"\nopacity = 0.5",
+        "[textures.b]\nfile = \"textures/bumps.png\"\nuv = 1",
     ] {
         assert_eq!(said(wrong), 1, "{wrong}");
     }
@@ -437,7 +491,9 @@ fn every_line_of_the_starter_may_be_uncommented() {
     };
     let uncommented = |line: &str| match line.strip_prefix("# ") {
         // It stands in place of others.
-        Some(text) if is_key(text) && !text.starts_with("orbiter") => format!("{text}\n"),
+        Some(text) if is_key(text) && !["orbiter", "matrix"].iter().any(|key| text.starts_with(key)) => {
+            format!("{text}\n")
+        }
         _ => format!("{line}\n"),
     };
     let text: String = starter().lines().map(uncommented).collect();

@@ -16,6 +16,7 @@ fn the_parts_of_every_bundled_scene_add_up_to_its_picture() {
         "cornell",
         "cornell_glass",
         "dof",
+        "leaves",
         "mesh",
         "normal_map",
         "orbiter",

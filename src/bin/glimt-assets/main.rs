@@ -3,6 +3,7 @@
 //! large to store.
 
 mod figure;
+mod foliage;
 mod furniture;
 mod noise;
 mod parts;
@@ -62,6 +63,11 @@ fn stored() -> Vec<Asset> {
         ("room.obj", room::obj()),
         ("room.mtl", room::mtl()),
         ("room_orbiter.txt", room::orbiter()),
+        (
+            "shrub.obj",
+            foliage::shrub().to_obj("A shrub of leaves, squares with texture coordinates and normals"),
+        ),
+        ("textures/leaf.png", foliage::leaf()),
         ("textures/bricks.png", pictures::bricks()),
         ("textures/bumps.png", pictures::bumps()),
         ("textures/checker.png", pictures::checker()),

@@ -25,7 +25,9 @@ mod scenes;
 mod shading;
 mod sky;
 mod speckle;
+mod straight;
 mod touching;
+mod two_sided;
 mod views;
 
 use glimt::math::DVec3;

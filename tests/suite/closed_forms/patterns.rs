@@ -21,7 +21,7 @@ fn greys(build: &mut Build, rows: &[&[f32]], filter: TextureFilter, repeat: Vec2
 }
 
 fn shining(texture: usize, scale: f32) -> Material {
-    let emission = EmissionSource { scale: Vec3::splat(scale), texture: Some(texture) };
+    let emission = EmissionSource { texture: Some(texture), ..EmissionSource::constant(Vec3::splat(scale)) };
     Material { emission, ..phong(0.0, 0.0, 1.0, 0.0) }
 }
 

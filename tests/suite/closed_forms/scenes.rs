@@ -13,8 +13,8 @@ use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
     Accel, Camera, ColorSource, EmissionSource, Encoding, Environment, Falloff, Integrator, Light, Located,
-    Material, MaterialKind, Mesh, Object, Photons, PixelFilter, PointLight, Render, Scene, Shadows, Shape,
-    Texture, TextureFilter, Tonemap, Wrap,
+    Material, MaterialKind, Mesh, Object, OpacitySource, Photons, PixelFilter, Placement, PointLight, Render,
+    Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
 };
 use glimt::world::{Geometry, Image, Lookups, MeshTree, Parts, World, lights, origin, sky, textures_needed};
 
@@ -158,7 +158,8 @@ impl Build {
         self.scene.mesh_files.push(Located { value: PathBuf::new(), span: 0..0 });
         let [scale, rotate, translate] = placed;
         let file = self.parts.meshes.len() - 1;
-        self.shape(Shape::Mesh(Mesh { file, scale, rotate, translate, smooth: false }), material)
+        let placed = Placement::Steps { scale, rotate, translate };
+        self.shape(Shape::Mesh(Mesh { file, placed, smooth: false, vertex_colors: false }), material)
     }
 
     /// Makes the last mesh smooth.
@@ -196,6 +197,8 @@ impl Build {
             filter,
             wrap,
             repeat,
+            rotate: 0.0,
+            offset: Vec2::ZERO,
             encoding: Encoding::Linear,
         });
         number
@@ -297,7 +300,13 @@ pub fn tile_by(
 
 /// A dark material without a normal map.
 pub fn plain(kind: MaterialKind) -> Material {
-    Material { name: String::new(), kind, emission: EmissionSource::NONE, normal_map: None }
+    Material {
+        name: String::new(),
+        kind,
+        emission: EmissionSource::NONE,
+        normal_map: None,
+        opacity: OpacitySource::FULL,
+    }
 }
 
 pub fn phong(diffuse: f32, specular: f32, shininess: f32, emission: f32) -> Material {

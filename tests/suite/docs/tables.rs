@@ -42,6 +42,14 @@ fn tables() -> Vec<Table> {
     let every: Vec<Vec<String>> =
         tables.iter().filter(|(name, _)| name == "Every shape").flat_map(|(_, rows)| rows.clone()).collect();
     assert_eq!(every.len(), 2);
+    let materials: Vec<Vec<String>> = tables
+        .iter()
+        .filter(|(name, _)| name == "Every material")
+        .flat_map(|(_, rows)| rows.clone())
+        .collect();
+    assert_eq!(materials.len(), 6);
+    let is_opacity = |row: &[String]| row[0].starts_with("`opacity");
+    let solid: Vec<_> = materials.iter().filter(|row| !is_opacity(row)).cloned().collect();
     let key = |row: &Vec<String>| {
         assert_eq!(row.len(), 6, "{row:?}");
         let [name, kind, range, default] = [0, 1, 3, 4].map(|index| row[index].clone());
@@ -52,7 +60,13 @@ fn tables() -> Vec<Table> {
         .filter_map(|(heading, rows)| Some((head(heading)?, rows)))
         .map(|(head, rows)| {
             let is_shape = head.starts_with("[[") && !head.starts_with("[[light]]");
-            let more = if is_shape { every.as_slice() } else { &[] };
+            let is_material = head.starts_with("[materials.it]\ntype");
+            let more = match head.contains("\"glass\"") {
+                _ if is_shape => every.as_slice(),
+                true => solid.as_slice(),
+                false if is_material => materials.as_slice(),
+                false => &[],
+            };
             let mut keys: Vec<Key> = rows.iter().chain(more).map(key).collect();
             // A mesh may have the materials of its file.
             let material = keys.iter_mut().find(|key| head.starts_with("[[mesh]]") && key.name == "material");

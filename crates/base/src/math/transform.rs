@@ -28,6 +28,11 @@ impl Transform {
         }
     }
 
+    /// The map of a linear part whose determinant is not 0, then a translation.
+    pub fn affine(linear: DMat3, translation: DVec3) -> Self {
+        Self { linear, translation, inverse_linear: linear.inverse() }
+    }
+
     /// The map, given from coordinates that start at `inside` to coordinates that start at `outside`.
     #[inline]
     pub fn between(self, inside: DVec3, outside: DVec3) -> Self {
@@ -86,21 +91,26 @@ impl Transform {
     }
 }
 
+/// Sine and cosine of an angle in degrees, exact for multiples of 90°.
+pub fn sin_cos_degrees(angle: f64) -> (f64, f64) {
+    let quarters = angle / 90.0;
+    if quarters == quarters.round() {
+        match (quarters.rem_euclid(4.0)) as i64 {
+            0 => (0.0, 1.0),
+            1 => (1.0, 0.0),
+            2 => (0.0, -1.0),
+            _ => (-1.0, 0.0),
+        }
+    } else {
+        libm::sincos(angle.to_radians())
+    }
+}
+
 /// Rotation by `degrees.x` about x, then `degrees.y` about y, then `degrees.z` about z. Multiples of 90°
 /// are exact.
 pub fn rotation_xyz(degrees: DVec3) -> DMat3 {
     let exact = |axis: DVec3, angle: f64| {
-        let quarters = angle / 90.0;
-        let (sin, cos) = if quarters == quarters.round() {
-            match (quarters.rem_euclid(4.0)) as i64 {
-                0 => (0.0, 1.0),
-                1 => (1.0, 0.0),
-                2 => (0.0, -1.0),
-                _ => (-1.0, 0.0),
-            }
-        } else {
-            libm::sincos(angle.to_radians())
-        };
+        let (sin, cos) = sin_cos_degrees(angle);
         if axis.x > 0.0 {
             DMat3::from_cols_array(&[1.0, 0.0, 0.0, 0.0, cos, sin, 0.0, -sin, cos])
         } else if axis.y > 0.0 {

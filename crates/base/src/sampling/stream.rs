@@ -21,6 +21,8 @@ pub enum Decision {
     Trace,
     /// Choice between reflection and refraction.
     Choice,
+    /// Choice whether a surface is there.
+    Opacity,
     /// Choice of the lobe to go on in.
     Lobe,
     /// Direction within a lobe.
@@ -64,6 +66,7 @@ impl Decision {
             Self::Sent => u32::MAX - 12,
             Self::Spared => u32::MAX - 13,
             Self::Gather => u32::MAX - 14,
+            Self::Opacity => u32::MAX - 15,
             Self::Trial(number) => (1 << 31) + number,
         };
         mix(mix(path.wrapping_add(1)) ^ number.wrapping_mul(0x9e37_79b9))

@@ -14,6 +14,8 @@ pub struct TriangleMesh {
     pub normals: Vec<Vec3>,
     /// Vertex texture coordinates, or empty; v = 0 is the bottom row of an image.
     pub uvs: Vec<Vec2>,
+    /// Vertex colours in sRGB, or empty.
+    pub colors: Vec<[u8; 3]>,
     /// Corners of each triangle; front along (b − a) × (c − a).
     pub triangles: Vec<[u32; 3]>,
     /// Material of each triangle as an index into the file's own list, with `u32::MAX` for no material; or empty.
@@ -35,6 +37,7 @@ impl TriangleMesh {
         size_of_val(self.positions.as_slice())
             + size_of_val(self.normals.as_slice())
             + size_of_val(self.uvs.as_slice())
+            + size_of_val(self.colors.as_slice())
             + size_of_val(self.triangles.as_slice())
             + size_of_val(self.materials.as_slice())
     }

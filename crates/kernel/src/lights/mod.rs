@@ -42,7 +42,9 @@ mod sample;
 mod set;
 pub mod tree;
 
-pub use area::{AreaLight, Chart, EmissionTexture, Emitter, MeshEmitter, Part, Patch, area_light};
+pub use area::{
+    AreaLight, Chart, EmissionTexture, Emitter, MeshEmitter, Part, Patch, Side, area_light, back_light,
+};
 pub use delta::{Falloff, PointLight, SpotLight};
 pub use emission::{Ball, Emitted, Numbers, Outline, PhotonSource, Start};
 pub use infinite::{DirectionalLight, Environment, SkyMap};

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use super::area::{AreaLight, MeshEmitter, Part};
+use super::area::{AreaLight, MeshEmitter, Part, Side};
 use super::infinite::{DirectionalLight, Environment, InfiniteLight};
 use super::light::Light;
 use super::tree::{Cut, LightTree, MOST_WITHOUT, Receiver};
@@ -14,7 +14,10 @@ use crate::math::Vec3;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lights {
     all: Vec<Light>,
+    /// Lights of the fronts of objects.
     by_object: HashMap<u32, OfObject>,
+    /// Lights of the backs of objects.
+    by_back: HashMap<u32, OfObject>,
     /// Directional lights, which rays see that leave the scene, with their numbers.
     suns: Vec<(u32, DirectionalLight)>,
     /// The environment, with its number.
@@ -166,9 +169,13 @@ impl Lights {
     }
 
     fn note(&mut self, number: u32, light: &AreaLight) {
+        let by_object = match light.side {
+            Side::Front => &mut self.by_object,
+            Side::Back => &mut self.by_back,
+        };
         let note = |primitive: u32| {
             let place = primitive as usize;
-            match self.by_object.entry(light.object).or_insert(OfObject::Primitives(Vec::new())) {
+            match by_object.entry(light.object).or_insert(OfObject::Primitives(Vec::new())) {
                 OfObject::Whole(_) => {}
                 OfObject::Primitives(lights) => {
                     lights.resize(lights.len().max(place + 1), None);
@@ -178,7 +185,7 @@ impl Lights {
         };
         match light.part {
             Part::Whole => {
-                self.by_object.insert(light.object, OfObject::Whole(number));
+                by_object.insert(light.object, OfObject::Whole(number));
             }
             Part::Listed => {
                 light.shape.as_mesh().into_iter().flat_map(MeshEmitter::primitives).for_each(note);
@@ -252,10 +259,14 @@ impl Lights {
         &self.all[number as usize]
     }
 
-    /// The light of a primitive of an object, with its number.
+    /// The light of a side of a primitive of an object, with its number.
     #[inline]
-    pub fn of_hit(&self, object: u32, primitive: u32) -> Option<(u32, &Light)> {
-        let number = match self.by_object.get(&object)? {
+    pub fn of_hit(&self, object: u32, primitive: u32, side: Side) -> Option<(u32, &Light)> {
+        let by_object = match side {
+            Side::Front => &self.by_object,
+            Side::Back => &self.by_back,
+        };
+        let number = match by_object.get(&object)? {
             OfObject::Whole(number) => *number,
             OfObject::Primitives(lights) => lights.get(primitive as usize).copied().flatten()?,
         };

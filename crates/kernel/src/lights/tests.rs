@@ -13,7 +13,7 @@ use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
 use crate::geometry::{Ray, Shape, ShapeHit};
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::{Decision, PixelSampler};
 
 /// Shapes for every sampling method: rectangles by solid angle, other parallelograms and distant ones by area.
@@ -155,7 +155,8 @@ fn the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds() {
                         hidden += 1;
                         continue;
                     }
-                    let (found, of_hit) = lights.of_hit(OBJECT, hit.primitive).expect("it is a light");
+                    let (found, of_hit) =
+                        lights.of_hit(OBJECT, hit.primitive, Side::Front).expect("it is a light");
                     assert_eq!(found, number, "{shape:?}");
                     let product = of_hit.pdf(from, Vec3::Y, &met) * factor;
                     assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
@@ -164,6 +165,85 @@ fn the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds() {
             }
         }
         assert!(compared >= 64 && hidden * 3 < compared, "{shape:?}: {compared}, {hidden} hidden");
+    }
+}
+
+/// Lights of both sides of a shape, the front's first.
+fn two_sided(shape: &Shape) -> Lights {
+    let both = [area_light(shape, Vec3::ONE, OBJECT), back_light(shape, Vec3::ONE, OBJECT)];
+    let all = both.into_iter().flatten().map(Light::Area).collect();
+    Lights::new(all, &CancelToken::new()).expect("nobody cancels")
+}
+
+#[test]
+fn the_samples_of_both_sides_fill_all_directions_in_which_the_shape_is_seen() {
+    let open = |cylinder| {
+        if cylinder {
+            Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Z, 0.5, false))
+        } else {
+            Shape::Cone(Cone::new(DVec3::ZERO, DVec3::Z, 0.5, false))
+        }
+    };
+    for shape in shapes().into_iter().chain([open(true), open(false)]) {
+        let lights = two_sided(&shape);
+        // Points around it, and one inside of it.
+        let is_flat = area_light(&shape, Vec3::ONE, 0).is_some_and(|light| light.bounds.cone.cos == 1.0);
+        let inner = shape.place(0, Vec2::splat(0.5));
+        let inner = (inner.point - inner.normal * 0.1).as_vec3();
+        for from in points().into_iter().chain((!is_flat).then_some(inner)) {
+            let (n, mut seen, mut sum) = (100_000_u32, 0.0, 0.0);
+            let around = SphereCone::new(Vec3::new(0.3, 0.5, 0.8), 0.0);
+            let around = SphereCone { one_minus_cos: 2.0, ..around };
+            for i in 0..n {
+                let direction = around.direction(i, n);
+                let Some((met, hit)) = met(&shape, from, direction) else { continue };
+                let side = if met.normal.dot(direction) < 0.0 { Side::Front } else { Side::Back };
+                let Some((_, light)) = lights.of_hit(OBJECT, hit.primitive, side) else { continue };
+                let part = f64::from(around.solid_angle()) / f64::from(n);
+                seen += part;
+                sum += if light.pdf(from, Vec3::Y, &met) > 0.0 { part } else { 0.0 };
+            }
+            assert!(
+                (sum - seen).abs() < 1e-3 * seen,
+                "{shape:?} from {from}: {sum} of {seen} sr are sampled"
+            );
+            // The weights of the samples add up to the same solid angle.
+            let found: f64 = lights
+                .iter()
+                .map(|(number, light)| {
+                    let all = samples(light, number, from, 16_384);
+                    all.iter().map(|(.., factor)| f64::from(*factor)).sum::<f64>() / 16_384.0
+                })
+                .sum();
+            assert!(
+                (found - seen).abs() < 0.02 * seen + 2e-4,
+                "{shape:?} from {from}: {found} is not {seen}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_density_of_a_sample_of_a_back_is_that_of_its_hit() {
+    let tube = Shape::Cylinder(Cylinder::new(DVec3::ZERO, DVec3::Z, 0.5, false));
+    for shape in shapes().into_iter().chain([tube]) {
+        let light = Light::Area(back_light(&shape, Vec3::ONE, OBJECT).expect("a light"));
+        let mut compared = 0;
+        let inner = shape.place(0, Vec2::splat(0.5));
+        let inner = (inner.point - inner.normal * 0.1).as_vec3();
+        for from in points().into_iter().chain([inner]) {
+            for (direction, target, factor) in samples(&light, 0, from, 256) {
+                let Some((met, _)) = met(&shape, from, direction) else { continue };
+                if (from + direction * met.distance - target).length() > 1e-3 {
+                    continue;
+                }
+                assert!(met.normal.dot(direction) > 0.0, "{shape:?}: a sample of the front");
+                let product = light.pdf(from, Vec3::Y, &met) * factor;
+                assert!((product - 1.0).abs() < 2e-3, "{shape:?} {from}: {product}");
+                compared += 1;
+            }
+        }
+        assert!(compared >= 100, "{shape:?}: {compared}");
     }
 }
 
@@ -182,7 +262,9 @@ fn densities_integrate_to_one_over_the_directions_that_meet_the_light() {
             for i in 0..n {
                 let direction = cone.direction(i, n);
                 let Some((met, hit)) = met(&shape, from, direction) else { continue };
-                let Some((number, light)) = lights.of_hit(OBJECT, hit.primitive) else { continue };
+                let Some((number, light)) = lights.of_hit(OBJECT, hit.primitive, Side::Front) else {
+                    continue;
+                };
                 sums[number as usize] +=
                     f64::from(light.pdf(from, Vec3::Y, &met) * cone.solid_angle()) / f64::from(n);
             }
@@ -240,19 +322,20 @@ fn a_mesh_s_triangles_find_the_light_that_they_belong_to() {
             texture: None,
             object: 3,
             part: Part::Listed,
+            side: Side::Front,
         })
     };
     let lights =
         Lights::new(vec![light(&[0, 4], 1.0), Light::Point(POINT), light(&[2], 2.0)], &CancelToken::new())
             .expect("nobody cancels");
-    let of_hit = |object, primitive| lights.of_hit(object, primitive).map(|(number, _)| number);
+    let of_hit = |object, primitive| lights.of_hit(object, primitive, Side::Front).map(|(number, _)| number);
     assert_eq!(
         [0, 1, 2, 3, 4, 5].map(|triangle| of_hit(3, triangle)),
         [Some(0), None, Some(2), None, Some(0), None]
     );
     assert_eq!(of_hit(4, 0), None);
     let met = LightHit { direction: Vec3::NEG_Z, distance: 2.0, normal: Vec3::Z, primitive: 2 };
-    let (_, light) = lights.of_hit(3, 2).expect("a light");
+    let (_, light) = lights.of_hit(3, 2, Side::Front).expect("a light");
     // d²/(A·cos) = 4/½.
     assert!((light.pdf(Vec3::ZERO, Vec3::Z, &met) - 8.0).abs() < 1e-5);
     assert_eq!(light.pdf(Vec3::ZERO, Vec3::Z, &LightHit { normal: Vec3::NEG_Z, ..met }), 0.0, "from behind");
@@ -265,7 +348,8 @@ fn mesh_light(triangles: &[[DVec3; 3]]) -> AreaLight {
     let mesh = MeshEmitter::new(numbered, &CancelToken::new()).expect("nobody cancels").expect("an area");
     let bounds = mesh.bounds();
     let (shape, radiance) = (Emitter::Mesh(mesh), Vec3::ONE);
-    AreaLight { shape, radiance, bounds, texture: None, object: OBJECT, part: Part::Listed }
+    let (side, part) = (Side::Front, Part::Listed);
+    AreaLight { shape, side, radiance, bounds, texture: None, object: OBJECT, part }
 }
 
 #[test]

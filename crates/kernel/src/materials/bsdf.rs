@@ -102,6 +102,9 @@ pub trait RoughPoint {
 
     /// Reflectance of ambient light.
     fn ambient(&self) -> Vec3;
+
+    /// The material with its colour multiplied by another one.
+    fn tinted(self, color: Vec3) -> Self;
 }
 
 /// Rough surfaces of one kind, side by side. All functions run inside of loops for each instruction set.

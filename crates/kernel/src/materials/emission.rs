@@ -4,29 +4,57 @@ use std::sync::Arc;
 
 use super::footprint::TexturePoint;
 use super::texture::Texture;
+use crate::choice;
 use crate::math::Vec3;
 
-/// Radiance of a front side.
+choice! {
+    /// Sides of a surface that emit.
+    pub enum EmissionSides {
+        /// The front.
+        Front = "front",
+        /// The front and the back alike.
+        Both = "both",
+    }
+}
+
+/// Radiance of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emission {
     /// Radiance; with a texture, the factor on it.
     pub scale: Vec3,
     /// Texture by which it is multiplied from point to point.
     pub texture: Option<Arc<Texture>>,
+    /// Sides that emit.
+    pub sides: EmissionSides,
 }
 
 impl Emission {
     /// No emission.
     pub const NONE: Self = Self::constant(Vec3::ZERO);
 
-    /// The same emission everywhere.
+    /// The same emission everywhere on the front.
     pub const fn constant(scale: Vec3) -> Self {
-        Self { scale, texture: None }
+        Self { scale, texture: None, sides: EmissionSides::Front }
     }
 
     /// Whether it may be above 0 somewhere.
     pub fn shines(&self) -> bool {
         self.scale != Vec3::ZERO
+    }
+
+    /// Whether both sides emit.
+    #[inline]
+    pub fn is_two_sided(&self) -> bool {
+        match self.sides {
+            EmissionSides::Front => false,
+            EmissionSides::Both => true,
+        }
+    }
+
+    /// Whether a side may emit.
+    #[inline]
+    pub fn shines_from(&self, is_front: bool) -> bool {
+        self.shines() && (is_front || self.is_two_sided())
     }
 
     /// The radiance at texture coordinates; adds to `lookups`.

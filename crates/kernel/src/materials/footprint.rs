@@ -55,7 +55,13 @@ impl Footprint {
 
     /// The longer axis in texels, for so many texels in a unit of u and of v.
     pub fn texels(&self, per_unit: Vec2) -> f32 {
-        let lengths = self.axes.map(|axis| (axis * per_unit).length());
+        self.longest(|axis| axis * per_unit)
+    }
+
+    /// The longer axis after a linear map.
+    #[inline]
+    pub fn longest(&self, map: impl Fn(Vec2) -> Vec2) -> f32 {
+        let lengths = self.axes.map(|axis| map(axis).length());
         lengths[0].max(lengths[1])
     }
 }

@@ -8,17 +8,23 @@ pub mod glass;
 pub mod mipmaps;
 pub mod mirror;
 pub mod normal_map;
+pub mod number;
+pub mod opacity;
+pub mod pane;
 pub mod phong;
 pub mod rough;
 pub mod texels;
 pub mod texture;
 
-pub use emission::Emission;
+pub use emission::{Emission, EmissionSides};
 pub use footprint::{Footprint, TexturePoint};
 pub use glass::Glass;
 pub use mipmaps::Mipmaps;
 pub use mirror::Mirror;
 pub use normal_map::NormalMap;
+pub use number::{Channel, Number, PixelNumber};
+pub use opacity::Opacity;
+pub use pane::Pane;
 pub use phong::Phong;
 pub use rough::{BsdfRow, Rough, RoughBsdf, RoughKind};
 
@@ -29,10 +35,12 @@ use crate::math::Vec3;
 pub struct Material {
     /// Scattering of arriving light.
     pub bsdf: Bsdf,
-    /// Radiance that its front side emits, the same in every direction.
+    /// Radiance that it emits, the same in every direction.
     pub emission: Emission,
     /// Normal map, which bends the shading normals.
     pub normal_map: Option<NormalMap>,
+    /// The chance that it is there. `None` if it is there everywhere.
+    pub opacity: Option<Opacity>,
 }
 
 impl Material {
@@ -40,18 +48,42 @@ impl Material {
     pub fn is_textured(&self) -> bool {
         let in_bsdf = match &self.bsdf {
             Bsdf::Rough(rough) => rough.constant().is_none(),
-            Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
+            Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => false,
         };
-        in_bsdf || self.normal_map.is_some() || self.emission.texture.is_some()
+        let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
+        in_bsdf || self.normal_map.is_some() || self.emission.texture.is_some() || of_opacity.is_some()
+    }
+
+    /// Whether light may pass it straight on.
+    #[inline]
+    pub fn lets_pass(&self) -> bool {
+        let is_pane = match &self.bsdf {
+            Bsdf::Pane(_) => true,
+            Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
+        };
+        is_pane || self.opacity.is_some()
+    }
+
+    /// The part of the light that passes straight on, at texture coordinates and the cosine of an angle of incidence; `color`
+    /// multiplies that of a pane. Adds to `lookups`.
+    pub fn passing(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
+        let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.at(at, lookups));
+        let through = match &self.bsdf {
+            Bsdf::Pane(pane) => pane.transmittance(cosine) * color,
+            Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) => Vec3::ZERO,
+        };
+        through * there + Vec3::splat(1.0 - there)
     }
 
     /// Whether any of its textures has mip levels.
     pub fn is_mipmapped(&self) -> bool {
         let in_bsdf = match &self.bsdf {
             Bsdf::Rough(rough) => rough.is_mipmapped(),
-            Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
+            Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => false,
         };
-        let others = [self.emission.texture.as_ref(), self.normal_map.as_ref().map(|map| &map.texture)];
+        let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
+        let of_normals = self.normal_map.as_ref().map(|map| &map.texture);
+        let others = [self.emission.texture.as_ref(), of_normals, of_opacity];
         in_bsdf || others.into_iter().flatten().any(|texture| texture.mipmaps.is_some())
     }
 }
@@ -65,6 +97,8 @@ pub enum Bsdf {
     Mirror(Mirror),
     /// A smooth dielectric.
     Glass(Glass),
+    /// A thin pane of glass.
+    Pane(Pane),
 }
 
 impl Bsdf {
@@ -73,7 +107,7 @@ impl Bsdf {
     pub fn is_delta(&self) -> bool {
         match self {
             Self::Rough(_) => false,
-            Self::Mirror(_) | Self::Glass(_) => true,
+            Self::Mirror(_) | Self::Glass(_) | Self::Pane(_) => true,
         }
     }
 
@@ -81,7 +115,7 @@ impl Bsdf {
     pub fn glass(&self) -> Option<&Glass> {
         match self {
             Self::Glass(glass) => Some(glass),
-            Self::Rough(_) | Self::Mirror(_) => None,
+            Self::Rough(_) | Self::Mirror(_) | Self::Pane(_) => None,
         }
     }
 
@@ -92,6 +126,7 @@ impl Bsdf {
             Self::Rough(rough) => rough.albedo(at, lookups),
             Self::Mirror(mirror) => mirror.reflectance,
             Self::Glass(glass) => glass.tint,
+            Self::Pane(pane) => pane.tint,
         }
     }
 }

@@ -23,6 +23,10 @@ impl NormalMap {
     pub fn bend(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
         let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
         let slope = mapped.truncate() * self.strength;
+        let slope = match &self.texture.moved {
+            None => slope,
+            Some(moved) => moved.vector_before(slope.as_dvec2()).as_vec2(),
+        };
         let (tangent, bitangent) = tangents(normal, dpdu, dpdv);
         let bent = tangent * slope.x + bitangent * slope.y + normal * mapped.z.abs();
         bent.try_normalize().unwrap_or(normal)
@@ -44,7 +48,7 @@ fn tangents(normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> (Vec3, Vec3) {
 mod tests {
     use super::*;
     use crate::materials::texels::{TexelData, Texels};
-    use crate::materials::texture::{TextureFilter, Wrap};
+    use crate::materials::texture::{Moved, TextureFilter, Wrap};
     use crate::math::{DVec2, Vec2};
 
     fn middle() -> TexturePoint {
@@ -60,8 +64,19 @@ mod tests {
             wrap: Wrap::Repeat,
             repeat: Vec2::ONE,
             mipmaps: None,
+            moved: None,
         };
         NormalMap { texture: Arc::new(texture), strength: 1.0 }
+    }
+
+    #[test]
+    fn slopes_turn_with_their_texture() {
+        let mut turned = map(Vec3::new(0.6, 0.0, 0.8));
+        let texture = Arc::make_mut(&mut turned.texture);
+        texture.moved = Moved::new(90.0, DVec2::ZERO).map(Box::new);
+        // The texture's first coordinate is −v.
+        let bent = turned.bend(&middle(), Vec3::Z, Vec3::X, Vec3::Y);
+        assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6, "{bent}");
     }
 
     #[test]

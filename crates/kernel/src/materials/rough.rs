@@ -104,6 +104,11 @@ macro_rules! kinds {
             pub fn ambient(&self) -> Vec3 {
                 match self { $(Self::$kind(own) => own.ambient()),+ }
             }
+
+            /// [`RoughPoint::tinted`].
+            pub fn tinted(self, color: Vec3) -> Self {
+                match self { $(Self::$kind(own) => Self::$kind(own.tinted(color))),+ }
+            }
         }
 
         // With a single kind, its pattern always fits.

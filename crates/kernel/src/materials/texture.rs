@@ -8,7 +8,8 @@ use super::texels::Texels;
 use crate::choice;
 use crate::math::elementary::log2;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
-use crate::math::{Vec2, Vec3};
+use crate::math::transform::sin_cos_degrees;
+use crate::math::{DVec2, Vec2, Vec3};
 
 choice! {
     /// Texture interpolation.
@@ -47,6 +48,57 @@ pub struct Texture {
     pub wrap: Wrap,
     /// Number of repetitions in u and v.
     pub repeat: Vec2,
+    /// Motion of the repeated coordinates. `None` if they stay.
+    pub moved: Option<Box<Moved>>,
+}
+
+/// Motion of texture coordinates: a rotation, then a translation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moved {
+    /// Sine and cosine of the angle, from u to v.
+    turn: (f64, f64),
+    /// Translation.
+    offset: DVec2,
+}
+
+impl Moved {
+    /// The motion by an angle in degrees about the origin, then by an offset. `None` if it changes nothing.
+    pub fn new(degrees: f64, offset: DVec2) -> Option<Self> {
+        let is_moved = degrees != 0.0 || offset != DVec2::ZERO;
+        is_moved.then(|| Self { turn: sin_cos_degrees(degrees), offset })
+    }
+
+    /// The moved coordinates.
+    #[inline]
+    fn point(&self, at: DVec2) -> DVec2 {
+        self.vector(at) + self.offset
+    }
+
+    /// A moved difference of coordinates.
+    #[inline]
+    fn vector(&self, by: DVec2) -> DVec2 {
+        let (sin, cos) = self.turn;
+        DVec2::new(by.x * cos - by.y * sin, by.x * sin + by.y * cos)
+    }
+
+    /// The difference of coordinates that moves to this one.
+    #[inline]
+    pub fn vector_before(&self, moved: DVec2) -> DVec2 {
+        let (sin, cos) = self.turn;
+        DVec2::new(moved.x * cos + moved.y * sin, moved.y * cos - moved.x * sin)
+    }
+
+    /// Repeated and moved coordinates, side by side.
+    #[cold]
+    #[inline(never)]
+    fn row(&self, uv: &[[f64; LANES]; 2], repeat: DVec2) -> [[f64; LANES]; 2] {
+        let mut row = *uv;
+        for i in 0..LANES {
+            let moved = self.point(DVec2::new(uv[0][i], uv[1][i]) * repeat);
+            (row[0][i], row[1][i]) = (moved.x, moved.y);
+        }
+        row
+    }
 }
 
 /// A colour, or a texture of colours.
@@ -91,6 +143,7 @@ impl Texture {
     /// The linear value at texture coordinates, v = 0 at the bottom row; coordinates that are not finite count as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tiles = at.uv * self.repeat.as_dvec2();
+        let tiles = self.moved.as_ref().map_or(tiles, |moved| moved.point(tiles));
         let folded = [tiles.x, tiles.y].map(|x| self.wrap.fold(finite(x)) as f32);
         match self.filter {
             TextureFilter::Nearest => self.nearest(folded),
@@ -101,18 +154,23 @@ impl Texture {
 
     /// Number of texels in a unit of u and v.
     pub fn texels_across(&self) -> [f64; 2] {
-        let across = size(&self.texels).as_dvec2() * self.repeat.as_dvec2();
-        across.abs().to_array()
+        let (size, repeat) = (size(&self.texels).as_dvec2(), self.repeat.as_dvec2());
+        let Some(moved) = &self.moved else { return (size * repeat).abs().to_array() };
+        let along = |axis: DVec2| (moved.vector(axis * repeat) * size).length();
+        [along(DVec2::X), along(DVec2::Y)]
     }
 
     /// [`Texture::lookup`] side by side, for a texture without mip levels.
     #[inline(always)]
     pub fn lookup_row(&self, uv: &[[f64; LANES]; 2]) -> Lanes3 {
         let (texels, size) = (&*self.texels, size(&self.texels));
-        let folded = [
-            self.wrap.fold_row(&uv[0], f64::from(self.repeat.x)),
-            self.wrap.fold_row(&uv[1], f64::from(self.repeat.y)),
-        ];
+        let (moved, mut uv, mut repeat) = (&self.moved, uv, self.repeat.as_dvec2());
+        let row;
+        if let Some(moved) = moved {
+            row = moved.row(uv, repeat);
+            (uv, repeat) = (&row, DVec2::ONE);
+        }
+        let folded = [self.wrap.fold_row(&uv[0], repeat.x), self.wrap.fold_row(&uv[1], repeat.y)];
         let extent = [texels.width as i32, texels.height as i32];
         let (mut first, mut part) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);
         let shift = match self.filter {
@@ -157,7 +215,13 @@ impl Texture {
 
     /// The level at which the footprint is one texel, from 0 on; with a fraction between two levels.
     fn level(&self, footprint: &Footprint) -> f32 {
-        let texels = footprint.texels(size(&self.texels) * self.repeat);
+        let texels = match &self.moved {
+            None => footprint.texels(size(&self.texels) * self.repeat),
+            Some(moved) => {
+                let size = size(&self.texels);
+                footprint.longest(|axis| moved.vector((axis * self.repeat).as_dvec2()).as_vec2() * size)
+            }
+        };
         if texels > 1.0 { log2(texels) } else { 0.0 }
     }
 
@@ -287,13 +351,12 @@ fn finite(x: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::materials::texels::TexelData;
-    use crate::math::DVec2;
 
     /// A texture of [[0, 1], [2, 3]], bottom row first.
     fn numbered(filter: TextureFilter, wrap: Wrap) -> Texture {
         let data = [2.0, 3.0, 0.0, 1.0].map(Vec3::splat).to_vec();
         let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data), unusable: 0 });
-        Texture { texels, mipmaps: None, filter, wrap, repeat: Vec2::ONE }
+        Texture { texels, mipmaps: None, filter, wrap, repeat: Vec2::ONE, moved: None }
     }
 
     fn bilinear(wrap: Wrap, u: f32, v: f32) -> f32 {
@@ -322,6 +385,22 @@ mod tests {
         repeated.repeat = Vec2::new(2.0, 1.0);
         assert_eq!(repeated.lookup(&TexturePoint::sharp(DVec2::new(0.6, 0.1))).x, 0.0);
         assert_eq!(repeated.lookup(&TexturePoint::sharp(DVec2::new(0.4, 0.1))).x, 1.0);
+    }
+
+    #[test]
+    fn coordinates_are_repeated_then_turned_then_moved() {
+        let at = |texture: &Texture, u: f64, v: f64| texture.lookup(&TexturePoint::sharp(DVec2::new(u, v))).x;
+        let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
+        texture.repeat = Vec2::new(2.0, 1.0);
+        texture.moved = Moved::new(90.0, DVec2::new(0.0, 0.5)).map(Box::new);
+        // (u, v) becomes (−v, 2u + ½): (.1, .3) is looked up at (−.3, .7), which is (.7, .7).
+        assert_eq!(at(&texture, 0.1, 0.3), 3.0);
+        assert_eq!(at(&texture, 0.1, 0.7), 2.0);
+        assert_eq!(at(&texture, 0.3, 0.3), 1.0);
+        assert_eq!(texture.texels_across(), [4.0, 2.0]);
+        assert_eq!(Moved::new(0.0, DVec2::ZERO), None);
+        let (sin, cos) = Moved::new(-270.0, DVec2::ZERO).expect("it turns").turn;
+        assert_eq!((sin, cos), (1.0, 0.0));
     }
 
     #[test]
@@ -362,9 +441,13 @@ mod tests {
             let texels = Arc::new(Texels { width, height, data, unusable: 0 });
             for filter in [TextureFilter::Nearest, TextureFilter::Bilinear] {
                 for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
-                    for repeat in [Vec2::ONE, Vec2::new(2.5, -3.0)] {
+                    for (repeat, degrees) in
+                        [(Vec2::ONE, 0.0), (Vec2::new(2.5, -3.0), 0.0), (Vec2::new(2.0, 3.0), 25.0)]
+                    {
                         let texels = Arc::clone(&texels);
-                        let texture = Texture { texels, mipmaps: None, filter, wrap, repeat };
+                        let moved = Moved::new(degrees, DVec2::new(degrees, 0.25)).filter(|_| degrees != 0.0);
+                        let moved = moved.map(Box::new);
+                        let texture = Texture { texels, mipmaps: None, filter, wrap, repeat, moved };
                         for first in 0..60 {
                             let u = std::array::from_fn(|i| number(first + i));
                             let v = std::array::from_fn(|i| number(first + 5 * i));

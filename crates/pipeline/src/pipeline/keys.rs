@@ -87,7 +87,10 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
         match object.material.map(|index| &scene.materials[index]) {
             Some(material) if !material.emits() => {}
             Some(material) => {
-                key.index(number).add(&object.shape, of).add(&material.emission, of);
+                key.index(number)
+                    .add(&object.shape, of)
+                    .add(&material.emission, of)
+                    .add(&material.opacity, of);
             }
             // The file's own materials may emit.
             None => {
@@ -125,6 +128,7 @@ pub(in crate::pipeline) fn surfaces(scene: &Scene, of: &Referents<'_>, textures:
             Some(index) => key.index(1).add(&scene.materials[index], of),
             None => key.index(0),
         };
+        key.flag(object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors));
     }
     for texture in textures {
         key.key(texture);

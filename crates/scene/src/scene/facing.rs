@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use super::description::{Camera, Mesh, Object, Scene, Shape, greatest};
+use super::description::{Camera, EmissionSides, Mesh, Object, Scene, Shape, greatest};
 use crate::math::DVec3;
-use crate::math::transform::Transform;
 
 /// Warning about such a light, with its label and the way out.
 pub(super) const MESSAGE: &str = "this light shines away from everything";
@@ -17,10 +16,13 @@ pub type MeshBounds = Option<[DVec3; 2]>;
 /// Least ratio of a reach in front of a light to the reach behind it that counts: a ceiling just above the light does not.
 const LEAST: f64 = 0.02;
 
-/// Quads that send light where nothing is, while all that they could light is behind them. Asks for the bounds of the scene's
+/// Quads that send light from their front alone where nothing is, while all that they could light is behind them. Asks for the bounds of the scene's
 /// mesh files only if there are such lights.
 pub(super) fn away(scene: &Scene, bounds: impl FnOnce() -> Vec<MeshBounds>) -> Vec<Range<usize>> {
-    let emits = |object: &Object| object.material.is_some_and(|index| scene.materials[index].emits());
+    let emits = |object: &Object| {
+        let material = object.material.map(|index| &scene.materials[index]);
+        material.is_some_and(|material| material.emits() && material.emission.sides == EmissionSides::Front)
+    };
     let quad = |object: &Object| {
         let Shape::Quad { corner, u, v } = object.shape else { return None };
         let front = u.cross(v).try_normalize()?;
@@ -67,8 +69,7 @@ fn furthest(shape: &Shape, bounds: &[MeshBounds], direction: DVec3) -> f64 {
 
 /// The corners of a mesh's box where the scene has it.
 fn corners(mesh: &Mesh, [least, greatest]: [DVec3; 2]) -> [DVec3; 8] {
-    let &Mesh { scale, rotate, translate, .. } = mesh;
-    let place = Transform::scale_rotate_translate(scale, rotate, translate);
+    let place = mesh.placed.transform();
     std::array::from_fn(|number| {
         let far = DVec3::new((number & 1) as f64, (number >> 1 & 1) as f64, (number >> 2) as f64);
         place.point(least + (greatest - least) * far)

@@ -145,7 +145,9 @@ fn a_mesh_file_is_listed_once_however_it_is_written() {
         .objects
         .iter()
         .map(|object| match object.shape {
-            Shape::Mesh(Mesh { file, scale, smooth, .. }) => (file, scale, smooth, object.material),
+            Shape::Mesh(Mesh { file, placed: Placement::Steps { scale, .. }, smooth, .. }) => {
+                (file, scale, smooth, object.material)
+            }
             _ => panic!("not a mesh"),
         })
         .collect();

@@ -21,6 +21,10 @@ pub fn shade(
     tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let Some(hit) = hit else { continue };
+        let passed =
+            if tile.world.has_passable() { Some(tile.first_there(path, hit, counters)) } else { None };
+        let Some((path, hit)) = passed.unwrap_or(Some((*path, *hit))) else { continue };
+        let (path, hit) = (&path, &hit);
         let vertex = Vertex::new(tile, path, hit);
         let surface = &vertex.surface;
         let value = match number {
@@ -32,7 +36,9 @@ pub fn shade(
             }
             FirstHit::Uv => fraction(surface.uv).as_vec2().extend(0.0),
             FirstHit::Albedo => {
-                vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups)
+                let albedo =
+                    vertex.material.bsdf.albedo(&vertex.texture_point, &mut counters.texture_lookups);
+                vertex.tinted(albedo)
             }
         };
         radiance[path.slot as usize] = value * path.throughput;

@@ -22,13 +22,13 @@ use super::transport::scatter::Continuation;
 use super::transport::scratch::Scratch;
 use super::transport::tile::TileContext;
 use super::transport::vertex::{ShadingVertex, Vertex};
-use super::transport::walk::{OpaqueHit, Reached, Walker, walk};
+use super::transport::walk::{OpaqueHit, Reached, Straight, Walker, walk};
 use super::view::Measure;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::geometry::surface_rows::SurfaceRow;
-use crate::materials::{Bsdf, Mirror, Rough};
+use crate::materials::{Bsdf, Mirror, Pane, Rough};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
 use crate::scene::description::Shadows;
@@ -158,14 +158,45 @@ impl<'a> Walker<'a> for Wavefront<'a, '_> {
                     match &vertex.material.bsdf {
                         Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
-                        Bsdf::Glass(_) => {}
+                        Bsdf::Glass(_) | Bsdf::Pane(_) => {}
                     }
                 }
             }
-            Reached::Glass(vertex, far) if self.goes_on() => self.shade_glass(path, vertex, far),
+            Reached::Glass(vertex, hit, far) => {
+                if self.arrive(path, vertex, OpaqueHit::Own(hit)) {
+                    self.shade_glass(path, vertex, far);
+                }
+            }
             Reached::Hidden if self.goes_on() => self.next.push(*path),
-            Reached::Glass(..) | Reached::Hidden => {}
+            Reached::Hidden => {}
             Reached::Nothing => self.leave(path),
+        }
+    }
+
+    fn lookups(&mut self) -> &mut u64 {
+        &mut self.counters.texture_lookups
+    }
+
+    fn meet_pane(&mut self, path: &PathRay, vertex: &Vertex<'a>, hit: OpaqueHit, pane: &Pane) -> Straight {
+        let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.to_eye));
+        let tint = vertex.tinted(pane.tint);
+        let left = tint * (1.0 - reflectance);
+        // After the last scattering, only what goes straight on finds light.
+        if !self.arrive(path, vertex, hit) {
+            return Straight::Passes(left);
+        }
+        let shading = vertex.shading(self.counters);
+        let mirrored = |weight: f32| reflected(path, vertex, &shading, Vec3::splat(weight));
+        let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
+        let splits = self.tile.behaviour.splits && path.state.only_specular_before;
+        if weaker >= LEAST_SPLIT && splits {
+            self.push_reflected(mirrored(reflectance));
+            Straight::Passes(left)
+        } else if self.tile.chooses_reflection(path, reflectance) {
+            self.push_reflected(mirrored(1.0));
+            Straight::Ends
+        } else {
+            Straight::Passes(tint)
         }
     }
 }
@@ -365,13 +396,16 @@ impl Wavefront<'_, '_> {
         // Look up no more textures than the picture shows.
         if !self.accumulator.takes_reflected() {
             if takes_ambient {
-                let reflectance = rough.ambient_at(at, lookups);
+                let reflectance = vertex.tinted(rough.ambient_at(at, lookups));
                 self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * reflectance);
             }
             return;
         }
-        let bsdf =
-            if self.accumulator.measure.is_colored() { rough.at(at, lookups) } else { rough.bleached() };
+        let bsdf = if self.accumulator.measure.is_colored() {
+            vertex.tinted_bsdf(rough.at(at, lookups))
+        } else {
+            rough.bleached()
+        };
         if takes_ambient {
             self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient());
         }
@@ -386,7 +420,7 @@ impl Wavefront<'_, '_> {
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {
         let shading = vertex.shading(self.counters);
-        self.push_reflected(reflected(path, vertex, &shading, mirror.reflectance));
+        self.push_reflected(reflected(path, vertex, &shading, vertex.tinted(mirror.reflectance)));
     }
 
     fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: Medium) {

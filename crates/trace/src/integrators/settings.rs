@@ -68,9 +68,9 @@ impl RenderSettings {
                 Lookups { diffuse: false, specular: false, ambient: false, ..Lookups::ALL }
             }
             Shown::Light(Measure::Radiance(parts)) if !parts.are_reflected() => {
-                // Mirrors and glass, through which such parts are visible too, have no normal maps.
+                // Such parts are visible by mirrors and through glass too.
                 let ambient = parts.ambient && self.effective().render.ambient != Vec3::ZERO;
-                Lookups { ambient, lights: parts.emitted, ..Lookups::NONE }
+                Lookups { ambient, lights: parts.emitted, delta_normals: true, ..Lookups::NONE }
             }
             // Boxes are drawn over the picture.
             Shown::Light(Measure::Radiance(_) | Measure::Work) | Shown::Bounds | Shown::Film(_) => {

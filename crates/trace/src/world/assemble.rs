@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::straight::Passable;
 use super::{Bodies, Camera, Geometry, ObjectMaterial, Parts, World, lower};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
@@ -27,8 +28,14 @@ impl World {
             bodies,
             glass_at_eye: Vec::new(),
             is_mipmapped,
+            colored: colored(scene),
+            passable: None,
         };
-        Self { glass_at_eye: world.find_glass_at_eye(), ..world }
+        Self {
+            glass_at_eye: world.find_glass_at_eye(),
+            passable: Passable::of(&world).map(Box::new),
+            ..world
+        }
     }
 }
 
@@ -36,6 +43,14 @@ fn bodies_of(scene: &Scene, parts: &Parts) -> Bodies {
     let meshes: Vec<&LoadedMesh> = parts.meshes.iter().map(|mesh| mesh.loaded()).collect();
     // A token that nobody cancels.
     Bodies::find(scene, &meshes, &CancelToken::new()).unwrap_or_default()
+}
+
+/// Whether the vertex colours of each object count. `None` if those of none do.
+fn colored(scene: &Scene) -> Option<Box<[bool]>> {
+    let is_colored =
+        |object: &description::Object| object.shape.mesh().is_some_and(|mesh| mesh.vertex_colors);
+    let all: Box<[bool]> = scene.objects.iter().map(is_colored).collect();
+    all.contains(&true).then_some(all)
 }
 
 /// The scene's materials, then each mesh file's, then the one for triangles without any.

@@ -2,19 +2,19 @@
 
 use std::sync::Arc;
 
-use super::lower::{emission, file_emission};
+use super::lower::{emission, file_emission, opacity};
 use super::{Geometry, Images, MeshInstance, Object};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
 use crate::lights::{
     AreaLight, Ball, Chart, DirectionalLight, EmissionTexture, Environment, Light, LightBounds, Lights,
-    Patch, PhotonSource, PointLight, SkyMap, SpotLight, area_light,
+    Patch, PhotonSource, PointLight, Side, SkyMap, SpotLight, area_light, back_light,
 };
 use crate::lights::{Emitter, Part};
-use crate::materials::Emission;
 use crate::materials::texels::Texels;
-use crate::math::DVec3;
+use crate::materials::{Emission, EmissionSides, Opacity};
+use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Scene};
 
 /// The map of the environment, from the texels of its file. `None` if they are black.
@@ -23,7 +23,7 @@ pub fn sky(texels: &Arc<Texels>) -> Option<Arc<SkyMap>> {
 }
 
 /// The lights of a scene with these objects: those without extent first, then the environment, then the objects that emit.
-/// A mesh is a light for each of its emitting materials. `sky` is the environment's map, if it has one.
+/// A mesh is a light for each of its emitting materials. What emits from both sides is two lights. `sky` is the environment's map, if it has one.
 ///
 /// # Errors
 /// [`Cancelled`] if the token is cancelled.
@@ -37,19 +37,22 @@ pub fn lights(
     let points = scene.lights.iter().filter(|light| light.sends());
     let points = points.map(|light| described(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
-    let emissions: Vec<Emission> =
-        scene.materials.iter().map(|material| lit(emission(scene, images, &material.emission))).collect();
+    let shining = scene.materials.iter().map(|material| {
+        let emission = lit(emission(scene, images, &material.emission));
+        Shining::new(emission, opacity(scene, images, &material.opacity))
+    });
+    let shining: Vec<Shining> = shining.collect();
     let environment = scene.environment.as_ref().and_then(|environment| around(environment, sky));
     let mut all: Vec<Light> = points.chain(environment.map(Light::Environment)).collect();
     for ((id, object), described) in objects {
-        let emission = described.material.map(|index| &emissions[index]);
+        let shining = described.material.map(|index| &shining[index]);
         match object {
             Object::Shape(shape) => {
-                let light = emission.and_then(|emission| shape_light(shape, emission, id));
-                all.extend(light.map(Light::Area));
+                let lights = shining.into_iter().flat_map(|shining| shape_lights(shape, shining, id));
+                all.extend(lights.map(Light::Area));
             }
             Object::Mesh(mesh) => {
-                all.extend(mesh_lights(id, mesh, emission, images, token)?.into_iter().map(Light::Area));
+                all.extend(mesh_lights(id, mesh, shining, images, token)?.into_iter().map(Light::Area));
             }
         }
     }
@@ -103,58 +106,106 @@ fn lit(emission: Emission) -> Emission {
     }
 }
 
-/// The light of a shape that emits.
-fn shape_light(shape: &Shape, emission: &Emission, object: u32) -> Option<AreaLight> {
-    let light = area_light(shape, emission.scale, object).filter(|_| emission.shines())?;
-    let light = AreaLight { bounds: of_mean(light.bounds, emission), ..light };
-    Some(match &emission.texture {
-        Some(texture) => light.with_texture(EmissionTexture::new(texture, Chart::Shape(*shape))),
-        None => light,
-    })
+/// Emission of a material, as far as the material is there.
+#[derive(Clone)]
+struct Shining {
+    /// The emission; the same opacity everywhere is a factor of it.
+    emission: Emission,
+    /// The opacity, if it differs from point to point.
+    opacity: Option<Opacity>,
 }
 
-/// Bounds of a lamp as bright as the mean of its texture.
-fn of_mean(bounds: LightBounds, emission: &Emission) -> LightBounds {
-    emission.texture.as_ref().map_or(bounds, |texture| bounds.times(texture.mean()))
+impl Shining {
+    fn new(emission: Emission, opacity: Option<Opacity>) -> Self {
+        match opacity.as_ref().and_then(Opacity::constant) {
+            Some(part) => {
+                Self { emission: Emission { scale: emission.scale * part, ..emission }, opacity: None }
+            }
+            None => Self { emission, opacity },
+        }
+    }
+
+    /// The sides that emit.
+    fn sides(&self) -> &'static [Side] {
+        match (self.emission.shines(), self.emission.sides) {
+            (false, _) => &[],
+            (true, EmissionSides::Front) => &[Side::Front],
+            (true, EmissionSides::Both) => &[Side::Front, Side::Back],
+        }
+    }
+
+    /// Bounds of a lamp as bright as the mean of its textures.
+    fn mean_of(&self, bounds: LightBounds) -> LightBounds {
+        let texture = self.emission.texture.as_ref();
+        let bounds = texture.map_or(bounds, |texture| bounds.times(texture.mean()));
+        self.opacity.as_ref().map_or(bounds, |opacity| bounds.times(Vec3::splat(opacity.mean())))
+    }
+
+    /// The factor that differs from point to point, with these texture coordinates.
+    fn texture(&self, chart: Chart) -> Option<EmissionTexture> {
+        EmissionTexture::new(self.emission.texture.as_ref(), self.opacity.as_ref(), chart)
+    }
+
+    /// Whether anything differs from point to point.
+    fn is_textured(&self) -> bool {
+        self.emission.texture.is_some() || self.opacity.is_some()
+    }
+}
+
+/// The lights of a shape that emits: one for each side.
+fn shape_lights(shape: &Shape, shining: &Shining, object: u32) -> impl Iterator<Item = AreaLight> {
+    let of_side = move |side: &Side| {
+        let light = match side {
+            Side::Front => area_light(shape, shining.emission.scale, object)?,
+            Side::Back => back_light(shape, shining.emission.scale, object)?,
+        };
+        let light = AreaLight { bounds: shining.mean_of(light.bounds), ..light };
+        Some(match shining.texture(Chart::Shape(*shape)) {
+            Some(texture) => light.with_texture(texture),
+            None => light,
+        })
+    };
+    shining.sides().iter().filter_map(of_side)
 }
 
 /// Lights of a mesh whose triangles all have this emission. `None` stands for the emission of their own materials.
 fn mesh_lights(
     object: u32,
     mesh: &MeshInstance,
-    emission: Option<&Emission>,
+    shining: Option<&Shining>,
     images: &Images,
     token: &CancelToken,
 ) -> Result<Vec<AreaLight>, Cancelled> {
     let loaded = mesh.tree.loaded();
-    let emissions: Vec<(Option<u32>, Emission)> = match emission {
-        Some(emission) => vec![(None, emission.clone())],
+    let all: Vec<(Option<u32>, Shining)> = match shining {
+        Some(shining) => vec![(None, shining.clone())],
         None => {
-            let of_file = |material| lit(file_emission(images, material));
+            let of_file = |material| Shining::new(lit(file_emission(images, material)), None);
             (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), of_file(material))).collect()
         }
     };
-    let light = |(own, emission): (Option<u32>, Emission)| -> Result<Option<AreaLight>, Cancelled> {
-        let triangles = triangles_of(mesh, own).map(|id| (mesh.world_corners(id), id)).collect();
-        let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
-        let bounds = of_mean(emitter.bounds().times(emission.scale), &emission);
-        let texture = emission.texture.as_ref().map(|texture| {
-            let patch =
-                |id| Patch { primitive: id, corners: mesh.world_corners(id), uvs: mesh.corner_uvs(id) };
-            let patches = triangles_of(mesh, own).map(patch).collect();
-            Box::new(EmissionTexture::new(texture, Chart::Triangles(patches)))
-        });
-        Ok(Some(AreaLight {
-            shape: Emitter::Mesh(emitter),
-            radiance: emission.scale,
-            texture,
-            object,
-            part: Part::Listed,
-            bounds,
-        }))
-    };
-    let lights = emissions.into_iter().filter(|(_, emission)| emission.shines()).map(light);
-    lights.filter_map(Result::transpose).collect()
+    let light =
+        |(own, shining, side): (Option<u32>, &Shining, Side)| -> Result<Option<AreaLight>, Cancelled> {
+            let corners = |id| match (mesh.world_corners(id), side) {
+                (corners, Side::Front) => corners,
+                ([a, b, c], Side::Back) => [a, c, b],
+            };
+            let triangles = triangles_of(mesh, own).map(|id| (corners(id), id)).collect();
+            let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
+            let radiance = shining.emission.scale;
+            let bounds = shining.mean_of(emitter.bounds().times(radiance));
+            let patches = || {
+                let patch =
+                    |id| Patch { primitive: id, corners: mesh.world_corners(id), uvs: mesh.corner_uvs(id) };
+                Chart::Triangles(triangles_of(mesh, own).map(patch).collect())
+            };
+            let texture = if shining.is_textured() { shining.texture(patches()).map(Box::new) } else { None };
+            let (shape, part) = (Emitter::Mesh(emitter), Part::Listed);
+            Ok(Some(AreaLight { shape, side, radiance, texture, object, part, bounds }))
+        };
+    let of_sides =
+        all.iter().flat_map(|(own, shining)| shining.sides().iter().map(move |&side| (*own, shining, side)));
+    of_sides.map(light).filter_map(Result::transpose).collect()
 }
 
 /// The triangles of one of the mesh file's own materials. `None` stands for all triangles.
@@ -193,8 +244,8 @@ mod tests {
         ] {
             let transform = Transform::scale_rotate_translate(scale, turned, at);
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
-            let emission = Emission::constant(Vec3::ONE);
-            let lights = mesh_lights(0, &mesh, Some(&emission), &Images::default(), &CancelToken::new())
+            let shining = Shining::new(Emission::constant(Vec3::ONE), None);
+            let lights = mesh_lights(0, &mesh, Some(&shining), &Images::default(), &CancelToken::new())
                 .expect("nobody cancels");
             let lights = lights.into_iter().map(Light::Area).collect();
             let lights = Arc::new(Lights::new(lights, &CancelToken::new()).expect("nobody cancels"));

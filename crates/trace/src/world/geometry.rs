@@ -6,8 +6,8 @@ use crate::accel::{Bvh, Instructions};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Asked, Ray, ShapeHit, SurfacePoint};
 use crate::lights::Source;
-use crate::math::DVec3;
-use crate::math::transform::Transform;
+use crate::math::color::srgb8_to_linear;
+use crate::math::{DVec3, Vec3};
 use crate::scene::description::{self, Lowered, Scene};
 
 use super::isolated::Isolated;
@@ -121,6 +121,11 @@ impl Geometry {
     #[inline(always)]
     pub(super) fn has_merged(&self) -> bool {
         self.merged.is_some()
+    }
+
+    /// Whether an object is among the merged meshes.
+    pub(super) fn is_merged(&self, object: u32) -> bool {
+        self.merged.as_ref().is_some_and(|merged| merged.meshes.has(object))
     }
 
     /// Whether a light is all of a merged object: shadow rays to it visit the trees of each mesh.
@@ -268,6 +273,16 @@ impl Geometry {
         materials.get(triangle as usize).copied().filter(|&own| own != u32::MAX)
     }
 
+    /// The vertex colour at a hit, interpolated in linear light. `None` if the mesh has none.
+    pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
+        let mesh = &self.objects[hit.object as usize].mesh()?.tree.loaded().mesh;
+        let corners = mesh.triangles.get(hit.shape.primitive as usize)?;
+        let color = |vertex: u32| mesh.colors.get(vertex as usize).map(|color| srgb8_to_linear(*color));
+        let [a, b, c] = corners.map(color);
+        let (u, v) = (hit.shape.u, hit.shape.v);
+        Some(a? * (1.0 - u - v) + b? * u + c? * v)
+    }
+
     /// Bytes of the objects and of the tree over them, without those of meshes.
     pub fn own_memory_bytes(&self) -> usize {
         let of_merged = |merged: &Merged| merged.meshes.memory_bytes() + merged.over.memory_bytes();
@@ -315,8 +330,7 @@ fn lowered(
         Lowered::Mesh(mesh) => mesh,
     };
     let tree = &meshes[mesh.file];
-    let placed = Transform::scale_rotate_translate(mesh.scale, mesh.rotate, mesh.translate);
-    let transform = placed.between(tree.loaded().mesh.origin, origin);
+    let transform = mesh.placed.transform().between(tree.loaded().mesh.origin, origin);
     let instance = MeshInstance::new(Arc::clone(tree), transform, mesh.smooth);
     if instance.smooth {
         instance.tree.prepare_normals(token)?;
@@ -328,8 +342,8 @@ fn lowered(
 mod tests {
     use super::*;
     use crate::geometry::ray::offset_origin;
-    use crate::math::Vec3;
     use crate::math::random::signed as random;
+    use crate::math::transform::Transform;
     use crate::world::merged::tests::mesh;
 
     /// Merged meshes, meshes of few triangles, and large ones with trees of their own, some of them moved.

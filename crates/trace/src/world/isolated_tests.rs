@@ -8,7 +8,7 @@ use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
 use crate::geometry::{Asked, Ray};
 use crate::math::{DVec3, Vec3};
-use crate::scene::description::{Accel, Located, Mesh, Object, Scene, Shape};
+use crate::scene::description::{Accel, Located, Mesh, Object, Placement, Scene, Shape};
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
@@ -53,7 +53,8 @@ impl Build {
         self.meshes.push(Arc::new(tree));
         self.scene.mesh_files.push(Located { value: PathBuf::new(), span: 0..0 });
         let file = self.meshes.len() - 1;
-        self.shape(Shape::Mesh(Mesh { file, scale, rotate, translate, smooth: false }), material)
+        let placed = Placement::Steps { scale, rotate, translate };
+        self.shape(Shape::Mesh(Mesh { file, placed, smooth: false, vertex_colors: false }), material)
     }
 
     fn world(self) -> World {

@@ -7,10 +7,14 @@ use super::textures::{TextureSource, declared_source, file_source};
 use super::{Image, Images};
 use crate::assets::FileMaterial;
 use crate::materials::texels::{TexelData, Texels};
-use crate::materials::texture::{Color, Texture, TextureFilter, Wrap};
-use crate::materials::{Bsdf, Emission, Glass, Material, Mirror, NormalMap, Phong, Rough};
+use crate::materials::texture::{Color, Moved, Texture, TextureFilter, Wrap};
+use crate::materials::{
+    Bsdf, Emission, Glass, Material, Mirror, NormalMap, Number, Opacity, Pane, Phong, Rough,
+};
 use crate::math::{DVec3, Vec2, Vec3};
-use crate::scene::description::{self, ColorSource, EmissionSource, MaterialKind, Scene, TextureUse};
+use crate::scene::description::{
+    self, ColorSource, EmissionSource, MaterialKind, NumberSource, OpacitySource, Scene, TextureUse,
+};
 
 /// A material of the scene file.
 pub fn material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
@@ -24,19 +28,33 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
         })),
         MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: *reflectance }),
         MaterialKind::Glass { ior, tint } => Bsdf::Glass(Glass::new(*ior, *tint)),
+        MaterialKind::Pane { ior, tint } => Bsdf::Pane(Pane { ior: *ior, tint: *tint }),
     };
     let emission = emission(scene, images, &material.emission);
     let normal_map = material.normal_map.map(|map| NormalMap {
         texture: declared_texture(scene, images, map.texture, TextureUse::Normal),
         strength: map.strength,
     });
-    Material { bsdf, emission, normal_map }
+    Material { bsdf, emission, normal_map, opacity: opacity(scene, images, &material.opacity) }
+}
+
+/// Opacity of a material of the scene file. `None` if the material is there everywhere.
+pub fn opacity(scene: &Scene, images: &Images, source: &OpacitySource) -> Option<Opacity> {
+    let value = match source.value {
+        _ if source.is_full() => return None,
+        NumberSource::Constant(value) => Number::Constant(value),
+        NumberSource::Texture { .. } => {
+            let (texture, number) = source.texture()?;
+            Number::Texture(declared_texture(scene, images, texture, TextureUse::Number(number)))
+        }
+    };
+    Some(Opacity { value, cutoff: source.cutoff })
 }
 
 /// Emission of a material of the scene file.
 pub fn emission(scene: &Scene, images: &Images, emission: &EmissionSource) -> Emission {
     let texture = emission.texture.map(|index| declared_texture(scene, images, index, TextureUse::Color));
-    Emission { scale: emission.scale, texture }
+    Emission { scale: emission.scale, texture, sides: emission.sides }
 }
 
 /// Kind of a material of a mesh file. Models 3, 5 and 8 of the MTL format with a highlight are mirrors, 4, 6, 7 and 9 glass.
@@ -82,7 +100,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     }
     let texture = own.emission_texture.as_ref();
     let texture = texture.map(|path| file_texture(images, &file_source(path, TextureUse::Color)));
-    Emission { scale: own.emission, texture }
+    Emission { texture, ..Emission::constant(own.emission) }
 }
 
 /// A material of a mesh file. The highlight's strength k becomes ks = 2k/(α + 2).
@@ -92,7 +110,7 @@ pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
         (FileKind::Glass, Some((ior, tint))) => Bsdf::Glass(Glass::new(ior, tint)),
         (FileKind::Phong | FileKind::Glass, _) => return file_phong(images, own),
     };
-    Material { bsdf, emission: Emission::NONE, normal_map: None }
+    Material { bsdf, emission: Emission::NONE, normal_map: None, opacity: None }
 }
 
 fn file_phong(images: &Images, own: &FileMaterial) -> Material {
@@ -111,7 +129,12 @@ fn file_phong(images: &Images, own: &FileMaterial) -> Material {
         .normal_texture
         .as_ref()
         .map(|path| NormalMap { texture: texture(path, TextureUse::Normal), strength: 1.0 });
-    Material { bsdf: Bsdf::Rough(Rough::Phong(phong)), emission: file_emission(images, own), normal_map }
+    Material {
+        bsdf: Bsdf::Rough(Rough::Phong(phong)),
+        emission: file_emission(images, own),
+        normal_map,
+        opacity: None,
+    }
 }
 
 /// The material of triangles of a mesh file that name none.
@@ -122,7 +145,12 @@ pub fn fallback_material() -> Material {
         shininess: 1.0,
         ambient: None,
     };
-    Material { bsdf: Bsdf::Rough(Rough::Phong(phong)), emission: Emission::NONE, normal_map: None }
+    Material {
+        bsdf: Bsdf::Rough(Rough::Phong(phong)),
+        emission: Emission::NONE,
+        normal_map: None,
+        opacity: None,
+    }
 }
 
 fn declared_color(scene: &Scene, images: &Images, source: &ColorSource) -> Color {
@@ -136,19 +164,20 @@ fn declared_color(scene: &Scene, images: &Images, source: &ColorSource) -> Color
 
 fn declared_texture(scene: &Scene, images: &Images, index: usize, used: TextureUse) -> Arc<Texture> {
     let declared = &scene.textures[index];
-    let &description::Texture { filter, wrap, repeat, .. } = declared;
+    let &description::Texture { filter, wrap, repeat, rotate, offset, .. } = declared;
     let Image { texels, mipmaps } = image(images, &declared_source(scene, index, used));
     let mipmaps = match filter {
         TextureFilter::Nearest | TextureFilter::Bilinear => None,
         TextureFilter::Mipmap => mipmaps,
     };
-    Arc::new(Texture { texels, mipmaps, filter, wrap, repeat })
+    let moved = Moved::new(rotate, offset.as_dvec2()).map(Box::new);
+    Arc::new(Texture { texels, mipmaps, filter, wrap, repeat, moved })
 }
 
 fn file_texture(images: &Images, source: &TextureSource) -> Arc<Texture> {
     let (filter, wrap, repeat) = (TextureFilter::Bilinear, Wrap::Repeat, Vec2::ONE);
     let Image { texels, .. } = image(images, source);
-    Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat })
+    Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat, moved: None })
 }
 
 /// The loaded image. A material that no object has may name textures that were not loaded: they are never looked up.

@@ -18,6 +18,7 @@ pub mod mesh_tree;
 mod object;
 mod origin;
 mod packet;
+mod straight;
 pub mod textures;
 mod triangle_tree;
 
@@ -36,6 +37,7 @@ pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
 pub use object::Object;
 pub use origin::origin;
+pub use straight::{MOST_STRAIGHT, Weakened};
 pub use textures::{
     Lookups, NeededTexture, TextureSource, declared_source, environment_source, textures_needed,
 };
@@ -45,6 +47,7 @@ use crate::geometry::rows::lanes;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
 use crate::materials::{Bsdf, Material, Mipmaps, Rough};
+use crate::math::Vec3;
 use crate::scene::description;
 
 /// The images of a scene.
@@ -95,6 +98,10 @@ pub struct World {
     glass_at_eye: Vec<(u32, u32)>,
     /// Whether any material has a texture with mip levels.
     is_mipmapped: bool,
+    /// Whether the vertex colours of each object count. `None` if those of none do.
+    colored: Option<Box<[bool]>>,
+    /// Objects that light may pass straight on. `None` if there are none.
+    passable: Option<Box<straight::Passable>>,
 }
 
 /// Map from an object to its material.
@@ -158,17 +165,30 @@ impl World {
         }
     }
 
-    /// A material and its rough BSDF. `None` if anything bends its normals, its emission is textured, or rows are not filled with
-    /// the BSDF.
+    /// Whether vertex colours count at an object.
+    #[inline]
+    pub fn is_colored(&self, object: u32) -> bool {
+        self.colored.as_ref().is_some_and(|colored| colored[object as usize])
+    }
+
+    /// A material and its rough BSDF. `None` if anything bends its normals, its emission is textured, light may pass it straight
+    /// on, or rows are not filled with the BSDF.
     pub fn plain_rough(&self, material: usize) -> Option<(&Material, &Rough)> {
         let material = &self.materials[material];
-        if material.normal_map.is_some() || material.emission.texture.is_some() {
+        if material.normal_map.is_some() || material.emission.texture.is_some() || material.opacity.is_some()
+        {
             return None;
         }
         match &material.bsdf {
             Bsdf::Rough(rough) => rough.fills_rows().then_some((material, rough)),
-            Bsdf::Mirror(_) | Bsdf::Glass(_) => None,
+            Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => None,
         }
+    }
+
+    /// The vertex colour at a hit, by which the material's colour is multiplied. `None` if it does not count.
+    #[inline]
+    pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
+        self.is_colored(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
     }
 
     /// Whether any material has a texture with mip levels, for which rays must know the width of their beams.

@@ -46,8 +46,7 @@ impl Geometry {
         if by_each != 0 {
             return self.occluded_by_each(rows, ends, traced, sources);
         }
-        let mut blockers =
-            Blockers { geometry: self, rows, sources, in_part: in_part(sources, folds), folds };
+        let mut blockers = Blockers::new(self, rows, sources, folds);
         self.visited().any_packet(rows, ends, traced, self.unbounded(), &mut blockers, folds)
     }
 }
@@ -55,7 +54,7 @@ impl Geometry {
 impl Geometry {
     /// A bit for each ray whose light is all of a merged mesh.
     #[inline(always)]
-    fn to_whole_merged(&self, sources: &SourceRow) -> u32 {
+    pub(super) fn to_whole_merged(&self, sources: &SourceRow) -> u32 {
         if !sources.is_any || !self.has_merged() {
             return 0;
         }
@@ -153,13 +152,21 @@ fn numbered_by_object(merged: &MergedMeshes, found: &mut HitRows) -> [u32; PACKE
 }
 
 /// Test for occluders of shadow rays.
-struct Blockers<'a, F> {
+pub(super) struct Blockers<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayRows,
     sources: &'a SourceRow,
     /// Rays whose light is a part of an object.
     in_part: u32,
     folds: F,
+}
+
+impl<'a, F: Folds> Blockers<'a, F> {
+    /// The test for the rays of a packet, each with its light.
+    #[inline(always)]
+    pub(super) fn new(geometry: &'a Geometry, rows: &'a RayRows, sources: &'a SourceRow, folds: F) -> Self {
+        Self { geometry, rows, sources, in_part: in_part(sources, folds), folds }
+    }
 }
 
 impl<F: Folds> AnyTest for Blockers<'_, F> {

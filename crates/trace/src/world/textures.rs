@@ -61,24 +61,41 @@ pub struct Lookups {
     pub ambient: bool,
     /// Emission textures, and the map of the environment.
     pub lights: bool,
-    /// Normal maps; Phong surfaces alone have them.
+    /// Normal maps.
     pub normals: bool,
+    /// Normal maps of mirrors and glass, by which other surfaces are seen.
+    pub delta_normals: bool,
 }
 
 impl Lookups {
     /// All textures.
-    pub const ALL: Self = Self { diffuse: true, specular: true, ambient: true, lights: true, normals: true };
-    /// No textures.
-    pub const NONE: Self =
-        Self { diffuse: false, specular: false, ambient: false, lights: false, normals: false };
+    pub const ALL: Self = Self {
+        diffuse: true,
+        specular: true,
+        ambient: true,
+        lights: true,
+        normals: true,
+        delta_normals: true,
+    };
+    /// No textures but those of opacity, which every picture looks up.
+    pub const NONE: Self = Self {
+        diffuse: false,
+        specular: false,
+        ambient: false,
+        lights: false,
+        normals: false,
+        delta_normals: false,
+    };
 
-    fn has(self, role: TextureRole) -> bool {
+    /// Whether textures of a role are looked up, in a material that is δ or not.
+    fn has(self, role: TextureRole, is_delta: bool) -> bool {
         match role {
             TextureRole::Diffuse => self.diffuse,
             TextureRole::Specular => self.specular,
             TextureRole::Ambient => self.ambient,
             TextureRole::Emission => self.lights,
-            TextureRole::NormalMap => self.normals,
+            TextureRole::NormalMap => self.normals || self.delta_normals && is_delta,
+            TextureRole::Opacity(_) => true,
         }
     }
 }
@@ -97,8 +114,8 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
     };
     let (used_materials, own_materials) = in_use(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
-        let textures = material.textures().into_iter();
-        for (texture, role) in textures.filter(|(_, role)| lookups.has(*role)) {
+        let (textures, is_delta) = (material.textures().into_iter(), material.kind.is_delta());
+        for (texture, role) in textures.filter(|(_, role)| lookups.has(*role, is_delta)) {
             add(NeededTexture {
                 source: declared_source(scene, texture, role.texture_use()),
                 name: scene.textures[texture].name.clone(),
@@ -174,6 +191,10 @@ pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> Textu
             ImageEncoding::Linear
         }
         (Encoding::Auto, TextureUse::Color) => ImageEncoding::Color,
+        (Encoding::Srgb, TextureUse::Number(of)) => ImageEncoding::Number { of, is_srgb: true },
+        (Encoding::Auto | Encoding::Linear, TextureUse::Number(of)) => {
+            ImageEncoding::Number { of, is_srgb: false }
+        }
     };
     TextureSource { path: texture.file.value.clone(), encoding }
 }
@@ -183,6 +204,7 @@ pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
     let encoding = match used {
         TextureUse::Color => ImageEncoding::Color,
         TextureUse::Normal => ImageEncoding::Linear,
+        TextureUse::Number(of) => ImageEncoding::Number { of, is_srgb: false },
     };
     TextureSource { path: path.to_owned(), encoding }
 }
@@ -195,6 +217,6 @@ fn file_textures(material: &FileMaterial, lookups: Lookups) -> impl Iterator<Ite
         (&material.emission_texture, TextureRole::Emission),
         (&material.normal_texture, TextureRole::NormalMap),
     ];
-    let looked_up = all.into_iter().filter(move |(_, role)| lookups.has(*role));
+    let looked_up = all.into_iter().filter(move |(_, role)| lookups.has(*role, false));
     looked_up.filter_map(|(path, role)| Some((path.as_deref()?, role.texture_use())))
 }

@@ -19,9 +19,9 @@ use super::contain::contain;
 use super::read::{self, Watch};
 use super::{AssetError, read::in_words};
 use crate::control::{CancelToken, Cancelled, Progress, unwatched};
-use crate::materials::Mipmaps;
 use crate::materials::mipmaps::Halving;
 use crate::materials::texels::Texels;
+use crate::materials::{Mipmaps, PixelNumber};
 use apart::Reporter;
 use counting::Counting;
 use exr::ExrDecoder;
@@ -41,6 +41,33 @@ pub enum ImageEncoding {
     Linear,
     /// Like [`Self::Color`], but floats stay as they are, negative or not finite: for pictures to compare.
     Raw,
+    /// One number of each pixel, in all channels; alpha is always linear.
+    Number {
+        /// The number.
+        of: PixelNumber,
+        /// Whether colours are sRGB.
+        is_srgb: bool,
+    },
+}
+
+impl ImageEncoding {
+    /// Index that no other encoding has.
+    pub fn index(self) -> usize {
+        match self {
+            Self::Color => 0,
+            Self::Srgb => 1,
+            Self::Linear => 2,
+            Self::Raw => 3,
+            Self::Number { of, is_srgb } => {
+                let of = match of {
+                    PixelNumber::Luminance => 0,
+                    PixelNumber::Opacity => 1,
+                    PixelNumber::Channel(channel) => 2 + channel as usize,
+                };
+                4 + 2 * of + usize::from(is_srgb)
+            }
+        }
+    }
 }
 
 /// Limits on the size of an image.
@@ -61,7 +88,7 @@ impl Default for ImageLimits {
 
 /// Reads an image: PNG, JPEG, PNM, TGA, BMP, HDR, EXR or WebP, recognised by its first bytes, else by its ending.
 ///
-/// Grey becomes RGB, alpha is left out, a camera's orientation tag is followed. Texels that are negative or not finite become 0
+/// Grey becomes RGB, alpha is left out but for numbers, a camera's orientation tag is followed. Texels that are negative or not finite become 0
 /// (but for [`ImageEncoding::Raw`]). A JPEG that is cut short is an error. 16-bit and float files give linear floats. Progress is
 /// in bytes of the file.
 ///

@@ -52,13 +52,15 @@ impl Faces {
     }
 }
 
-/// A mesh file's numbers. `normals` and `uvs` are empty or one for each position; a normal of zero is missing.
+/// A mesh file's numbers. `normals`, `uvs` and `colors` are empty or one for each position; a normal of zero is missing.
 /// `face_materials` is empty or one for each face.
 #[derive(Debug, Default)]
 pub(super) struct Parsed {
     pub(super) positions: Vec<DVec3>,
     pub(super) normals: Vec<Vec3>,
     pub(super) uvs: Vec<Vec2>,
+    /// In sRGB.
+    pub(super) colors: Vec<[u8; 3]>,
     pub(super) faces: Faces,
     pub(super) face_materials: Vec<u32>,
     pub(super) materials: Vec<FileMaterial>,
@@ -68,12 +70,18 @@ pub(super) struct Parsed {
     pub(super) pictures: Vec<PathBuf>,
 }
 
+/// A vertex colour of parts from 0 to 1 in sRGB, in bytes; what is not a number is 0.
+pub(super) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
+    parts.map(|part| (part.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
+}
+
 /// Assembles a mesh: cuts polygons, drops bad faces, compacts the vertices, completes the normals.
 pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
     let Parsed {
         positions,
         normals,
         uvs,
+        colors,
         faces,
         face_materials,
         materials,
@@ -91,7 +99,8 @@ pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh
         return Err(source.wrong(no_usable_face(faces.len(), dropped)));
     }
     let materials_of = triangle_materials;
-    let mut mesh = TriangleMesh { origin, positions, normals, uvs, triangles, materials: materials_of };
+    let mut mesh =
+        TriangleMesh { origin, positions, normals, uvs, colors, triangles, materials: materials_of };
     drop_unused_vertices(&mut mesh);
     for uv in mesh.uvs.iter_mut().filter(|uv| !uv.is_finite()) {
         *uv = Vec2::ZERO;
@@ -254,6 +263,7 @@ fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     retain_used(&mut mesh.positions, &new_index);
     retain_used(&mut mesh.normals, &new_index);
     retain_used(&mut mesh.uvs, &new_index);
+    retain_used(&mut mesh.colors, &new_index);
     for corner in mesh.triangles.as_flattened_mut() {
         *corner = new_index[*corner as usize];
     }

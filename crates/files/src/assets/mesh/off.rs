@@ -2,7 +2,7 @@
 //! counts behind the header word, no edge count, undeclared columns behind coordinates and faces, comments and blank
 //! lines anywhere.
 
-use super::assemble::{Faces, Parsed, assemble};
+use super::assemble::{Faces, Parsed, assemble, color_bytes};
 use super::text::{Cursor, shown};
 use super::{AssetError, LoadedMesh, Source};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -10,11 +10,12 @@ use crate::math::{DVec2, DVec3, Vec2};
 /// Lines between two polls of the token.
 const BATCH: u64 = 1 << 13;
 
-/// Columns of each vertex according to the header word. Colours are skipped.
+/// Columns of each vertex according to the header word.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Header {
     uvs: bool,
     normals: bool,
+    colors: bool,
     /// A fourth coordinate that divides the others.
     homogeneous: bool,
 }
@@ -73,7 +74,7 @@ impl Reader<'_> {
         self.cursor = Cursor::new(self.source.bytes, self.cursor.at() - behind.len());
         self.refuse_binary()?;
         let has = |letter| kind.contains(&letter);
-        Ok(Header { uvs: has(b'S'), normals: has(b'N'), homogeneous: has(b'4') })
+        Ok(Header { uvs: has(b'S'), normals: has(b'N'), colors: has(b'C'), homogeneous: has(b'4') })
     }
 
     fn refuse_binary(&mut self) -> Result<(), AssetError> {
@@ -144,6 +145,7 @@ impl Reader<'_> {
 
     fn vertices(&mut self, header: Header, count: u64, parsed: &mut Parsed) -> Result<(), AssetError> {
         parsed.positions.reserve(count as usize);
+        let mut colors = Vec::new();
         for index in 0..count {
             if index % BATCH == 0 {
                 self.source.tick(self.cursor.at())?;
@@ -157,11 +159,29 @@ impl Reader<'_> {
             if header.normals {
                 parsed.normals.push(self.triple("a normal")?.as_vec3());
             }
-            if header.uvs {
+            if header.colors {
+                let rest = self.rest_of_line()?;
+                let (color, uv) = rest.split_at(rest.len().saturating_sub(if header.uvs { 2 } else { 0 }));
+                if header.uvs {
+                    let [u, v] = *uv else {
+                        return self.wrong("expected texture coordinates, found the line's end");
+                    };
+                    parsed.uvs.push(DVec2::new(u, v).as_vec2());
+                }
+                colors.extend(color.first_chunk().map(|color: &[f64; 3]| DVec3::from_array(*color)));
+            } else if header.uvs {
                 parsed.uvs.push(self.last_two()?);
             }
             self.cursor.end_line();
         }
+        // A single number is an index into colours that are elsewhere.
+        if colors.len() < parsed.positions.len() {
+            return Ok(());
+        }
+        // Colours are from 0 to 1, or from 0 to 255.
+        let are_bytes = colors.iter().any(|color: &DVec3| color.max_element() > 1.0);
+        let greatest = if are_bytes { 255.0 } else { 1.0 };
+        parsed.colors = colors.into_iter().map(|color| color_bytes((color / greatest).to_array())).collect();
         Ok(())
     }
 
@@ -177,6 +197,15 @@ impl Reader<'_> {
             Some(value) => Ok(value),
             None => self.unexpected(what),
         }
+    }
+
+    /// Reads the numbers up to the line's end: a colour of any length, and texture coordinates.
+    fn rest_of_line(&mut self) -> Result<Vec<f64>, AssetError> {
+        let mut rest = Vec::new();
+        while self.cursor.skip_in_line() {
+            rest.push(self.float("a number")?);
+        }
+        Ok(rest)
     }
 
     /// Reads texture coordinates, which are the last of a line, behind a colour of any length.
@@ -271,8 +300,25 @@ mod tests {
             format!("OFF\n4 1 0\n{}4 0 1 2 3\n", lines("")),
             format!("OFF\n4 1 0\n{}4 0 1\n2 3\n", lines("")),
         ] {
-            assert_eq!(read(&text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh, plain, "{text}");
+            let mut mesh = read(&text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh;
+            assert_eq!(mesh.colors.is_empty(), !text.starts_with("COFF"), "{text}");
+            mesh.colors.clear();
+            assert_eq!(mesh, plain, "{text}");
         }
+    }
+
+    #[test]
+    fn declared_colours_are_read() {
+        let read = |tails: [&str; 3]| {
+            let [a, b, c] = tails;
+            let text = format!("STCOFF\n3 1 0\n0 0 0 {a} 0 0\n1 0 0 {b} 1 0\n0 1 0 {c} 0 1\n3 0 1 2\n");
+            let mesh = read(&text).expect("whole").mesh;
+            assert_eq!(mesh.uvs, [Vec2::ZERO, Vec2::X, Vec2::Y]);
+            mesh.colors
+        };
+        assert_eq!(read(["255 0 1 9", "1 1 1", "2 3 4 255"]), [[255, 0, 1], [1, 1, 1], [2, 3, 4]]);
+        assert_eq!(read(["1 0 0.2", "0 0 0 1", "1 1 1"]), [[255, 0, 51], [0; 3], [255; 3]]);
+        assert_eq!(read(["3", "1 1 1", "1 1 1"]), [[0; 3]; 0]);
     }
 
     #[test]

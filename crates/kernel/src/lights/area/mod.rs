@@ -7,6 +7,7 @@
 pub mod cuboid;
 pub mod disk;
 pub mod emission_texture;
+pub mod inside;
 mod linear;
 mod meridians;
 pub mod mesh;
@@ -26,12 +27,14 @@ pub use sample_point::LightSamplePoint;
 use super::sample::{End, LightHit, LightSample, Source};
 use super::tree::bounds::{EmissionCone, LightBounds, strength};
 use crate::geometry::Shape;
+use crate::geometry::disk::Disk;
+use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
-use crate::materials::TexturePoint;
 use crate::math::{DVec2, DVec3, Vec3};
 use cuboid::BoxEmitter;
 use disk::DiskEmitter;
+use inside::InsideEmitter;
 use mesh::QuadOfTwo;
 use quad::QuadEmitter;
 use round::{ConeSide, CylinderSide, RoundEmitter};
@@ -52,11 +55,13 @@ pub trait ShapeEmitter {
     fn middle(&self) -> DVec3;
 }
 
-/// A shape that emits from its front side, with the same radiance in every direction.
+/// A shape that emits from one side, with the same radiance in every direction. A shape that emits from both sides is two lights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AreaLight {
-    /// Emitting shape.
+    /// Emitting shape, with its front on the side that emits.
     pub shape: Emitter,
+    /// The side of the object that emits.
+    pub side: Side,
     /// Radiance; with a texture, the factor on it.
     pub radiance: Vec3,
     /// Emission texture, by which the radiance is multiplied from point to point.
@@ -76,6 +81,15 @@ pub enum Part {
     Whole,
     /// The triangles that the emitter lists.
     Listed,
+}
+
+/// A side of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The front.
+    Front,
+    /// The back: the inside of closed shapes.
+    Back,
 }
 
 /// The shapes that can emit.
@@ -99,6 +113,8 @@ pub enum Emitter {
     Cone(Box<RoundEmitter<ConeSide>>),
     /// A torus.
     Torus(TorusEmitter),
+    /// The inside of a shape.
+    Inside(Box<InsideEmitter>),
     /// Triangles of a mesh.
     Mesh(MeshEmitter),
 }
@@ -116,6 +132,7 @@ macro_rules! of_any {
             Emitter::Cylinder($it) => $asked,
             Emitter::Cone($it) => $asked,
             Emitter::Torus($it) => $asked,
+            Emitter::Inside($it) => $asked,
             Emitter::Mesh($mesh) => $of_mesh,
         }
     };
@@ -144,7 +161,7 @@ impl Emitter {
     }
 }
 
-/// The light of a shape that emits all over. `None` if the shape is infinite, or has no area.
+/// The light of the front of a shape that emits all over. `None` if the shape is infinite, or has no area.
 pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
     let emitter = match shape {
         Shape::Sphere(sphere) => {
@@ -161,7 +178,25 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
         Shape::Plane(_) => return None,
     };
     let bounds = bounds(shape, radiance)?;
-    Some(AreaLight { shape: emitter, radiance, texture: None, object, part: Part::Whole, bounds })
+    let (side, texture, part) = (Side::Front, None, Part::Whole);
+    Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
+}
+
+/// The light of the back of a shape that emits all over. `None` if the shape is infinite, or has no area.
+pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLight> {
+    let turned = match shape {
+        Shape::Quad(quad) => Some(Shape::Quad(Parallelogram::new(quad.corner, quad.v, quad.u))),
+        Shape::Triangle(Triangle { a, b, c }) => Some(Shape::Triangle(Triangle { a: *a, b: *c, c: *b })),
+        Shape::Disk(disk) => Some(Shape::Disk(Disk::new(disk.middle(), -disk.normal(), disk.radius()))),
+        Shape::Plane(_) => return None,
+        Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) => None,
+    };
+    let light = area_light(turned.as_ref().unwrap_or(shape), radiance, object)?;
+    let emitter = match turned {
+        Some(_) => light.shape,
+        None => Emitter::Inside(Box::new(InsideEmitter::new(shape)?)),
+    };
+    Some(AreaLight { shape: emitter, side: Side::Back, ..light })
 }
 
 /// Bounds of a shape's emission. `None` if the shape is infinite. Flat shapes emit by the cosine. Others emit a quarter of their
@@ -190,8 +225,14 @@ impl AreaLight {
     /// The light with an emission texture, by which a quad is sampled as well.
     pub fn with_texture(mut self, texture: EmissionTexture) -> Self {
         if let Emitter::Quad(quad) = &self.shape {
-            let color = |at: [f64; 2]| texture.texture().lookup(&TexturePoint::sharp(DVec2::from_array(at)));
-            let picture = TexturedQuadEmitter::new(*quad, texture.texture().texels_across(), color);
+            // The edges of a back are in the other order.
+            let ordered = |[u, v]: [f64; 2]| match self.side {
+                Side::Front => [u, v],
+                Side::Back => [v, u],
+            };
+            let color = |at: [f64; 2]| texture.lookup(DVec2::from_array(ordered(at)));
+            let across = ordered(texture.texels_across());
+            let picture = TexturedQuadEmitter::new(*quad, across, color);
             if let Some(picture) = picture {
                 self.shape = Emitter::TexturedQuad(Box::new(picture));
             }
@@ -225,6 +266,10 @@ impl AreaLight {
 
     /// [`Light::pdf`](super::Light::pdf).
     pub fn pdf(&self, from: Vec3, normal: Vec3, met: &LightHit) -> f32 {
+        let met = &match self.side {
+            Side::Front => *met,
+            Side::Back => LightHit { normal: -met.normal, ..*met },
+        };
         if !(met.normal.dot(met.direction) < 0.0) {
             return 0.0;
         }

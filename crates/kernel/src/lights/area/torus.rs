@@ -67,6 +67,9 @@ struct Slice {
     sine: f64,
 }
 
+/// Relative difference of distances that are equal within rounding.
+const SAME_PLACE: f64 = 1e-3;
+
 /// A point of a slice's circle.
 struct Place {
     /// Offset from the foot, outwards and along the axis.
@@ -110,7 +113,10 @@ impl ShapeEmitter for TorusEmitter {
     fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
         View::new(&self.torus, from).map_or(0.0, |view| {
             let slices = view.slices();
-            view.densities(&self.torus, &slices, met.direction.as_dvec3()).0 as f32
+            let (density, first) = view.densities(&self.torus, &slices, met.direction.as_dvec3());
+            // A ray that passes the first place straight on finds another one, which no sample does.
+            let is_later = first.is_some_and(|first| f64::from(met.distance) > first * (1.0 + SAME_PLACE));
+            if is_later { 0.0 } else { density as f32 }
         })
     }
 

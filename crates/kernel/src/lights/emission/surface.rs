@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::Outline;
 use crate::geometry::surface::error;
 use crate::geometry::{AreaPoint, Shape};
-use crate::lights::area::AreaLight;
+use crate::lights::area::{AreaLight, Side};
 use crate::lights::tree::bounds::strength;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::distribution::Discrete;
@@ -41,7 +41,7 @@ pub struct Place {
     pub point: Vec3,
     /// The place.
     pub from: DVec3,
-    /// Unit normal of the front.
+    /// Unit normal of the side that emits.
     pub normal: DVec3,
     /// Bound on the error of each of its components.
     pub error: Vec3,
@@ -138,6 +138,10 @@ impl On {
                 let corner = Vec2::new((cell % all) as f32, (cell / all) as f32);
                 let u = ((corner + u) / *side as f32).min(Vec2::splat(1.0_f32.next_down()));
                 let AreaPoint { point, normal } = shape.place(part as u32, u);
+                let normal = match light.side {
+                    Side::Front => normal,
+                    Side::Back => -normal,
+                };
                 OnPiece { point, normal, area: areas[part] / (all * all) as f64, primitive: part as u32 }
             }
             (Self::Mesh { .. }, Some(mesh)) => {

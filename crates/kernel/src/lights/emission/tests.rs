@@ -10,6 +10,7 @@ use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
+use crate::lights::area::Side;
 use crate::lights::delta::DeltaLight;
 use crate::lights::{
     AreaLight, Chart, DirectionalLight, EmissionTexture, Emitter, Environment, MeshEmitter, Part, Patch,

@@ -12,7 +12,7 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
 use crate::lights::{
     AreaLight, DirectionalLight, Emitter, Environment, Falloff, Light, Lights, MeshEmitter, Part, PointLight,
-    SpotLight, area_light,
+    Side, SpotLight, area_light,
 };
 use crate::math::{DVec3, Vec3, random};
 
@@ -434,6 +434,7 @@ fn the_density_of_a_mesh_is_that_of_its_samples() {
         assert_eq!(mesh.tree().is_some(), count > 32);
         let bounds = mesh.bounds();
         let light = AreaLight {
+            side: Side::Front,
             shape: Emitter::Mesh(mesh),
             radiance: Vec3::ONE,
             object: 4,

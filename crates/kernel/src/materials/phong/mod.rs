@@ -111,6 +111,10 @@ impl RoughPoint for PhongBsdf {
     fn ambient(&self) -> Vec3 {
         self.ambient
     }
+
+    fn tinted(self, color: Vec3) -> Self {
+        Self { diffuse: self.diffuse * color, ambient: self.ambient * color, ..self }
+    }
 }
 
 impl PhongBsdf {

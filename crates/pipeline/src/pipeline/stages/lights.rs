@@ -56,8 +56,12 @@ fn picked(by_whom: &str, lights: &Lights) -> String {
 /// The images that lamps by materials of the scene file have on them.
 fn patterns(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     let shining = scene.materials.iter().filter(|material| material.emits());
-    let textures = shining.filter_map(|material| material.emission.texture);
-    textures.map(|texture| world::declared_source(scene, texture, TextureUse::Color))
+    let textures = shining.flat_map(|material| {
+        let emission = material.emission.texture.map(|texture| (texture, TextureUse::Color));
+        let opacity = material.opacity.texture();
+        emission.into_iter().chain(opacity.map(|(texture, number)| (texture, TextureUse::Number(number))))
+    });
+    textures.map(|(texture, used)| world::declared_source(scene, texture, used))
 }
 
 fn sky(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<SkyMap>> {

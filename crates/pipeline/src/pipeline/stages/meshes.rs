@@ -118,6 +118,16 @@ pub(in crate::pipeline) fn meshes(
             findings.error(loaded, object.span.clone(), message, help);
         }
     }
+    for object in &loaded.scene.objects {
+        if let Some(mesh) = object.shape.mesh().filter(|mesh| mesh.vertex_colors)
+            && meshes[mesh.file].mesh.mesh.colors.is_empty()
+            && !meshes[mesh.file].mesh.mesh.positions.is_empty()
+        {
+            let name = files[mesh.file].value.display();
+            let message = format!("`vertex_colors` changes nothing: the vertices of {name} have no colours");
+            findings.warn(loaded, object.span.clone(), message);
+        }
+    }
     if counts.failed == 0 {
         let bounds = || meshes.iter().map(|mesh| mesh.bounds()).collect();
         findings.warnings.extend(loaded.lights_facing_away(bounds));

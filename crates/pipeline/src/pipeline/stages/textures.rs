@@ -228,7 +228,7 @@ impl Wanted<'_> {
     fn key(&self) -> Key {
         let (path, encoding) = &self.name;
         let mut key = Fingerprint::new("texture");
-        self.content.add_to(key.path(path).index(*encoding as usize));
+        self.content.add_to(key.path(path).index(encoding.index()));
         key.finish()
     }
 }

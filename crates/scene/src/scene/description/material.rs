@@ -6,6 +6,7 @@ use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use super::Located;
 use crate::choice;
 pub use crate::materials::texture::{TextureFilter, Wrap};
+pub use crate::materials::{Channel, EmissionSides, PixelNumber};
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// An image that materials look up.
@@ -21,6 +22,10 @@ pub struct Texture {
     pub wrap: Wrap,
     /// Repetitions in u and v; not 0.
     pub repeat: Vec2,
+    /// Rotation of the repeated coordinates, in degrees from u to v.
+    pub rotate: f64,
+    /// Offset of the coordinates after that.
+    pub offset: Vec2,
     /// Meaning of its numbers.
     pub encoding: Encoding,
 }
@@ -28,7 +33,7 @@ pub struct Texture {
 choice! {
     /// Meaning of a texture's numbers.
     pub enum Encoding {
-        /// sRGB for 8-bit colour, linear for normal maps and float files.
+        /// sRGB for colours in 8 and 16 bits, linear for numbers, normal maps and float files.
         Auto = "auto",
         /// sRGB, decoded.
         Srgb = "srgb",
@@ -46,6 +51,59 @@ pub enum ColorSource {
     Texture(usize),
 }
 
+/// A number or a texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum NumberSource {
+    /// The same everywhere.
+    Constant(f32),
+    /// The numbers of a texture.
+    Texture {
+        /// Index into [`Scene::textures`](super::Scene::textures).
+        texture: usize,
+        /// The channel that holds them. `None` for the usual number of a pixel.
+        channel: Option<Channel>,
+    },
+}
+
+impl NumberSource {
+    /// The texture and its number of each pixel, if it is one; without a channel, the number is `usual`.
+    fn texture(&self, usual: PixelNumber) -> Option<(usize, PixelNumber)> {
+        match *self {
+            Self::Constant(_) => None,
+            Self::Texture { texture, channel } => {
+                Some((texture, channel.map_or(usual, PixelNumber::Channel)))
+            }
+        }
+    }
+}
+
+/// The chance that a surface is there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpacitySource {
+    /// The chance in [0, 1].
+    pub value: NumberSource,
+    /// The chance from which the surface is there, below which it is not; 0 for none.
+    pub cutoff: f32,
+}
+
+impl OpacitySource {
+    /// A surface that is there.
+    pub const FULL: Self = Self { value: NumberSource::Constant(1.0), cutoff: 0.0 };
+
+    /// Whether the surface is there everywhere.
+    pub fn is_full(&self) -> bool {
+        match self.value {
+            NumberSource::Constant(value) => value >= 1.0 || self.cutoff > 0.0 && value >= self.cutoff,
+            NumberSource::Texture { .. } => false,
+        }
+    }
+
+    /// The texture and its number of each pixel, if it has one.
+    pub fn texture(&self) -> Option<(usize, PixelNumber)> {
+        self.value.texture(PixelNumber::Opacity)
+    }
+}
+
 /// Radiance, the same everywhere or by a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmissionSource {
@@ -53,15 +111,17 @@ pub struct EmissionSource {
     pub scale: Vec3,
     /// Index into [`Scene::textures`](super::Scene::textures).
     pub texture: Option<usize>,
+    /// Sides that emit.
+    pub sides: EmissionSides,
 }
 
 impl EmissionSource {
     /// None.
     pub const NONE: Self = Self::constant(Vec3::ZERO);
 
-    /// The same everywhere.
+    /// The same everywhere on the front.
     pub const fn constant(radiance: Vec3) -> Self {
-        Self { scale: radiance, texture: None }
+        Self { scale: radiance, texture: None, sides: EmissionSides::Front }
     }
 }
 
@@ -72,10 +132,12 @@ pub struct Material {
     pub name: String,
     /// Its reflection or transmission of light.
     pub kind: MaterialKind,
-    /// Radiance on the front side.
+    /// Radiance.
     pub emission: EmissionSource,
     /// The map that bends the shading normals.
     pub normal_map: Option<NormalMap>,
+    /// The chance that it is there.
+    pub opacity: OpacitySource,
 }
 
 impl MaterialKind {
@@ -84,7 +146,7 @@ impl MaterialKind {
         match self {
             Self::Phong { .. } => "phong",
             Self::Mirror { .. } => "mirror",
-            Self::Glass { .. } => "glass",
+            Self::Glass { .. } | Self::Pane { .. } => "glass",
         }
     }
 
@@ -92,11 +154,11 @@ impl MaterialKind {
     pub fn is_delta(&self) -> bool {
         match self {
             Self::Phong { .. } => false,
-            Self::Mirror { .. } | Self::Glass { .. } => true,
+            Self::Mirror { .. } | Self::Glass { .. } | Self::Pane { .. } => true,
         }
     }
 
-    /// Whether it is glass.
+    /// Whether it is glass that fills its shape.
     pub fn is_glass(&self) -> bool {
         self.substance().is_some()
     }
@@ -105,7 +167,7 @@ impl MaterialKind {
     pub fn substance(&self) -> Option<[u64; 4]> {
         match *self {
             Self::Glass { ior, tint } => Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits)),
-            Self::Phong { .. } | Self::Mirror { .. } => None,
+            Self::Phong { .. } | Self::Mirror { .. } | Self::Pane { .. } => None,
         }
     }
 }
@@ -126,6 +188,8 @@ pub enum TextureUse {
     Color,
     /// Normals.
     Normal,
+    /// Numbers.
+    Number(PixelNumber),
 }
 
 /// Role of a texture in a material.
@@ -141,6 +205,8 @@ pub enum TextureRole {
     Emission,
     /// Map that bends its normals.
     NormalMap,
+    /// The chance that it is there.
+    Opacity(PixelNumber),
 }
 
 impl TextureRole {
@@ -149,6 +215,7 @@ impl TextureRole {
         match self {
             Self::Diffuse | Self::Specular | Self::Ambient | Self::Emission => TextureUse::Color,
             Self::NormalMap => TextureUse::Normal,
+            Self::Opacity(number) => TextureUse::Number(number),
         }
     }
 }
@@ -179,6 +246,13 @@ pub enum MaterialKind {
         /// Transmittance per unit of length inside, in [0, 1].
         tint: DVec3,
     },
+    /// A pane of smooth glass without thickness.
+    Pane {
+        /// Index of refraction, in [0.1, 10].
+        ior: f32,
+        /// Transmittance of the glass at any angle, in [0, 1].
+        tint: Vec3,
+    },
 }
 
 impl ColorSource {
@@ -200,27 +274,31 @@ impl Material {
     /// The textures that it looks up, as indices into [`Scene::textures`](super::Scene::textures), each with its role; one may
     /// have several.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
-        let Self { name: _, kind, emission, normal_map } = self;
+        let Self { name: _, kind, emission, normal_map, opacity } = self;
         let colors = match kind {
             MaterialKind::Phong { diffuse, specular, shininess: _, ambient } => vec![
                 (diffuse, TextureRole::Diffuse),
                 (specular, TextureRole::Specular),
                 (ambient.as_ref().unwrap_or(diffuse), TextureRole::Ambient),
             ],
-            MaterialKind::Mirror { reflectance: _ } | MaterialKind::Glass { ior: _, tint: _ } => Vec::new(),
+            MaterialKind::Mirror { reflectance: _ }
+            | MaterialKind::Glass { ior: _, tint: _ }
+            | MaterialKind::Pane { ior: _, tint: _ } => Vec::new(),
         };
         let colors = colors.into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
         let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
-        colors.chain(shown).chain(normals).collect()
+        let opacity = opacity.texture().map(|(texture, number)| (texture, TextureRole::Opacity(number)));
+        colors.chain(shown).chain(normals).chain(opacity).collect()
     }
 }
 
 /// Key of the look-up; the texels have keys of their own.
 impl Fingerprinted for Texture {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
-        let Self { name: _, file, filter, wrap, repeat, encoding } = self;
+        let Self { name: _, file, filter, wrap, repeat, rotate, offset, encoding } = self;
         key.path(&file.value).choice(*filter).choice(*wrap).choice(*encoding).f32(repeat.x).f32(repeat.y);
+        key.f64(*rotate).f32(offset.x).f32(offset.y);
     }
 }
 
@@ -237,10 +315,29 @@ impl Fingerprinted for ColorSource {
     }
 }
 
+impl Fingerprinted for OpacitySource {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        let Self { value, cutoff } = self;
+        key.f32(*cutoff);
+        match *value {
+            NumberSource::Constant(value) => {
+                key.index(0).f32(value);
+            }
+            NumberSource::Texture { texture, channel } => {
+                key.index(1).flag(channel.is_some());
+                if let Some(channel) = channel {
+                    key.choice(channel);
+                }
+                of.textures[texture].add_to(key, of);
+            }
+        }
+    }
+}
+
 impl Fingerprinted for EmissionSource {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
-        let Self { scale, texture } = *self;
-        key.vec3(scale).flag(texture.is_some());
+        let Self { scale, texture, sides } = *self;
+        key.vec3(scale).choice(sides).flag(texture.is_some());
         if let Some(texture) = texture {
             of.textures[texture].add_to(key, of);
         }
@@ -266,13 +363,16 @@ impl Fingerprinted for MaterialKind {
             Self::Glass { ior, tint } => {
                 key.index(2).f32(*ior).dvec3(*tint);
             }
+            Self::Pane { ior, tint } => {
+                key.index(3).f32(*ior).vec3(*tint);
+            }
         }
     }
 }
 
 impl Fingerprinted for Material {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
-        let Self { name: _, kind, emission, normal_map } = self;
-        key.add(kind, of).add(emission, of).add(normal_map, of);
+        let Self { name: _, kind, emission, normal_map, opacity } = self;
+        key.add(kind, of).add(emission, of).add(normal_map, of).add(opacity, of);
     }
 }

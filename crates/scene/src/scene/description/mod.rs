@@ -16,14 +16,14 @@ use std::path::PathBuf;
 pub use camera::{Camera, CameraChange, Pose, Viewpoint, is_same_distance};
 pub use light::{DirectionalLight, Environment, Falloff, Light, PointLight, SpotLight};
 pub use material::{
-    ColorSource, EmissionSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter,
-    TextureRole, TextureUse, Wrap,
+    Channel, ColorSource, EmissionSides, EmissionSource, Encoding, Material, MaterialKind, NormalMap,
+    NumberSource, OpacitySource, PixelNumber, Texture, TextureFilter, TextureRole, TextureUse, Wrap,
 };
 pub use method::{Integrator, Method};
 pub use render::{
     Accel, KeyRange, MOST_SCATTERINGS, PixelFilter, Render, RenderKey, Shadows, Tonemap, render_keys,
 };
-pub use shape::{Lowered, Mesh, Object, Shape, Sheet, greatest};
+pub use shape::{Lowered, Mesh, Object, Placement, Shape, Sheet, greatest};
 
 /// A whole scene.
 #[derive(Clone, Debug, PartialEq)]

@@ -13,7 +13,8 @@ use crate::geometry::plane::Plane;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
-use crate::math::DVec3;
+use crate::math::transform::Transform;
+use crate::math::{DMat3, DVec3};
 
 /// A shape with its material.
 #[derive(Clone, Debug, PartialEq)]
@@ -159,14 +160,47 @@ pub enum Sheet {
 pub struct Mesh {
     /// Index into [`Scene::mesh_files`](super::Scene::mesh_files).
     pub file: usize,
-    /// Applied first; no component 0.
-    pub scale: DVec3,
-    /// Then this, degrees about x, then y, then z.
-    pub rotate: DVec3,
-    /// Then this.
-    pub translate: DVec3,
+    /// Map from the file's coordinates to the scene's.
+    pub placed: Placement,
     /// Interpolate vertex normals.
     pub smooth: bool,
+    /// Whether the file's vertex colours multiply the material's colour.
+    pub vertex_colors: bool,
+}
+
+/// Map from the coordinates of a mesh file to those of the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Placement {
+    /// Three steps.
+    Steps {
+        /// Applied first; no component 0.
+        scale: DVec3,
+        /// Then this, degrees about x, then y, then z.
+        rotate: DVec3,
+        /// Then this.
+        translate: DVec3,
+    },
+    /// Any affine map that flattens nothing.
+    Matrix {
+        /// Images of the axes.
+        linear: [DVec3; 3],
+        /// Image of the origin.
+        translate: DVec3,
+    },
+}
+
+impl Placement {
+    /// The map.
+    pub fn transform(&self) -> Transform {
+        match *self {
+            Self::Steps { scale, rotate, translate } => {
+                Transform::scale_rotate_translate(scale, rotate, translate)
+            }
+            Self::Matrix { linear: [x, y, z], translate } => {
+                Transform::affine(DMat3::from_cols(x, y, z), translate)
+            }
+        }
+    }
 }
 
 /// Forms that shapes have when they are traced.
@@ -327,7 +361,16 @@ impl Fingerprinted for Shape {
 
 impl Fingerprinted for Mesh {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
-        let Self { file, scale, rotate, translate, smooth } = *self;
-        key.key(&of.meshes[file]).dvec3(scale).dvec3(rotate).dvec3(translate).flag(smooth);
+        // Colours belong to the surfaces, not to the geometry.
+        let Self { file, placed, smooth, vertex_colors: _ } = *self;
+        key.key(&of.meshes[file]).flag(smooth);
+        match placed {
+            Placement::Steps { scale, rotate, translate } => {
+                key.index(0).dvec3(scale).dvec3(rotate).dvec3(translate);
+            }
+            Placement::Matrix { linear: [x, y, z], translate } => {
+                key.index(1).dvec3(x).dvec3(y).dvec3(z).dvec3(translate);
+            }
+        }
     }
 }

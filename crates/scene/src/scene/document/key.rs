@@ -3,6 +3,7 @@
 
 mod color;
 mod file;
+mod number;
 
 use std::ops::{Range, RangeInclusive};
 
@@ -186,7 +187,7 @@ impl<'a> Key<'a> {
     }
 
     /// Numbers of an array of that length; reports every wrong one.
-    fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
+    pub(super) fn numbers<const N: usize>(&self, limits: Limits, expected: &str) -> Option<[f64; N]> {
         let value = self.value?;
         let Some(array) = value.array().filter(|array| array.len() == N) else {
             wrong_type(self.context, self.name, value, expected);

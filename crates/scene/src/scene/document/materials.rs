@@ -1,6 +1,7 @@
 //! `[materials.*]`.
 
-use super::super::description::{ColorSource, EmissionSource, Material, MaterialKind, NormalMap};
+use super::super::description::{ColorSource, Material, MaterialKind, OpacitySource};
+use super::common;
 use super::context::Issue;
 use super::key::Key;
 use super::limits::Limits;
@@ -52,23 +53,20 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
     let key = table.optional("type");
     // Without knowing the type, no key can be called unknown.
     let kind = if key.is_given() { key.choice()? } else { Kind::Phong };
-    let plain = |kind| (kind, EmissionSource::NONE, None);
-    let (kind, emission, normal_map) = match kind {
-        Kind::Phong => {
-            let emission = table.optional("emission").emission(textures).unwrap_or(EmissionSource::NONE);
-            (phong(table, textures), emission, normal_map(table, textures))
-        }
-        Kind::Mirror => plain(mirror(table)),
-        Kind::Glass => plain(glass(table)),
+    let kind = match kind {
+        Kind::Phong => phong(table, textures),
+        Kind::Mirror => mirror(table),
+        Kind::Glass => glass(table),
+    };
+    let (emission, normal_map) = (common::emission(table, textures), common::normal_map(table, textures));
+    let opacity = if kind.is_glass() {
+        common::refuse_opacity(table);
+        OpacitySource::FULL
+    } else {
+        common::opacity(table, textures)
     };
     table.finish();
-    Some(Material { name, kind, emission, normal_map })
-}
-
-fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMap> {
-    let texture = table.optional("normal_map").name_in(textures);
-    let strength = table.optional("normal_strength").number32(Limits::AtLeast(0.0)).unwrap_or(1.0);
-    texture.map(|texture| NormalMap { texture, strength })
+    Some(Material { name, kind, emission, normal_map, opacity })
 }
 
 fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
@@ -117,8 +115,12 @@ fn mirror(table: &Table<'_>) -> MaterialKind {
 }
 
 fn glass(table: &Table<'_>) -> MaterialKind {
-    MaterialKind::Glass {
-        ior: table.optional("ior").number32(Limits::Between(0.1, 10.0)).unwrap_or(1.5),
-        tint: table.optional("tint").exact_fraction().unwrap_or(DVec3::ONE),
+    let ior = table.optional("ior").number32(Limits::Between(0.1, 10.0)).unwrap_or(1.5);
+    let tint = table.optional("tint").exact_fraction().unwrap_or(DVec3::ONE);
+    let thin = table.optional("thin");
+    // Whoever writes it wrongly hardly means glass that fills its shape.
+    match thin.flag().unwrap_or(thin.is_given()) {
+        true => MaterialKind::Pane { ior, tint: tint.as_vec3() },
+        false => MaterialKind::Glass { ior, tint },
     }
 }

@@ -2,6 +2,7 @@
 //! all of them are reported, and gives nothing where a value is missing or wrong.
 
 mod camera;
+mod common;
 mod context;
 mod environment;
 mod key;
@@ -116,6 +117,9 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
     let photons = photons::read(root);
     let textures = textures::read(root);
     let materials = materials::read(root, &textures.names);
+    if let Some(list) = &materials.list {
+        textures::check_encodings(root.context, &textures, list);
+    }
     let (objects, mesh_files) = shapes::read(root, &materials);
     let lights = lights::read(root);
     let environment = environment::read(root);

@@ -30,6 +30,11 @@ impl Names {
         Self { kind, entries, indices }
     }
 
+    /// The place of a name by its index; the start of the file for one that is not there.
+    pub(super) fn span(&self, index: usize) -> Range<usize> {
+        self.entries.get(index).map_or(0..0, |entry| entry.span.clone())
+    }
+
     /// The index of a name, which is used from now on.
     pub(super) fn find(&self, name: &str) -> Option<usize> {
         let index = *self.indices.get(name)?;

@@ -1,6 +1,11 @@
 //! `[textures.*]`.
 
-use super::super::description::{Encoding, Texture, TextureFilter, Wrap};
+use super::super::description::{
+    Channel, Encoding, Material, PixelNumber, Texture, TextureFilter, TextureUse, Wrap,
+};
+use super::super::sanitize::shortened;
+use super::context::{Context, Issue};
+use super::key::Key;
 use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
@@ -31,7 +36,42 @@ fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
     let filter = table.optional("filter").choice().unwrap_or(TextureFilter::Bilinear);
     let wrap = table.optional("wrap").choice().unwrap_or(Wrap::Repeat);
     let repeat = table.optional("repeat").pair(Limits::NotZero).unwrap_or(Vec2::ONE);
+    let rotate = table.optional("rotate").number(Limits::Any).unwrap_or(0.0);
+    let offset = table.optional("offset").pair(Limits::Any).unwrap_or(Vec2::ZERO);
     let encoding = table.optional("encoding").choice().unwrap_or(Encoding::Auto);
+    first_coordinates(&table.optional("uv"));
     table.finish();
-    Some(Texture { name, file: file?, filter, wrap, repeat, encoding })
+    Some(Texture { name, file: file?, filter, wrap, repeat, rotate, offset, encoding })
+}
+
+/// Reports a set of texture coordinates other than the first: no mesh file has more.
+fn first_coordinates(key: &Key<'_>) {
+    let set: Option<u32> = key.whole(0..=i128::from(u32::MAX));
+    if let Some(span) = key.span().filter(|_| set.is_some_and(|set| set > 0)) {
+        let message = "`uv` must be 0: the mesh files of this version have one set of texture coordinates";
+        key.context.report(Issue::error(span, message));
+    }
+}
+
+/// Reports textures without an encoding that materials use for colours and for numbers. Alpha has no encoding.
+pub(super) fn check_encodings(context: &Context<'_>, textures: &Textures, materials: &[Material]) {
+    let Some(list) = &textures.list else { return };
+    let (mut colors, mut numbers) = (vec![false; list.len()], vec![false; list.len()]);
+    for (texture, role) in materials.iter().flat_map(Material::textures) {
+        match role.texture_use() {
+            TextureUse::Color => colors[texture] = true,
+            TextureUse::Normal | TextureUse::Number(PixelNumber::Channel(Channel::Alpha)) => {}
+            TextureUse::Number(_) => numbers[texture] = true,
+        }
+    }
+    let is_unclear = |texture: &usize| colors[*texture] && numbers[*texture];
+    for texture in (0..list.len()).filter(is_unclear).filter(|&index| list[index].encoding == Encoding::Auto)
+    {
+        let name = shortened(&list[texture].name, 40);
+        let message = format!("the texture \"{name}\" is used for colours and for numbers");
+        let issue = Issue::error(textures.names.span(texture), message)
+            .label("it needs `encoding`")
+            .help("write `encoding = \"srgb\"` or `\"linear\"`, or take numbers from `channel = \"a\"`");
+        context.report(issue);
+    }
 }

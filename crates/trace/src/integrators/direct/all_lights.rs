@@ -282,8 +282,32 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         if self.measure == Measure::Work {
             return add_work(self.tile, rays, ends, traced, &mut sums.light);
         }
+        if self.tile.world.has_passable() {
+            return self.add_weakened((rays, ends, traced), sources, values, sums);
+        }
         let occluded = self.tile.world.geometry.occluded_rows(rays, ends, traced, sources, folds);
         add_where(traced & !occluded, values, &mut sums.light);
+    }
+
+    /// [`Lighting::add_seen`], where light may pass surfaces straight on.
+    #[cold]
+    #[inline(never)]
+    fn add_weakened(
+        &self,
+        (rays, ends, traced): (&RayRows, &Ends, u32),
+        sources: &SourceRow,
+        values: &Lanes3,
+        sums: &mut Sums,
+    ) {
+        let weakened = self.tile.world.weakened_rows(rays, ends, traced, sources);
+        sums.rays.lookups += weakened.lookups;
+        let mut values = *values;
+        let arriving = traced & !weakened.occluded;
+        for i in lanes(arriving) {
+            let value = lane(&values, i) * passed(lane(&weakened.left, i), self.measure);
+            set_lane(&mut values, i, value);
+        }
+        add_where(arriving, &values, &mut sums.light);
     }
 
     /// Contribution of each sample if it is not occluded, a bit for each that is not 0, and the response of its vertex.
@@ -347,5 +371,13 @@ pub fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
             let is_added = bits & 1 << i != 0;
             sums[axis][i] += if is_added { values[axis][i] } else { 0.0 };
         }
+    }
+}
+
+/// The part of light that passed surfaces straight on, for a measure of light.
+pub fn passed(left: Vec3, measure: Measure) -> Vec3 {
+    match measure {
+        Measure::Radiance(_) | Measure::Work => left,
+        Measure::ArrivingShare => Vec3::splat(luminance(left)),
     }
 }

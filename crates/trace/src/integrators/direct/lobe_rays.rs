@@ -65,11 +65,17 @@ impl Loops for LobeRays<'_> {
             // Add the light of lamps that they find.
             for i in lanes(sent) {
                 let density = densities[i];
+                let lookups = &mut arrived.rays.lookups;
                 let radiance = match hits.get(i) {
+                    hit if tile.world.has_passable() => {
+                        let hit = hit.map(|shape| Hit { shape, object: objects[i] });
+                        let (ray, normal) = (rays.ray(i), lane(&row.normal, i));
+                        let left = |distance| transmittance(i, distance);
+                        tile.radiance_straight_on((&ray, hit), normal, density, left, lookups)
+                    }
                     Some(shape) => {
                         let hit = Hit { shape, object: objects[i] };
                         let normal = lane(&row.normal, i);
-                        let lookups = &mut arrived.rays.lookups;
                         let radiance = tile.lamp_radiance(&rays.ray(i), normal, &hit, density, lookups);
                         radiance * transmittance(i, hit.shape.t)
                     }

@@ -1,16 +1,16 @@
 //! Techniques that find the light of lamps beside light samples, and the MIS weights of light samples and of these against each other
 //! (multiple importance sampling: Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
 
-use crate::geometry::{Ray, SurfacePoint};
+use crate::geometry::{Ray, ShapeHit, SurfacePoint};
 use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
-use crate::lights::{LightHit, LightRow, Source};
+use crate::lights::{LightHit, LightRow, Side, Source};
 use crate::materials::TexturePoint;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
-use crate::world::Hit;
+use crate::world::{Hit, MOST_STRAIGHT};
 
 /// Technique that competes with light samples.
 #[derive(Clone, Copy)]
@@ -169,7 +169,8 @@ impl TileContext<'_> {
         let (direction, distance, primitive) = (ray.direction, hit.shape.t, hit.shape.primitive);
         let met = LightHit { direction, distance, normal: of_light, primitive };
         let lights = &self.world.lights;
-        lights.of_hit(hit.object, primitive).map_or(0.0, |(number, light)| {
+        let side = if of_light.dot(direction) > 0.0 { Side::Back } else { Side::Front };
+        lights.of_hit(hit.object, primitive, side).map_or(0.0, |(number, light)| {
             light.pdf(ray.origin, normal, &met)
                 * lights.samples_at(self.behaviour.receivers, ray.origin, normal).of(number)
         })
@@ -186,16 +187,59 @@ impl TileContext<'_> {
         lookups: &mut u64,
     ) -> Vec3 {
         let world = self.world;
-        let emission = &world.materials[world.material_index(hit)].emission;
+        let material = &world.materials[world.material_index(hit)];
+        let emission = &material.emission;
         if !emission.shines() {
             return Vec3::ZERO;
         }
         let SurfacePoint { normal, uv, .. } = world.geometry.surface(ray, hit);
-        if !(normal.dot(ray.direction) < 0.0) {
+        if !emission.shines_from(normal.dot(ray.direction) < 0.0) {
             return Vec3::ZERO;
         }
-        let radiance = emission.at(&TexturePoint::sharp(uv), lookups);
+        let at = TexturePoint::sharp(uv);
+        let mut radiance = emission.at(&at, lookups);
+        if let Some(opacity) = &material.opacity {
+            radiance *= opacity.at(&at, lookups);
+        }
         radiance * weight(self.sample_density(ray, from_normal, (hit, normal)) / density)
+    }
+
+    /// Weighted radiance that a ray in a lobe meets, from a surface with this normal, beginning with its first hit and going straight
+    /// on from there. `transmittance` is that of the medium up to a distance.
+    #[cold]
+    #[inline(never)]
+    pub fn radiance_straight_on(
+        &self,
+        (ray, first): (&Ray, Option<Hit>),
+        from_normal: Vec3,
+        density: f32,
+        transmittance: impl Fn(f32) -> Vec3,
+        lookups: &mut u64,
+    ) -> Vec3 {
+        let (mut sum, mut left, mut passed) = (Vec3::ZERO, Vec3::ONE, 0.0);
+        let (mut along, mut next) = (*ray, first);
+        for _ in 0..=MOST_STRAIGHT {
+            let Some(hit) = next else {
+                let beyond = self.radiance_beyond(ray, from_normal, density);
+                return sum + left * beyond * transmittance(f32::MAX);
+            };
+            // Add the light of the surface, as if the ray had come there without a stop.
+            let distance = passed + hit.shape.t;
+            let met = Hit { shape: ShapeHit { t: distance, ..hit.shape }, ..hit };
+            let radiance = self.lamp_radiance(ray, from_normal, &met, density, lookups);
+            sum += left * radiance * transmittance(distance);
+            // Go straight on, if the surface lets light pass.
+            if !self.world.materials[self.world.material_index(&hit)].lets_pass() {
+                return sum;
+            }
+            let (part, beyond) = self.world.beyond(&along, &hit, lookups);
+            (left, along, passed) = (left * part, beyond, distance);
+            if left == Vec3::ZERO {
+                return sum;
+            }
+            next = self.world.geometry.closest(&along);
+        }
+        sum
     }
 
     /// [`TileContext::lamp_weight`] for a lamp that touches the glass which the path hits with it: the result of the light samples'
@@ -203,7 +247,7 @@ impl TileContext<'_> {
     pub fn touching_lamp_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment(origin, origin + direction * hit.shape.t);
-        if path.state.density > 0.0 && !self.world.geometry.occluded(&shadow, Source::Object(hit.object)) {
+        if path.state.density > 0.0 && !self.world.is_dark(&shadow, Source::Object(hit.object)) {
             self.lamp_weight(path, hit)
         } else {
             1.0

@@ -186,11 +186,11 @@ impl DirectLightQueue {
                 let sums = self.sums(asked, tile, measure, group.len() as u32);
                 group.push(sums);
                 if self.pool.is_full() {
-                    self.pool.trace(&tile.world.geometry, &mut group);
+                    self.pool.trace(tile, measure, &mut group);
                 }
             }
             // Trace the rest of the pool.
-            self.pool.trace(&tile.world.geometry, &mut group);
+            self.pool.trace(tile, measure, &mut group);
             // Add the light by rays in lobes and by photons, and store the result.
             for (number, sums) in (first..end).zip(group.drain(..)) {
                 let row = &self.rows[number];

@@ -1,11 +1,13 @@
 //! Shadow rays of many rows of vertices, grouped by light: rays to one corner of the scene visit the same boxes on the way, while
 //! those of one row go everywhere.
 
-use super::all_lights::{Sums, add_where};
+use super::all_lights::{Sums, add_where, passed};
 use crate::geometry::rows::{Ends, RayRows, lanes};
+use crate::integrators::transport::tile::TileContext;
+use crate::integrators::view::Measure;
 use crate::lights::{Source, SourceRow};
-use crate::math::lanes::{Folds, LANES, Lanes3};
-use crate::world::{Geometry, Loops};
+use crate::math::lanes::{Folds, LANES, Lanes3, lane, set_lane};
+use crate::world::{Loops, World};
 
 /// Rays of a row of vertices, and their contributions.
 struct QueuedRow {
@@ -59,13 +61,14 @@ impl ShadowRayQueue {
 
     /// Traces all rays and drops them; adds the light that arrives to the sums of the rows, in the order in which rays
     /// came.
-    pub fn trace(&mut self, geometry: &Geometry, sums: &mut [Sums]) {
+    pub fn trace(&mut self, tile: &TileContext<'_>, measure: Measure, sums: &mut [Sums]) {
         if self.rows.is_empty() {
             return;
         }
         self.sort();
         let Self { rows, sorted, .. } = self;
-        geometry.instructions().run(Tracing { geometry, rows, rays: sorted });
+        let world = tile.world;
+        world.geometry.instructions().run(Tracing { world, measure, rows, rays: sorted });
         for QueuedRow { row, traced, values, .. } in &*rows {
             add_where(*traced, values, &mut sums[*row as usize].light);
         }
@@ -101,7 +104,8 @@ impl ShadowRayQueue {
 
 /// Test that finds the rays which are occluded.
 struct Tracing<'a> {
-    geometry: &'a Geometry,
+    world: &'a World,
+    measure: Measure,
     rows: &'a mut [QueuedRow],
     /// Their rows and lanes.
     rays: &'a [u32],
@@ -112,7 +116,7 @@ impl Loops for Tracing<'_> {
 
     #[inline(always)]
     fn run(self, folds: impl Folds) {
-        let Self { geometry, rows, rays } = self;
+        let Self { world, measure, rows, rays } = self;
         for rays in rays.chunks(LANES) {
             let mut packet = RayRows::of([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
             let mut ends = [-1.0; LANES];
@@ -128,11 +132,35 @@ impl Loops for Tracing<'_> {
                 sources.copy(to, &row.sources, from);
             }
             let traced = ((1_u64 << rays.len()) - 1) as u32;
-            let occluded = geometry.occluded_rows(&packet, &ends, traced, &sources, folds);
+            let occluded = if world.has_passable() {
+                weaken(world, measure, (&packet, &ends, traced), &sources, (rows, rays))
+            } else {
+                world.geometry.occluded_rows(&packet, &ends, traced, &sources, folds)
+            };
             for to in lanes(occluded) {
                 let ray = rays[to] as usize;
                 rows[ray / LANES].traced &= !(1 << (ray % LANES));
             }
         }
     }
+}
+
+/// Weakens the contributions of rays by what they pass straight on; returns a bit for each on which nothing is left.
+#[cold]
+#[inline(never)]
+fn weaken(
+    world: &World,
+    measure: Measure,
+    (packet, ends, traced): (&RayRows, &Ends, u32),
+    sources: &SourceRow,
+    (rows, rays): (&mut [QueuedRow], &[u32]),
+) -> u32 {
+    let weakened = world.weakened_rows(packet, ends, traced, sources);
+    for from in lanes(traced & !weakened.occluded) {
+        let left = passed(lane(&weakened.left, from), measure);
+        let (row, to) = (&mut rows[rays[from] as usize / LANES], rays[from] as usize % LANES);
+        let value = lane(&row.values, to) * left;
+        set_lane(&mut row.values, to, value);
+    }
+    weakened.occluded
 }

@@ -74,7 +74,7 @@ pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
 pub fn receives(material: &Material) -> bool {
     match &material.bsdf {
         Bsdf::Rough(rough) => rough.constant().is_none_or(|bsdf| !bsdf.is_black()),
-        Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
+        Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => false,
     }
 }
 

@@ -20,11 +20,11 @@ use crate::integrators::transport::ray::{PathRay, PathState};
 use crate::integrators::transport::scatter::{BsdfSampling, Continuation};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, Vertex};
-use crate::integrators::transport::walk::{MOST_HIDDEN, Reached, Walker, walk};
+use crate::integrators::transport::walk::{MOST_HIDDEN, OpaqueHit, Reached, Straight, Walker, chance, walk};
 use crate::integrators::view::Measure;
 use crate::integrators::{PACKET, RayCounters};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
-use crate::materials::Bsdf;
+use crate::materials::{Bsdf, Pane};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
@@ -97,8 +97,8 @@ impl PhotonTracing<'_> {
         Ok(wavefront.shots)
     }
 
-    /// The ray of a photon from beyond all finite objects, started at its hit on planes of glass on the way there. `None` if
-    /// something opaque is there.
+    /// The ray of a photon from beyond all finite objects, started at its hit on planes on the way there that it may pass. `None`
+    /// if something opaque is there.
     fn past_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.tile.world;
         let mut start = ray.origin;
@@ -107,7 +107,10 @@ impl PhotonTracing<'_> {
             let Some(hit) = world.geometry.closest(&back) else {
                 return Some(Ray::new(start, ray.direction));
             };
-            world.materials[world.material_index(&hit)].bsdf.glass()?;
+            let material = &world.materials[world.material_index(&hit)];
+            if material.bsdf.glass().is_none() && !material.lets_pass() {
+                return None;
+            }
             let SurfacePoint { point, error, normal, .. } = world.geometry.surface(&back, &hit);
             start = offset_origin(point, error, normal, back.direction);
         }
@@ -157,9 +160,28 @@ impl<'a> Walker<'a> for PhotonWavefront<'a> {
                 let lacks_photons = self.depth == 0 && !has_passed;
                 self.shade_surface(path, vertex, lacks_photons);
             }
-            Reached::Glass(vertex, far) => self.shade_glass(path, vertex, far),
+            Reached::Glass(vertex, _, far) => self.shade_glass(path, vertex, far),
             Reached::Nothing | Reached::Hidden => {}
         }
+    }
+
+    fn lookups(&mut self) -> &mut u64 {
+        &mut self.counters.texture_lookups
+    }
+
+    fn meet_pane(&mut self, path: &PathRay, vertex: &Vertex<'a>, _: OpaqueHit, pane: &Pane) -> Straight {
+        let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.to_eye));
+        let tint = vertex.tinted(pane.tint);
+        if !self.goes_on() {
+            return Straight::Passes(tint * (1.0 - reflectance));
+        }
+        if !self.tracing.tile.chooses_reflection(path, reflectance) {
+            return Straight::Passes(tint);
+        }
+        let shading = vertex.shading(&mut self.counters);
+        let ray = reflected(path, vertex, &shading, Vec3::ONE);
+        self.push(path, vertex, (shading.normal, 1.0), ray);
+        Straight::Ends
     }
 }
 
@@ -242,11 +264,14 @@ impl PhotonWavefront<'_> {
             Bsdf::Rough(_) if lacks_photons => {}
             Bsdf::Rough(rough) => {
                 let bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
+                let bsdf = vertex.tinted_bsdf(bsdf);
                 if bsdf.is_black() {
                     return;
                 }
-                // Store the photon.
-                self.store(path, vertex.surface.point, vertex.normal);
+                // Store the photon; it stands for those that passed the surface as if it were not there.
+                let chance = chance(path, vertex, &mut self.counters.texture_lookups);
+                let all = PathRay { throughput: path.throughput / chance, ..*path };
+                self.store(&all, vertex.surface.point, vertex.normal);
                 if !(path.state.only_specular_before && self.goes_on()) {
                     return;
                 }
@@ -265,10 +290,10 @@ impl PhotonWavefront<'_> {
             }
             Bsdf::Mirror(mirror) if self.goes_on() => {
                 let shading = vertex.shading(&mut self.counters);
-                let ray = reflected(path, vertex, &shading, mirror.reflectance);
+                let ray = reflected(path, vertex, &shading, vertex.tinted(mirror.reflectance));
                 self.push(path, vertex, (shading.normal, 1.0), ray);
             }
-            Bsdf::Mirror(_) | Bsdf::Glass(_) => {}
+            Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => {}
         }
     }
 

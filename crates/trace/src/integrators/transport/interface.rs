@@ -14,6 +14,8 @@ const REFLECTED: u32 = 1;
 const REFRACTED: u32 = 2;
 /// Branch number of scattering by a lobe that is not δ.
 pub const SCATTERED: u32 = 3;
+/// Branch number of the way straight on.
+pub const STRAIGHT: u32 = 4;
 
 /// The mirrored ray. A shading normal that sends it below the surface is replaced by the geometric one.
 pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflectance: Vec3) -> PathRay {

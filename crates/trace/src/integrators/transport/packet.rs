@@ -186,6 +186,8 @@ struct Plain {
     all: u32,
     /// A bit for each that emits, on either side.
     shining: u32,
+    /// A bit for each whose both sides emit alike.
+    two_sided: u32,
     /// Look-ups of their textures.
     lookups: u64,
 }
@@ -259,7 +261,7 @@ impl Loops for PacketIntersection<'_> {
             Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
             Some(_) | None => ([[0.0; PACKET]; 3], [0.0; PACKET]),
         };
-        let (shining, lookups) = (plain.shining & front, plain.lookups);
+        let (shining, lookups) = (plain.shining & (front | plain.two_sided), plain.lookups);
         PacketHits { hits, object, any, plain: plain.all, shining, found, lookups, sky }
     }
 }
@@ -275,10 +277,13 @@ impl PacketIntersection<'_> {
         folds: impl Folds,
     ) -> Plain {
         let Self { tile, measure, are_lit, row, surface, .. } = self;
-        let mut plain = Plain { all: 0, shining: 0, lookups: 0 };
+        let mut plain = Plain { all: 0, shining: 0, two_sided: 0, lookups: 0 };
         while left != 0 {
             let (id, of_object) = first_alike(object, left, folds);
             left &= !of_object;
+            if tile.world.is_colored(id) {
+                continue;
+            }
             // Leave out materials that are not plain. The first plain one decides the kind of all BSDFs.
             let materials = tile.world.row_of_materials(id, of_object, &hits.primitive);
             let (mut of, mut has_uv) = (0, false);
@@ -296,6 +301,7 @@ impl PacketIntersection<'_> {
                 of |= alike;
                 has_uv |= rough.row_texture().is_some() && *are_lit && measure.is_colored();
                 plain.shining |= if material.emission.shines() { alike } else { 0 };
+                plain.two_sided |= if material.emission.is_two_sided() { alike } else { 0 };
                 groups.push((rough, alike));
             }
             if of == 0 {
@@ -306,7 +312,7 @@ impl PacketIntersection<'_> {
                 Object::Shape(shape) => {
                     row.set_starts(of, &[Ray::NO_TRIANGLE; PACKET]);
                     if !surface.fill(shape, rows, hits, of) {
-                        plain.shining &= !of;
+                        (plain.shining, plain.two_sided) = (plain.shining & !of, plain.two_sided & !of);
                         continue;
                     }
                     if has_uv {

@@ -59,6 +59,11 @@ impl PathState {
         Self { density: 0.0, roulette_throughput: self.roulette_throughput * part, ..self }
     }
 
+    /// The state after a surface that it passed straight on, of which this part is left: light samples find what is behind it.
+    pub fn straight(self, part: f32) -> Self {
+        Self { roulette_throughput: self.roulette_throughput * part, ..self }
+    }
+
     /// Whether the view shows light that reaches the first diffuse or glossy surface by this path.
     pub fn contributes(&self, ways: Ways) -> bool {
         match (self.one_diffuse_before, self.density > 0.0) {

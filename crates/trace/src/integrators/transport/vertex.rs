@@ -33,6 +33,8 @@ pub struct Vertex<'a> {
     pub texture_point: TexturePoint,
     /// The beam of the path at the surface.
     pub cone: Cone,
+    /// Vertex colour, by which the material's colour is multiplied. `None` if it does not count.
+    pub color: Option<Vec3>,
     /// Mean curvature, > 0 if the surface bulges towards the viewer; computed for δ surfaces alone.
     pub curvature: f32,
 }
@@ -98,6 +100,7 @@ impl<'a> Vertex<'a> {
         Self {
             texture_point: TexturePoint { uv: surface.uv, footprint },
             cone,
+            color: tile.world.vertex_color(hit),
             curvature,
             material,
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
@@ -112,7 +115,7 @@ impl<'a> Vertex<'a> {
 
     /// Whether it emits towards the path.
     pub fn emits(&self) -> bool {
-        self.is_front && self.material.emission.shines()
+        self.material.emission.shines_from(self.is_front)
     }
 
     /// The radiance that it emits. For paths that share their lamps with light samples, it is what light samples find: that of the
@@ -121,6 +124,18 @@ impl<'a> Vertex<'a> {
         let is_shared = path.state.density > 0.0;
         let at = if is_shared { TexturePoint::sharp(self.surface.uv) } else { self.texture_point };
         self.material.emission.at(&at, &mut counters.texture_lookups)
+    }
+
+    /// A colour of the material, multiplied by the vertex colour.
+    #[inline]
+    pub fn tinted(&self, color: Vec3) -> Vec3 {
+        self.color.map_or(color, |own| color * own)
+    }
+
+    /// The BSDF, multiplied by the vertex colour.
+    #[inline]
+    pub fn tinted_bsdf(&self, bsdf: RoughBsdf) -> RoughBsdf {
+        self.color.map_or(bsdf, |color| bsdf.tinted(color))
     }
 
     /// Sets the starts of rays that leave.

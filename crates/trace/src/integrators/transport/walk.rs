@@ -1,14 +1,21 @@
-//! Walk of a ray to the first surface where the glass around it changes, or which is opaque. Paths from the eye and photons walk
-//! alike; a [`Walker`] decides what happens at that surface.
+//! Walk of a ray to the first surface where the glass around it changes, or which is opaque and there. Paths from the eye and photons
+//! walk alike; a [`Walker`] decides what happens at that surface.
+//!
+//! Thin panes, and surfaces that chance leaves out by their opacity, are passed straight on: to what it meets there, the path comes
+//! from its last vertex, as shadow rays do.
 
 use super::crossing::{Crossing, CrossingMemory};
+use super::interface::STRAIGHT;
 use super::medium::{Medium, absorption};
 use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::Vertex;
 use crate::geometry::{Ray, ShapeHit, SurfacePoint};
+use crate::integrators::RayCounters;
+use crate::materials::{Bsdf, Pane, TexturePoint};
+use crate::math::Vec3;
 use crate::sampling::Decision;
-use crate::world::Hit;
+use crate::world::{Hit, MOST_STRAIGHT};
 
 /// Most surfaces without a change of glass that a ray passes in one walk.
 pub const MOST_HIDDEN: usize = 64;
@@ -17,8 +24,8 @@ pub const MOST_HIDDEN: usize = 64;
 pub enum Reached<'v, 'a> {
     /// An opaque surface.
     Opaque(&'v Vertex<'a>, OpaqueHit),
-    /// A change of glass, and the medium beyond it.
-    Glass(&'v Vertex<'a>, Medium),
+    /// A change of glass at a hit, and the medium beyond it.
+    Glass(&'v Vertex<'a>, Hit, Medium),
     /// None: the ray leaves the scene.
     Nothing,
     /// One more surface within glass, after [`MOST_HIDDEN`] of them.
@@ -39,6 +46,50 @@ pub trait Walker<'a> {
     /// Goes on where the walk ends. The path's ray is the one that arrives, in the medium before the surface, with the absorption on
     /// the way in its throughput. `has_passed` tells whether any surface was passed.
     fn reach(&mut self, path: &PathRay, reached: Reached<'_, 'a>, has_passed: bool);
+
+    /// Number of texture look-ups, to be added to.
+    fn lookups(&mut self) -> &mut u64;
+
+    /// Goes on at a thin pane. The path is as for [`Walker::reach`].
+    fn meet_pane(&mut self, path: &PathRay, vertex: &Vertex<'a>, hit: OpaqueHit, pane: &Pane) -> Straight;
+}
+
+/// Continuation of a path at a surface that light may pass straight on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Straight {
+    /// It passes, with this factor on its throughput.
+    Passes(Vec3),
+    /// The surface is there.
+    Stays,
+    /// It ends, or goes on elsewhere.
+    Ends,
+}
+
+/// Way of a path since its last vertex, if it passed surfaces straight on.
+#[derive(Clone, Copy)]
+struct Way {
+    /// The last vertex.
+    origin: Vec3,
+    /// Distance of the path's current ray from it.
+    distance: f32,
+    /// Number of the surfaces.
+    count: u32,
+}
+
+impl Way {
+    fn from(path: &PathRay) -> Self {
+        Self { origin: path.ray.origin, distance: 0.0, count: 0 }
+    }
+
+    /// Makes the path one that comes from its last vertex without a stop; returns its hit.
+    #[inline(always)]
+    fn straighten(&self, path: &mut PathRay, mut hit: Hit) -> Hit {
+        if self.count > 0 {
+            path.ray.origin = self.origin;
+            hit.shape.t += self.distance;
+        }
+        hit
+    }
 }
 
 /// Hit of an opaque surface.
@@ -58,16 +109,41 @@ pub fn walk<'a, W: Walker<'a>>(
     (mut hit, mut surface): (Hit, Option<SurfacePoint>),
 ) {
     let tile = walker.tile();
-    for number in 0..MOST_HIDDEN {
-        let has_passed = number > 0;
+    let (mut way, mut hidden) = (Way::from(&path), 0);
+    while hidden < MOST_HIDDEN {
+        let has_passed = hidden > 0;
         let mut vertex = match surface.take() {
             Some(surface) => Vertex::on(tile, &path, &hit, surface),
             None => Vertex::to_shade(tile, &path, &hit),
         };
-        // Stop at an opaque surface.
+        // Stop at an opaque surface, or pass it straight on.
         if vertex.material.bsdf.glass().is_none() {
             path.throughput *= absorption(tile.world, path.medium, hit.shape.t);
+            if vertex.material.lets_pass() {
+                match straight(walker, &path, &vertex, (way, hit)) {
+                    Straight::Passes(_) if way.count == MOST_STRAIGHT => return,
+                    Straight::Passes(part) => {
+                        way = Way { distance: way.distance + hit.shape.t, count: way.count + 1, ..way };
+                        path = passed(path, &vertex, part);
+                        match tile.world.geometry.closest(&path.ray) {
+                            Some(next) => {
+                                walker.pass(&path, Some(next));
+                                hit = next;
+                                continue;
+                            }
+                            None => {
+                                walker.pass(&path, None);
+                                path.ray.origin = way.origin;
+                                return walker.reach(&path, Reached::Nothing, has_passed);
+                            }
+                        }
+                    }
+                    Straight::Ends => return,
+                    Straight::Stays => {}
+                }
+            }
             path.medium = tile.without_open(path.medium);
+            let hit = way.straighten(&mut path, hit);
             return walker.reach(&path, Reached::Opaque(&vertex, OpaqueHit::Own(hit)), has_passed);
         }
         // At glass, find all surfaces that touch here.
@@ -77,18 +153,25 @@ pub fn walk<'a, W: Walker<'a>>(
         path.medium = near;
         if let Some(touching) = opaque {
             let vertex = Vertex::touching(tile, &path, (sides, &touching), hit.shape.t);
-            let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
-            return walker.reach(&path, Reached::Opaque(&vertex, OpaqueHit::Touching(touched)), has_passed);
+            if !vertex.material.lets_pass() || is_touched(walker, &path, &vertex) {
+                let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
+                let touched = way.straighten(&mut path, touched);
+                let reached = Reached::Opaque(&vertex, OpaqueHit::Touching(touched));
+                return walker.reach(&path, reached, has_passed);
+            }
+            path.path = path.next_path(STRAIGHT);
         }
         // Stop at a change of glass.
         if near.glass() != far.glass() {
             vertex.start_between(sides);
-            return walker.reach(&path, Reached::Glass(&vertex, far), has_passed);
+            let hit = way.straighten(&mut path, hit);
+            return walker.reach(&path, Reached::Glass(&vertex, hit, far), has_passed);
         }
         // Pass on, as nothing changes here.
         (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
         path.state = path.state.hidden();
         path.cone = path.cone.after(hit.shape.t);
+        (way, hidden) = (Way::from(&path), hidden + 1);
         let next = tile.world.geometry.closest(&path.ray);
         walker.pass(&path, next);
         match next {
@@ -99,7 +182,88 @@ pub fn walk<'a, W: Walker<'a>>(
     walker.reach(&path, Reached::Hidden, true);
 }
 
+/// What a path does at a surface that light may pass straight on.
+#[cold]
+#[inline(never)]
+fn straight<'a, W: Walker<'a>>(
+    walker: &mut W,
+    path: &PathRay,
+    vertex: &Vertex<'a>,
+    (way, hit): (Way, Hit),
+) -> Straight {
+    if !is_there(walker.tile(), path, vertex, walker.lookups()) {
+        return Straight::Passes(Vec3::ONE);
+    }
+    match &vertex.material.bsdf {
+        Bsdf::Pane(pane) => {
+            let mut whole = *path;
+            let hit = way.straighten(&mut whole, hit);
+            whole.medium = walker.tile().without_open(whole.medium);
+            walker.meet_pane(&whole, vertex, OpaqueHit::Own(hit), pane)
+        }
+        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) => Straight::Stays,
+    }
+}
+
+/// Whether a surface that touches glass, and which light may pass, stops a path. Panes add nothing to the glass.
+#[cold]
+#[inline(never)]
+fn is_touched<'a, W: Walker<'a>>(walker: &mut W, path: &PathRay, vertex: &Vertex<'a>) -> bool {
+    match &vertex.material.bsdf {
+        Bsdf::Pane(_) => false,
+        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) => {
+            is_there(walker.tile(), path, vertex, walker.lookups())
+        }
+    }
+}
+
+/// The chance that the surface is there. For paths that share their lamps with light samples, it is what these find: that of the
+/// point.
+pub fn chance(path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> f32 {
+    let Some(opacity) = &vertex.material.opacity else { return 1.0 };
+    let is_shared = path.state.density > 0.0;
+    let at = if is_shared { TexturePoint::sharp(vertex.surface.uv) } else { vertex.texture_point };
+    opacity.at(&at, lookups)
+}
+
+/// Whether chance puts the surface there.
+fn is_there(tile: &TileContext<'_>, path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> bool {
+    let chance = chance(path, vertex, lookups);
+    chance >= 1.0 || tile.sampler(path.slot).pair(path.path, Decision::Opacity).x < chance
+}
+
+/// The path behind a surface that it passed straight on.
+fn passed(path: PathRay, vertex: &Vertex<'_>, part: Vec3) -> PathRay {
+    PathRay {
+        ray: vertex.leaving(path.ray.direction),
+        throughput: path.throughput * part,
+        path: path.next_path(STRAIGHT),
+        state: path.state.straight(part.max_element()),
+        cone: vertex.cone,
+        ..path
+    }
+}
+
 impl TileContext<'_> {
+    /// The first surface that is there along a camera ray from its hit on, with the ray's path. `None` if there is none.
+    pub fn first_there(
+        &self,
+        path: &PathRay,
+        hit: &Hit,
+        counters: &mut RayCounters,
+    ) -> Option<(PathRay, Hit)> {
+        let (mut path, mut hit) = (*path, *hit);
+        for _ in 0..=MOST_STRAIGHT {
+            let vertex = Vertex::to_shade(self, &path, &hit);
+            if is_there(self, &path, &vertex, &mut counters.texture_lookups) {
+                return Some((path, hit));
+            }
+            path = passed(path, &vertex, Vec3::ONE);
+            hit = self.world.geometry.closest(&path.ray)?;
+        }
+        None
+    }
+
     /// Whether chance chooses reflection, which has this probability, at a path's vertex.
     #[inline]
     pub fn chooses_reflection(&self, path: &PathRay, reflectance: f32) -> bool {

@@ -6,7 +6,6 @@ use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, RayF64, Shape};
 use crate::math::DVec3;
-use crate::math::transform::Transform;
 use crate::scene::description::{Lowered, Mesh, Scene};
 
 /// Most rims of a hole that are examined.
@@ -158,8 +157,7 @@ pub(super) fn triangles<'a>(
     origin: DVec3,
 ) -> impl Iterator<Item = [DVec3; 3]> + 'a {
     let own = &loaded.mesh;
-    let to_scene = Transform::scale_rotate_translate(placed.scale, placed.rotate, placed.translate);
-    let place = to_scene.between(own.origin, origin);
+    let place = placed.placed.transform().between(own.origin, origin);
     let corners = move |number: u32| own.corners(number).map(|corner| place.point(corner.as_dvec3()));
     (0..own.triangles.len() as u32).map(corners)
 }

@@ -7,7 +7,6 @@ use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
-use crate::math::transform::Transform;
 use crate::scene::description::{MaterialKind, Mesh, Object, Scene, Shape, Sheet};
 
 /// Number of chords of a circular rim: they are the same points for every rim on one circle.
@@ -159,8 +158,7 @@ impl Pieces {
         open: &[[u32; 2]],
     ) {
         let mesh = &loaded.mesh;
-        let to_scene = Transform::scale_rotate_translate(placed.scale, placed.rotate, placed.translate);
-        let place = to_scene.between(mesh.origin, self.origin);
+        let place = placed.placed.transform().between(mesh.origin, self.origin);
         let mirrors = place.mirrors();
         let is_glass = |triangle: usize| match glass {
             MeshGlass::All => true,
@@ -200,10 +198,10 @@ impl Pieces {
 
 /// A point of a shape.
 fn start(shape: &Shape, meshes: &[&LoadedMesh]) -> DVec3 {
-    let of_mesh = |&Mesh { file, scale, rotate, translate, .. }: &Mesh| {
-        let mesh = &meshes[file].mesh;
+    let of_mesh = |placed: &Mesh| {
+        let mesh = &meshes[placed.file].mesh;
         let first = mesh.positions.first().map_or(DVec3::ZERO, |first| first.as_dvec3());
-        Transform::scale_rotate_translate(scale, rotate, translate).point(mesh.origin + first)
+        placed.placed.transform().point(mesh.origin + first)
     };
     shape.point().or_else(|| shape.mesh().map(of_mesh)).unwrap_or(DVec3::ZERO)
 }

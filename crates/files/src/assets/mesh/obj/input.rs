@@ -16,18 +16,26 @@ pub(super) struct Survey<'a> {
     /// Place of a slash that ends the first such corner of a face, with its number missing; `tobj` takes the corner for one
     /// without a slash.
     pub(super) open_corner: Option<usize>,
+    /// Number of vertices, and the places of the colours of those that have one.
+    vertices: usize,
+    colors: Vec<Range<usize>>,
 }
 
 impl<'a> Survey<'a> {
-    /// Prepares the text of an OBJ. It blanks comments behind numbers, colours of vertices, and lines that `tobj`
+    /// Prepares the text of an OBJ. It blanks comments behind numbers, colours unless all vertices have one, and lines that `tobj`
     /// mistakes for faces (`l`, `p`). It joins lines that continue behind a backslash, moves keywords before names to
     /// the start of their line, replaces bytes beyond UTF-8, and adds a second texture coordinate of 0 to single ones.
     ///
     /// # Errors
     /// [`Cancelled`] if the token is cancelled.
     pub(super) fn of(bytes: &'a [u8], token: &CancelToken) -> Result<Self, Cancelled> {
-        let mut survey =
-            Self { text: Cow::Borrowed(bytes), used_materials: BTreeSet::new(), open_corner: None };
+        let mut survey = Self {
+            text: Cow::Borrowed(bytes),
+            used_materials: BTreeSet::new(),
+            open_corner: None,
+            vertices: 0,
+            colors: Vec::new(),
+        };
         let mut unfinished = None;
         let mut lone = Vec::new();
         let mut start = 0;
@@ -50,6 +58,9 @@ impl<'a> Survey<'a> {
                 unfinished = goes_on.then_some((statement, 0));
             }
             start = (end + 1).min(bytes.len());
+        }
+        if survey.colors.len() < survey.vertices {
+            std::mem::take(&mut survey.colors).into_iter().for_each(|place| survey.blank(place));
         }
         survey.complete(&lone);
         if !survey.text.is_ascii() && std::str::from_utf8(&survey.text).is_err() {
@@ -97,8 +108,9 @@ impl<'a> Survey<'a> {
         match statement {
             Statement::Skipped => self.blank(start..start + line.len()),
             Statement::Vertex => {
-                let colours = colours(content).unwrap_or(content.len());
-                self.blank(start + colours..start + content.len());
+                self.vertices += 1;
+                let colours = colours(content).map(|place| start + place..start + content.len());
+                self.colors.extend(colours);
             }
             Statement::Comment
             | Statement::Named
@@ -223,7 +235,10 @@ fn colours(line: &[u8]) -> Option<usize> {
     });
     // The colours follow the keyword and three coordinates.
     let colours = ends.nth(3)?;
-    (words_of(&line[colours..]).count() == 3).then_some(colours)
+    let number =
+        |word: &[u8]| std::str::from_utf8(word).ok()?.parse::<f32>().ok().filter(|part| part.is_finite());
+    let words = || words_of(&line[colours..]);
+    (words().count() == 3 && words().all(|word| number(word).is_some())).then_some(colours)
 }
 
 /// Bytes that `tobj` gets at a time, between two polls of the token.

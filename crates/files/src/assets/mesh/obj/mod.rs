@@ -7,7 +7,7 @@ mod libraries;
 
 use std::cell::RefCell;
 
-use super::assemble::{Parsed, assemble};
+use super::assemble::{Parsed, assemble, color_bytes};
 use super::text::with_line_feeds;
 use super::{AssetError, LoadedMesh, Source};
 use crate::assets::FileMaterial;
@@ -66,6 +66,7 @@ fn join(models: &[tobj::Model], parsed: &mut Parsed) {
     let vertices = |model: &tobj::Model| model.mesh.positions.len() / 3;
     let any_uvs = models.iter().any(|model| !model.mesh.texcoords.is_empty());
     let any_normals = models.iter().any(|model| !model.mesh.normals.is_empty());
+    let any_colors = models.iter().any(|model| !model.mesh.vertex_color.is_empty());
     let any_materials = models.iter().any(|model| model.mesh.material_id.is_some());
     for model in models {
         let mesh = &model.mesh;
@@ -79,6 +80,11 @@ fn join(models: &[tobj::Model], parsed: &mut Parsed) {
             let normals = mesh.normals.chunks_exact(3).map(|normal| DVec3::from_slice(normal).as_vec3());
             parsed.normals.extend(normals);
         }
+        if any_colors {
+            let colors = mesh.vertex_color.chunks_exact(3).map(DVec3::from_slice);
+            parsed.colors.extend(colors.map(|color| color_bytes(color.to_array())));
+        }
+        parsed.colors.resize(if any_colors { end } else { 0 }, [u8::MAX; 3]);
         parsed.uvs.resize(if any_uvs { end } else { 0 }, Vec2::ZERO);
         parsed.normals.resize(if any_normals { end } else { 0 }, Vec3::ZERO);
         add_faces(mesh, base, parsed);

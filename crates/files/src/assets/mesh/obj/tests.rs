@@ -163,7 +163,15 @@ fn keywords_may_be_indented_and_followed_by_tabs() {
 fn colours_and_weights_behind_coordinates() {
     // Some vertices with a colour, some without.
     let text = "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 1 1 1 # white\nf 1 2 3\n";
-    assert_eq!(read(text).expect("whole").mesh.positions[2], Vec3::Y);
+    let mesh = read(text).expect("whole").mesh;
+    assert_eq!((mesh.positions[2], mesh.colors.len()), (Vec3::Y, 0));
+    // All of them with a colour, and corners that differ in texture coordinates.
+    let text = "v 0 0 0 1 0 0\nv 1 0 0 0 0.2 0\nv 0 1 0 1 1 1 # white\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/2 3/1 2/1\n";
+    let mesh = read(text).expect("whole").mesh;
+    assert_eq!(mesh.colors, [[255, 0, 0], [0, 51, 0], [255, 255, 255], [255, 0, 0]]);
+    // Words are no colours.
+    let text = "v 0 0 0 a b c\nv 1 0 0 a b c\nv 0 1 0 a b c\nf 1 2 3\n";
+    assert_eq!(read(text).expect("whole").mesh.colors.len(), 0);
     assert_eq!(
         read("v 0 0 0 2\nv 1 0 0 2\nv 0 1 0 0.5\nf 1 2 3\n").expect("whole").mesh.positions[2],
         Vec3::Y * 2.0

@@ -4,7 +4,7 @@
 mod body;
 mod header;
 
-use super::assemble::{Parsed, assemble};
+use super::assemble::{Parsed, assemble, color_bytes};
 use super::text::Cursor;
 use super::{AssetError, LoadedMesh, Source};
 use crate::math::{DVec2, DVec3};
@@ -121,7 +121,7 @@ fn list_length(numbers: &mut impl Numbers, count: Scalar, item: Scalar) -> Resul
     }
 }
 
-/// Slot of a vertex value: position, normal, texture coordinates. `None` for other properties.
+/// Slot of a vertex value: position, normal, texture coordinates, colour. `None` for other properties.
 fn slot(name: &str) -> Option<usize> {
     Some(match name {
         "x" => 0,
@@ -132,6 +132,9 @@ fn slot(name: &str) -> Option<usize> {
         "nz" => 5,
         "u" | "s" | "texture_u" | "texture_s" => 6,
         "v" | "t" | "texture_v" | "texture_t" => 7,
+        "red" | "diffuse_red" | "r" => 8,
+        "green" | "diffuse_green" | "g" => 9,
+        "blue" | "diffuse_blue" | "b" => 10,
         _ => return None,
     })
 }
@@ -152,26 +155,36 @@ fn read_vertices(
     if !has(&[0, 1, 2]) {
         return Err(place.source.wrong("the vertices have no x, y and z"));
     }
-    let (has_normals, has_uvs) = (has(&[3, 4, 5]), has(&[6, 7]));
+    let (has_normals, has_uvs, has_colors) = (has(&[3, 4, 5]), has(&[6, 7]), has(&[8, 9, 10]));
+    // Whole numbers are parts of the greatest.
+    let greatest = |slot: usize| {
+        let kind = layout.iter().find(|(_, to)| *to == Some(slot)).map(|(kind, _)| *kind);
+        if let Some(Kind::One(scalar)) = kind { scalar.greatest() } else { 1.0 }
+    };
+    let full = [8, 9, 10].map(greatest);
     let count = element.count as usize;
     parsed.positions.reserve(count);
     parsed.normals.reserve(if has_normals { count } else { 0 });
     parsed.uvs.reserve(if has_uvs { count } else { 0 });
+    parsed.colors.reserve(if has_colors { count } else { 0 });
     each(place, element, numbers, |numbers| {
-        let mut values = [0.0; 8];
+        let mut values = [0.0; 11];
         for &(kind, slot) in &layout {
             match (kind, slot) {
                 (Kind::One(scalar), Some(slot)) => values[slot] = numbers.float(scalar)?,
                 _ => skip(numbers, kind)?,
             }
         }
-        let [x, y, z, nx, ny, nz, u, v] = values;
+        let [x, y, z, nx, ny, nz, u, v, red, green, blue] = values;
         parsed.positions.push(DVec3::new(x, y, z));
         if has_normals {
             parsed.normals.push(DVec3::new(nx, ny, nz).as_vec3());
         }
         if has_uvs {
             parsed.uvs.push(DVec2::new(u, v).as_vec2());
+        }
+        if has_colors {
+            parsed.colors.push(color_bytes([red / full[0], green / full[1], blue / full[2]]));
         }
         Ok(())
     })

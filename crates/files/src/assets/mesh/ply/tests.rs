@@ -174,3 +174,20 @@ fn a_list_of_negative_length_is_said_to_be_one() {
     assert_eq!(says(&ascii(&format!("{SQUARE}-3 0 1 2\n"))), "a.ply:15: face 1: the length of a list is -3");
     assert!(says(&ascii(&format!("{SQUARE}999 0 1 2\n"))).contains("it claims 999 corners"));
 }
+
+#[test]
+fn vertices_have_colours() {
+    let with = |properties: &str, colors: [&str; 4]| {
+        let vertices = ["0 0 0", "1 0 0", "1 1 0", "0 1 0"];
+        let lines: String =
+            vertices.iter().zip(colors).map(|(place, color)| format!("{place} {color}\n")).collect();
+        let text = format!("ply\nformat ascii 1.0\n{VERTEX}{properties}{FACE}{lines}4 0 1 2 3\n");
+        read_bytes(text.as_bytes()).expect("whole").mesh.colors
+    };
+    let bytes = "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n";
+    let read = with(bytes, ["255 0 51 9", "1 2 3 9", "0 0 0 9", "4 5 6 9"]);
+    assert_eq!(read, [[255, 0, 51], [1, 2, 3], [0, 0, 0], [4, 5, 6]]);
+    let floats = "property float r\nproperty float g\nproperty float b\n";
+    assert_eq!(with(floats, ["1 0 0.2", "2 -1 nan", "0 0 0", "1 1 1"])[..2], [[255, 0, 51], [255, 0, 0]]);
+    assert_eq!(with("property uchar red\n", ["1", "2", "3", "4"]), [[0; 3]; 0]);
+}

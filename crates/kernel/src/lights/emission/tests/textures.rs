@@ -18,12 +18,16 @@ fn patchy(width: u32, height: u32) -> Arc<Texels> {
 
 fn texture(width: u32, height: u32, filter: TextureFilter) -> Arc<Texture> {
     let texels = patchy(width, height);
-    Arc::new(Texture { texels, mipmaps: None, filter, wrap: Wrap::Repeat, repeat: Vec2::new(1.0, 2.0) })
+    let (wrap, repeat) = (Wrap::Repeat, Vec2::new(1.0, 2.0));
+    Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat, moved: None })
 }
 
 /// A light with a texture.
 fn textured(light: AreaLight, texture: &Arc<Texture>, chart: Chart) -> Light {
-    Light::Area(AreaLight { texture: Some(Box::new(EmissionTexture::new(texture, chart))), ..light })
+    Light::Area(AreaLight {
+        texture: EmissionTexture::new(Some(texture), None, chart).map(Box::new),
+        ..light
+    })
 }
 
 #[test]
@@ -91,6 +95,7 @@ fn meshes_send_what_samples_of_them_say() {
         let mesh = mesh.expect("an area");
         let bounds = mesh.bounds();
         let light = AreaLight {
+            side: Side::Front,
             shape: Emitter::Mesh(mesh),
             radiance: COLOR,
             texture: None,

@@ -59,7 +59,7 @@ impl Key<'_> {
             let scale = table.optional("scale");
             let scale = if scale.is_given() { scale.color() } else { Some(Vec3::ONE) };
             table.finish();
-            return Some(EmissionSource { scale: scale?, texture: Some(texture?) });
+            return Some(EmissionSource { texture: Some(texture?), ..EmissionSource::constant(scale?) });
         }
         self.is_no_texture(textures, EMISSION)?;
         self.color_of(Limits::AtLeast(0.0), EMISSION).map(|color| EmissionSource::constant(color.as_vec3()))

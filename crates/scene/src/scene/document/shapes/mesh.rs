@@ -3,10 +3,13 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use super::super::super::description::{Located, Mesh, Shape};
+use super::super::super::description::{Located, Mesh, Placement, Shape};
+use super::super::context::Issue;
+use super::super::key::Key;
 use super::super::limits::Limits;
 use super::super::table::Table;
 use crate::math::DVec3;
+use crate::math::limits::{SHORTEST, is_too_short, length};
 
 /// Endings of mesh files that can be read.
 pub(super) const MESHES: [&str; 3] = ["obj", "off", "ply"];
@@ -37,9 +40,58 @@ impl MeshFiles {
 
 pub(super) fn read(table: &Table<'_>, files: &mut MeshFiles) -> Option<Shape> {
     let file = table.required("file", "\"mesh.obj\"").file(&MESHES, &UNAVAILABLE);
-    let scale = table.optional("scale").scale(Limits::NotZero).unwrap_or(DVec3::ONE);
-    let rotate = table.optional("rotate").vector(Limits::Any).unwrap_or(DVec3::ZERO);
-    let translate = table.optional("translate").vector(Limits::Any).unwrap_or(DVec3::ZERO);
+    let placed = placement(table);
     let smooth = table.optional("smooth").flag().unwrap_or(true);
-    Some(Shape::Mesh(Mesh { file: files.index(file?), scale, rotate, translate, smooth }))
+    let vertex_colors = table.optional("vertex_colors").flag().unwrap_or(false);
+    Some(Shape::Mesh(Mesh { file: files.index(file?), placed: placed?, smooth, vertex_colors }))
+}
+
+/// `matrix`, or `scale`, `rotate` and `translate`.
+fn placement(table: &Table<'_>) -> Option<Placement> {
+    let (matrix, steps) =
+        (table.optional("matrix"), ["scale", "rotate", "translate"].map(|name| table.optional(name)));
+    if matrix.is_given() {
+        for key in &steps {
+            if let Some(span) = key.key_span() {
+                let message = format!("`{}` and `matrix` exclude each other", key.name);
+                key.context.report(Issue::error(span, message));
+            }
+        }
+        return affine(&matrix);
+    }
+    let [scale, rotate, translate] = steps;
+    Some(Placement::Steps {
+        scale: scale.scale(Limits::NotZero).unwrap_or(DVec3::ONE),
+        rotate: rotate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
+        translate: translate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
+    })
+}
+
+/// Least ratio of the volume of a cell that a matrix makes to that of the box of its edges: below, it is flat but for rounding.
+const LEAST_VOLUME: f64 = 1e-12;
+
+/// An affine map that flattens nothing, row by row.
+fn affine(key: &Key<'_>) -> Option<Placement> {
+    let numbers: [f64; 16] = key.numbers(Limits::Any, "16 numbers, row by row")?;
+    let [x, y, z, translate] =
+        std::array::from_fn(|column| DVec3::from_array(std::array::from_fn(|row| numbers[4 * row + column])));
+    let wrong = |message: &str, label: String| {
+        key.context.report(Issue::error(key.span().unwrap_or_default(), message).label(label));
+        None
+    };
+    if numbers[12..] != [0.0, 0.0, 0.0, 1.0] {
+        let [a, b, c, d] = [12, 13, 14, 15].map(|place| numbers[place]);
+        return wrong("the last row of `matrix` must be 0, 0, 0, 1", format!("it is {a}, {b}, {c}, {d}"));
+    }
+    let (volume, edges) = (x.cross(y).dot(z), x.length() * y.length() * z.length());
+    if !(volume.abs() > LEAST_VOLUME * edges) {
+        return wrong("`matrix` makes the mesh flat", format!("its determinant is {volume:e}"));
+    }
+    if [x, y, z].iter().any(|axis| is_too_short(length(*axis))) {
+        return wrong(
+            "`matrix` makes the mesh too small",
+            format!("its columns must be more than {SHORTEST:e} long"),
+        );
+    }
+    Some(Placement::Matrix { linear: [x, y, z], translate })
 }

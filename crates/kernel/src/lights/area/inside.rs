@@ -1,0 +1,95 @@
+//! Insides of round shapes and boxes that emit from both sides.
+
+use std::f32::consts::{PI, TAU};
+
+use super::sample_point::LightSamplePoint;
+use super::{LightHit, ShapeEmitter};
+use crate::geometry::{AreaPoint, RayF64, Shape};
+use crate::math::elementary::sin_cos;
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::sampling::distribution::Discrete;
+
+/// The inside of a shape. From inside of a closed one it fills all directions, and they are sampled uniformly; from elsewhere it is
+/// invisible. That of an open one is sampled by area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InsideEmitter {
+    shape: Shape,
+    by_area: Discrete,
+}
+
+impl ShapeEmitter for InsideEmitter {
+    fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+        match self.shape.encloses(point.as_dvec3()) {
+            Some(true) => self.around(point, u),
+            Some(false) => LightSamplePoint::NOTHING,
+            None => self.by_area(point, u),
+        }
+    }
+
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+        match self.shape.encloses(from.as_dvec3()) {
+            Some(true) => 1.0 / ALL_AROUND,
+            Some(false) => 0.0,
+            None if self.is_first(from, met.direction, met.distance) => met.pdf_by_area(self.by_area.total()),
+            None => 0.0,
+        }
+    }
+
+    fn middle(&self) -> DVec3 {
+        self.shape.middle()
+    }
+}
+
+/// Solid angle in sr of all directions.
+const ALL_AROUND: f32 = 4.0 * PI;
+
+impl InsideEmitter {
+    /// The emitter of the inside of a shape. `None` if the shape has no area.
+    pub fn new(shape: &Shape) -> Option<Self> {
+        Some(Self { shape: *shape, by_area: Discrete::new(shape.areas())? })
+    }
+
+    /// Samples a direction from a point inside.
+    fn around(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+        let cos = 1.0 - 2.0 * u[0];
+        let sin = ((1.0 - cos) * (1.0 + cos)).max(0.0).sqrt();
+        let (sin_around, cos_around) = sin_cos(TAU * u[1]);
+        let direction = Vec3::new(sin * cos_around, sin * sin_around, cos);
+        self.first(point, direction).map_or(LightSamplePoint::NOTHING, |distance| LightSamplePoint {
+            direction,
+            target: point + direction * distance,
+            factor: ALL_AROUND,
+        })
+    }
+
+    /// Samples a place by area; nothing arrives if another part of the shape is before it.
+    fn by_area(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
+        let (part, rest) = self.by_area.sample(u[0]);
+        let AreaPoint { point: place, normal } = self.shape.place(part as u32, Vec2::new(rest, u[1]));
+        let offset = place - point.as_dvec3();
+        let distance = offset.length();
+        let direction = offset / distance;
+        let cosine = direction.dot(normal);
+        let direction = direction.as_vec3();
+        if !(cosine > 0.0 && self.is_first(point, direction, distance as f32)) {
+            return LightSamplePoint::NOTHING;
+        }
+        let factor = cosine * self.by_area.total() / (distance * distance);
+        LightSamplePoint { direction, target: point + direction * distance as f32, factor: factor as f32 }
+    }
+
+    /// Whether nothing of the shape is before a place of it.
+    fn is_first(&self, point: Vec3, direction: Vec3, distance: f32) -> bool {
+        self.first(point, direction).is_some_and(|first| first > distance * (1.0 - SAME_PLACE))
+    }
+
+    /// Distance to the first point of the shape in a direction.
+    fn first(&self, point: Vec3, direction: Vec3) -> Option<f32> {
+        let (origin, direction) = (point.as_dvec3(), direction.as_dvec3());
+        let ray = RayF64 { origin, direction, t_max: f64::INFINITY };
+        self.shape.intersect(&ray).map(|hit| hit.t)
+    }
+}
+
+/// Relative difference of distances that are equal within rounding.
+const SAME_PLACE: f32 = 1e-4;

@@ -1,0 +1,36 @@
+//! The keys that all materials have.
+
+use super::super::description::{EmissionSource, NormalMap, NumberSource, OpacitySource};
+use super::limits::Limits;
+use super::names::Names;
+use super::table::Table;
+
+/// `emission` and `emission_sides`.
+pub(super) fn emission(table: &Table<'_>, textures: &Names) -> EmissionSource {
+    let source = table.optional("emission").emission(textures).unwrap_or(EmissionSource::NONE);
+    let sides = table.optional("emission_sides").choice().unwrap_or(source.sides);
+    EmissionSource { sides, ..source }
+}
+
+/// `normal_map` and `normal_strength`.
+pub(super) fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMap> {
+    let texture = table.optional("normal_map").name_in(textures);
+    let strength = table.optional("normal_strength").number32(Limits::AtLeast(0.0)).unwrap_or(1.0);
+    texture.map(|texture| NormalMap { texture, strength })
+}
+
+/// `opacity` and `opacity_cutoff`.
+pub(super) fn opacity(table: &Table<'_>, textures: &Names) -> OpacitySource {
+    let part = Limits::Between(0.0, 1.0);
+    let value = table.optional("opacity").number_or_texture(textures, part);
+    let cutoff = table.optional("opacity_cutoff").number32(part).unwrap_or(0.0);
+    OpacitySource { value: value.unwrap_or(NumberSource::Constant(1.0)), cutoff }
+}
+
+/// Reports these keys in a material that fills its shape.
+pub(super) fn refuse_opacity(table: &Table<'_>) {
+    for name in ["opacity", "opacity_cutoff"] {
+        let message = format!("`{name}` is for surfaces, and this glass fills its shape");
+        table.unavailable(name, &message, Some("`thin = true` makes a pane of it"));
+    }
+}

@@ -1,0 +1,40 @@
+//! Numbers or textures.
+
+use super::super::super::description::NumberSource;
+use super::super::context::Issue;
+use super::super::limits::Limits;
+use super::super::names::Names;
+use super::super::value::{Item, limited};
+use super::Key;
+
+const NUMBER_OR_TEXTURE: &str = "a number, or { texture = \"name\" }";
+
+impl Key<'_> {
+    /// A number or a texture of numbers, perhaps with the channel that holds them.
+    pub(in super::super) fn number_or_texture(
+        &self,
+        textures: &Names,
+        limits: Limits,
+    ) -> Option<NumberSource> {
+        if self.is_table() {
+            let table = self.inline_table()?;
+            let texture = table.required("texture", "\"name\"").name_in(textures);
+            let key = table.optional("channel");
+            let channel = if key.is_given() { key.choice().map(Some) } else { Some(None) };
+            table.finish();
+            return Some(NumberSource::Texture { texture: texture?, channel: channel? });
+        }
+        let value = self.value?;
+        if let Item::String(text) = value.item()
+            && textures.find(text).is_some()
+        {
+            let issue = Issue::error(value.span(), format!("`{}` must be {NUMBER_OR_TEXTURE}", self.name))
+                .label("found the name of a texture")
+                .help(format!("write {{ texture = {} }}", self.context.text(&value.span())));
+            self.context.report(issue);
+            return None;
+        }
+        let number = limited(self.context, self.name, value, limits, NUMBER_OR_TEXTURE);
+        number.map(|number| NumberSource::Constant(number as f32))
+    }
+}

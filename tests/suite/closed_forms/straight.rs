@@ -1,0 +1,321 @@
+//! Light that goes straight on: thin panes, and what opacity lets through.
+
+use std::f64::consts::PI;
+
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::integrators::View;
+use glimt::math::{DVec3, Vec2, Vec3};
+use glimt::scene::description::{
+    Accel, Falloff, Integrator, Material, MaterialKind, NumberSource, OpacitySource, Shadows, Shape,
+    TextureFilter, Wrap,
+};
+
+use super::scenes::{AS_IT_IS, Build, emitter, matte, mirror, phong, plain, receiver, scene};
+use super::{assert_close, assert_mean, mean_and_error, v};
+
+fn pane(tint: f32) -> Material {
+    plain(MaterialKind::Pane { ior: 1.5, tint: Vec3::splat(tint) })
+}
+
+fn veiled(mut material: Material, opacity: f32) -> Material {
+    material.opacity = OpacitySource { value: NumberSource::Constant(opacity), cutoff: 0.0 };
+    material
+}
+
+fn path(build: Build) -> Build {
+    build.with(|scene| scene.render.integrator = Integrator::Path)
+}
+
+/// Reflectance of a pane of n = 1.5: 2R/(1 + R), R by Fresnel's sine and tangent laws.
+fn reflectance(i: f64) -> f64 {
+    let t = (i.sin() / 1.5).asin();
+    let r = if i == 0.0 {
+        0.04
+    } else {
+        (((i - t).sin() / (i + t).sin()).powi(2) + ((i - t).tan() / (i + t).tan()).powi(2)) / 2.0
+    };
+    2.0 * r / (1.0 + r)
+}
+
+/// A large square that a ray down −z meets at a depth, turned about x.
+fn sheet(build: Build, z: f64, degrees: f64, material: Material) -> Build {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let (u, w) = (v(2e3, 0.0, 0.0), v(0.0, cos, sin) * 2e3);
+    build.quad(v(0.0, 0.0, z) - (u + w) * 0.5, u, w, material)
+}
+
+/// A lamp that fills what is behind.
+fn lamp_at(build: Build, z: f64) -> Build {
+    sheet(build, z, 0.0, emitter(1.0))
+}
+
+/// Means that agree within their errors.
+#[track_caller]
+fn assert_same(what: &str, a: &[f64], b: &[f64]) {
+    let [a, b] = [mean_and_error(a), mean_and_error(b)];
+    assert!(a.0 > 0.0 && (a.0 - b.0).abs() <= 3.5 * a.1.hypot(b.1), "{what}: {a:?} {b:?}");
+}
+
+#[test]
+fn a_pane_before_a_lamp_by_angle() {
+    for degrees in [0.0_f64, 30.0, 60.0, 80.0] {
+        let exact = 0.9 * (1.0 - reflectance(degrees.to_radians()));
+        // What the pane reflects passes beside the lamp.
+        let lamp = [v(-10.0, -10.0, -2e3), v(20.0, 0.0, 0.0), v(0.0, 20.0, 0.0)];
+        let build = sheet(scene(), -2.0, degrees, pane(0.9));
+        let seen = build.quad(lamp[0], lamp[1], lamp[2], emitter(1.0));
+        for depth in [0, 8] {
+            assert_close(&format!("{degrees}° at depth {depth}"), seen.clone().depth(depth).value(), exact);
+        }
+        assert_mean(&format!("{degrees}°, by paths"), &path(seen).values(37, 256), exact);
+    }
+}
+
+#[test]
+fn a_pane_reflects_the_rest() {
+    // The pane at 60° turns the ray by 60°, down to the lamp.
+    let seen = sheet(scene(), -2.0, 60.0, pane(0.9)).quad(
+        v(-1e3, -500.0, 1e3),
+        v(2e3, 0.0, 0.0),
+        v(0.0, 0.0, -2e3),
+        emitter(1.0),
+    );
+    let exact = reflectance(PI / 3.0);
+    assert_close("reflected", seen.clone().depth(1).value(), exact);
+    assert_eq!(seen.clone().depth(0).value(), 0.0);
+    assert_mean("by paths", &path(seen).depth(1).values(256, 64), exact);
+}
+
+/// A receiver under a round lamp of radius 1 at height 2, on its axis, with something between them.
+fn under_lamp(between: impl Fn(Build) -> Build) -> Build {
+    let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal: DVec3::NEG_Y, radius: 1.0 };
+    between(receiver(DVec3::ZERO, 0.7)).shape(disk, emitter(1.0))
+}
+
+fn level(build: Build, y: f64, material: Material) -> Build {
+    build.quad(v(-9.0, y, 9.0), v(18.0, 0.0, 0.0), v(0.0, 0.0, -18.0), material)
+}
+
+#[test]
+fn a_lamp_lights_through_panes() {
+    // E = 2π·∫(1 − R')ⁿ·cos θ·sin θ dθ up to tan θ = ½.
+    let irradiance = |count: i32, tint: f64| {
+        let (steps, end) = (2000, 0.5_f64.atan());
+        let of = |k: i32| {
+            let theta = (f64::from(k) + 0.5) * end / f64::from(steps);
+            (tint * (1.0 - reflectance(theta))).powi(count) * theta.cos() * theta.sin()
+        };
+        2.0 * PI * (0..steps).map(of).sum::<f64>() * end / f64::from(steps)
+    };
+    for count in [1, 3] {
+        let panes = |build: Build| {
+            (0..count).fold(build, |build, i| level(build, 0.5 + 0.3 * f64::from(i), pane(0.8)))
+        };
+        let exact = 0.7 * irradiance(count, 0.8) / PI;
+        let lit = under_lamp(panes).depth(1);
+        for samples in [1, 16] {
+            let values = lit.clone().shadows(Shadows::Soft, samples).values(256 / samples, 256);
+            assert_mean(&format!("{count} panes, {samples} shadow rays"), &values, exact);
+        }
+        assert_mean(&format!("{count} panes, by paths"), &path(lit.clone()).values(256, 256), exact);
+        // Photons add nothing to what goes straight on.
+        assert_mean(&format!("{count} panes, with photons"), &lit.photons(4096, 0.1).values(16, 64), exact);
+    }
+}
+
+#[test]
+fn whitted_with_photons_finds_what_paths_find() {
+    // Light by a pane's reflection, and by reflections between the receiver and the pane.
+    let lit = under_lamp(|build| {
+        let build = level(build, 0.5, pane(0.9));
+        build.quad(v(-1.0, 0.2, -1.0), v(2.0, 0.0, 0.0), v(0.0, 2.5, 0.0), veiled(mirror(0.9), 0.5)).quad(
+            v(-2.0, -0.1, 2.0),
+            v(4.0, 0.0, 0.0),
+            v(0.0, 0.0, -4.0),
+            veiled(matte(0.8), 0.5),
+        )
+    });
+    let lit = lit.depth(4);
+    let photons = lit.clone().photons(6_000, 0.04).values(16, 48);
+    assert_same("photons", &path(lit).values(1024, 64), &photons);
+}
+
+#[test]
+fn a_half_there_surface_shows_the_mean_of_both() {
+    // Radiance 4 with a chance of .25, before radiance 1.
+    let seen = lamp_at(sheet(scene(), -2.0, 20.0, veiled(emitter(4.0), 0.25)), -9.0);
+    for build in [seen.clone(), path(seen)] {
+        assert_mean("both", &build.values(256, 64), 0.25 * 4.0 + 0.75);
+    }
+    // A mirror that is not there at all, and one that is there by its cutoff.
+    let cut = |opacity, cutoff| {
+        let mut material = veiled(mirror(0.0), opacity);
+        material.opacity.cutoff = cutoff;
+        lamp_at(sheet(scene(), -2.0, 0.0, material), -9.0).value()
+    };
+    assert_eq!([cut(0.0, 0.0), cut(0.4, 0.5), cut(0.6, 0.5), cut(1.0, 0.0)], [1.0, 1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn shadows_are_as_deep_as_the_product_of_what_is_there() {
+    let lit = |opacities: &[f32]| {
+        let build = receiver(DVec3::ZERO, 0.7).point_light(v(0.0, 20.0, 0.0), 10.0, Falloff::None);
+        let layer = |build: Build, (i, opacity): (usize, &f32)| {
+            level(build, 0.5 + 0.1 * i as f64, veiled(matte(0.5), *opacity))
+        };
+        opacities.iter().enumerate().fold(build, layer)
+    };
+    let open = lit(&[]).value();
+    for integrator in [Integrator::Whitted, Integrator::Path] {
+        for accel in [Accel::Bvh, Accel::KdTree] {
+            let value = |opacities: &[f32]| {
+                let build = lit(opacities).depth(1).accel(accel);
+                build.with(|scene| scene.render.integrator = integrator).value()
+            };
+            assert_close("one", value(&[0.3]), 0.7 * open);
+            assert_close("two", value(&[0.3, 0.5]), 0.35 * open);
+            assert_close("64", value(&[0.01; 64]), 0.99_f64.powi(64) * open);
+            assert_eq!(value(&[0.01; 65]), 0.0);
+            assert_eq!(value(&[0.3, 1.0]), 0.0);
+        }
+    }
+    // One ray to the middle of a lamp decides alike; without shadows nothing weakens.
+    let under = |shadows| {
+        let lit = under_lamp(|build| level(build, 1.0, veiled(matte(0.5), 0.3)));
+        mean_and_error(&lit.shadows(shadows, 1).values(256, 64)).0
+    };
+    assert!((under(Shadows::Hard) / under(Shadows::Off) - 0.7).abs() < 0.01);
+}
+
+#[test]
+fn eyes_pass_64_surfaces_in_a_row() {
+    let seen = |count: u32| {
+        let build = (0..count)
+            .fold(scene(), |build, i| sheet(build, -1.0 - f64::from(i), 0.0, veiled(matte(0.5), 0.0)));
+        lamp_at(build, -200.0)
+    };
+    for build in [seen(64), path(seen(64))] {
+        assert_eq!(build.depth(0).value(), 1.0);
+    }
+    assert_eq!(seen(65).value(), 0.0);
+    let through = |count: i32| {
+        let build = (0..count).fold(scene(), |build, i| sheet(build, -1.0 - f64::from(i), 0.0, pane(1.0)));
+        lamp_at(build, -200.0).depth(0).value()
+    };
+    assert_close("64 panes", through(64), (1.0 - 0.08 / 1.04_f64).powi(64));
+    assert_eq!(through(65), 0.0);
+}
+
+#[test]
+fn lamps_that_are_half_there_shine_half() {
+    let full = mean_and_error(&under_lamp(|build| build).values(256, 64)).0;
+    assert_close("the formula", full, 0.7 / 5.0);
+    let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal: DVec3::NEG_Y, radius: 1.0 };
+    let lit = receiver(DVec3::ZERO, 0.7).shape(disk, veiled(emitter(1.0), 0.25));
+    for build in [lit.clone(), path(lit)] {
+        assert_mean("a quarter", &build.values(256, 128), 0.25 * 0.7 / 5.0);
+    }
+}
+
+#[test]
+fn opacity_by_a_texture_shapes_lamps_and_shadows() {
+    // A square of side 2 at height 1, there on its left half alone: as a lamp, and as a screen before a sky.
+    let square = |material: Material, build: Build| {
+        build.quad(v(-1.0, 1.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), material)
+    };
+    let half = [v(-1.0, 1.0, -1.0), v(0.0, 1.0, -1.0), v(0.0, 1.0, 1.0), v(-1.0, 1.0, 1.0)];
+    let exact = super::lambert(DVec3::ZERO, DVec3::Y, &half);
+    let masked = |mut build: Build, mut material: Material| {
+        let texture =
+            build.texture(&[&[Vec3::ONE, Vec3::ZERO]], TextureFilter::Nearest, Wrap::Clamp, Vec2::ONE);
+        material.opacity =
+            OpacitySource { value: NumberSource::Texture { texture, channel: None }, cutoff: 0.5 };
+        square(material, build)
+    };
+    let lamp = masked(receiver(DVec3::ZERO, 0.7), emitter(1.0));
+    for build in [lamp.clone(), path(lamp)] {
+        assert_mean("lamp", &build.values(256, 256), 0.7 * exact / PI);
+    }
+    let screen = masked(receiver(DVec3::ZERO, 0.7), matte(0.0)).environment(1.0);
+    for build in [screen.clone(), path(screen)] {
+        assert_mean("screen", &build.values(256, 256), 0.7 * (PI - exact) / PI);
+    }
+}
+
+#[test]
+fn a_furnace_with_panes_and_veils_stays_one() {
+    let build = scene()
+        .environment(1.0)
+        .sphere(v(0.0, 0.0, -6.0), 1.0, matte(1.0))
+        .sphere(v(0.0, 0.0, -6.0), 1.5, pane(1.0))
+        .sphere(v(0.5, 0.5, -6.0), 2.5, veiled(mirror(1.0), 0.4));
+    let build = sheet(sheet(build, -2.0, 30.0, pane(1.0)), -2.5, -50.0, veiled(pane(1.0), 0.5)).depth(10_000);
+    assert_mean("by paths", &path(build.clone()).values(256, 64), 1.0);
+    // Without anything diffuse, whitted has all light.
+    let clear =
+        sheet(sheet(scene().environment(1.0), -2.0, 30.0, pane(1.0)), -4.0, -50.0, pane(1.0)).depth(60);
+    let (mean, _) = mean_and_error(&clear.values(64, 16));
+    assert!((mean - 1.0).abs() < 1e-3, "{mean}");
+}
+
+#[test]
+fn highlights_of_lamps_are_seen_through_veils() {
+    // A sharp lobe has rays of its own, which pass as shadow rays and paths do.
+    let lit = |material: Material| {
+        scene()
+            .quad(v(-9.0, 0.0, 9.0), v(18.0, 0.0, 0.0), v(0.0, 0.0, -18.0), phong(0.2, 0.7, 3000.0, 0.0))
+            .quad(v(-0.5, 2.0, -2.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), material)
+            .quad(v(-2.0, 1.2, -3.0), v(4.0, 0.0, 0.0), v(0.0, 0.0, 4.0), veiled(matte(0.0), 0.4))
+            .quad(v(-2.0, 1.5, -3.0), v(4.0, 0.0, 0.0), v(0.0, 0.0, 4.0), pane(0.9))
+            .seen(v(0.0, 1.0, 1.0), DVec3::ZERO)
+            .depth(1)
+    };
+    for material in [emitter(1.0), veiled(emitter(2.0), 0.5)] {
+        let build = lit(material);
+        assert_same("highlight", &build.values(256, 64), &path(build.clone()).values(1024, 64));
+    }
+}
+
+#[test]
+fn small_meshes_under_one_tree_weaken_each_by_itself() {
+    // Grids of 8 × 8 squares, enough for a common tree; the solid one is beside the way of the light.
+    let grid = |y: f64, x: f64| {
+        let mut mesh = TriangleMesh::default();
+        for i in 0..9 {
+            for j in 0..9 {
+                mesh.positions.push(v(x + f64::from(i) - 4.1, y, f64::from(j) - 4.2).as_vec3());
+            }
+        }
+        for i in 0..8_u32 {
+            for j in 0..8 {
+                let a = 9 * i + j;
+                mesh.triangles.extend([[a, a + 1, a + 10], [a, a + 10, a + 9]]);
+            }
+        }
+        mesh
+    };
+    let lit = |shift: f64| {
+        receiver(DVec3::ZERO, 0.7)
+            .point_light(v(0.0, 20.0, 0.0), 10.0, Falloff::None)
+            .mesh(grid(1.0, 0.0), AS_IT_IS, veiled(matte(0.5), 0.3))
+            .mesh(grid(2.0, 0.0), AS_IT_IS, veiled(matte(0.5), 0.5))
+            .mesh(grid(3.0, shift), AS_IT_IS, matte(0.5))
+    };
+    assert!(lit(20.0).world().geometry.objects().len() == 4);
+    assert_close("beside", lit(20.0).value(), 0.35 * 0.7 * 10.0 / PI);
+    assert_eq!(lit(0.0).value(), 0.0);
+}
+
+#[test]
+fn views_of_the_first_hit_pass_what_is_not_there() {
+    let build = |opacity: f32| {
+        let near = sheet(scene(), -2.0, 45.0, veiled(matte(0.5), opacity));
+        sheet(near, -7.0, 0.0, matte(0.25))
+    };
+    for (opacity, depth, albedo) in [(0.0, 7.0, 0.25), (1.0, 2.0, 0.5)] {
+        assert_close("depth", build(opacity).viewed(View::Depth).value(), depth);
+        assert_close("albedo", build(opacity).viewed(View::Albedo).value(), albedo);
+    }
+    let shadow = under_lamp(|build| level(build, 1.0, veiled(matte(0.5), 0.25))).viewed(View::Shadow);
+    assert_mean("shadow", &shadow.values(64, 16), 0.75);
+}

@@ -1,0 +1,138 @@
+//! Lamps that shine from both sides.
+
+use std::f64::consts::PI;
+
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::math::DVec3;
+use glimt::scene::description::{EmissionSides, Integrator, Material, Shape};
+
+use super::direct::{assert_hard, assert_irradiance};
+use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, mirror, receiver, scene};
+use super::{assert_close, assert_mean, lambert, mean_and_error, v};
+
+/// A lamp of radiance 1 on both sides.
+fn both() -> Material {
+    let mut material = emitter(1.0);
+    material.emission.sides = EmissionSides::Both;
+    material
+}
+
+fn at_origin() -> Build {
+    receiver(DVec3::ZERO, 0.7)
+}
+
+/// Checks the irradiance by light samples and by paths.
+#[track_caller]
+fn assert_lit(what: &str, lit: &Build, irradiance: f64) {
+    assert_irradiance(what, lit, irradiance);
+    let paths = lit.clone().with(|scene| scene.render.integrator = Integrator::Path);
+    assert_mean(&format!("{what}, by paths"), &paths.values(256, 256), 0.7 * irradiance / PI);
+}
+
+#[test]
+fn flat_lamps_light_both_sides_alike() {
+    let corner = v(-0.3, 0.8, -0.5);
+    let (x, z) = (v(0.9, 0.2, 0.0), v(0.1, 0.3, 1.0));
+    let polygon = [corner, corner + x, corner + x + z, corner + z];
+    let whole = lambert(DVec3::ZERO, DVec3::Y, &polygon);
+    let half = lambert(DVec3::ZERO, DVec3::Y, &polygon[..3]);
+    // One of each pair has its front up.
+    for (u, w) in [(x, z), (z, x)] {
+        let quad = at_origin().quad(corner, u, w, both());
+        assert_lit("quad", &quad, whole);
+        assert_hard("quad", &quad, whole);
+        let ends =
+            if u == x { [polygon[0], polygon[1], polygon[2]] } else { [polygon[0], polygon[2], polygon[1]] };
+        assert_lit("triangle", &at_origin().triangle(ends, both()), half);
+    }
+    for normal in [DVec3::Y, DVec3::NEG_Y] {
+        // E = π·r²/(r² + h²) on the axis.
+        let disk = Shape::Disk { center: v(0.0, 2.0, 0.0), normal, radius: 1.0 };
+        assert_lit("disk", &at_origin().shape(disk, both()), PI / 5.0);
+    }
+}
+
+#[test]
+fn a_mesh_lamp_lights_both_sides_alike() {
+    let corners = [v(-1.0, 1.0, -1.0), v(1.0, 1.0, -1.0), v(1.0, 1.0, 1.0), v(-1.0, 1.0, 1.0)];
+    let exact = lambert(DVec3::ZERO, DVec3::Y, &corners);
+    let of = |triangles: &[[u32; 3]]| TriangleMesh {
+        positions: corners.iter().map(|corner| corner.as_vec3()).collect(),
+        triangles: triangles.to_vec(),
+        ..TriangleMesh::default()
+    };
+    // The sides of the quads are told by the order of corners, and by a placement that mirrors.
+    for (name, mesh) in [
+        ("down", of(&[[0, 1, 2], [0, 2, 3]])),
+        ("up", of(&[[0, 2, 1], [0, 3, 2]])),
+        ("askew", of(&[[0, 1, 2], [0, 3, 2]])),
+    ] {
+        assert_lit(name, &at_origin().mesh(mesh.clone(), AS_IT_IS, both()), exact);
+        let mirrored = [v(-1.0, 1.0, 1.0), DVec3::ZERO, DVec3::ZERO];
+        assert_lit(name, &at_origin().mesh(mesh, mirrored, both()), exact);
+    }
+}
+
+#[test]
+fn a_lamp_around_a_surface_lights_it_from_everywhere() {
+    // All of the hemisphere has radiance 1: E = π.
+    let at = v(2.0, 0.0, 0.0);
+    let around = |shape: Shape| receiver(at, 0.7).shape(shape, both());
+    for shape in [
+        Shape::Sphere { center: at + v(0.2, 0.1, 0.0), radius: 0.7 },
+        Shape::Box { center: at, size: v(1.0, 0.6, 2.0), rotate: v(10.0, 20.0, 30.0) },
+        Shape::Cylinder { a: at - DVec3::Y, b: at + DVec3::Y, radius: 0.5, caps: true },
+        Shape::Cone { base: at - DVec3::Y, tip: at + v(0.0, 3.0, 0.0), radius: 1.0, cap: true },
+        Shape::Torus { center: DVec3::ZERO, axis: DVec3::Y, radius: 2.0, tube: 0.5 },
+    ] {
+        assert_lit(shape.kind(), &around(shape.clone()), PI);
+    }
+    let ball = lat_long_sphere(12, 24, 0.8, at);
+    assert_lit("mesh", &receiver(at, 0.7).mesh(ball, AS_IT_IS, both()), PI);
+}
+
+#[test]
+fn the_inside_of_an_open_tube() {
+    // From the axis, a disk of radius 1 at height h fills π/(1 + h²) of the irradiance.
+    let disk = |h: f64| PI / (1.0 + h * h);
+    let tube = |from: f64, to: f64| {
+        at_origin().shape(
+            Shape::Cylinder { a: v(0.0, from, 0.0), b: v(0.0, to, 0.0), radius: 1.0, caps: false },
+            both(),
+        )
+    };
+    assert_lit("from inside", &tube(-0.5, 1.5), PI - disk(1.5));
+    assert_lit("from below", &tube(1.0, 2.0), disk(1.0) - disk(2.0));
+    // From beside, the outside hides the inside.
+    let outside = receiver(v(3.0, 0.0, 0.0), 0.7);
+    let of = |material: Material| {
+        let shape = Shape::Cylinder { a: v(0.0, 0.0, 0.0), b: v(0.0, 1.0, 0.0), radius: 1.0, caps: true };
+        outside.clone().shape(shape, material)
+    };
+    let [one, two] = [emitter(1.0), both()].map(|material| mean_and_error(&of(material).values(64, 256)));
+    assert!((one.0 - two.0).abs() <= 3.0 * one.1.hypot(two.1), "{one:?} {two:?}");
+}
+
+#[test]
+fn both_sides_are_seen() {
+    let lamp = |u: DVec3, w: DVec3, material| scene().quad(v(-1.0, -1.0, -2.0), u, w, material);
+    for (u, w) in [(v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0)), (v(0.0, 2.0, 0.0), v(2.0, 0.0, 0.0))] {
+        assert_close("seen", lamp(u, w, both()).value(), 1.0);
+    }
+    assert_eq!(lamp(v(0.0, 2.0, 0.0), v(2.0, 0.0, 0.0), emitter(1.0)).value(), 0.0);
+}
+
+#[test]
+fn photons_come_from_both_sides() {
+    // The lamp's back faces a mirror that throws its light on the receiver.
+    let lit = receiver(DVec3::ZERO, 0.7).quad(v(-0.5, 1.0, -0.5), v(0.0, 0.0, 1.0), DVec3::X, both()).quad(
+        v(-3.0, 2.0, -3.0),
+        v(6.0, 0.0, 0.0),
+        v(0.0, 0.0, 6.0),
+        mirror(0.8),
+    );
+    let paths = lit.clone().with(|scene| scene.render.integrator = Integrator::Path).values(256, 64);
+    let photons = lit.photons(4_000, 0.05).values(16, 32);
+    let [paths, photons] = [mean_and_error(&paths), mean_and_error(&photons)];
+    assert!((paths.0 - photons.0).abs() <= 3.5 * paths.1.hypot(photons.1), "{paths:?} {photons:?}");
+}
