@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::process::{Child, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -76,7 +76,7 @@ fn killed_while_it_writes_a_checkpoint_is_the_one_before_or_the_new_one() {
     let desk = desk();
     let mut next = random(5);
     let line = "room.toml --once --progress none -o out.exr --checkpoint 0.000001 --samples 100000 --resume";
-    for number in 0..60 {
+    for number in 0..200 {
         let child = begin(&desk, line);
         std::thread::sleep(Duration::from_secs_f64(0.02 + 0.1 * next()));
         end(child, Signal::SIGKILL);
@@ -240,6 +240,141 @@ fn what_is_not_asked_for_is_said_and_not_done() {
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(end(child, Signal::SIGTERM), Some(143));
     assert!(!desk.path("other.exr.checkpoint").exists(), "0 is never");
+}
+
+/// Waits until a file is there.
+#[track_caller]
+fn await_file(desk: &Desk, name: &str) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !desk.path(name).exists() {
+        assert!(Instant::now() < deadline, "{name} does not come");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_checkpoint_that_another_process_keeps_is_left_to_it() {
+    let desk = desk();
+    let line = "room.toml --once -o out.exr --samples 1000000 --checkpoint 0.05";
+    let seed_is = |seed: u32| {
+        let said = self::said(&desk, "room.toml --once -o out.exr --seed 9 --resume", 2);
+        assert!(said.contains(&format!("seed is {seed} there and 9 here")), "{said}");
+    };
+    let first = begin(&desk, &format!("{line} --seed 1"));
+    await_file(&desk, "out.exr.checkpoint");
+    // Another render to the same image, and the same one once more, keep none, and say so once.
+    for options in ["--seed 2", "--seed 1 --resume"] {
+        let mut second = desk.glimt(&format!("{line} {options}"));
+        let second = second.stderr(Stdio::piped()).spawn().expect("it runs");
+        std::thread::sleep(Duration::from_millis(800));
+        kill(Pid::from_raw(second.id() as i32), Signal::SIGTERM).expect("it runs");
+        let output = second.wait_with_output().expect("a child");
+        let text = String::from_utf8(output.stderr).expect("UTF-8");
+        let words: Vec<_> = text.split_whitespace().collect();
+        let said = words.join(" ");
+        let kept = "no checkpoint: another glimt that is running keeps out.exr.checkpoint";
+        assert_eq!(said.matches(kept).count(), 1, "{said}");
+        assert!(said.contains("no picture was written"), "{said}");
+        seed_is(1);
+    }
+    // A finished image of the same render takes nothing away from it.
+    desk.expect("room.toml --once --progress none -o out.exr --samples 1 --seed 1", 0);
+    seed_is(1);
+    assert!(!desk.path("out.exr.checkpoint.before").exists());
+    // What nobody keeps any more makes way.
+    end(first, Signal::SIGKILL);
+    let child = begin(&desk, &format!("{line} --seed 2"));
+    await_file(&desk, "out.exr.checkpoint.before");
+    await_file(&desk, "out.exr.checkpoint");
+    end(child, Signal::SIGTERM);
+    seed_is(2);
+}
+
+#[test]
+fn no_room_for_a_checkpoint_is_said_once_and_the_image_is_written() {
+    let desk = desk();
+    // Blocks of 512 bytes: a checkpoint has 150 kB, the image 8.
+    let limited = |blocks: u32, line: &str| {
+        let program = desk.glimt("").get_program().to_owned();
+        let mut shell = std::process::Command::new("sh");
+        shell.current_dir(desk.0.path());
+        shell.arg("-c").arg(format!("ulimit -f {blocks}; exec \"$0\" {line}")).arg(program);
+        let output = shell.output().expect("a shell");
+        let text = String::from_utf8(output.stderr).expect("UTF-8");
+        (output.status.code(), text.split_whitespace().collect::<Vec<_>>().join(" "))
+    };
+    let line = "room.toml --once --samples 2000 --checkpoint 0.02";
+    let why = "cannot write out.png.checkpoint: file too large";
+    let (code, said) = limited(100, &format!("{line} -o out.png"));
+    assert_eq!(code, Some(0), "{said}");
+    assert_eq!(said.to_lowercase().matches(why).count(), 1, "{said}");
+    assert!(said.contains("wrote out.png"), "{said}");
+    // No room for the image either.
+    desk.write("out.png", "the image before");
+    let (code, said) = limited(2, &format!("{line} -o out.png"));
+    assert_eq!(code, Some(1), "{said}");
+    assert_eq!(said.to_lowercase().matches(why).count(), 1, "{said}");
+    assert!(said.to_lowercase().contains("error: cannot write out.png: file too large"), "{said}");
+    assert_eq!(desk.bytes("out.png"), b"the image before");
+    assert_no_leftovers(&desk);
+}
+
+#[test]
+fn a_render_without_checkpoints_goes_on_from_one_all_the_same() {
+    let desk = desk();
+    kept(&desk, "--samples 2");
+    desk.expect("room.toml --once --progress none -o one.exr --samples 5", 0);
+    let said = self::said(&desk, "room.toml --once -o out.exr --samples 5 --resume --checkpoint 0", 0);
+    assert!(said.contains("going on from out.exr.checkpoint, after 2 samples"), "{said}");
+    assert!(desk.bytes("out.exr") == desk.bytes("one.exr"));
+    assert!(!desk.path("out.exr.checkpoint").exists());
+}
+
+#[test]
+fn a_checkpoint_of_another_version_makes_way_and_is_not_replaced() {
+    let desk = desk();
+    kept(&desk, "");
+    let mut newer = desk.bytes("out.exr.checkpoint");
+    newer[12] = 2;
+    desk.write("out.exr.checkpoint", &newer);
+    let child = begin(&desk, "room.toml --once -o out.exr --samples 1000000 --checkpoint 0.05");
+    await_file(&desk, "out.exr.checkpoint.before");
+    end(child, Signal::SIGKILL);
+    assert!(desk.bytes("out.exr.checkpoint.before") == newer);
+}
+
+#[test]
+fn a_finished_part_is_kept_and_that_of_another_render_is_not_replaced() {
+    let desk = desk();
+    for options in
+        ["--samples 5", "--photons on --samples 40 --set photons.count=500", "--samples 64 --error 0.2"]
+    {
+        let line = format!("room.toml --once -o a.part --shard 1/2 {options}");
+        desk.expect(&format!("{line} --progress none"), 0);
+        let part = desk.bytes("a.part");
+        let report = desk.report(&format!("{line} --resume --progress none"));
+        assert!(desk.bytes("a.part") == part, "{options}");
+        assert_eq!(report["counters"]["camera_rays"], 0, "{options}: nothing is rendered again");
+        let said = self::said(&desk, &format!("{line} --resume"), 0);
+        assert!(said.contains("a.part is finished already"), "{said}");
+        for (other, words) in [
+            ("--seed 4", "seed is 0 there and 4 here"),
+            ("--set render.exposure=1", "exposure is 0 there and 1 here"),
+            ("--shard 1/3", "part 1/2"),
+        ] {
+            let line =
+                line.replace("--shard 1/2", if other.starts_with("--shard") { "" } else { "--shard 1/2" });
+            let said = self::said(&desk, &format!("{line} --resume {other}"), 2);
+            assert!(said.contains(words) && said.contains("leave --resume out to replace it"), "{said}");
+            assert!(desk.bytes("a.part") == part, "{options} {other}");
+        }
+        // One that is not whole is rendered again.
+        desk.write("a.part", &part[..part.len() / 2]);
+        let said = self::said(&desk, &format!("{line} --resume"), 0);
+        assert!(said.contains("a.part is not used: it ends at byte"), "{said}");
+        assert!(desk.bytes("a.part") == part, "{options}");
+        fs::remove_file(desk.path("a.part")).expect("removed");
+    }
 }
 
 #[test]
