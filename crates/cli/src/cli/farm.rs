@@ -274,7 +274,7 @@ mod tests {
         }
     }
 
-    /// What Kubernetes makes of a command: `$(NAME)` is the variable, where there is one; `$$` is `$`
+    /// A command as Kubernetes hands it on: `$(NAME)` is the variable of that name, if there is one; `$$` is `$`
     /// (k8s.io/kubernetes/third_party/forked/golang/expansion).
     fn expanded(text: &str, variables: &[(&str, &str)]) -> String {
         let (mut out, mut rest) = (String::new(), text);

@@ -13,6 +13,8 @@ pub(in crate::pipeline) struct Claim {
     held: Option<File>,
     /// The last one that it wrote, or reported as unused.
     told: Option<FileIdentity>,
+    /// The request whose failure was reported: each further one of it has the same cause.
+    failed: Option<u64>,
 }
 
 impl Claim {
@@ -46,6 +48,11 @@ impl Claim {
     pub(super) fn is_of_another(&self, path: &Path) -> bool {
         !self.holds(path)
             && File::open(path).is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
+    }
+
+    /// Whether a failure is the first one of a request; from now on, there was one.
+    pub(super) fn is_first_failure(&mut self, request: u64) -> bool {
+        self.failed.replace(request) != Some(request)
     }
 
     /// Whether a person has not heard of this file yet; from now on, they have.

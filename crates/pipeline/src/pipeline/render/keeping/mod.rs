@@ -87,8 +87,6 @@ pub(in crate::pipeline) struct Keeping<'a> {
     around: Around<'a>,
     identity: OnceCell<Vec<Trait>>,
     due: Cell<Instant>,
-    /// Whether glimt has reported a failure: each further one has the same cause.
-    is_failure_told: Cell<bool>,
     /// Whether the checkpoint that this process holds is of this render.
     is_own: Cell<bool>,
 }
@@ -103,7 +101,6 @@ impl<'a> Keeping<'a> {
             around,
             identity: OnceCell::new(),
             due: Cell::new(Instant::now() + Duration::from_secs_f64(settings.seconds.min(1e9))),
-            is_failure_told: Cell::new(false),
             is_own: Cell::new(false),
         }
     }
@@ -323,7 +320,8 @@ impl<'a> Keeping<'a> {
     pub(in crate::pipeline) fn at_the_end(&self, state: &FilmState, rays: RayCounters, seconds: f64) {
         let is_kept = match (self.around.interruption)() {
             Interruption::Replaced => false,
-            Interruption::Left => seconds >= self.settings.seconds,
+            // A checkpoint that is there already is to have all that there is.
+            Interruption::Left => seconds >= self.settings.seconds || self.is_own.get(),
             Interruption::Ended => true,
         };
         if is_kept && state.is_begun() {
@@ -408,7 +406,8 @@ impl<'a> Keeping<'a> {
     }
 
     fn tell_failure(&self, why: &str) {
-        if !self.is_failure_told.replace(true) {
+        let Around { sink, claim, .. } = self.around;
+        if claim.borrow_mut().is_first_failure(sink.generation) {
             self.tell(CheckpointNews::Failed { message: format!("no checkpoint: {why}") });
         }
     }
