@@ -374,6 +374,18 @@ fn a_render_without_checkpoints_goes_on_from_one_all_the_same() {
 }
 
 #[test]
+fn a_pipe_in_the_place_of_a_checkpoint_or_a_part_holds_nothing_up() {
+    let desk = desk();
+    for name in ["out.exr.checkpoint", "a.part"] {
+        nix::unistd::mkfifo(&desk.path(name), nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
+    }
+    let said = self::said(&desk, "room.toml --once -o out.exr --keep-checkpoint", 0);
+    assert!(said.contains("out.exr.checkpoint: the file of this name is no checkpoint"), "{said}");
+    self::said(&desk, "room.toml --once -o a.part --shard 1/2 --resume", 1);
+    self::said(&desk, "merge joined.exr a.part", 2);
+}
+
+#[test]
 fn a_checkpoint_of_another_version_makes_way_and_is_not_replaced() {
     let desk = desk();
     kept(&desk, "");

@@ -32,7 +32,7 @@ pub struct PartFile {
 /// Whether a file begins as a part or a checkpoint does.
 pub fn is_part(path: &Path) -> bool {
     let mut mark = [0; MARK.len()];
-    File::open(path).and_then(|mut file| file.read_exact(&mut mark)).is_ok() && mark == MARK
+    open(path).and_then(|mut file| file.read_exact(&mut mark)).is_ok() && mark == MARK
 }
 
 impl PartFile {

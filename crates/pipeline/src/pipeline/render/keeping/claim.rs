@@ -25,7 +25,7 @@ impl Claim {
 
     /// Holds the file of a process that has ended. Does nothing if another process holds it.
     pub(super) fn take_over(&mut self, path: &Path) {
-        let Ok(file) = File::open(path) else { return };
+        let Some(file) = open(path) else { return };
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => {}
             // Without locks, the identity tells as well whether it is the same file.
@@ -46,8 +46,8 @@ impl Claim {
 
     /// Whether another process, which is still there, holds the file of this path.
     pub(super) fn is_of_another(&self, path: &Path) -> bool {
-        !self.holds(path)
-            && File::open(path).is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
+        let is_locked = |file: File| matches!(file.try_lock(), Err(TryLockError::WouldBlock));
+        !self.holds(path) && open(path).is_some_and(is_locked)
     }
 
     /// Whether a failure is the first one of a request; from now on, there was one.
@@ -62,6 +62,11 @@ impl Claim {
         self.told = identity;
         is_news
     }
+}
+
+/// A regular file. `None` for all else: opening a pipe would wait for its writer.
+fn open(path: &Path) -> Option<File> {
+    if path.metadata().is_ok_and(|found| found.is_file()) { File::open(path).ok() } else { None }
 }
 
 #[cfg(test)]
