@@ -246,6 +246,92 @@ fn a_merge_waits_for_parts_and_shows_what_does_not_fit_at_once() {
 }
 
 #[test]
+fn a_merge_waits_for_a_part_that_is_not_whole_yet() {
+    let desk = desk();
+    desk.expect("room.toml --once --progress none -o one.exr", 0);
+    parts(&desk, 2, "");
+    let whole = desk.bytes("2.part");
+    for progress in ["plain", "json"] {
+        desk.write("2.part", "");
+        let mut merge = desk.glimt(&format!("merge joined.exr 1.part 2.part --watch --progress {progress}"));
+        let mut waiting = merge.stderr(std::process::Stdio::piped()).spawn().expect("it runs");
+        for length in [0, 7, 100, whole.len() / 2, whole.len() - 1] {
+            desk.write("2.part", &whole[..length]);
+            std::thread::sleep(std::time::Duration::from_millis(600));
+            assert!(waiting.try_wait().expect("a child").is_none(), "{length} bytes are there");
+        }
+        desk.write("2.part", &whole);
+        let output = waiting.wait_with_output().expect("a child");
+        let said = String::from_utf8(output.stderr).expect("UTF-8");
+        assert!(output.status.success(), "{said}");
+        let words = match progress {
+            "plain" => "1 of 2 parts; 2.part is not whole yet",
+            _ => r#""unfinished":["2.part"]"#,
+        };
+        assert_eq!(said.matches(words).count(), 1, "{said}");
+        assert!(desk.bytes("joined.exr") == desk.bytes("one.exr"));
+        fs::remove_file(desk.path("joined.exr")).expect("removed");
+    }
+    // One that is damaged does not become whole.
+    let mut flipped = whole.clone();
+    flipped[whole.len() / 2] ^= 4;
+    desk.write("2.part", flipped);
+    let said = desk.expect("merge joined.exr 1.part 2.part --watch --progress none", 2);
+    assert!(said.contains("2.part: it is damaged: the bytes from"), "{said}");
+    // Without --watch it is an error at once.
+    desk.write("2.part", &whole[..whole.len() - 1]);
+    let said = desk.expect("merge joined.exr 1.part 2.part --progress none", 2);
+    assert!(said.contains("2.part: it is damaged: it ends at byte"), "{said}");
+    assert!(!desk.path("joined.exr").exists());
+}
+
+/// Only a user other than root can test this: root may write everywhere.
+#[test]
+fn a_merge_replaces_what_a_render_would_and_nothing_else() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+    use std::os::unix::process::CommandExt;
+    let desk = desk();
+    parts(&desk, 2, "");
+    // A copy, as another user may not reach where the program is.
+    fs::copy(desk.glimt("").get_program(), desk.path("program")).expect("a copy");
+    let is_root = fs::metadata(desk.0.path()).expect("a folder").uid() == 0;
+    fs::set_permissions(desk.0.path(), fs::Permissions::from_mode(0o777)).expect("permitted");
+    let said = |line: &str| {
+        let mut process = std::process::Command::new(desk.path("program"));
+        process.current_dir(desk.0.path()).args(line.split_whitespace());
+        if is_root {
+            process.uid(65534).gid(65534);
+        }
+        let output = process.output().expect("it runs");
+        (output.status.code(), String::from_utf8(output.stderr).expect("UTF-8"))
+    };
+    let calls = ["merge NAME 1.part 2.part --progress none", "room.toml --once --progress none -o NAME"];
+    for call in calls {
+        let (kept, target) = (desk.path("kept.png"), desk.path("target.png"));
+        for path in [&kept, &target] {
+            fs::write(path, "the image before").expect("written");
+            fs::set_permissions(path, fs::Permissions::from_mode(0o666)).expect("permitted");
+        }
+        let _ = fs::remove_file(desk.path("link.png"));
+        symlink("target.png", desk.path("link.png")).expect("a link");
+        // A file that is protected stays.
+        fs::set_permissions(&kept, fs::Permissions::from_mode(0o444)).expect("permitted");
+        let (code, text) = said(&call.replace("NAME", "kept.png"));
+        assert_eq!(code, Some(1), "{call}: {text}");
+        assert!(text.contains("cannot write kept.png") && text.contains("allow writing there"), "{text}");
+        assert_eq!(fs::read(&kept).expect("a file"), b"the image before");
+        // A link stays, and its target is replaced.
+        let (code, text) = said(&call.replace("NAME", "link.png"));
+        assert_eq!(code, Some(0), "{call}: {text}");
+        let link = desk.path("link.png").symlink_metadata().expect("a link");
+        assert!(link.is_symlink() && fs::read(&target).expect("a file").starts_with(b"\x89PNG"), "{call}");
+        let protected = fs::metadata(&target).expect("a file").mode() & 0o777;
+        assert_eq!(protected, 0o666, "{call}");
+        fs::remove_file(kept).expect("removed");
+    }
+}
+
+#[test]
 fn what_cannot_be_divided_is_refused_before_the_work() {
     let desk = desk();
     for (line, words) in [
@@ -281,6 +367,8 @@ fn scripts_of_schedulers_are_sound() {
     }
     let said = desk.expect("farm room.toml -o out.xyz --shards 4 --engine slurm", 2);
     assert!(said.contains(".xyz is not a format"), "{said}");
+    let said = desk.expect("farm room.toml -o out.exr --shards 4 --engine slurm -- --sample 3", 2);
+    assert!(said.contains("behind `--`: unexpected argument '--sample'"), "{said}");
     let said = desk.expect("farm none.toml -o out.exr --shards 4 --engine slurm", 2);
     assert!(said.contains("none.toml: no such file"), "{said}");
 }

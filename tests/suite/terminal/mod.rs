@@ -11,6 +11,7 @@ mod hands;
 mod input;
 mod keys;
 mod leafing;
+mod long;
 mod outputs;
 #[cfg(target_os = "linux")]
 mod polite;
@@ -18,6 +19,8 @@ mod pty;
 mod relay;
 mod saving;
 mod screen;
+#[cfg(target_os = "linux")]
+mod soak;
 mod switches;
 mod thin_line;
 

@@ -5,7 +5,16 @@ use nix::time::{ClockId, clock_gettime};
 /// Processor seconds that this thread has used. Time of other threads, and time in which it waited, do not count. 0 if the system
 /// does not measure it.
 pub fn seconds_of_thread() -> f64 {
-    let Ok(time) = clock_gettime(ClockId::CLOCK_THREAD_CPUTIME_ID) else { return 0.0 };
+    seconds_by(ClockId::CLOCK_THREAD_CPUTIME_ID)
+}
+
+/// Processor seconds that all threads of this process have used. 0 if the system does not measure it.
+pub fn seconds_of_process() -> f64 {
+    seconds_by(ClockId::CLOCK_PROCESS_CPUTIME_ID)
+}
+
+fn seconds_by(clock: ClockId) -> f64 {
+    let Ok(time) = clock_gettime(clock) else { return 0.0 };
     time.tv_sec() as f64 + 1e-9 * time.tv_nsec() as f64
 }
 
@@ -24,5 +33,6 @@ mod tests {
         let worked = (0..10_000_000).any(|_| seconds_of_thread() - before > slept + 0.01);
         assert!(worked || before == 0.0, "{slept}");
         assert!(begin.elapsed().as_secs_f64() >= slept + 0.03, "{slept}");
+        assert!(seconds_of_process() >= seconds_of_thread() - 0.01, "other threads count there");
     }
 }

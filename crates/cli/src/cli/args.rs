@@ -181,7 +181,7 @@ pub struct RenderArgs {
     /// Seconds between two checkpoints, beside the output as FILE.checkpoint; 0 keeps none
     #[arg(long, value_name = "SECONDS", default_value = "60", allow_negative_numbers = true, value_parser = pause, help_heading = "Long renders")]
     pub checkpoint: f64,
-    /// Go on from the checkpoint of an interrupted render
+    /// Go on from the checkpoint of an interrupted render; without --once glimt does that by itself
     #[arg(long, help_heading = "Long renders")]
     pub resume: bool,
     /// Keep the last checkpoint of a finished render, which --resume with more --samples extends
@@ -278,10 +278,10 @@ impl RenderArgs {
             checkpoints: Checkpoints {
                 seconds: self.checkpoint,
                 resume: match (self.resume, self.once) {
-                    (true, _) => Resume::Asked,
+                    (true, true) => Resume::Asked,
                     (false, true) => Resume::No,
-                    // A dropped line is no reason to begin anew.
-                    (false, false) => Resume::IfSame,
+                    // A dropped line is no reason to begin anew; an edit makes another picture, which has no checkpoint yet.
+                    (_, false) => Resume::IfSame,
                 },
                 are_kept: self.keep_checkpoint,
             },

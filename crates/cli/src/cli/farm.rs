@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use super::args::{Engine, FarmArgs};
+use clap::Parser;
+
+use super::args::{Args, Engine, FarmArgs, Switch};
 use super::console::Console;
 use super::exit::Exit;
 use crate::output::Format;
@@ -21,12 +23,54 @@ pub(super) fn run(args: &FarmArgs, console: &Console) -> Exit {
     if !args.scene.is_file() {
         return console.fail(Exit::WRONG, &format!("{}: no such file", args.scene.display()));
     }
+    if let Err(message) = check_options(args) {
+        return console.fail(Exit::WRONG, &format!("behind `--`: {message}"));
+    }
     console.text(&match args.engine {
         Engine::Slurm => slurm(args),
         Engine::Parallel => parallel(args),
         Engine::Kubernetes => kubernetes(args),
     });
     Exit::DONE
+}
+
+/// Reads the options of every render as the renders will.
+///
+/// # Errors
+/// One is unknown or wrong, or is not the same for all parts.
+fn check_options(args: &FarmArgs) -> Result<(), String> {
+    let (program, scene) = ("glimt".to_owned(), file(&args.scene));
+    let words = [program, scene].into_iter().chain(args.options.iter().cloned());
+    let render = match Args::try_parse_from(words) {
+        Ok(Args { command: None, render }) => render,
+        Ok(_) => return Err("a command is no option of a render".to_owned()),
+        Err(error) => return Err(first_words(&error)),
+    };
+    let photons_by_error =
+        render.photons == Some(Switch::On) && render.error.is_some_and(|error| error > 0.0);
+    let faults = [
+        (
+            !render.outputs.is_empty(),
+            "-o names the image, in front of the `--`; each part has a name of its own",
+        ),
+        (render.shard.is_some(), "--shard is given to each part by the script"),
+        (render.once, "--once is given to each part by the script"),
+        (render.resume, "--resume is given to each part by the script"),
+        (render.report.is_some(), "--report would be one file for all parts"),
+        (render.time.is_some(), "--time has no parts: machines differ in speed"),
+        (photons_by_error, "photons with a noise threshold have no parts: each pass judges the whole image"),
+    ];
+    faults.iter().find(|(is_there, _)| *is_there).map_or(Ok(()), |(_, message)| Err((*message).to_owned()))
+}
+
+/// The words of an error about arguments, without the usage below them.
+fn first_words(error: &clap::Error) -> String {
+    if !error.use_stderr() {
+        return "--help and --version are no options of a render".to_owned();
+    }
+    let text = error.to_string();
+    let lines: Vec<&str> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
+    lines.join(" ").trim_start_matches("error: ").to_owned()
 }
 
 /// One word for a shell, for glimt no option and no command.
@@ -91,22 +135,20 @@ echo \"parts: job $parts; merge: job $merge\"
 
 fn parallel(args: &FarmArgs) -> String {
     let (count, merge) = (args.shards, merge(args, ""));
-    // A part appears under its name when it is whole. Each line that parallel reads is a command: in a template it would take
-    // parts of names for its own.
+    // Each line that parallel reads is a command: in a template it would take parts of names for its own.
     let index = "\u{0}";
-    let render = format!("test -e {} || {}", part(args, index), render(args, index));
-    let render: Vec<String> = render.split(index).map(word).collect();
+    let render: Vec<String> = render(args, index).split(index).map(word).collect();
     let (format, render) = ("%s".repeat(2 * render.len() - 1), render.join(" \"$index\" "));
     let hosts: String = args.hosts.iter().map(|host| format!(" --sshlogin {}", word(host))).collect();
     let way = if args.hosts.is_empty() { "" } else { " --workdir \"$PWD\"" };
     format!(
         "\
 #!/bin/sh
-# Renders in {count} parts, one at a time on each machine, and joins them. Called again, it goes on where it was;
-# remove the parts of another scene first.
+# Renders in {count} parts, one at a time on each machine, and joins them. A part that is killed is tried again. Called again,
+# the script goes on where it was: finished parts stay, and glimt refuses to replace those of another scene or other options.
 set -eu
 seq {count} | while read -r index; do printf '{format}\\n' {render}; done |
-    parallel --jobs 1 --halt soon,fail=1{way}{hosts}
+    parallel --jobs 1 --retries 3 --halt soon,fail=1{way}{hosts}
 {merge}
 "
     )
@@ -116,7 +158,7 @@ fn kubernetes(args: &FarmArgs) -> String {
     let (count, render, merge) =
         (args.shards, render(args, "$index"), merge(args, "--watch --progress plain "));
     let (image, claim) = (yaml(&args.image), yaml(&args.claim));
-    let render = yaml(&format!("index=$((JOB_COMPLETION_INDEX + 1)); exec {render}"));
+    let render = command(&format!("index=$((JOB_COMPLETION_INDEX + 1)); exec {render}"));
     let job = |name: &str, indexed: &str, command: &str| {
         format!(
             "\
@@ -148,8 +190,13 @@ spec:
     format!(
         "# Renders in {count} parts and joins them: kubectl apply -f -\n{}---\n{}",
         job("glimt", &indexed, &render),
-        job("glimt-merge", "", &yaml(&merge))
+        job("glimt-merge", "", &command(&merge))
     )
+}
+
+/// A command of a container. Kubernetes puts variables in the place of `$(NAME)`, and `$` in that of `$$`.
+fn command(text: &str) -> String {
+    yaml(&text.replace('$', "$$"))
 }
 
 /// A text as YAML holds it: a string of JSON is one.
@@ -193,8 +240,86 @@ mod tests {
         let printed = std::process::Command::new("sh").args(["-c", lines]).output().expect("a shell");
         let printed = String::from_utf8(printed.stdout).expect("text");
         let second = shlex::split(printed.lines().nth(1).expect("two parts")).expect("words");
-        assert_eq!(&second[..4], ["test", "-e", "a {}.exr.2.part", "||"]);
-        assert_eq!(&second[5..], [name, "--once", "-o", "a {}.exr.2.part", "--shard", "2/2", "--resume"]);
+        assert_eq!(&second[1..], [name, "--once", "-o", "a {}.exr.2.part", "--shard", "2/2", "--resume"]);
+    }
+
+    #[test]
+    fn options_are_those_of_a_render_and_the_same_for_all_parts() {
+        let said = |options: &str| {
+            let args = args(&format!("a.toml -o a.exr --shards 2 --engine slurm -- {options}"));
+            check_options(&args).err().unwrap_or_default()
+        };
+        for (options, words) in [
+            ("-o x.png", "-o names the image"),
+            ("--shard 1/3", "--shard is given"),
+            ("--once", "--once is given"),
+            ("--resume", "--resume is given"),
+            ("--report r.json", "one file for all parts"),
+            ("--time 3", "--time has no parts"),
+            ("--photons on --error 0.1", "photons with a noise threshold"),
+            ("--sample 3", "unexpected argument '--sample'"),
+            ("--samples 0", "invalid value '0'"),
+            ("--samples 3 --samples 4", "--samples"),
+            ("another.toml", "another.toml"),
+            ("check b.toml", ""),
+            ("--help", "--help"),
+        ] {
+            let said = said(options);
+            assert!(!said.is_empty() && said.contains(words) && !said.contains('\n'), "{options}: {said:?}");
+        }
+        for options in
+            ["", "--samples 9 --integrator path --error 0.1", "--photons on", "--checkpoint 5 --threads 2"]
+        {
+            assert_eq!(said(options), "", "{options}");
+        }
+    }
+
+    /// A command as Kubernetes hands it on: `$(NAME)` is the variable of that name, if there is one; `$$` is `$`
+    /// (k8s.io/kubernetes/third_party/forked/golang/expansion).
+    fn expanded(text: &str, variables: &[(&str, &str)]) -> String {
+        let (mut out, mut rest) = (String::new(), text);
+        while let Some(at) = rest.find('$') {
+            out += &rest[..at];
+            rest = &rest[at + 1..];
+            if let Some(after) = rest.strip_prefix('$') {
+                out.push('$');
+                rest = after;
+            } else if let Some((name, after)) = rest.strip_prefix('(').and_then(|rest| rest.split_once(')')) {
+                let known = variables.iter().find(|(known, _)| *known == name);
+                out += &known.map_or(format!("$({name})"), |(_, value)| (*value).to_owned());
+                rest = after;
+            } else {
+                out.push('$');
+            }
+        }
+        out + rest
+    }
+
+    #[test]
+    fn names_survive_kubernetes_and_its_shell() {
+        let (scene, picture) = ("$(HOME) $$ $$(HOME).toml", "o $$ $(JOB_COMPLETION_INDEX).exr");
+        let args = args(&format!("{} -o {} --shards 8 --engine kubernetes", word(scene), word(picture)));
+        let script = kubernetes(&args);
+        let commands: Vec<String> = script
+            .lines()
+            .filter_map(|line| line.trim().strip_prefix("command: "))
+            .map(|command| {
+                let words: Vec<String> = serde_json::from_str(command).expect("a list of strings");
+                expanded(&words[2], &[("HOME", "/root"), ("JOB_COMPLETION_INDEX", "3")])
+            })
+            .collect();
+        assert_eq!(commands.len(), 2);
+        let print = commands[0].replace("exec glimt", "printf '%s\\n'");
+        assert_ne!(print, commands[0]);
+        let printed = std::process::Command::new("sh")
+            .env("JOB_COMPLETION_INDEX", "3")
+            .args(["-c", &print])
+            .output()
+            .expect("a shell");
+        let printed = String::from_utf8(printed.stdout).expect("text");
+        let words: Vec<&str> = printed.lines().collect();
+        let part = format!("{picture}.4.part");
+        assert_eq!(words, [scene, "--once", "-o", &part, "--shard", "4/8", "--resume"]);
     }
 
     #[test]

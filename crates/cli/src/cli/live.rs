@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::console::Console;
 use super::exit::Exit;
 use super::lower::Order;
-use crate::pipeline::protocol::{Command, Event, Failure, Stage, Status};
+use crate::pipeline::protocol::{CheckpointNews, Command, Event, Failure, Stage, Status};
 use crate::pipeline::start;
 use crate::pipeline::watch::{Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
@@ -91,6 +91,10 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         if said.is_empty() && ended.status == ExitStatus::QUIT {
             said.push(ended.summary.clone());
         }
+        // After SIGHUP nobody reads it.
+        if ended.status != ExitStatus::HANGUP {
+            said.extend(writes.checkpoint());
+        }
         said.iter().for_each(|line| console.say(line));
     }
     let exit = |ended: Ended| match ended.status {
@@ -120,6 +124,8 @@ struct Heard {
     /// A line for each picture since the last order to write, and whether it came after the front end was left.
     lines: Vec<(bool, String)>,
     has_left: bool,
+    /// The checkpoint that was written after the front end was left, or the reason why there is none.
+    checkpoint: Option<String>,
     /// Whether a request is at its last stage.
     is_last_stage: bool,
 }
@@ -160,6 +166,19 @@ impl Writes {
             Event::Done { .. } | Event::Failed { .. } | Event::Cancelled { .. } => {
                 heard.is_last_stage = false;
             }
+            Event::Checkpoint { news, .. } if has_left => match news {
+                CheckpointNews::Written { path } => {
+                    let line = format!("{} has what was rendered: call glimt again to go on", path.display());
+                    heard.checkpoint = Some(line);
+                }
+                CheckpointNews::Failed { message } => heard.checkpoint = Some(format!("warning: {message}")),
+                CheckpointNews::Resumed { .. }
+                | CheckpointNews::Absent { .. }
+                | CheckpointNews::Ignored { .. }
+                | CheckpointNews::Unused { .. }
+                | CheckpointNews::Finished { .. }
+                | CheckpointNews::SetAside { .. } => {}
+            },
             Event::Started { .. }
             | Event::Asset { .. }
             | Event::Settings { .. }
@@ -174,6 +193,11 @@ impl Writes {
             | Event::Picked { .. }
             | Event::Files { .. } => {}
         }
+    }
+
+    /// A line about the checkpoint of a render that was left.
+    fn checkpoint(&self) -> Option<String> {
+        self.heard().checkpoint.clone()
     }
 
     /// A line for each picture that a person does not know of: those after the front end was left; of an order that is

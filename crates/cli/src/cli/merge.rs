@@ -2,7 +2,7 @@
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use indicatif::ProgressBar;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -111,26 +111,29 @@ impl Merge<'_> {
         }
     }
 
-    /// Waits until all parts are there, and shows what is there.
+    /// Waits until all parts are there and whole, and shows what is there.
     fn watched(&self) -> Result<Vec<PartFile>, Exit> {
         let mut parts: Vec<PartFile> = Vec::new();
-        let mut waiting: Vec<PathBuf> = self.args.parts.clone();
-        let mut is_said = false;
+        let mut waiting: Vec<Awaited> = self.args.parts.iter().cloned().map(Awaited::new).collect();
+        let mut said = None;
         loop {
-            let before = parts.len();
             let mut rest = Vec::new();
-            for path in waiting {
-                // A part appears under its name when it is whole.
-                if !path.exists() {
-                    rest.push(path);
-                    continue;
+            for mut awaited in waiting {
+                match awaited.look(self.token).map_err(|error| self.refuse(&error))? {
+                    Some(part) => parts.push(part),
+                    None => rest.push(awaited),
                 }
-                parts.push(PartFile::open(&path, self.token).map_err(|error| self.refuse(&error))?);
             }
             waiting = rest;
-            if parts.len() > before || !is_said {
-                is_said = true;
-                self.show(&parts)?;
+            let unfinished: Vec<&Path> = waiting.iter().filter_map(Awaited::unfinished).collect();
+            let state = (parts.len(), unfinished.iter().map(|path| path.to_path_buf()).collect::<Vec<_>>());
+            if said.as_ref() != Some(&state) {
+                let is_new = said.is_none_or(|(count, _)| count != parts.len());
+                self.say_parts(parts.len(), &unfinished);
+                if is_new {
+                    self.show(&parts)?;
+                }
+                said = Some(state);
             }
             if waiting.is_empty() {
                 return Ok(parts);
@@ -150,14 +153,29 @@ impl Merge<'_> {
         Ok(())
     }
 
-    /// Shows the picture of these parts, on a terminal, and how many there are.
-    fn show(&self, parts: &[PartFile]) -> Result<(), Exit> {
-        let (count, all) = (parts.len(), self.args.parts.len());
+    /// Reports how many parts are there, and those that are not whole yet.
+    fn say_parts(&self, count: usize, unfinished: &[&Path]) {
+        let all = self.args.parts.len();
+        let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
         match self.args.progress {
             Progress::None => {}
-            Progress::Json => json_line(&json!({ "event": "parts", "parts": count, "total": all })),
-            Progress::Auto | Progress::Plain => self.console.say(&format!("{count} of {all} parts")),
+            Progress::Json => {
+                json_line(&json!({ "event": "parts", "parts": count, "total": all, "unfinished": names }));
+            }
+            Progress::Auto | Progress::Plain => {
+                let not_whole = match names.as_slice() {
+                    [] => String::new(),
+                    [name] => format!("; {name} is not whole yet"),
+                    names => format!("; {} are not whole yet", names.join(", ")),
+                };
+                self.console.say(&format!("{count} of {all} parts{not_whole}"));
+            }
         }
+    }
+
+    /// Shows the picture of these parts, on a terminal.
+    fn show(&self, parts: &[PartFile]) -> Result<(), Exit> {
+        let (count, all) = (parts.len(), self.args.parts.len());
         let is_terminal = std::io::stdout().is_terminal();
         let finish = parts.first().and_then(|part| part.head.picture.finish());
         let Some(finish) = finish.filter(|_| is_terminal) else {
@@ -189,6 +207,7 @@ impl Merge<'_> {
             PartError::Unreadable { .. }
             | PartError::Foreign { .. }
             | PartError::Version { .. }
+            | PartError::Unfinished { .. }
             | PartError::Damaged { .. }
             | PartError::Kind { .. }
             | PartError::Other { .. }
@@ -233,6 +252,49 @@ impl Merge<'_> {
 fn is_one_file(one: &Path, other: &Path) -> bool {
     let identity = FileIdentity::of(one);
     identity.is_some() && identity == FileIdentity::of(other)
+}
+
+/// A part that is waited for.
+struct Awaited {
+    path: PathBuf,
+    /// Length and time of the file when it was found to end too early. `None` if it was not there yet.
+    unfinished: Option<(u64, Option<SystemTime>)>,
+}
+
+impl Awaited {
+    fn new(path: PathBuf) -> Self {
+        Self { path, unfinished: None }
+    }
+
+    /// Opens the part. `None` if it is not there, or not whole yet.
+    ///
+    /// # Errors
+    /// Those of opening it.
+    fn look(&mut self, token: &CancelToken) -> Result<Option<PartFile>, PartError> {
+        let now = std::fs::metadata(&self.path).ok().map(|found| (found.len(), found.modified().ok()));
+        // One that has not grown is not read again.
+        if now.is_none() || now == self.unfinished {
+            self.unfinished = now;
+            return Ok(None);
+        }
+        match PartFile::open(&self.path, token) {
+            Ok(part) => Ok(Some(part)),
+            Err(PartError::Unfinished { .. }) => {
+                self.unfinished = now;
+                Ok(None)
+            }
+            Err(PartError::Unreadable { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => {
+                self.unfinished = None;
+                Ok(None)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Its name, if it is there and not whole.
+    fn unfinished(&self) -> Option<&Path> {
+        self.unfinished.is_some().then_some(&self.path)
+    }
 }
 
 /// Progress of one step of the work.

@@ -197,6 +197,12 @@ fn hear(news: &CheckpointNews, of_call: &mut Vec<Diagnostic>, reporter: &dyn Rep
             let message = format!("{} is of this picture, and is not used", path.display());
             warn(&message, "--resume goes on from it");
         }
+        CheckpointNews::Unused { path, why } => {
+            say(format!("{} is not used: {why}; starting from the beginning", path.display()));
+        }
+        CheckpointNews::Finished { path } => {
+            say(format!("{} is finished already", path.display()));
+        }
         CheckpointNews::SetAside { path } => {
             say(format!("the checkpoint of another render is {}", path.display()));
         }

@@ -52,11 +52,13 @@ impl Temporary {
         }
     }
 
-    /// Gives it its final name, replacing any file of that name.
-    pub(super) fn rename_to(mut self, target: &Path) -> io::Result<()> {
+    /// Gives it its final name, replacing any file of that name. Returns the file, still locked.
+    pub(super) fn rename_to(mut self, target: &Path) -> io::Result<File> {
+        // A lock is that of the open file, whatever the number of its descriptors.
+        let file = self.file.try_clone()?;
         fs::rename(&self.path, target)?;
         self.kept = true;
-        Ok(())
+        Ok(file)
     }
 }
 

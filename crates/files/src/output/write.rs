@@ -56,6 +56,7 @@ pub fn atomic_until(
     token: &CancelToken,
 ) -> Result<(), OutputError> {
     atomic_by(path, &|file| stoppable::write_all(file, bytes, token), guard, (token, Durability::Power))
+        .map(drop)
 }
 
 /// Events that a file survives from the moment at which it has its name.
@@ -67,7 +68,8 @@ pub enum Durability {
     Power,
 }
 
-/// [`atomic_until`] of bytes that are made while they are written: `content` writes all of them, as often as it is called.
+/// [`atomic_until`] of bytes that are made while they are written: `content` writes all of them, as often as it is called. Returns the
+/// new file, which stays locked against other processes until it is closed. `None` if it was written in place.
 ///
 /// # Errors
 /// As [`atomic_until`], and the errors of `content`.
@@ -76,7 +78,7 @@ pub fn atomic_by(
     content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
     guard: &Guard<'_>,
     (token, durability): (&CancelToken, Durability),
-) -> Result<(), OutputError> {
+) -> Result<Option<File>, OutputError> {
     prepare_process();
     let named = |error| OutputError::file(path, error);
     match place::find(path)? {
@@ -93,7 +95,7 @@ pub fn atomic_by(
             }
             stoppable::or_cancelled(fill(&new, content, carried.as_ref(), durability), named)?;
             (guard.may_replace)(&target.path)?;
-            new.rename_to(&target.path).map_err(named)?;
+            let file = new.rename_to(&target.path).map_err(named)?;
             match durability {
                 Durability::Process => {}
                 Durability::Power => sync_directory(target.directory()).map_err(named)?,
@@ -101,13 +103,14 @@ pub fn atomic_by(
             if let (Losses::Told(tell), false) = (guard.losses, lost.is_empty()) {
                 tell(format!("{}: {} could not be kept", path.display(), lost.join(" and ")));
             }
-            Ok(())
+            Ok(Some(file))
         }
         Place::InPlace(place) => {
             (guard.may_replace)(&place)?;
             let mut bytes = Vec::new();
             stoppable::or_cancelled(content(&mut bytes), named)?;
-            stoppable::or_cancelled(in_place(&place, &bytes, token), named)
+            stoppable::or_cancelled(in_place(&place, &bytes, token), named)?;
+            Ok(None)
         }
     }
 }

@@ -75,6 +75,10 @@ impl Foretold {
             Some(("photons", _)) => "give [photons] a smaller `count`",
             Some(_) | None => "allow more",
         };
+        let way_out = match most < 1 << 20 {
+            true => "a size without a unit is in bytes: give one, as in 8GiB",
+            false => way_out,
+        };
         Err(Stop::work(format!(
             "the render needs about {} of memory ({}), more than the {} of --memory; {way_out}",
             words(all),
@@ -94,8 +98,14 @@ fn blocks(plan: &Plan) -> Blocks {
     }
 }
 
-/// `1.25 GiB`, `300 MiB`
+/// `1.25 GiB`, `300 MiB`; below that `12 KiB`, `1 byte`
 fn words(bytes: u64) -> String {
+    match bytes {
+        1 => return "1 byte".to_owned(),
+        0..1024 => return format!("{bytes} bytes"),
+        1024..0x10_0000 => return format!("{} KiB", bytes / 1024),
+        0x10_0000.. => {}
+    }
     let mib = bytes as f64 / f64::from(1 << 20);
     if mib < 1024.0 { format!("{:.0} MiB", mib.ceil()) } else { format!("{:.2} GiB", mib / 1024.0) }
 }
@@ -129,6 +139,16 @@ mod tests {
         // 64 million pixels of 40 and 15 bytes.
         assert!(said.contains("needs about 3.30 GiB of memory (the film 2.38 GiB"), "{said}");
         assert!(said.contains("more than the 1.00 GiB of --memory; render a smaller picture"), "{said}");
+        let said = |memory: u64| {
+            let small = Overrides { memory: Some(memory), ..Overrides::default() };
+            match Foretold::of_picture(&planned(&small)).check(&planned(&small)) {
+                Err(Stop::Failed(Failure::Work(said))) => said,
+                other => panic!("{other:?}"),
+            }
+        };
+        assert!(said(1).contains("more than the 1 byte of --memory; a size without a unit is in bytes"));
+        assert!(said(8 << 10).contains("more than the 8 KiB of --memory"));
+        assert!(said(8 << 20).contains("more than the 8 MiB of --memory; render a smaller picture"));
         let crop = Some(Rect { x: 10, y: 10, width: 500, height: 500 });
         let part = Overrides { crop, memory: Some(1 << 30), ..large };
         assert!(Foretold::of_picture(&planned(&part)).check(&planned(&part)).is_ok());

@@ -271,6 +271,18 @@ pub enum CheckpointNews {
         /// The file.
         path: PathBuf,
     },
+    /// It is there, and the render begins anew: why. Also a part that is not whole.
+    Unused {
+        /// The file.
+        path: PathBuf,
+        /// The reason: it is of another picture, has more samples than asked for, or is damaged.
+        why: String,
+    },
+    /// The output is this part already.
+    Finished {
+        /// The file.
+        path: PathBuf,
+    },
     /// That of another render made way for this one's.
     SetAside {
         /// Its new name.

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc;
 
-use super::engine::{Engine, Means, Meanwhile, Orders};
+use super::engine::{Engine, Interruption, Means, Meanwhile, Orders};
 pub use super::engine::{Rendered, Unrendered};
 use super::errands::Errand;
 use super::protocol::{PreviewSize, PreviewSlot, Request, Writing};
@@ -78,8 +78,8 @@ impl Orders for NoOrders {
         None
     }
 
-    fn is_suspended(&self) -> bool {
-        false
+    fn interruption(&self) -> Interruption {
+        Interruption::Replaced
     }
 }
 

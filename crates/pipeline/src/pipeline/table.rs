@@ -5,6 +5,7 @@ use super::protocol::{Stage, StageReport, Status};
 use super::sink::Sink;
 use super::stages::{Staged, Stop};
 use crate::control::CancelToken;
+use crate::system::processor::seconds_of_process;
 
 /// The stages of one request.
 pub(super) struct StageTable<'a> {
@@ -27,7 +28,11 @@ impl StageTable<'_> {
         work: impl FnOnce() -> Result<Staged<T>, Stop>,
     ) -> Result<T, Stop> {
         let watch = Stopwatch::start(self.token);
-        let report = |status, why| StageReport { name, status, seconds: watch.seconds(), why };
+        let before = seconds_of_process();
+        let report = |status, why| {
+            let processor_seconds = seconds_of_process() - before;
+            StageReport { name, status, seconds: watch.seconds(), processor_seconds, why }
+        };
         self.say(report(Status::Running, String::new()));
         let staged = work()?;
         let report = report(staged.status, staged.why);

@@ -11,7 +11,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::engine::{Engine, Means, Meanwhile, Orders};
+use super::engine::{Engine, Interruption, Means, Meanwhile, Orders};
 use super::errands::Errand;
 use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, Writing};
 use super::settings::{CameraChange, View};
@@ -280,8 +280,13 @@ impl Orders for Remote {
         self.lock().errands.pop_front()
     }
 
-    fn is_suspended(&self) -> bool {
-        self.lock().suspended
+    fn interruption(&self) -> Interruption {
+        let mailbox = self.lock();
+        match (mailbox.suspended, mailbox.quit) {
+            (true, _) => Interruption::Ended,
+            (false, true) => Interruption::Left,
+            (false, false) => Interruption::Replaced,
+        }
     }
 }
 

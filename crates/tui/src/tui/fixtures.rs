@@ -180,7 +180,7 @@ pub(super) fn camera() -> Viewpoint {
 }
 
 pub(super) fn stage(name: Stage, status: Status, seconds: f64, why: &str) -> StageReport {
-    StageReport { name, status, seconds, why: why.to_owned() }
+    StageReport { name, status, seconds, processor_seconds: seconds, why: why.to_owned() }
 }
 
 pub(super) fn asset(name: &str, done: u64, total: u64) -> AssetProgress {

@@ -103,6 +103,8 @@ fn checkpoint(news: &CheckpointNews) -> Value {
         CheckpointNews::Resumed { path, samples } => ("resumed", Some(path), None, Some(samples)),
         CheckpointNews::Absent { path } => ("absent", Some(path), None, None),
         CheckpointNews::Ignored { path } => ("ignored", Some(path), None, None),
+        CheckpointNews::Unused { path, why } => ("unused", Some(path), Some(why), None),
+        CheckpointNews::Finished { path } => ("finished", Some(path), None, None),
         CheckpointNews::SetAside { path } => ("set_aside", Some(path), None, None),
     };
     let path = path.map(|path| path.to_string_lossy());

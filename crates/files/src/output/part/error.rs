@@ -41,6 +41,14 @@ pub enum PartError {
         /// The version that is read.
         known: u32,
     },
+    /// It ends too early: it is being copied, or the copy was broken off.
+    #[error("{}: it is damaged: it ends at byte {bytes}, before its end; copy or render it again", path.display())]
+    Unfinished {
+        /// The file.
+        path: PathBuf,
+        /// Its length.
+        bytes: u64,
+    },
     /// Its bytes are not those that were written.
     #[error("{}: it is damaged: {why}; copy or render it again", path.display())]
     Damaged {

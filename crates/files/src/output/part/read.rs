@@ -32,14 +32,14 @@ pub struct PartFile {
 /// Whether a file begins as a part or a checkpoint does.
 pub fn is_part(path: &Path) -> bool {
     let mut mark = [0; MARK.len()];
-    File::open(path).and_then(|mut file| file.read_exact(&mut mark)).is_ok() && mark == MARK
+    open(path).and_then(|mut file| file.read_exact(&mut mark)).is_ok() && mark == MARK
 }
 
 impl PartFile {
     /// Opens a file and reads all of it.
     ///
     /// # Errors
-    /// It cannot be read, is something else, is of another version, or is damaged; cancelled.
+    /// It cannot be read, is something else, is of another version, ends too early, or is damaged; cancelled.
     pub fn open(path: &Path, token: &CancelToken) -> Result<Self, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
         let file = open(path).map_err(unreadable)?;
@@ -170,6 +170,10 @@ impl Reader<'_> {
         PartError::Damaged { path: self.path.to_owned(), why: why.to_owned() }
     }
 
+    fn unfinished(&self) -> PartError {
+        PartError::Unfinished { path: self.path.to_owned(), bytes: self.size }
+    }
+
     /// Fills some bytes.
     fn fill(&mut self, bytes: &mut [u8]) -> Result<(), PartError> {
         match self.file.read_exact(bytes) {
@@ -177,9 +181,7 @@ impl Reader<'_> {
                 self.at += bytes.len() as u64;
                 Ok(())
             }
-            Err(error) if error.kind() == ErrorKind::UnexpectedEof => {
-                Err(self.damaged(&format!("it ends at byte {}, before its end", self.size)))
-            }
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => Err(self.unfinished()),
             Err(source) => Err(PartError::Unreadable { path: self.path.to_owned(), source }),
         }
     }
@@ -193,16 +195,19 @@ impl Reader<'_> {
     /// Reads as many bytes as a number in the file says; reserves none beyond the end of the file.
     fn bytes(&mut self, length: u32, into: &mut Vec<u8>) -> Result<(), PartError> {
         if u64::from(length) > self.size - self.at {
-            return Err(self.damaged(&format!("it ends at byte {}, before its end", self.size)));
+            return Err(self.unfinished());
         }
         into.resize(length as usize, 0);
         self.fill(into)
     }
 
     fn head(&mut self) -> Result<(Head, Digest), PartError> {
-        let mut mark = [0; MARK.len()];
-        if self.fill(&mut mark).is_err() || mark != MARK {
-            return Err(PartError::Foreign { path: self.path.to_owned() });
+        let mut mark = Vec::new();
+        self.bytes(self.size.min(MARK.len() as u64) as u32, &mut mark)?;
+        match mark.len() < MARK.len() {
+            true if MARK.starts_with(&mark) => return Err(self.unfinished()),
+            false if mark == MARK => {}
+            true | false => return Err(PartError::Foreign { path: self.path.to_owned() }),
         }
         let version = self.word()?;
         if version != VERSION {

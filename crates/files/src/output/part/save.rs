@@ -1,5 +1,6 @@
 //! Writing a part: tile after tile, so that no more than a tile is in memory beside the film.
 
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::mpsc::{self, SyncSender};
@@ -13,7 +14,7 @@ use crate::control::CancelToken;
 use crate::film::Film;
 
 /// Writes a film with its head, as a whole or not at all. `state` is what the render needs to go on. Other threads may add to the
-/// film: each tile is written as it is at a moment of its own.
+/// film: each tile is written as it is at a moment of its own. Returns the file, as [`atomic_by`] does.
 ///
 /// # Errors
 /// Those of writing.
@@ -24,7 +25,7 @@ pub fn save(
     state: &Value,
     guard: &Guard<'_>,
     (token, durability): (&CancelToken, Durability),
-) -> Result<(), OutputError> {
+) -> Result<Option<File>, OutputError> {
     atomic_by(path, &|file| write(file, head, film, state, token), guard, (token, durability))
 }
 

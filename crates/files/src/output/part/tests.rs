@@ -135,7 +135,14 @@ fn other_files_are_told_from_parts() {
         opened(&other).expect_err("refused")
     };
     assert!(matches!(with(&|bytes| bytes[0] = 0), PartError::Foreign { .. }));
-    assert!(matches!(with(&|bytes| bytes.truncate(5)), PartError::Foreign { .. }));
+    for length in [0, 5, 12, 15, 20, bytes.len() / 2, bytes.len() - 1] {
+        let error = with(&|bytes| bytes.truncate(length));
+        assert!(
+            matches!(error, PartError::Unfinished { bytes, .. } if bytes == length as u64),
+            "{length}: {error}"
+        );
+    }
+    assert!(matches!(with(&|bytes| *bytes = b"short".to_vec()), PartError::Foreign { .. }));
     assert!(matches!(with(&|bytes| bytes[12] = 9), PartError::Version { found: 9, known: VERSION, .. }));
     assert!(matches!(with(&|bytes| bytes.push(0)), PartError::Damaged { .. }));
     assert!(opened(folder.path()).is_err() && opened(&folder.path().join("none")).is_err());

@@ -9,7 +9,7 @@ mod spares;
 mod tests;
 mod unfinished;
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::collections::HashSet;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-pub(super) use self::orders::{Meanwhile, Orders};
+pub(super) use self::orders::{Interruption, Meanwhile, Orders};
 use self::outcome::Outcome;
 pub use self::outcome::{Rendered, Unrendered};
 use self::unfinished::Good;
@@ -35,12 +35,12 @@ use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Statu
 use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
 use super::render::first_picture::FirstPictures;
-use super::render::keeping::Keeping;
+use super::render::keeping::{Around, Claim, Keeping};
 use super::render::preview::Screen;
 use super::render::scheduler::Rendering;
 use super::render::share::Share;
 use super::report::finish::{Finished, report};
-use super::settings::Overrides;
+use super::settings::{Checkpoints, Overrides, Resume};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
 use super::stages::glass::glass;
@@ -116,6 +116,8 @@ pub(super) struct Engine {
     inputs: Inputs,
     /// Whether the scene as it is now could not be read: nobody knows all the files that it names.
     is_broken: bool,
+    /// Checkpoints that were met.
+    claim: RefCell<Claim>,
 }
 
 /// Everything that is ready to be rendered.
@@ -158,6 +160,7 @@ impl Engine {
             assets: Vec::new(),
             inputs: Inputs::default(),
             is_broken: false,
+            claim: RefCell::default(),
         }
     }
 
@@ -434,16 +437,24 @@ impl Engine {
         };
         let finish = finish(plan);
         let name = || self.identity(request, ready);
-        let is_suspended = || meanwhile.orders.is_suspended();
-        let keeping = Keeping::new(output, checkpoints, &finish, (&self.inputs, sink), &name, &is_suspended);
-        work(Some(&keeping), self)
+        let interruption = || meanwhile.orders.interruption();
+        let around = Around {
+            finish: &finish,
+            inputs: &self.inputs,
+            sink,
+            name: &name,
+            interruption: &interruption,
+            claim: &self.claim,
+        };
+        work(Some(&Keeping::new(output, checkpoints, around)), self)
     }
 
-    /// Whether a request has checkpoints: its picture is written to a file, and they are not switched off.
+    /// Whether a request has checkpoints: its picture is written to a file, and they are not switched off, or it goes on from one.
     fn keeps(&self, request: &Request, plan: &Plan) -> bool {
         let is_file =
             plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
-        request.write != Writing::No && plan.checkpoints.seconds > 0.0 && is_file
+        let Checkpoints { seconds, resume, .. } = plan.checkpoints;
+        request.write != Writing::No && (seconds > 0.0 || resume == Resume::Asked) && is_file
     }
 
     /// Names and values of all that a picture depends on.

@@ -9,6 +9,17 @@ use crate::pipeline::protocol::{Event, PreviewSize};
 use crate::pipeline::render::film_state::FilmState;
 use crate::pipeline::sink::Sink;
 
+/// Why a render is cancelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::pipeline) enum Interruption {
+    /// Something else is rendered, or nothing: nobody comes back to it.
+    Replaced,
+    /// A person leaves: if it took long, it is gone on with later.
+    Left,
+    /// The process is ended: it is gone on with later.
+    Ended,
+}
+
 /// Orders that come while a request is under way.
 pub(in crate::pipeline) trait Orders {
     /// Whether the picture is to be written as it is.
@@ -19,8 +30,8 @@ pub(in crate::pipeline) trait Orders {
     fn take_preview(&self) -> Option<Option<PreviewSize>>;
     /// The next question about the current picture.
     fn take_errand(&self) -> Option<Errand>;
-    /// Whether a render that is cancelled is to be gone on with later.
-    fn is_suspended(&self) -> bool;
+    /// Why a render that is cancelled is not gone on with now.
+    fn interruption(&self) -> Interruption;
 }
 
 /// Tokens and orders of a request while it is under way.

@@ -73,6 +73,8 @@ pub struct StageReport {
     pub status: Status,
     /// Wall-clock time of the stage.
     pub seconds: f64,
+    /// Processor time of all threads of the process during the stage.
+    pub processor_seconds: f64,
     /// Why it was skipped or reused, or what it made, in a few words; may be empty.
     pub why: String,
 }

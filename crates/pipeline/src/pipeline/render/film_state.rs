@@ -54,6 +54,8 @@ pub(in crate::pipeline) struct FilmState {
     pub(in crate::pipeline) before: Before,
     /// Names of all that the picture depends on. `None` before the first request for them.
     pub(in crate::pipeline) identity: Option<Vec<Trait>>,
+    /// Whether it was read from a part that is finished.
+    pub(in crate::pipeline) is_finished_part: bool,
 }
 
 /// Work of an earlier process.
@@ -111,6 +113,7 @@ impl FilmState {
             own,
             before: Before::default(),
             identity: None,
+            is_finished_part: false,
         })
     }
 
@@ -376,6 +379,7 @@ mod tests {
             own: None,
             before: Before::default(),
             identity: None,
+            is_finished_part: false,
         }
     }
 

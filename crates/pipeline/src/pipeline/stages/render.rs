@@ -33,23 +33,29 @@ pub(in crate::pipeline) fn render(
         };
         let (plan, most_bytes) = (rendering.plan, rendering.most_film_bytes);
         let state = || FilmState::new(key, plan, most_bytes, convergence, rendering.share.clone());
-        let state = films.put(state).map_err(Stop::work)?;
-        if let Some(keeping) = rendering.keeping.filter(|_| !rendering.force) {
-            keeping.resume(state, wanted)?;
+        let empty = films.put(&state).map_err(Stop::work)?;
+        let is_of_use = match rendering.keeping.filter(|_| !rendering.force) {
+            Some(keeping) => keeping.resume(empty, wanted)?,
+            None => true,
+        };
+        if !is_of_use {
+            films.put(state).map_err(Stop::work)?;
         }
     }
     let Some(state) = films.current_mut() else { return Err(Stop::work("the film is gone")) };
     let budget = rendering.plan.time_seconds;
-    let finished = state.is_complete(wanted) || (budget.is_some() && state.ended_by == budget);
+    let is_part = state.is_finished_part;
+    let finished = is_part || state.is_complete(wanted) || (budget.is_some() && state.ended_by == budget);
     let had = state.samples(wanted);
     let is_resumed = state.before.seconds > 0.0;
     let mut scheduler = Scheduler::new(state, rendering);
     if finished {
         scheduler.show();
-        let why = match (is_resumed, is_other) {
-            (true, _) => "the checkpoint has all samples",
-            (false, true) => "its film was kept",
-            (false, false) => "nothing that it shows changed",
+        let why = match (is_part, is_resumed, is_other) {
+            (true, ..) => "the part is finished",
+            (false, true, _) => "the checkpoint has all samples",
+            (false, false, true) => "its film was kept",
+            (false, false, false) => "nothing that it shows changed",
         };
         return Ok(Staged::reused(scheduler.rays, why));
     }

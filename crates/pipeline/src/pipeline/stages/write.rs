@@ -211,7 +211,7 @@ fn write_part(
 ) -> Result<u64, OutputError> {
     let head = head(Kind::Part, canvas, canvas.identity.clone().unwrap_or_default(), &finish(plan));
     let save = |guard: &Guard<'_>| {
-        part::save(path, &head, &canvas.film, &Value::Null, guard, (token, Durability::Power))
+        part::save(path, &head, &canvas.film, &Value::Null, guard, (token, Durability::Power)).map(drop)
     };
     guarded(plan, inputs, path, sink, save)?;
     Ok(path.metadata().map_or(0, |found| found.len()))

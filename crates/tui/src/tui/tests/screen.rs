@@ -187,6 +187,7 @@ fn words_beside_a_stage_are_not_cut_in_the_middle() {
         name: Stage::Meshes,
         status: Status::Skipped,
         seconds: 0.0,
+        processor_seconds: 0.0,
         why: why.to_owned(),
     };
     desk.worker(protocol::Event::Stage { generation: 1, stage: stage("no need") });
@@ -213,7 +214,13 @@ fn words_beside_a_stage_are_not_cut_in_the_middle() {
 #[test]
 fn a_stage_that_failed_does_not_look_at_work() {
     let mut desk = Desk::new();
-    let stage = StageReport { name: Stage::Parse, status: Status::Running, seconds: 0.0, why: String::new() };
+    let stage = StageReport {
+        name: Stage::Parse,
+        status: Status::Running,
+        seconds: 0.0,
+        processor_seconds: 0.0,
+        why: String::new(),
+    };
     desk.worker(protocol::Event::Stage { generation: 1, stage });
     assert!(desk.text().contains("> parse"));
     let failure = Failure::Scene(vec![diagnostic(Severity::Error, "wrong")]);

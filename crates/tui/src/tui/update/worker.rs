@@ -76,7 +76,12 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
                     format!("the checkpoint of another render is {}", visible(&path.to_string_lossy())),
                 );
             }
+            CheckpointNews::Unused { path, why } => {
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+                say(state, format!("{} is not used: {}", visible(&name), visible(&why)));
+            }
             CheckpointNews::Written { .. }
+            | CheckpointNews::Finished { .. }
             | CheckpointNews::Absent { .. }
             | CheckpointNews::Ignored { .. } => {}
         },

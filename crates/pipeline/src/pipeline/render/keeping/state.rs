@@ -1,0 +1,85 @@
+//! State of a render that its film does not hold.
+
+use serde::{Deserialize, Serialize};
+
+use crate::integrators::RayCounters;
+use crate::pipeline::render::film_state::{Before, FilmState};
+
+/// State of a render beside its film.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct State {
+    /// Samples that the halves of each cell are to have, as far as that is decided.
+    goals: Vec<[u32; 2]>,
+    /// Samples at which each tile was judged last.
+    judged: Vec<u32>,
+    /// Brightness that noise is held against.
+    brightness: Option<f64>,
+    /// Rays of each cell.
+    cell_rays: Vec<u64>,
+    /// Camera, shadow, reflected, refracted, scattered rays; texture look-ups.
+    rays: [u64; 6],
+    /// Seconds of rendering.
+    pub(super) seconds: f64,
+    /// Seconds of a processor.
+    processor_seconds: f64,
+}
+
+impl State {
+    pub(super) fn of(state: &FilmState, rays: RayCounters, seconds: f64) -> Self {
+        let RayCounters {
+            camera_rays,
+            shadow_rays,
+            reflected_rays,
+            refracted_rays,
+            scattered_rays,
+            texture_lookups,
+        } = rays;
+        Self {
+            goals: state.goals.decided.clone(),
+            judged: state.goals.judged.clone(),
+            brightness: state.goals.brightness,
+            cell_rays: state.rays.clone(),
+            rays: [camera_rays, shadow_rays, reflected_rays, refracted_rays, scattered_rays, texture_lookups],
+            seconds,
+            processor_seconds: state.seconds,
+        }
+    }
+
+    /// Camera rays that were traced.
+    pub(super) fn camera_rays(&self) -> u64 {
+        let [camera_rays, ..] = self.rays;
+        camera_rays
+    }
+
+    /// Whether it is of a film of this size.
+    pub(super) fn fits(&self, state: &FilmState) -> bool {
+        self.goals.len() == state.done.len()
+            && self.cell_rays.len() == state.done.len()
+            && self.judged.len() == state.film.tile_count()
+    }
+
+    /// Puts it into a film's state. `None`, and nothing is changed, if it is of another film.
+    pub(super) fn put(self, state: &mut FilmState) -> Option<()> {
+        if !self.fits(state) {
+            return None;
+        }
+        let [camera_rays, shadow_rays, reflected_rays, refracted_rays, scattered_rays, texture_lookups] =
+            self.rays;
+        let rays = RayCounters {
+            camera_rays,
+            shadow_rays,
+            reflected_rays,
+            refracted_rays,
+            scattered_rays,
+            texture_lookups,
+        };
+        state.goals.decided = self.goals;
+        state.goals.judged = self.judged;
+        state.goals.brightness = self.brightness;
+        state.rays = self.cell_rays;
+        state.before = Before { rays, seconds: self.seconds };
+        state.render_seconds = self.seconds;
+        state.seconds = self.processor_seconds;
+        Some(())
+    }
+}

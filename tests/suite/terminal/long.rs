@@ -1,0 +1,120 @@
+//! Long renders: checkpoints of a live program, and a merge that waits.
+
+use std::fs;
+
+use super::pty::{Folder, SCENE, Terminal};
+
+/// The scene with so many samples.
+fn scene(samples: u32, rest: &str) -> String {
+    SCENE.replace("samples = 4", &format!("samples = {samples}\n{rest}"))
+}
+
+/// A folder with the checkpoint of a finished render of the scene.
+fn with_checkpoint(samples: u32) -> Folder {
+    let folder = Folder::new();
+    folder.write("scene.toml", &scene(samples, ""));
+    let options = ["-o", "scene.png", "--keep-checkpoint"];
+    let mut process = std::process::Command::new(folder.program());
+    process.current_dir(folder.path("")).args(["scene.toml", "--once"]).args(options);
+    assert!(process.output().expect("it runs").status.success());
+    assert!(folder.path("scene.png.checkpoint").is_file());
+    fs::remove_file(folder.path("scene.png")).expect("removed");
+    folder
+}
+
+fn terminal(folder: &Folder, options: &[&str]) -> Terminal {
+    folder.terminal_with(&[&[folder.program(), "scene.toml"], options].concat(), &[])
+}
+
+#[test]
+fn a_checkpoint_that_is_not_used_is_named_and_the_scene_is_not_called_broken() {
+    let is_fine = |terminal: &Terminal, words: &str| {
+        terminal.wait_for(words);
+        terminal.wait_for_render(1);
+        let text = terminal.text();
+        assert!(!text.contains("error") && !text.contains("--resume"), "{text}");
+    };
+    // More samples than asked for.
+    let folder = with_checkpoint(8);
+    folder.write("scene.toml", &scene(3, ""));
+    let long = terminal(&folder, &[]);
+    is_fine(&long, "scene.png.checkpoint is not used: it has more samples than the 3");
+    assert_eq!(folder.bytes("scene.png"), folder.once(&[]), "nothing of it is in the image");
+    assert!(folder.path("scene.png.checkpoint").exists(), "it has more than the image");
+    drop(long);
+    // Another image; it is said once, not for each edit.
+    folder.write("scene.toml", &scene(9, "seed = 5"));
+    let other = terminal(&folder, &[]);
+    is_fine(&other, "scene.png.checkpoint is not used: seed is 0 there and 5 here");
+    folder.write("scene.toml", &scene(9, "seed = 6"));
+    other.wait_for_render(2);
+    assert!(!other.text().contains("is not used"), "{}", other.text());
+    drop(other);
+    // Damaged.
+    let mut bytes = folder.bytes("scene.png.checkpoint");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(folder.path("scene.png.checkpoint"), bytes).expect("written");
+    folder.write("scene.toml", &scene(9, ""));
+    let damaged = terminal(&folder, &["--resume"]);
+    is_fine(&damaged, "scene.png.checkpoint is not used: it is damaged");
+    assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
+}
+
+#[test]
+fn a_long_render_that_is_left_is_kept_and_the_last_line_says_so() {
+    let folder = Folder::new();
+    folder.write("scene.toml", &scene(10_000_000, ""));
+    let mut long = terminal(&folder, &["--checkpoint", "0.2"]);
+    long.wait_for("ETA");
+    std::thread::sleep(std::time::Duration::from_millis(400));
+    long.press("q");
+    assert_eq!(long.end_saying("scene.png.checkpoint has what was rendered: call glimt again to go on"), 0);
+    assert!(folder.path("scene.png.checkpoint").is_file());
+    let mut again = terminal(&folder, &[]);
+    again.wait_for("going on from");
+    again.press("q");
+    assert_eq!(again.end_saying("scene.png.checkpoint has what was rendered"), 0);
+    // A short one is not worth it.
+    fs::remove_file(folder.path("scene.png.checkpoint")).expect("removed");
+    let mut short = terminal(&folder, &["--checkpoint", "1000"]);
+    short.wait_for("ETA");
+    short.press("q");
+    assert_eq!(short.end(), 0);
+    assert!(!folder.path("scene.png.checkpoint").exists());
+}
+
+#[test]
+fn a_merge_that_waits_shows_the_image_as_parts_arrive() {
+    let folder = Folder::new();
+    let run = |line: &str| {
+        let mut process = std::process::Command::new(folder.program());
+        process.current_dir(folder.path("")).args(line.split_whitespace());
+        assert!(process.output().expect("it runs").status.success(), "{line}");
+    };
+    for index in 1..=3 {
+        run(&format!("scene.toml --once -o {index} --shard {index}/3"));
+    }
+    run("scene.toml --once -o one.png");
+    fs::rename(folder.path("1"), folder.path("1.part")).expect("renamed");
+    let parts = ["1.part", "2.part", "3.part"];
+    let command = [&[folder.program(), "merge", "joined.png"], parts.as_slice(), &["--watch"]].concat();
+    let merge = folder.terminal_with(&command, &[]);
+    let cells = |merge: &Terminal| merge.settled(|screen| super::Colors::of(screen).total());
+    merge.wait_for("1 of 3 parts");
+    let first = cells(&merge);
+    fs::write(folder.path("2.part"), &folder.bytes("2")[..100]).expect("written");
+    merge.wait_for("1 of 3 parts; 2.part is not whole yet");
+    fs::rename(folder.path("2"), folder.path("2.part")).expect("renamed");
+    merge.wait_for("2 of 3 parts");
+    let second = cells(&merge);
+    fs::rename(folder.path("3"), folder.path("3.part")).expect("renamed");
+    merge.wait_for("wrote joined.png (64×48)");
+    let all = cells(&merge);
+    assert!(first > 0 && first < second && second < all, "{first}, {second}, {all} cells");
+    // The image and the words are 80 columns wide at most, and no line of them is broken.
+    let text = merge.text();
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    assert_eq!(merge.end(), 0);
+    assert_eq!(folder.bytes("joined.png"), folder.bytes("one.png"));
+}

@@ -1,0 +1,261 @@
+//! A soak: edits, keys, resizes, broken scenes, dropped terminals for as long as one likes, at random with a fixed seed.
+//!
+//!     GLIMT_SOAK_MINUTES=60 cargo test --profile quick --test suite soak -- --ignored --nocapture
+//!
+//! One program lives from the start to the end. Beside it, in a folder of its own, others are ended in every way and called again,
+//! with a checkpoint. `GLIMT_SOAK_SEED` chooses other events.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::time::{Duration, Instant};
+
+use nix::sys::signal::Signal;
+
+use super::pty::{Folder, Terminal};
+
+/// Time between two looks at the program.
+const PAUSE: Duration = Duration::from_secs(20);
+/// Longest time for an image.
+const LIMIT: Duration = Duration::from_secs(300);
+/// Growth of the memory from the middle to the end that is not a leak, in KiB.
+const SLACK: u64 = 16 << 10;
+
+/// Random numbers.
+struct Dice(Box<dyn FnMut() -> f32>);
+
+impl Dice {
+    fn new(seed: u64) -> Self {
+        Self(Box::new(glimt::math::random::unit(seed)))
+    }
+
+    /// A whole number below `count`.
+    fn below(&mut self, count: usize) -> usize {
+        ((self.0)() * count as f32) as usize % count
+    }
+
+    fn of<T: Copy>(&mut self, all: &[T]) -> T {
+        all[self.below(all.len())]
+    }
+}
+
+/// A scene that shows a mesh and a texture.
+fn scene(dice: &mut Dice, samples: u32, number: u32) -> String {
+    let (width, height) = (32 + dice.below(48), 24 + dice.below(32));
+    let photons = dice.of(&["", "", "[photons]\nenabled = true\ncount = 2000\n"]);
+    let radius = 0.2 + dice.below(8) as f32 / 20.0;
+    let floor = dice.of(&["{ texture = \"tiles\" }", "[0.7, 0.5, 0.3]", "\"#8090a0\""]);
+    let ball = dice.of(&["type = \"glass\"", "type = \"mirror\"", "diffuse = [0.8, 0.1, 0.1]"]);
+    format!(
+        "# {number}\n[render]\nwidth = {width}\nheight = {height}\nsamples = {samples}\nseed = {number}\n{photons}\
+        [camera]\nposition = [0, 1.2, 4]\nlook_at = [0, 0.7, 0]\naperture = 0.05\n\
+        [textures.tiles]\nfile = \"tiles.ppm\"\n[materials.floor]\ndiffuse = {floor}\n[materials.ball]\n{ball}\n\
+        [materials.lamp]\nemission = [6, 5, 4]\n\
+        [[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nmaterial = \"floor\"\n\
+        [[sphere]]\ncenter = [0.4, 0.5, 0]\nradius = {radius}\nmaterial = \"ball\"\n\
+        [[quad]]\ncorner = [-0.6, 2.2, -0.4]\nu = [1.2, 0, 0]\nv = [0, 0, 1.2]\nmaterial = \"lamp\"\n\
+        [[mesh]]\nfile = \"step.obj\"\nmaterial = \"floor\"\n"
+    )
+}
+
+/// Writes a file as one of many editors does.
+fn save(folder: &Folder, dice: &mut Dice, name: &str, text: &str) {
+    let new = folder.path("new~");
+    match dice.below(4) {
+        0 => folder.write(name, text),
+        1 => {
+            fs::write(&new, text).expect("written");
+            fs::rename(&new, folder.path(name)).expect("renamed");
+        }
+        2 => {
+            // Without the file for a moment.
+            let _ = fs::remove_file(folder.path(name));
+            fs::write(&new, text).expect("written");
+            fs::rename(&new, folder.path(name)).expect("renamed");
+        }
+        _ => {
+            // In two pieces.
+            folder.write(name, &text[..text.len() / 2]);
+            std::thread::sleep(Duration::from_millis(20));
+            folder.write(name, text);
+        }
+    }
+}
+
+/// Writes the mesh and the texture, each a little other than before.
+fn save_assets(folder: &Folder, dice: &mut Dice) {
+    let top = 0.5 + dice.below(8) as f32 / 10.0;
+    let grey = 100 + dice.below(100);
+    save(folder, dice, "step.obj", &format!("v -1.5 0 0\nv -0.6 0 0\nv -1 {top} -0.2\nf 1 2 3\n"));
+    let tiles = format!("P3\n2 2\n255\n{grey} 200 200 40 40 60\n40 40 60 {grey} 200 200\n");
+    save(folder, dice, "tiles.ppm", &tiles);
+}
+
+/// Figures of a process.
+#[derive(Clone, Copy, Debug)]
+struct Figures {
+    minutes: f32,
+    memory_kib: u64,
+    handles: usize,
+    threads: usize,
+    temporary: usize,
+}
+
+impl Figures {
+    fn of(terminal: &Terminal, folder: &Folder, begin: Instant) -> Self {
+        let process = format!("/proc/{}", terminal.id());
+        let status = fs::read_to_string(format!("{process}/status")).expect("a process");
+        let field = |name: &str| {
+            let line = status.lines().find(|line| line.starts_with(name)).expect(name);
+            line.split_whitespace().nth(1).and_then(|word| word.parse::<u64>().ok()).expect("a number")
+        };
+        let names = fs::read_dir(folder.path("")).expect("a folder").flatten().map(|entry| entry.file_name());
+        Self {
+            minutes: begin.elapsed().as_secs_f32() / 60.0,
+            memory_kib: field("VmRSS:"),
+            handles: fs::read_dir(format!("{process}/fd")).expect("handles").count(),
+            threads: field("Threads:") as usize,
+            temporary: names.filter(|name| name.to_string_lossy().ends_with(".tmp")).count(),
+        }
+    }
+
+    fn say(&self, when: &str) {
+        let Self { minutes, memory_kib, handles, threads, temporary } = self;
+        eprintln!(
+            "{when}: {minutes:.1} min, memory {:.1} MiB, {handles} handles, {threads} threads, {temporary} temporary files",
+            *memory_kib as f32 / 1024.0
+        );
+    }
+}
+
+/// Saves a last scene, and waits until its image is that of `--once`.
+fn assert_image(terminal: &mut Terminal, folder: &Folder, text: &str, options: &[&str]) {
+    folder.write("scene.toml", text);
+    let once = folder.once(options);
+    let (begin, mut next) = (Instant::now(), Instant::now());
+    while fs::read(folder.path("scene.png")).ok().as_ref() != Some(&once) {
+        assert!(begin.elapsed() < LIMIT, "not the image of --once\n{text}\n{}", terminal.text());
+        // Close what is open, go back to the scene's settings. On a busy machine both keys may arrive as one, which is another key.
+        if Instant::now() >= next {
+            terminal.press("\x1b");
+            std::thread::sleep(Duration::from_millis(400));
+            terminal.press("0");
+            next = Instant::now() + Duration::from_secs(5);
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// Keys that change the picture, the screen or nothing. Not those that end the program, start an editor or change the file.
+const KEYS: [&str; 34] = [
+    "s", "d", "p", "i", "v", "V", "\t", "x", "z", "h", "j", "k", "l", "+", "-", "<", ">", "[", "]", "f",
+    "\r", "m", "b", "n", "N", " ", "r", "w", "0", "e", "?", "\x1b", "3", "\x1b[A",
+];
+
+#[test]
+#[ignore = "takes as long as one likes"]
+fn soak() {
+    let number =
+        |name: &str, default: u64| std::env::var(name).map_or(default, |text| text.parse().expect(name));
+    let minutes = number("GLIMT_SOAK_MINUTES", 3);
+    let mut dice = Dice::new(number("GLIMT_SOAK_SEED", 1));
+    let begin = Instant::now();
+    let end = begin + Duration::from_secs(60 * minutes);
+    let folders = [Folder::new(), Folder::new()];
+    let [own, other] = &folders;
+    for folder in &folders {
+        save_assets(folder, &mut dice);
+        folder.write("scene.toml", &scene(&mut dice, 4, 0));
+    }
+    let long = ["--checkpoint", "0.3"];
+    let begin_other =
+        || other.terminal_with(&[&[other.program(), "scene.toml"], long.as_slice()].concat(), &[]);
+    let (mut lives, mut falls) = (own.terminal(), begin_other());
+    let (mut events, mut images, mut ends) = (0_u32, 0_u32, BTreeSet::new());
+    let mut figures: Vec<Figures> = Vec::new();
+    let mut next = begin + PAUSE;
+    while Instant::now() < end {
+        events += 1;
+        match dice.below(14) {
+            0..=3 => {
+                let text = scene(&mut dice, 1 + events % 8, events);
+                save(own, &mut dice, "scene.toml", &text);
+            }
+            4 => {
+                let text = scene(&mut dice, 4, events);
+                let broken =
+                    dice.of(&["samples = ", "material = \"ball\"", "[camera]", "file = \"tiles.ppm\""]);
+                let with =
+                    dice.of(&["samples = -", "material = \"bell\"", "[[", "file = \"none.ppm\"", "\u{0}"]);
+                save(own, &mut dice, "scene.toml", &text.replace(broken, with));
+            }
+            5 => save_assets(own, &mut dice),
+            6..=9 => {
+                for _ in 0..1 + dice.below(6) {
+                    lives.press(dice.of(&KEYS));
+                }
+            }
+            10 => lives.resize(20 + dice.below(140) as u16, 6 + dice.below(50) as u16),
+            11 => {
+                // A line that hangs.
+                lives.set_reading(false);
+                std::thread::sleep(Duration::from_millis(300));
+                lives.set_reading(true);
+            }
+            12 => {
+                let text = scene(&mut dice, 2000, events % 5);
+                save(other, &mut dice, "scene.toml", &text);
+                falls.press(dice.of(&["s", "0", "r", "h", "i"]));
+            }
+            _ => {
+                let signal = dice.of(&[
+                    Signal::SIGHUP,
+                    Signal::SIGHUP,
+                    Signal::SIGKILL,
+                    Signal::SIGTERM,
+                    Signal::SIGINT,
+                ]);
+                let sent = Instant::now();
+                falls.signal(signal);
+                let code = falls.code();
+                assert!(sent.elapsed() < Duration::from_secs(20), "{signal} is heard");
+                ends.insert((signal as i32, code));
+                falls = begin_other();
+            }
+        }
+        std::thread::sleep(Duration::from_millis(dice.below(250) as u64));
+        if Instant::now() < next {
+            continue;
+        }
+        // The images of both, then the figures of the one that lives.
+        let text = scene(&mut dice, 8, events);
+        assert_image(&mut lives, own, &text, &[]);
+        let text = scene(&mut dice, 64, events % 5);
+        assert_image(&mut falls, other, &text, &[]);
+        images += 2;
+        figures.push(Figures::of(&lives, own, begin));
+        if images % 20 == 2 {
+            figures[figures.len() - 1].say("now");
+        }
+        next = Instant::now() + PAUSE;
+    }
+    // How it all was.
+    assert!(figures.len() >= 3, "some minutes, please");
+    let (first, middle, last) = (figures[0], figures[figures.len() / 2], figures[figures.len() - 1]);
+    eprintln!("{events} events, {images} images as by --once; ended as (signal, code): {ends:?}");
+    [("start", first), ("middle", middle), ("end", last)]
+        .iter()
+        .for_each(|(when, figures)| figures.say(when));
+    let most = figures.iter().map(|figures| figures.memory_kib).max().unwrap_or_default();
+    eprintln!("most memory at a look: {:.1} MiB", most as f32 / 1024.0);
+    lives.press("q");
+    assert_eq!(lives.code(), 0);
+    drop(falls);
+    for folder in &folders {
+        let names = fs::read_dir(folder.path("")).expect("a folder").flatten().map(|entry| entry.file_name());
+        eprintln!("left: {:?}", names.collect::<Vec<_>>());
+    }
+    assert_eq!(last.temporary, 0);
+    assert!(last.handles <= first.handles + 2, "handles");
+    assert!(last.threads <= first.threads + 2, "threads");
+    assert!(last.memory_kib <= middle.memory_kib + SLACK, "memory");
+}
