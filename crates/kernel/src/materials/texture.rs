@@ -6,6 +6,7 @@ use super::footprint::{Footprint, TexturePoint};
 use super::mipmaps::Mipmaps;
 use super::texels::Texels;
 use crate::choice;
+use crate::math::color::luminance;
 use crate::math::elementary::log2;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::math::{Vec2, Vec3};
@@ -82,6 +83,44 @@ impl Color {
             Self::Texture(texture) => {
                 *lookups += 1;
                 texture.lookup(at)
+            }
+        }
+    }
+}
+
+/// A number, or a texture whose luminance it is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Number {
+    /// The same everywhere.
+    Constant(f32),
+    /// A texture, to be looked up.
+    Texture(Arc<Texture>),
+}
+
+impl Number {
+    /// The number, if it is the same everywhere.
+    pub fn constant(&self) -> Option<f32> {
+        match self {
+            Self::Constant(number) => Some(*number),
+            Self::Texture(_) => None,
+        }
+    }
+
+    /// The texture. `None` if the number is the same everywhere.
+    pub fn texture(&self) -> Option<&Arc<Texture>> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Texture(texture) => Some(texture),
+        }
+    }
+
+    /// The number at texture coordinates; adds to `lookups`.
+    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
+        match self {
+            Self::Constant(number) => *number,
+            Self::Texture(texture) => {
+                *lookups += 1;
+                luminance(texture.lookup(at))
             }
         }
     }

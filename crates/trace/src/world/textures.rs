@@ -76,6 +76,7 @@ impl Lookups {
         match role {
             TextureRole::Diffuse => self.diffuse,
             TextureRole::Specular => self.specular,
+            TextureRole::Facets | TextureRole::Roughness => self.diffuse || self.specular,
             TextureRole::Ambient => self.ambient,
             TextureRole::Emission => self.lights,
             TextureRole::NormalMap => self.normals,
@@ -169,8 +170,8 @@ fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
 pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> TextureSource {
     let texture = &scene.textures[texture];
     let encoding = match (texture.encoding, used) {
-        (Encoding::Srgb, TextureUse::Color | TextureUse::Normal) => ImageEncoding::Srgb,
-        (Encoding::Linear, TextureUse::Color | TextureUse::Normal) | (Encoding::Auto, TextureUse::Normal) => {
+        (Encoding::Srgb, _) => ImageEncoding::Srgb,
+        (Encoding::Linear, _) | (Encoding::Auto, TextureUse::Number | TextureUse::Normal) => {
             ImageEncoding::Linear
         }
         (Encoding::Auto, TextureUse::Color) => ImageEncoding::Color,
@@ -182,7 +183,7 @@ pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> Textu
 pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
     let encoding = match used {
         TextureUse::Color => ImageEncoding::Color,
-        TextureUse::Normal => ImageEncoding::Linear,
+        TextureUse::Number | TextureUse::Normal => ImageEncoding::Linear,
     };
     TextureSource { path: path.to_owned(), encoding }
 }

@@ -16,8 +16,8 @@ use std::path::PathBuf;
 pub use camera::{Camera, CameraChange, Pose, Viewpoint, is_same_distance};
 pub use light::{DirectionalLight, Environment, Falloff, Light, PointLight, SpotLight};
 pub use material::{
-    ColorSource, EmissionSource, Encoding, Material, MaterialKind, NormalMap, Texture, TextureFilter,
-    TextureRole, TextureUse, Wrap,
+    ColorSource, EmissionSource, Encoding, FresnelSource, Material, MaterialKind, NormalMap, NumberSource,
+    Texture, TextureFilter, TextureRole, TextureUse, Wrap,
 };
 pub use method::{Integrator, Method};
 pub use render::{

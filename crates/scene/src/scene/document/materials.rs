@@ -1,12 +1,19 @@
 //! `[materials.*]`.
 
-use super::super::description::{ColorSource, EmissionSource, Material, MaterialKind, NormalMap};
-use super::context::Issue;
+use std::collections::HashSet;
+
+use super::super::description::{
+    ColorSource, EmissionSource, Encoding, FresnelSource, Material, MaterialKind, NormalMap, NumberSource,
+    TextureUse,
+};
+use super::context::{Context, Issue};
 use super::key::Key;
 use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
+use super::textures::Textures;
 use crate::choice;
+use crate::materials::metal::elements::Element;
 use crate::math::{DVec3, Vec3};
 
 /// The materials of a file.
@@ -20,6 +27,26 @@ pub(super) struct Materials {
 }
 
 impl Materials {
+    /// Reports textures without an `encoding` that are colours here and numbers there.
+    pub(super) fn check_encodings(&self, context: &Context<'_>, textures: &Textures) {
+        let (Some(materials), Some(list)) = (&self.list, &textures.list) else { return };
+        let uses: HashSet<(usize, TextureUse)> = materials
+            .iter()
+            .flat_map(Material::textures)
+            .map(|(texture, role)| (texture, role.texture_use()))
+            .collect();
+        for (number, texture) in list.iter().enumerate() {
+            let has = |used| uses.contains(&(number, used));
+            if texture.encoding == Encoding::Auto && has(TextureUse::Color) && has(TextureUse::Number) {
+                let message =
+                    format!("\"{}\" is a colour and a number: it needs an `encoding`", texture.name);
+                let issue = Issue::error(texture.file.span.clone(), message)
+                    .help("write `encoding = \"srgb\"` or `\"linear\"`, or name the file in two textures");
+                context.report(issue);
+            }
+        }
+    }
+
     /// Whether a material emits light.
     pub(super) fn is_emissive(&self, index: usize) -> bool {
         self.emissive.get(index).copied().unwrap_or(false)
@@ -45,6 +72,12 @@ choice! {
         Mirror = "mirror",
         /// A smooth dielectric.
         Glass = "glass",
+        /// A rough or smooth conductor.
+        Metal = "metal",
+        /// A diffuse base under a rough or smooth coat.
+        Plastic = "plastic",
+        /// The inputs of glTF.
+        Principled = "principled",
     }
 }
 
@@ -52,17 +85,21 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
     let key = table.optional("type");
     // Without knowing the type, no key can be called unknown.
     let kind = if key.is_given() { key.choice()? } else { Kind::Phong };
-    let plain = |kind| (kind, EmissionSource::NONE, None);
+    let plain = |kind| (Some(kind), EmissionSource::NONE, None);
+    let with_emission = |kind| {
+        let emission = table.optional("emission").emission(textures).unwrap_or(EmissionSource::NONE);
+        (kind, emission, normal_map(table, textures))
+    };
     let (kind, emission, normal_map) = match kind {
-        Kind::Phong => {
-            let emission = table.optional("emission").emission(textures).unwrap_or(EmissionSource::NONE);
-            (phong(table, textures), emission, normal_map(table, textures))
-        }
+        Kind::Phong => with_emission(Some(phong(table, textures))),
+        Kind::Metal => with_emission(metal(table, textures)),
+        Kind::Plastic => with_emission(Some(plastic(table, textures))),
+        Kind::Principled => with_emission(Some(principled(table, textures))),
         Kind::Mirror => plain(mirror(table)),
         Kind::Glass => plain(glass(table)),
     };
     table.finish();
-    Some(Material { name, kind, emission, normal_map })
+    Some(Material { name, kind: kind?, emission, normal_map })
 }
 
 fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMap> {
@@ -110,6 +147,83 @@ fn warn_about_gain(kd_key: &Key<'_>, ks_key: &Key<'_>, kd: &ColorSource, ks: &Co
         .label(format!("diffuse + specular is {:.3} in {channel}", most))
         .help("keep `diffuse` + `specular` at or below 1 in every channel");
     kd_key.context.report(issue);
+}
+
+fn metal(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
+    let fresnel = fresnel(table, textures);
+    let anisotropy = table.optional("anisotropy").number_or_texture(textures, Limits::Between(-1.0, 1.0));
+    Some(MaterialKind::Metal {
+        roughness: fraction(table, textures, "roughness", 0.2),
+        anisotropy: anisotropy.unwrap_or(NumberSource::Constant(0.0)),
+        fresnel: fresnel?,
+    })
+}
+
+/// Range of the indices of refraction of coats.
+const COAT_IOR: Limits = Limits::Between(1.0, 10.0);
+
+fn plastic(table: &Table<'_>, textures: &Names) -> MaterialKind {
+    let color = |name, default| reflectance(table, textures, name, default);
+    MaterialKind::Plastic {
+        diffuse: color("diffuse", 0.7),
+        specular: color("specular", 1.0),
+        ior: table.optional("ior").number32(COAT_IOR).unwrap_or(1.5),
+        roughness: fraction(table, textures, "roughness", 0.1),
+    }
+}
+
+fn principled(table: &Table<'_>, textures: &Names) -> MaterialKind {
+    let number = |name, default| fraction(table, textures, name, default);
+    MaterialKind::Principled {
+        color: reflectance(table, textures, "color", 0.8),
+        metallic: number("metallic", 0.0),
+        roughness: number("roughness", 0.5),
+        ior: table.optional("ior").number32(COAT_IOR).unwrap_or(1.5),
+        specular: number("specular", 1.0),
+        specular_color: table
+            .optional("specular_color")
+            .color_or_texture(textures)
+            .unwrap_or(ColorSource::Constant(Vec3::ONE)),
+        clearcoat: number("clearcoat", 0.0),
+        clearcoat_roughness: number("clearcoat_roughness", 0.0),
+    }
+}
+
+/// A part of the light, or a texture.
+fn reflectance(table: &Table<'_>, textures: &Names, name: &'static str, default: f32) -> ColorSource {
+    let color = table.optional(name).fraction_or_texture(textures);
+    color.unwrap_or(ColorSource::Constant(Vec3::splat(default)))
+}
+
+/// A number in [0, 1], or a texture.
+fn fraction(table: &Table<'_>, textures: &Names, name: &'static str, default: f32) -> NumberSource {
+    let number = table.optional(name).number_or_texture(textures, Limits::Between(0.0, 1.0));
+    number.unwrap_or(NumberSource::Constant(default))
+}
+
+/// The reflectance of a metal, which it has by exactly one of three groups of keys.
+fn fresnel(table: &Table<'_>, textures: &Names) -> Option<FresnelSource> {
+    let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional(name));
+    let is_index = eta.is_given() || k.is_given();
+    let count = [color.is_given(), is_index, element.is_given()].into_iter().filter(|given| *given).count();
+    if count > 1 {
+        let given = [&element, &k, &eta, &color].into_iter().find(|key| key.is_given());
+        let issue = Issue::error(given.and_then(Key::key_span)?, "this metal has its reflectance twice")
+            .help("a metal has exactly one of `color`, `eta` with `k`, and `element`");
+        table.context.report(issue);
+        return None;
+    }
+    if element.is_given() {
+        let [eta, k] = element.choice::<Element>()?.index().map(ColorSource::Constant);
+        return Some(FresnelSource::Index { eta, k });
+    }
+    if is_index {
+        let [eta, k] = ["eta", "k"].map(|name| table.required(name, "[0.2, 0.9, 1.1]"));
+        let [eta, k] = [eta, k].map(|key| key.color_or_texture(textures));
+        return Some(FresnelSource::Index { eta: eta?, k: k? });
+    }
+    let color = table.required("color", "[0.9, 0.8, 0.4]");
+    color.fraction_or_texture(textures).map(FresnelSource::Schlick)
 }
 
 fn mirror(table: &Table<'_>) -> MaterialKind {

@@ -116,6 +116,7 @@ fn scene(root: &Table<'_>) -> Option<Scene> {
     let photons = photons::read(root);
     let textures = textures::read(root);
     let materials = materials::read(root, &textures.names);
+    materials.check_encodings(root.context, &textures);
     let (objects, mesh_files) = shapes::read(root, &materials);
     let lights = lights::read(root);
     let environment = environment::read(root);

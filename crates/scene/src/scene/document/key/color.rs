@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use csscolorparser::NAMED_COLORS;
 
-use super::super::super::description::{ColorSource, EmissionSource};
+use super::super::super::description::{ColorSource, EmissionSource, NumberSource};
 use super::super::super::nearest::nearest;
 use super::super::context::Issue;
 use super::super::limits::Limits;
@@ -19,6 +19,7 @@ const COLOR: &str = "a colour: [r, g, b], a number, \"#rrggbb\" or a name";
 const LEAST_BYTE: u8 = 10;
 const COLOR_OR_TEXTURE: &str =
     "a colour, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\" }";
+const NUMBER_OR_TEXTURE: &str = "a number, or { texture = \"name\" }";
 const EMISSION: &str =
     "a colour, [r, g, b], a number, \"#rrggbb\" or a name, or { texture = \"name\", scale = 1.0 }";
 
@@ -40,15 +41,42 @@ impl Key<'_> {
 
     /// A colour ≥ 0 or a texture.
     pub(in super::super) fn color_or_texture(&self, textures: &Names) -> Option<ColorSource> {
+        self.color_or_texture_of(textures, Limits::AtLeast(0.0))
+    }
+
+    /// A colour of components in [0, 1] or a texture.
+    pub(in super::super) fn fraction_or_texture(&self, textures: &Names) -> Option<ColorSource> {
+        self.color_or_texture_of(textures, Limits::Between(0.0, 1.0))
+    }
+
+    fn color_or_texture_of(&self, textures: &Names, limits: Limits) -> Option<ColorSource> {
         if self.is_table() {
-            let table = self.inline_table()?;
-            let texture = table.required("texture", "\"name\"").name_in(textures);
-            table.finish();
-            return texture.map(ColorSource::Texture);
+            return self.texture(textures).map(ColorSource::Texture);
         }
         self.is_no_texture(textures, COLOR_OR_TEXTURE)?;
-        self.color_of(Limits::AtLeast(0.0), COLOR_OR_TEXTURE)
-            .map(|color| ColorSource::Constant(color.as_vec3()))
+        self.color_of(limits, COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
+    }
+
+    /// A number within limits, or a texture whose luminance it is.
+    pub(in super::super) fn number_or_texture(
+        &self,
+        textures: &Names,
+        limits: Limits,
+    ) -> Option<NumberSource> {
+        if self.is_table() {
+            return self.texture(textures).map(NumberSource::Texture);
+        }
+        self.is_no_texture(textures, NUMBER_OR_TEXTURE)?;
+        let number = limited(self.context, self.name, self.value?, limits, NUMBER_OR_TEXTURE)?;
+        Some(NumberSource::Constant(number as f32))
+    }
+
+    /// The texture of `{ texture = "name" }`.
+    fn texture(&self, textures: &Names) -> Option<usize> {
+        let table = self.inline_table()?;
+        let texture = table.required("texture", "\"name\"").name_in(textures);
+        table.finish();
+        texture
     }
 
     /// Radiance: a colour ≥ 0, or a texture and what that is multiplied by.
