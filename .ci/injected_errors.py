@@ -30,6 +30,10 @@ GLOBAL = "closed_forms::global::"
 MANY = "closed_forms::many_lights::"
 PHOTONS = "closed_forms::photons::"
 CAUSTICS = "closed_forms::caustics::"
+MICROFACETS = "closed_forms::microfacets::"
+METAL = "materials::metal::tests::"
+PLASTIC = "materials::plastic::tests::"
+PRINCIPLED = "materials::principled::tests::"
 
 # Fault, file, where the expression in ⟦⟧ is, what stands in its place, the test that must fail.
 FAULTS = [
@@ -132,6 +136,41 @@ FAULTS = [
      "let of_quad = ⟦self.quad.density(to_corner).unwrap_or(1.0 / by_area)⟧;",
      "1.1 * self.quad.density(to_corner).unwrap_or(1.0 / by_area)",
      "lights::shown_tests::the_density_of_a_picture_is_that_of_its_samples"),
+    ("a distribution without its π", "materials/microfacet.rs", "self.squared * self.squared * ⟦FRAC_1_PI⟧ / (product", "1.0",
+     METAL + "values_are_those_of_the_formulas_and_reciprocal"),
+    ("shadowing by the wrong side", "materials/microfacet.rs",
+     "let value = distribution / (2.0 * ⟦(self.cosine * other.slope + other.cosine * self.slope)⟧);",
+     "(self.cosine * self.slope + other.cosine * other.slope)", METAL + "values_are_those_of_the_formulas_and_reciprocal"),
+    ("a pdf of half vectors for one of directions", "materials/microfacet.rs",
+     "let density = distribution / (⟦2.0⟧ * (self.cosine + self.slope));", "0.5", PLASTIC + "samples_are_drawn_by_their_density"),
+    ("a pdf of metal off by a factor", "materials/microfacet.rs",
+     "let both = ⟦self.cosine * other.slope + other.cosine * self.slope⟧;",
+     "self.cosine * other.slope", METAL + "samples_are_drawn_by_their_density"),
+    ("normals stretched along u by v", "materials/microfacet.rs", "let shrunk = Vec3::new(⟦along_u * normal.x⟧,", "along_v * normal.x",
+     METAL + "samples_are_drawn_by_their_density"),
+    ("normals that are not visible", "materials/microfacet.rs", "let part = ⟦0.5 * (1.0 + view.z)⟧;", "1.0",
+     METAL + "samples_are_drawn_by_their_density"),
+    ("η and k swapped", "materials/metal/mod.rs", "let exact = ⟦conductor(cosine, first, second)⟧;", "conductor(cosine, second, first)",
+     METAL + "elements_have_their_colours"),
+    ("a coat's η upside down", "materials/plastic/row.rs", "dielectric_outside(half.cosine(), ⟦self.ior[i]⟧)", "1.0 / self.ior[i]",
+     PLASTIC + "values_are_those_of_the_formulas_and_reciprocal"),
+    ("a coat that light passes once", "materials/plastic/row.rs", "if is_ahead { ⟦self.left[i] * left⟧ } else", "self.left[i]",
+     PLASTIC + "white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has"),
+    ("what a coat returns inside is lost", "materials/lobe_albedo.rs", "diffuse / (Vec3::ONE - ⟦diffuse * returned⟧)", "Vec3::ZERO",
+     PLASTIC + "white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has"),
+    ("an albedo off by 1 %", "materials/lobe_albedo.rs", "sum += ⟦2.0 * radius * by_radius⟧ * by_turn", "2.02 * radius * by_radius",
+     PLASTIC + "white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has"),
+    ("a clear coat that takes nothing from the light", "materials/principled/row.rs",
+     "if self.is_coated { ⟦self.through[i] * (1.0 - self.coat_albedo(i, ahead(cosine)))⟧ }", "1.0",
+     PRINCIPLED + "values_are_those_of_the_formulas_and_reciprocal"),
+    ("a clear coat chosen too often", "materials/principled/row.rs", "let alpha = if choice < ⟦of_coat⟧ {", "1.3 * of_coat",
+     PRINCIPLED + "samples_are_drawn_by_their_density"),
+    ("paths at a smooth coat not divided by their chance", "integrators/eye.rs",
+     "let by_chance = if both { 1.0 } else { ⟦1.0 / (1.0 - fresnel)⟧ };", "1.0", MICROFACETS + "white_plastic_vanishes_in_a_furnace"),
+    ("a smooth coat throws too much", "integrators/photons/emit.rs", "specular * ⟦if chooses { 1.0 } else { fresnel }⟧", "1.0",
+     MICROFACETS + "photons_and_paths_see_the_same_light_of_smooth_coats_and_metals"),
+    ("rays of rough lobes counted beside light samples", "integrators/direct/mis.rs",
+     "Self::Paths | Self::NarrowPaths => ⟦1.0 / count as f32⟧,", "0.0", MICROFACETS + "every_technique_finds_the_same_light_of_lamps"),
 ]
 
 

@@ -122,6 +122,39 @@ const TABLES: &[(&str, &[Key])] = &[
         ],
     ),
     (
+        "[materials.brass]",
+        &[
+            ("type", "\"metal\"", Other),
+            ("color", "[0.89, 0.79, 0.43]", Required),
+            ("roughness", "0.2", Default),
+            ("anisotropy", "0.0", Default),
+        ],
+    ),
+    (
+        "[materials.enamel]",
+        &[
+            ("type", "\"plastic\"", Other),
+            ("diffuse", "[0.7, 0.7, 0.7]", Default),
+            ("specular", "[1, 1, 1]", Default),
+            ("ior", "1.5", Default),
+            ("roughness", "0.1", Default),
+        ],
+    ),
+    (
+        "[materials.car]",
+        &[
+            ("type", "\"principled\"", Other),
+            ("color", "[0.8, 0.8, 0.8]", Default),
+            ("metallic", "0.0", Default),
+            ("roughness", "0.5", Default),
+            ("ior", "1.5", Default),
+            ("specular", "1.0", Default),
+            ("specular_color", "[1, 1, 1]", Default),
+            ("clearcoat", "0.0", Default),
+            ("clearcoat_roughness", "0.0", Default),
+        ],
+    ),
+    (
         "[[sphere]]",
         &[
             ("center", "[0, 0.5, 0]", Required),
@@ -350,7 +383,7 @@ fn a_table_of_required_keys_alone_is_enough() {
     let outcome = parse(example(|table, key| !is_kept(table, key)).into(), &path);
     assert_eq!(errors(&outcome.diagnostics), [""; 0]);
     let scene = outcome.scene.expect("a scene");
-    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (10, 3, 3));
+    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (10, 6, 3));
     assert_eq!(scene.output, None);
 }
 
@@ -391,7 +424,11 @@ fn every_word_that_this_version_has_is_known() {
         ("[textures.bumps]\nfile = \"textures/bumps.png\"\nfilter", &["nearest", "bilinear"]),
         ("[textures.bumps]\nfile = \"textures/bumps.png\"\nwrap", &["repeat", "clamp", "mirror"]),
         ("[textures.bumps]\nfile = \"textures/bumps.png\"\nencoding", &["auto", "srgb", "linear"]),
-        ("[materials.a]\ntype", &["phong", "mirror", "glass"]),
+        ("[materials.a]\ntype", &["phong", "mirror", "glass", "plastic", "principled"]),
+        (
+            "[materials.a]\ntype = \"metal\"\nelement",
+            &["gold", "silver", "copper", "aluminium", "iron", "chromium", "titanium"],
+        ),
         ("[materials.a]\nemission_sides", &["front", "both"]),
         ("[[light]]\nfalloff", &["square", "none"]),
     ];
@@ -428,6 +465,10 @@ fn the_ends_of_the_promised_ranges_are_in_them() {
         "[materials.a]\nopacity = 0\nopacity_cutoff = 1",
         "[materials.a]\nopacity = { texture = \"b\", channel = \"a\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
         "[textures.b]\nfile = \"textures/bumps.png\"\noffset = [-0.5, 7]\nrotate = -720\nuv = 0",
+        "[materials.a]\ntype = \"metal\"\neta = [0, 0, 0]\nk = [9, 9, 9]\nroughness = 0\nanisotropy = -1",
+        "[materials.a]\ntype = \"metal\"\ncolor = 1\nroughness = { texture = \"b\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
+        "[materials.a]\ntype = \"plastic\"\nior = 1\nroughness = 1",
+        "[materials.a]\ntype = \"principled\"\nior = 10\nspecular_color = 7",
         "[materials.a]\nambient = { texture = \"b\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
         "[environment]",
         "[environment]\ncolor = [1, 1, 1]",
@@ -437,6 +478,13 @@ fn the_ends_of_the_promised_ranges_are_in_them() {
         assert_eq!(said(right), 0, "{right}");
     }
     for wrong in [
+        "[materials.a]\ntype = \"metal\"",
+        "[materials.a]\ntype = \"metal\"\ncolor = 1\nelement = \"gold\"",
+        "[materials.a]\ntype = \"metal\"\neta = 1",
+        "[materials.a]\ntype = \"metal\"\ncolor = 1.5",
+        "[materials.a]\ntype = \"metal\"\ncolor = 1\nanisotropy = 1.5",
+        "[materials.a]\ntype = \"plastic\"\nior = 0.9",
+        "[materials.a]\ntype = \"principled\"\ntransmission = 0.5",
         "[render]\nwidth = 0",
         "[render]\nwidth = 65537",
         "[render]\nsamples = 0",

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{ColorSource, Falloff, Integrator, MaterialKind, Shadows, Shape};
+use glimt::scene::description::{ColorSource, Falloff, Integrator, Material, MaterialKind, Shadows, Shape};
 
 use super::distant::sun;
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, plain, scene};
@@ -185,16 +185,11 @@ fn the_parts_of_a_picture_by_paths_add_up_to_it() {
     );
 }
 
-/// Every kind of lamp, wide and near above a floor of these lobes.
-fn lamps_over_a_floor(diffuse: f32, specular: f32, shininess: f32) -> Vec<(&'static str, Build)> {
+/// Every kind of lamp, wide and near above a floor of a material.
+pub fn lamps_over_a_floor(material: &Material) -> Vec<(&'static str, Build)> {
     let floor = || {
         let corner = v(-0.05, 0.0, 0.05);
-        let floor = scene().quad(
-            corner,
-            v(0.1, 0.0, 0.0),
-            v(0.0, 0.0, -0.1),
-            phong(diffuse, specular, shininess, 0.0),
-        );
+        let floor = scene().quad(corner, v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), material.clone());
         // From −45°: the mirrored direction goes through (1, 1, 0).
         floor.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO)
     };
@@ -240,7 +235,7 @@ fn lamps_over_a_floor(diffuse: f32, specular: f32, shininess: f32) -> Vec<(&'sta
 fn direct_light_by_paths_is_that_of_whitted() {
     // Both ways to find a lamp: the narrower the lobe, the more is found by its own samples.
     for (diffuse, specular, shininess) in [(0.7, 0.0, 1.0), (0.3, 0.6, 10.0), (0.1, 0.8, 90.0)] {
-        for (what, build) in lamps_over_a_floor(diffuse, specular, shininess) {
+        for (what, build) in lamps_over_a_floor(&phong(diffuse, specular, shininess, 0.0)) {
             let path = by_paths(build.clone(), 1).values(512, 16);
             let whitted = build.depth(1).values(2048, 16);
             let ((a, of_a), (b, of_b)) = (mean_and_error(&path), mean_and_error(&whitted));

@@ -13,6 +13,7 @@ mod glass;
 mod global;
 mod hard;
 mod many_lights;
+mod microfacets;
 mod mirror;
 mod patterns;
 mod photons;

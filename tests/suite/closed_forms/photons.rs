@@ -149,7 +149,7 @@ fn caustics_alone(depth: u32) -> Build {
 }
 
 /// Means of pictures by paths and by photons, with their standard errors.
-fn both(build: &Build, depth: u32, samples: [u32; 2], (count, radius): (u64, f64)) -> [(f64, f64); 2] {
+pub fn both(build: &Build, depth: u32, samples: [u32; 2], (count, radius): (u64, f64)) -> [(f64, f64); 2] {
     let means = |build: &Build, samples| -> (f64, f64) {
         let means: Vec<f64> = (0..16).map(|seed| mean(&build.picture(samples, seed))).collect();
         mean_and_error(&means)
@@ -161,7 +161,7 @@ fn both(build: &Build, depth: u32, samples: [u32; 2], (count, radius): (u64, f64
 /// Checks that both see the same light: within 4 standard errors, which are at most this fraction of it, and some slack
 /// for kernels at edges.
 #[track_caller]
-fn assert_same_light(what: &str, [(a, da), (b, db)]: [(f64, f64); 2], most_error: f64, slack: f64) {
+pub fn assert_same_light(what: &str, [(a, da), (b, db)]: [(f64, f64); 2], most_error: f64, slack: f64) {
     let error = da.hypot(db);
     assert!(error < most_error * a, "{what}: {error} of {a}");
     assert!((a - b).abs() < 4.0 * error + slack * a, "{what}: {b} ± {db}, by paths {a} ± {da}");

@@ -12,9 +12,9 @@ use glimt::integrators::{self, PhotonMaps, PhotonSettings, RenderSettings, View,
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, EmissionSource, Encoding, Environment, Falloff, Integrator, Light, Located,
-    Material, MaterialKind, Mesh, Object, OpacitySource, Photons, PixelFilter, Placement, PointLight, Render,
-    Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
+    Accel, Camera, ColorSource, EmissionSource, Encoding, Environment, Falloff, FresnelSource, Integrator,
+    Light, Located, Material, MaterialKind, Mesh, NumberSource, Object, OpacitySource, Photons, PixelFilter,
+    Placement, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
 };
 use glimt::world::{Geometry, Image, Lookups, MeshTree, Parts, World, lights, origin, sky, textures_needed};
 
@@ -326,6 +326,40 @@ pub fn emitter(radiance: f32) -> Material {
 
 pub fn mirror(reflectance: f32) -> Material {
     plain(MaterialKind::Mirror { reflectance: Vec3::splat(reflectance) })
+}
+
+/// Metal of a grey reflectance at normal incidence.
+pub fn metal(reflectance: f32, roughness: f32, anisotropy: f32) -> Material {
+    plain(MaterialKind::Metal {
+        fresnel: FresnelSource::Schlick(ColorSource::Constant(Vec3::splat(reflectance))),
+        roughness: NumberSource::Constant(roughness),
+        anisotropy: NumberSource::Constant(anisotropy),
+    })
+}
+
+/// Plastic of an index of refraction of 1.5 under a full coat.
+pub fn plastic(diffuse: f32, roughness: f32) -> Material {
+    plain(MaterialKind::Plastic {
+        diffuse: ColorSource::Constant(Vec3::splat(diffuse)),
+        specular: ColorSource::Constant(Vec3::ONE),
+        ior: 1.5,
+        roughness: NumberSource::Constant(roughness),
+    })
+}
+
+/// A principled material under a clear coat of half weight.
+pub fn principled(color: f32, metallic: f32, roughness: f32) -> Material {
+    let number = NumberSource::Constant;
+    plain(MaterialKind::Principled {
+        color: ColorSource::Constant(Vec3::splat(color)),
+        metallic: number(metallic),
+        roughness: number(roughness),
+        ior: 1.5,
+        specular: number(1.0),
+        specular_color: ColorSource::Constant(Vec3::ONE),
+        clearcoat: number(0.5),
+        clearcoat_roughness: number(0.1),
+    })
 }
 
 pub fn glass(ior: f32) -> Material {

@@ -5,6 +5,7 @@
 //!
 //! A kind may have a narrow lobe beside its wide ones, whose light has rays of its own: see [`LobeSet::Narrow`].
 
+use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
 use super::footprint::TexturePoint;
@@ -48,8 +49,19 @@ pub enum LobeSet {
 pub struct BsdfValues {
     /// f in sr⁻¹ of the shown lobes.
     pub f: Lanes3,
-    /// A number for each surface that f, pdf and the parts of f share; each kind has its own.
-    pub(super) shared: Lanes,
+    /// Two numbers for each surface that f, pdf and the parts of f share; each kind has its own.
+    pub(super) shared: [Lanes; 2],
+}
+
+/// Directions at a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Unit shading normal on the viewer's side.
+    pub normal: Vec3,
+    /// Unit direction to the viewer.
+    pub to_eye: Vec3,
+    /// Derivative of the position by u; zero without texture coordinates.
+    pub tangent: Vec3,
 }
 
 /// Shape of a narrow lobe, as far as the choice of lights needs it: a power of the cosine about an axis.
@@ -63,6 +75,27 @@ pub struct NarrowLobe {
     pub peak: f32,
     /// f in sr⁻¹ of the wide lobes, grey.
     pub wide: f32,
+}
+
+impl NarrowLobe {
+    /// The lobe of microfacets with this α and this reflectance, beside wide lobes. About the mirrored direction, a power of 1/2α² has
+    /// the curvature of its peak.
+    #[inline(always)]
+    pub(super) fn of_microfacets(
+        normal: Vec3,
+        to_eye: Vec3,
+        alpha: f32,
+        reflectance: f32,
+        wide: f32,
+    ) -> Self {
+        let squared = alpha * alpha;
+        Self {
+            axis: normal * (2.0 * normal.dot(to_eye)) - to_eye,
+            exponent: 0.5 / squared,
+            peak: reflectance * 0.25 * FRAC_1_PI / squared,
+            wide,
+        }
+    }
 }
 
 /// A rough material: its textures and numbers.
@@ -93,6 +126,12 @@ pub trait RoughMaterial {
 
     /// The texture that rows look up. `None` if they look up nothing.
     fn row_texture(&self) -> Option<&Texture>;
+
+    /// Whether it depends on [`Place::tangent`].
+    #[inline]
+    fn has_direction(&self) -> bool {
+        false
+    }
 }
 
 /// A rough material at one point.
@@ -114,14 +153,17 @@ pub trait RoughRow: Clone {
     /// The material at one point.
     type Point: RoughPoint;
 
+    /// Whether a ray in its narrow lobe goes on where other paths end, to find what the lobe mirrors.
+    const SENDS_RAYS: bool;
+
     /// A row of any content.
     const EMPTY: Self;
 
     /// Prepares the row for other surfaces.
     fn reset(&mut self);
 
-    /// Sets a surface, for a direction to the viewer, by the unit shading normal on that side.
-    fn put(&mut self, i: usize, bsdf: &Self::Point, shown: ShownLobes, normal: Vec3, to_eye: Vec3);
+    /// Sets a surface.
+    fn put(&mut self, i: usize, bsdf: &Self::Point, shown: ShownLobes, place: &Place);
 
     /// Sets the surfaces of some lanes to a material, looked up at these texture coordinates, or bleached without them. Each entry
     /// of `shown` replaces those before it. Returns a bit for each surface that reflects nothing.
@@ -142,8 +184,8 @@ pub trait RoughRow: Clone {
     /// Evaluates the shown lobes for light from these directions.
     fn f(&self, directions: &Lanes3) -> BsdfValues;
 
-    /// The parts of f: of the wide lobes, and of the narrow lobe.
-    fn parts(&self, values: &BsdfValues) -> [Lanes3; 2];
+    /// The parts of f: of the wide lobes, and of the narrow lobes.
+    fn parts(&self, directions: &Lanes3, values: &BsdfValues) -> [Lanes3; 2];
 
     /// f in sr⁻¹ of all lobes, whatever lobes are shown, by the largest components of their colours.
     fn grey(&self, values: &BsdfValues) -> Lanes;

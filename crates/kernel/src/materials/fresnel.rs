@@ -19,6 +19,45 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
     ((0.5 * (parallel * parallel + perpendicular * perpendicular)) as f32, Some(cos_t as f32))
 }
 
+/// [`dielectric`] from outside in `f32`, for rows: `eta` ≥ 1.
+#[inline(always)]
+pub fn dielectric_outside(cos_incident: f32, eta: f32) -> f32 {
+    let cos_t = ((eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident).sqrt();
+    let squared = eta * eta;
+    // Both cosines are multiplied by η. At grazing angles without a boundary nothing is divided by 0.
+    let parallel = (squared * cos_incident - cos_t) / (squared * cos_incident + cos_t).max(f32::MIN_POSITIVE);
+    let perpendicular = (cos_incident - cos_t) / (cos_incident + cos_t).max(f32::MIN_POSITIVE);
+    0.5 * (parallel * parallel + perpendicular * perpendicular)
+}
+
+/// Unpolarised reflectance of a conductor of index η and extinction k (Born and Wolf, *Principles of Optics*, section 14.2).
+#[inline(always)]
+pub fn conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
+    let cos2 = cos_incident * cos_incident;
+    let sin2 = (1.0 - cos2).max(0.0);
+    // a + ib is the root of (η + ik)² − sin²θ; of a² and b² the larger one first, as the smaller one cancels.
+    let real = (eta - k) * (eta + k) - sin2;
+    let product = eta * k;
+    let sum = (real * real + 4.0 * product * product).sqrt();
+    let larger = 0.5 * (sum + real.abs());
+    let smaller = product * product / larger.max(f32::MIN_POSITIVE);
+    let a = if real > 0.0 { larger } else { smaller }.sqrt();
+    let (even, odd) = (sum + cos2, 2.0 * a * cos_incident);
+    let perpendicular = (even - odd) / (even + odd);
+    let (even, odd) = (cos2 * sum + sin2 * sin2, odd * sin2);
+    let parallel = perpendicular * ((even - odd) / (even + odd));
+    0.5 * (perpendicular + parallel)
+}
+
+/// Weight of the reflectance at grazing angles against that at normal incidence, (1 − cosθ)⁵ (Schlick, *An Inexpensive BRDF Model for
+/// Physically-based Rendering*, 1994).
+#[inline(always)]
+pub fn schlick_weight(cos_incident: f32) -> f32 {
+    let rest = (1.0 - cos_incident).max(0.0);
+    let squared = rest * rest;
+    squared * squared * rest
+}
+
 /// The refracted direction of unit `incident`, given the unit normal on its own side and the result of [`dielectric`]
 /// (Snell).
 pub fn refract(incident: Vec3, normal: Vec3, eta: f32, cos_transmitted: f32) -> Vec3 {
@@ -29,6 +68,52 @@ pub fn refract(incident: Vec3, normal: Vec3, eta: f32, cos_transmitted: f32) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_reflect_as_single_rays_do() {
+        for eta in [1.0_f32, 1.01, 1.5, 2.5, 10.0] {
+            for step in 0..=1000_u16 {
+                let cosine = f32::from(step) / 1000.0;
+                let (exact, found) = (dielectric(cosine, eta).0, dielectric_outside(cosine, eta));
+                assert!(
+                    (exact - found).abs() < 2e-6 || eta == 1.0 && cosine == 0.0,
+                    "{eta} {cosine}: {found}"
+                );
+            }
+        }
+    }
+
+    /// The reflectance of a conductor by complex numbers.
+    fn conductor_of_complex_numbers(cos: f64, eta: f64, k: f64) -> f64 {
+        type Complex = [f64; 2];
+        let times = |[a, b]: Complex, [c, d]: Complex| [a * c - b * d, a * d + b * c];
+        let over = |z: Complex, [c, d]: Complex| times(z, [c / (c * c + d * d), -d / (c * c + d * d)]);
+        let index = [eta, k];
+        let [re, im] = times(index, index);
+        // The cosine of the transmitted direction times the index: √(n² − sin²θ).
+        let (re, im) = (re - (1.0 - cos * cos), im);
+        let size = (re * re + im * im).sqrt();
+        let root = [((size + re) * 0.5).sqrt(), ((size - re) * 0.5).sqrt()];
+        let square = |[a, b]: Complex| a * a + b * b;
+        let perpendicular = over([cos - root[0], -root[1]], [cos + root[0], root[1]]);
+        let [n2, m2] = times(index, index).map(|part| part * cos);
+        let parallel = over([n2 - root[0], m2 - root[1]], [n2 + root[0], m2 + root[1]]);
+        0.5 * (square(perpendicular) + square(parallel))
+    }
+
+    #[test]
+    fn conductors_reflect_as_complex_indices_say() {
+        for (eta, k) in [(0.05_f32, 4.3_f32), (0.2, 3.9), (1.5, 7.6), (2.9, 3.1), (1.5, 0.0), (0.5, 0.1)] {
+            for step in 1..=100_u16 {
+                let cosine = f32::from(step) / 100.0;
+                let exact = conductor_of_complex_numbers(cosine.into(), eta.into(), k.into());
+                let found = f64::from(conductor(cosine, eta, k));
+                assert!((exact - found).abs() < 2e-5, "{eta} + {k}i at {cosine}: {found} is not {exact}");
+            }
+        }
+        // Gold at normal incidence: ((η − 1)² + k²)/((η + 1)² + k²).
+        assert!((conductor(1.0, 0.108, 3.508) - 0.9681).abs() < 1e-4);
+    }
 
     fn reflectance(degrees: f64, eta: f32) -> f64 {
         f64::from(dielectric(degrees.to_radians().cos() as f32, eta).0)

@@ -1,10 +1,16 @@
 //! Materials: reflection, transmission and emission of surfaces.
 
 pub mod bsdf;
+pub mod coated;
 pub mod emission;
 pub mod footprint;
 pub mod fresnel;
 pub mod glass;
+pub mod lobe_albedo;
+#[cfg(test)]
+mod lobe_checks;
+pub mod metal;
+pub mod microfacet;
 pub mod mipmaps;
 pub mod mirror;
 pub mod normal_map;
@@ -12,13 +18,17 @@ pub mod number;
 pub mod opacity;
 pub mod pane;
 pub mod phong;
+pub mod plastic;
+pub mod principled;
 pub mod rough;
 pub mod texels;
 pub mod texture;
 
+pub use coated::Coated;
 pub use emission::{Emission, EmissionSides};
 pub use footprint::{Footprint, TexturePoint};
 pub use glass::Glass;
+pub use metal::{Metal, MetalFresnel};
 pub use mipmaps::Mipmaps;
 pub use mirror::Mirror;
 pub use normal_map::NormalMap;
@@ -26,6 +36,8 @@ pub use number::{Channel, Number, PixelNumber};
 pub use opacity::Opacity;
 pub use pane::Pane;
 pub use phong::Phong;
+pub use plastic::Plastic;
+pub use principled::{Principled, PrincipledInputs};
 pub use rough::{BsdfRow, Rough, RoughBsdf, RoughKind};
 
 use crate::math::Vec3;
@@ -44,11 +56,13 @@ pub struct Material {
 }
 
 impl Material {
-    /// Whether anything of it changes with texture coordinates.
+    /// Whether anything of it changes with texture coordinates or their directions.
     pub fn is_textured(&self) -> bool {
         let in_bsdf = match &self.bsdf {
-            Bsdf::Rough(rough) => rough.constant().is_none(),
-            Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => false,
+            Bsdf::Rough(rough) => rough.has_textures() || rough.has_direction(),
+            Bsdf::Mirror(mirror) => mirror.textures().next().is_some(),
+            Bsdf::Coated(coated) => coated.textures().next().is_some() || coated.base.has_textures(),
+            Bsdf::Glass(_) | Bsdf::Pane(_) => false,
         };
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         in_bsdf || self.normal_map.is_some() || self.emission.texture.is_some() || of_opacity.is_some()
@@ -59,7 +73,7 @@ impl Material {
     pub fn lets_pass(&self) -> bool {
         let is_pane = match &self.bsdf {
             Bsdf::Pane(_) => true,
-            Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) => false,
+            Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => false,
         };
         is_pane || self.opacity.is_some()
     }
@@ -70,7 +84,7 @@ impl Material {
         let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.at(at, lookups));
         let through = match &self.bsdf {
             Bsdf::Pane(pane) => pane.transmittance(cosine) * color,
-            Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) => Vec3::ZERO,
+            Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => Vec3::ZERO,
         };
         through * there + Vec3::splat(1.0 - there)
     }
@@ -79,7 +93,11 @@ impl Material {
     pub fn is_mipmapped(&self) -> bool {
         let in_bsdf = match &self.bsdf {
             Bsdf::Rough(rough) => rough.is_mipmapped(),
-            Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => false,
+            Bsdf::Mirror(mirror) => mirror.textures().any(|texture| texture.mipmaps.is_some()),
+            Bsdf::Coated(coated) => {
+                coated.base.is_mipmapped() || coated.textures().any(|texture| texture.mipmaps.is_some())
+            }
+            Bsdf::Glass(_) | Bsdf::Pane(_) => false,
         };
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         let of_normals = self.normal_map.as_ref().map(|map| &map.texture);
@@ -99,15 +117,38 @@ pub enum Bsdf {
     Glass(Glass),
     /// A thin pane of glass.
     Pane(Pane),
+    /// A rough surface under a smooth coat.
+    Coated(Coated),
 }
 
 impl Bsdf {
-    /// Whether it is δ: a mirror or glass.
+    /// Whether it has a δ lobe.
     #[inline]
-    pub fn is_delta(&self) -> bool {
+    pub fn has_delta(&self) -> bool {
         match self {
             Self::Rough(_) => false,
-            Self::Mirror(_) | Self::Glass(_) | Self::Pane(_) => true,
+            Self::Mirror(_) | Self::Glass(_) | Self::Pane(_) | Self::Coated(_) => true,
+        }
+    }
+
+    /// Whether it has a lobe that is not δ.
+    #[inline]
+    pub fn is_lit(&self) -> bool {
+        self.rough().is_some()
+    }
+
+    /// Whether its lobes depend on the direction of texture coordinates.
+    #[inline]
+    pub fn has_direction(&self) -> bool {
+        self.rough().is_some_and(Rough::has_direction)
+    }
+
+    /// Its lobes that are not δ. `None` if there are none.
+    #[inline]
+    pub fn rough(&self) -> Option<&Rough> {
+        match self {
+            Self::Rough(rough) | Self::Coated(Coated { base: rough, .. }) => Some(rough),
+            Self::Mirror(_) | Self::Glass(_) | Self::Pane(_) => None,
         }
     }
 
@@ -115,7 +156,7 @@ impl Bsdf {
     pub fn glass(&self) -> Option<&Glass> {
         match self {
             Self::Glass(glass) => Some(glass),
-            Self::Rough(_) | Self::Mirror(_) | Self::Pane(_) => None,
+            Self::Rough(_) | Self::Mirror(_) | Self::Coated(_) | Self::Pane(_) => None,
         }
     }
 
@@ -124,9 +165,10 @@ impl Bsdf {
     pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
             Self::Rough(rough) => rough.albedo(at, lookups),
-            Self::Mirror(mirror) => mirror.reflectance,
+            Self::Mirror(mirror) => mirror.reflectance(1.0, at, lookups),
             Self::Glass(glass) => glass.tint,
             Self::Pane(pane) => pane.tint,
+            Self::Coated(coated) => coated.base.albedo(at, lookups),
         }
     }
 }

@@ -1,8 +1,13 @@
 //! The table of rough BSDFs, and the sum of them all: an enum for a material, for a point, and for a row.
 
-use super::bsdf::{BsdfValues, LobeSet, NarrowLobe, RoughMaterial, RoughPoint, RoughRow, ShownLobes, UvRow};
+use super::bsdf::{
+    BsdfValues, LobeSet, NarrowLobe, Place, RoughMaterial, RoughPoint, RoughRow, ShownLobes, UvRow,
+};
 use super::footprint::TexturePoint;
+use super::metal::{BrushedMetalRow, Metal, RoundMetalRow};
 use super::phong::{Phong, PhongRow};
+use super::plastic::{Plastic, PlasticRow};
+use super::principled::{Principled, PrincipledRow};
 use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, Lanes, Lanes3, Truths};
@@ -28,6 +33,8 @@ macro_rules! kinds {
         pub enum RoughBsdf { $($(#[$doc])* $kind(<$material as RoughMaterial>::Point)),+ }
 
         /// Rough surfaces of one kind, side by side.
+        // Rows stay where they are; a row that fills less of its place touches no more of it.
+        #[allow(clippy::large_enum_variant)]
         #[derive(Clone, Debug)]
         pub enum BsdfRow { $($(#[$doc])* $kind($row)),+ }
 
@@ -73,10 +80,22 @@ macro_rules! kinds {
                 match self { $(Self::$kind(own) => own.textures().any(|texture| texture.mipmaps.is_some())),+ }
             }
 
+            /// Whether it has any textures.
+            #[inline]
+            pub fn has_textures(&self) -> bool {
+                match self { $(Self::$kind(own) => own.textures().next().is_some()),+ }
+            }
+
             /// [`RoughMaterial::fills_rows`].
             #[inline]
             pub fn fills_rows(&self) -> bool {
                 match self { $(Self::$kind(own) => own.fills_rows()),+ }
+            }
+
+            /// [`RoughMaterial::has_direction`].
+            #[inline]
+            pub fn has_direction(&self) -> bool {
+                match self { $(Self::$kind(own) => own.has_direction()),+ }
             }
 
             /// [`RoughMaterial::row_texture`].
@@ -111,13 +130,17 @@ macro_rules! kinds {
             }
         }
 
-        // With a single kind, its pattern always fits.
-        #[allow(irrefutable_let_patterns)]
         impl BsdfRow {
             /// Its kind.
             #[inline(always)]
             pub fn kind(&self) -> RoughKind {
                 match self { $(Self::$kind(_) => RoughKind::$kind),+ }
+            }
+
+            /// [`RoughRow::SENDS_RAYS`].
+            #[inline(always)]
+            pub fn sends_rays(&self) -> bool {
+                match self { $(Self::$kind(_) => <$row as RoughRow>::SENDS_RAYS),+ }
             }
 
             /// Makes it a row of a kind, of any content.
@@ -136,9 +159,9 @@ macro_rules! kinds {
 
             /// [`RoughRow::put`], of a BSDF of the row's kind.
             #[inline(always)]
-            pub fn put(&mut self, i: usize, bsdf: &RoughBsdf, shown: ShownLobes, normal: Vec3, to_eye: Vec3) {
+            pub fn put(&mut self, i: usize, bsdf: &RoughBsdf, shown: ShownLobes, place: &Place) {
                 $(if let (Self::$kind(row), RoughBsdf::$kind(bsdf)) = (&mut *self, bsdf) {
-                    row.put(i, bsdf, shown, normal, to_eye);
+                    row.put(i, bsdf, shown, place);
                 })+
             }
 
@@ -179,8 +202,8 @@ macro_rules! kinds {
 
             /// [`RoughRow::parts`].
             #[inline(always)]
-            pub fn parts(&self, values: &BsdfValues) -> [Lanes3; 2] {
-                match self { $(Self::$kind(row) => row.parts(values)),+ }
+            pub fn parts(&self, directions: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
+                match self { $(Self::$kind(row) => row.parts(directions, values)),+ }
             }
 
             /// [`RoughRow::grey`].
@@ -249,6 +272,14 @@ macro_rules! kinds {
 kinds! {
     /// The normalised Phong model.
     Phong(Phong, PhongRow),
+    /// A conductor of microfacets, the same in all azimuths.
+    Metal(Metal, RoundMetalRow),
+    /// A conductor of microfacets that are long along u or along v.
+    BrushedMetal(Metal, BrushedMetalRow),
+    /// A diffuse base under a coat of microfacets.
+    Plastic(Plastic, PlasticRow),
+    /// The inputs of glTF.
+    Principled(Principled, PrincipledRow),
 }
 
 impl BsdfRow {

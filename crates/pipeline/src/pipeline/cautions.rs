@@ -73,7 +73,7 @@ impl Cause {
 fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
     let RenderSettings { render, photons, .. } = &settings.effective();
     let finds_all_light = render.integrator.method().scatters;
-    let is_specular = |index: usize| scene.materials[index].kind.is_delta();
+    let is_specular = |index: usize| scene.materials[index].kind.has_delta();
     let specular = || scene.objects.iter().filter_map(|object| object.material).any(is_specular);
     let mut warnings = Vec::new();
     if finds_all_light && scene.lights.iter().any(Light::sends) && specular() {

@@ -1,5 +1,6 @@
 //! Camera rays, round by round over queues instead of recursion. In whitted they are split at glass and end at Phong surfaces,
-//! which get direct and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*, 1980). In path each ray stays
+//! which get direct and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*, 1980); a ray in the lobe of
+//! microfacets goes on to what the lobe mirrors. In path each ray stays
 //! one and goes on from all surfaces (Kajiya, *The Rendering Equation*, 1986); with photons, whitted also goes on from Phong
 //! surfaces so.
 
@@ -8,6 +9,7 @@ use std::ops::Range;
 use super::RayCounters;
 use super::direct::queue::DirectLightQueue;
 use super::memory::Memory;
+use super::method::Behaviour;
 use super::photons::PhotonMaps;
 use super::photons::gather::Gathering;
 use super::transport::accumulator::{Accumulator, Part};
@@ -28,7 +30,8 @@ use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::geometry::surface_rows::SurfaceRow;
-use crate::materials::{Bsdf, Mirror, Pane, Rough};
+use crate::materials::bsdf::LobeSet;
+use crate::materials::{Bsdf, Coated, Mirror, Pane, Rough};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
 use crate::scene::description::Shadows;
@@ -158,6 +161,7 @@ impl<'a> Walker<'a> for Wavefront<'a, '_> {
                     match &vertex.material.bsdf {
                         Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
+                        Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated),
                         Bsdf::Glass(_) | Bsdf::Pane(_) => {}
                     }
                 }
@@ -209,7 +213,7 @@ impl Wavefront<'_, '_> {
             let maps = maps?;
             Some(tile.world.geometry.instructions().run(Gathering { tile, row, maps, depth, measure }))
         };
-        let rays = self.direct.light(tile, measure, self.continuation, gather, self.next)?;
+        let rays = self.direct.light(tile, measure, (self.continuation, depth), gather, self.next)?;
         self.counters.shadow_rays += rays.shadow;
         self.counters.texture_lookups += rays.lookups;
         self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
@@ -217,7 +221,8 @@ impl Wavefront<'_, '_> {
     }
 
     fn begin_round(&mut self) {
-        self.continuation = self.tile.behaviour.scatters.then(|| Continuation::new(self.tile, self.depth));
+        let continuation = || Continuation::new(self.tile, self.depth, LobeSet::All);
+        self.continuation = self.tile.behaviour.scatters.then(continuation);
     }
 
     /// Makes the found rays those of the next round; the old ones stay as memory.
@@ -334,7 +339,7 @@ impl Wavefront<'_, '_> {
         let render = &self.tile.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
             let Some(bsdf) = rough.constant() else { return };
-            self.accumulator.add(path.slot, Part::Ambient, path.throughput * render.ambient * bsdf.ambient());
+            self.accumulator.add_ambient(path, path.throughput * render.ambient * bsdf.ambient());
         }
     }
 
@@ -353,8 +358,10 @@ impl Wavefront<'_, '_> {
     /// Whether another technique finds the light that a path meets: photons, behind mirrors and glass, or light samples alone, for
     /// hard shadows.
     fn is_gathered(&self, path: &PathRay) -> bool {
-        let goes_on = self.tile.behaviour.gathers && !path.state.only_specular_before;
-        goes_on && !(path.state.density > 0.0 && self.tile.settings.render.shadows == Shadows::Soft)
+        let Behaviour { gathers, mirrors, .. } = self.tile.behaviour;
+        let is_shared = path.state.density > 0.0;
+        let is_soft = self.tile.settings.render.shadows == Shadows::Soft;
+        !path.state.only_specular_before && (gathers || mirrors && is_shared) && !(is_shared && is_soft)
     }
 
     fn leave(&mut self, path: &PathRay) {
@@ -392,12 +399,12 @@ impl Wavefront<'_, '_> {
     fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.tile.settings.render.ambient;
-        let takes_ambient = ambient != Vec3::ZERO && self.accumulator.takes_ambient();
+        let takes_ambient = ambient != Vec3::ZERO && self.accumulator.takes_ambient(path);
         // Look up no more textures than the picture shows.
         if !self.accumulator.takes_reflected() {
             if takes_ambient {
                 let reflectance = vertex.tinted(rough.ambient_at(at, lookups));
-                self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * reflectance);
+                self.accumulator.add_ambient(path, path.throughput * ambient * reflectance);
             }
             return;
         }
@@ -407,7 +414,7 @@ impl Wavefront<'_, '_> {
             rough.bleached()
         };
         if takes_ambient {
-            self.accumulator.add(path.slot, Part::Ambient, path.throughput * ambient * bsdf.ambient());
+            self.accumulator.add_ambient(path, path.throughput * ambient * bsdf.ambient());
         }
         if bsdf.is_black() {
             return;
@@ -420,7 +427,34 @@ impl Wavefront<'_, '_> {
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {
         let shading = vertex.shading(self.counters);
-        self.push_reflected(reflected(path, vertex, &shading, vertex.tinted(mirror.reflectance)));
+        let is_colored = self.accumulator.measure.is_colored();
+        let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
+        self.push_reflected(reflected(path, vertex, &shading, reflectance));
+    }
+
+    /// Splits a path at a smooth coat, or chooses between the coat and its base as often as the coat reflects.
+    fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated) {
+        let shading = vertex.shading(self.counters);
+        let fresnel = vertex.coat_reflectance(coated, &shading);
+        let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
+        let splits = self.tile.behaviour.splits && path.state.only_specular_before;
+        let both = weaker >= LEAST_SPLIT && splits;
+        let is_coat = !both && self.tile.chooses_reflection(path, fresnel);
+        if both || is_coat {
+            let lookups = &mut self.counters.texture_lookups;
+            let specular = coated.specular(&vertex.texture_point, lookups) * if both { fresnel } else { 1.0 };
+            if specular != Vec3::ZERO {
+                self.push_reflected(reflected(path, vertex, &shading, specular));
+            }
+        }
+        if !is_coat {
+            // The base is found as often as it is not the coat.
+            let by_chance = if both { 1.0 } else { 1.0 / (1.0 - fresnel) };
+            let mut state = path.state;
+            state.roulette_throughput *= by_chance;
+            let path = PathRay { throughput: path.throughput * by_chance, state, ..*path };
+            self.shade_rough(&path, vertex, &coated.base);
+        }
     }
 
     fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: Medium) {

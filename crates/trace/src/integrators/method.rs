@@ -12,6 +12,8 @@ pub struct Behaviour {
     pub splits: bool,
     /// Whether paths scatter at rough surfaces: by the method, or in whitted to find what photons do not bring.
     pub scatters: bool,
+    /// Whether rays in the lobes of microfacets go on, where other paths end.
+    pub mirrors: bool,
     /// Whether photons are gathered at rough surfaces; then paths leave to them the light behind mirrors and glass.
     pub gathers: bool,
     /// Purpose of light samples.
@@ -26,12 +28,12 @@ impl Behaviour {
         match settings.view.shown().measure() {
             // The share of the lamps' light that arrives is measured at the first visible surface, for which all light is sampled.
             Measure::ArrivingShare => {
-                Self { splits: true, scatters: gathers, gathers, receivers: Receivers::Eye }
+                Self { splits: true, scatters: gathers, mirrors: false, gathers, receivers: Receivers::Eye }
             }
             Measure::Radiance(_) | Measure::Work => {
                 let scatters = scatters || gathers;
                 let receivers = if scatters { Receivers::Paths } else { Receivers::Eye };
-                Self { splits, scatters, gathers, receivers }
+                Self { splits, scatters, mirrors: !scatters, gathers, receivers }
             }
         }
     }

@@ -9,16 +9,19 @@ use crate::assets::FileMaterial;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Color, Moved, Texture, TextureFilter, Wrap};
 use crate::materials::{
-    Bsdf, Emission, Glass, Material, Mirror, NormalMap, Number, Opacity, Pane, Phong, Rough,
+    Bsdf, Coated, Emission, Glass, Material, Metal, MetalFresnel, Mirror, NormalMap, Number, Opacity, Pane,
+    Phong, Plastic, Principled, PrincipledInputs, Rough,
 };
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{
-    self, ColorSource, EmissionSource, MaterialKind, NumberSource, OpacitySource, Scene, TextureUse,
+    self, ColorSource, EmissionSource, FresnelSource, MaterialKind, NumberSource, OpacitySource, PixelNumber,
+    Scene, TextureUse,
 };
 
 /// A material of the scene file.
 pub fn material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
     let color = |source: &ColorSource| declared_color(scene, images, source);
+    let number = |source: &NumberSource| declared_number(scene, images, source, PixelNumber::Luminance);
     let bsdf = match &material.kind {
         MaterialKind::Phong { diffuse, specular, shininess, ambient } => Bsdf::Rough(Rough::Phong(Phong {
             diffuse: color(diffuse),
@@ -26,7 +29,32 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             shininess: *shininess,
             ambient: ambient.as_ref().map(color),
         })),
-        MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror { reflectance: *reflectance }),
+        MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Even(*reflectance)),
+        MaterialKind::Metal { fresnel, roughness, anisotropy } => {
+            metal(fresnel_of(fresnel, &color), number(roughness), number(anisotropy))
+        }
+        MaterialKind::Plastic { diffuse, specular, ior, roughness } => {
+            plastic(color(diffuse), color(specular), number(roughness), *ior)
+        }
+        MaterialKind::Principled {
+            color: base,
+            metallic,
+            roughness,
+            ior,
+            specular,
+            specular_color,
+            clearcoat,
+            clearcoat_roughness,
+        } => Bsdf::Rough(Rough::Principled(Principled::new(PrincipledInputs {
+            color: color(base),
+            metallic: number(metallic),
+            roughness: number(roughness),
+            ior: *ior,
+            specular: number(specular),
+            specular_color: color(specular_color),
+            clearcoat: number(clearcoat),
+            clearcoat_roughness: number(clearcoat_roughness),
+        }))),
         MaterialKind::Glass { ior, tint } => Bsdf::Glass(Glass::new(*ior, *tint)),
         MaterialKind::Pane { ior, tint } => Bsdf::Pane(Pane { ior: *ior, tint: *tint }),
     };
@@ -40,15 +68,35 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
 
 /// Opacity of a material of the scene file. `None` if the material is there everywhere.
 pub fn opacity(scene: &Scene, images: &Images, source: &OpacitySource) -> Option<Opacity> {
-    let value = match source.value {
-        _ if source.is_full() => return None,
-        NumberSource::Constant(value) => Number::Constant(value),
-        NumberSource::Texture { .. } => {
-            let (texture, number) = source.texture()?;
-            Number::Texture(declared_texture(scene, images, texture, TextureUse::Number(number)))
-        }
-    };
+    if source.is_full() {
+        return None;
+    }
+    let value = declared_number(scene, images, &source.value, PixelNumber::Opacity);
     Some(Opacity { value, cutoff: source.cutoff })
+}
+
+/// A metal: a mirror if it is smooth.
+fn metal(fresnel: MetalFresnel, roughness: Number, anisotropy: Number) -> Bsdf {
+    if roughness.constant() == Some(0.0) {
+        return Bsdf::Mirror(Mirror::Metal(fresnel));
+    }
+    let is_brushed = anisotropy.constant() != Some(0.0);
+    let metal = Metal { fresnel, roughness, anisotropy };
+    Bsdf::Rough(if is_brushed { Rough::BrushedMetal(metal) } else { Rough::Metal(metal) })
+}
+
+/// Plastic: if its coat is smooth, this is a δ lobe over what is left.
+fn plastic(diffuse: Color, specular: Color, roughness: Number, ior: f32) -> Bsdf {
+    let is_smooth = roughness.constant() == Some(0.0);
+    let base = Rough::Plastic(Plastic::new(diffuse, specular.clone(), roughness, ior));
+    if is_smooth { Bsdf::Coated(Coated { specular, ior, base }) } else { Bsdf::Rough(base) }
+}
+
+fn fresnel_of(source: &FresnelSource, color: impl Fn(&ColorSource) -> Color) -> MetalFresnel {
+    match source {
+        FresnelSource::Schlick(reflectance) => MetalFresnel::Schlick(color(reflectance)),
+        FresnelSource::Index { eta, k } => MetalFresnel::Index { eta: color(eta), k: color(k) },
+    }
 }
 
 /// Emission of a material of the scene file.
@@ -106,7 +154,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
 /// A material of a mesh file. The highlight's strength k becomes ks = 2k/(α + 2).
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (kind(own), file_glass(own)) {
-        (FileKind::Mirror, _) => Bsdf::Mirror(Mirror { reflectance: own.specular.min(Vec3::ONE) }),
+        (FileKind::Mirror, _) => Bsdf::Mirror(Mirror::Even(own.specular.min(Vec3::ONE))),
         (FileKind::Glass, Some((ior, tint))) => Bsdf::Glass(Glass::new(ior, tint)),
         (FileKind::Phong | FileKind::Glass, _) => return file_phong(images, own),
     };
@@ -158,6 +206,17 @@ fn declared_color(scene: &Scene, images: &Images, source: &ColorSource) -> Color
         ColorSource::Constant(color) => Color::Constant(*color),
         ColorSource::Texture(index) => {
             Color::Texture(declared_texture(scene, images, *index, TextureUse::Color))
+        }
+    }
+}
+
+/// A number of the scene file; `usual` is that of a pixel without a channel.
+fn declared_number(scene: &Scene, images: &Images, source: &NumberSource, usual: PixelNumber) -> Number {
+    match source {
+        NumberSource::Constant(number) => Number::Constant(*number),
+        NumberSource::Texture { texture, channel } => {
+            let used = TextureUse::Number(channel.map_or(usual, PixelNumber::Channel));
+            Number::Texture(declared_texture(scene, images, *texture, used))
         }
     }
 }

@@ -181,7 +181,7 @@ impl World {
         }
         match &material.bsdf {
             Bsdf::Rough(rough) => rough.fills_rows().then_some((material, rough)),
-            Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => None,
+            Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) | Bsdf::Coated(_) => None,
         }
     }
 
@@ -189,6 +189,12 @@ impl World {
     #[inline]
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
         self.is_colored(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
+    }
+
+    /// Whether an object has texture coordinates of its own, in place of barycentric ones.
+    pub fn has_coordinates(&self, object: u32) -> bool {
+        let mesh = self.geometry.objects()[object as usize].mesh();
+        mesh.is_none_or(|mesh| !mesh.tree.loaded().mesh.uvs.is_empty())
     }
 
     /// Whether any material has a texture with mip levels, for which rays must know the width of their beams.

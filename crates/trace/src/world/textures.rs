@@ -92,6 +92,7 @@ impl Lookups {
         match role {
             TextureRole::Diffuse => self.diffuse,
             TextureRole::Specular => self.specular,
+            TextureRole::Facets | TextureRole::Roughness(_) => self.diffuse || self.specular,
             TextureRole::Ambient => self.ambient,
             TextureRole::Emission => self.lights,
             TextureRole::NormalMap => self.normals || self.delta_normals && is_delta,

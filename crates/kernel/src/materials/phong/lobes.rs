@@ -71,7 +71,7 @@ impl Lobes {
 
 /// A unit direction by its angle to an axis and a number in [0, 1) for the angle about it.
 #[inline(always)]
-fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
+pub fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
     let (sin_phi, cos_phi) = sin_cos(2.0 * PI * turn);
     let local = Vec3::new(sine * cos_phi, sine * sin_phi, cosine);
     let direction = Frame::from_normal(axis).to_world(local);

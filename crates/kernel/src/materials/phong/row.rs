@@ -2,7 +2,7 @@
 
 use super::lobes::{Lobes, gloss};
 use super::{Phong, PhongBsdf};
-use crate::materials::bsdf::{BsdfValues, LobeSet, NarrowLobe, RoughRow, ShownLobes, UvRow};
+use crate::materials::bsdf::{BsdfValues, LobeSet, NarrowLobe, Place, RoughRow, ShownLobes, UvRow};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane, take, truths};
 
@@ -95,6 +95,8 @@ impl RoughRow for PhongRow {
     type Material = Phong;
     type Point = PhongBsdf;
 
+    const SENDS_RAYS: bool = false;
+
     const EMPTY: Self = Self {
         mirrored_eye: [[0.0; LANES]; 3],
         diffuse: [[0.0; LANES]; 3],
@@ -110,8 +112,8 @@ impl RoughRow for PhongRow {
     }
 
     #[inline(always)]
-    fn put(&mut self, i: usize, bsdf: &PhongBsdf, shown: ShownLobes, normal: Vec3, to_eye: Vec3) {
-        set_lane(&mut self.mirrored_eye, i, mirrored(normal, to_eye));
+    fn put(&mut self, i: usize, bsdf: &PhongBsdf, shown: ShownLobes, place: &Place) {
+        set_lane(&mut self.mirrored_eye, i, mirrored(place.normal, place.to_eye));
         let [diffuse, specular] = shown_parts(bsdf, shown);
         set_lane(&mut self.diffuse, i, diffuse);
         set_lane(&mut self.specular, i, specular);
@@ -181,15 +183,15 @@ impl RoughRow for PhongRow {
                 glosses[i] = left;
             }
         }
-        BsdfValues { f, shared: glosses }
+        BsdfValues { f, shared: [glosses, [0.0; LANES]] }
     }
 
     #[inline(always)]
-    fn parts(&self, values: &BsdfValues) -> [Lanes3; 2] {
+    fn parts(&self, _: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
         let mut glossy = self.specular;
         for axis in 0..3 {
             for i in 0..LANES {
-                glossy[axis][i] = self.specular[axis][i] * values.shared[i];
+                glossy[axis][i] = self.specular[axis][i] * values.shared[0][i];
             }
         }
         [self.diffuse, glossy]
@@ -200,7 +202,7 @@ impl RoughRow for PhongRow {
         let mut grey = [0.0; LANES];
         for i in 0..LANES {
             // The normal does not matter here.
-            grey[i] = self.lobes(i, &self.mirrored_eye).value(values.shared[i]);
+            grey[i] = self.lobes(i, &self.mirrored_eye).value(values.shared[0][i]);
         }
         grey
     }
@@ -213,7 +215,7 @@ impl RoughRow for PhongRow {
                 LobeSet::All => self.lobes(i, normals),
                 LobeSet::Narrow => self.glossy_lobe(i, normals),
             };
-            densities[i] = own.density(lane(directions, i), values.shared[i]);
+            densities[i] = own.density(lane(directions, i), values.shared[0][i]);
         }
         densities
     }

@@ -127,6 +127,17 @@ pub(in crate::pipeline) fn meshes(
             let message = format!("`vertex_colors` changes nothing: the vertices of {name} have no colours");
             findings.warn(loaded, object.span.clone(), message);
         }
+        if let (Some(mesh), Some(material)) = (object.shape.mesh(), object.material)
+            && loaded.scene.materials[material].kind.has_direction()
+            && counts.failed == 0
+            && meshes[mesh.file].mesh.mesh.uvs.is_empty()
+        {
+            let (file, name) = (files[mesh.file].value.display(), &loaded.scene.materials[material].name);
+            let message = format!(
+                "{file} has no texture coordinates: the `anisotropy` of \"{name}\" has no direction there"
+            );
+            findings.warn(loaded, object.span.clone(), message);
+        }
     }
     if counts.failed == 0 {
         let bounds = || meshes.iter().map(|mesh| mesh.bounds()).collect();

@@ -67,7 +67,7 @@ pub enum NumberSource {
 
 impl NumberSource {
     /// The texture and its number of each pixel, if it is one; without a channel, the number is `usual`.
-    fn texture(&self, usual: PixelNumber) -> Option<(usize, PixelNumber)> {
+    pub fn texture(&self, usual: PixelNumber) -> Option<(usize, PixelNumber)> {
         match *self {
             Self::Constant(_) => None,
             Self::Texture { texture, channel } => {
@@ -102,6 +102,20 @@ impl OpacitySource {
     pub fn texture(&self) -> Option<(usize, PixelNumber)> {
         self.value.texture(PixelNumber::Opacity)
     }
+}
+
+/// Reflectance of a smooth conductor.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FresnelSource {
+    /// Schlick's approximation, by the reflectance at normal incidence.
+    Schlick(ColorSource),
+    /// Exact equations, by the complex index of refraction.
+    Index {
+        /// Its real part.
+        eta: ColorSource,
+        /// Its imaginary part.
+        k: ColorSource,
+    },
 }
 
 /// Radiance, the same everywhere or by a texture.
@@ -147,14 +161,33 @@ impl MaterialKind {
             Self::Phong { .. } => "phong",
             Self::Mirror { .. } => "mirror",
             Self::Glass { .. } | Self::Pane { .. } => "glass",
+            Self::Metal { .. } => "metal",
+            Self::Plastic { .. } => "plastic",
+            Self::Principled { .. } => "principled",
         }
     }
 
-    /// Whether it is δ: a mirror or glass.
-    pub fn is_delta(&self) -> bool {
+    /// Whether it has a δ lobe: as mirrors, glass and smooth coats have.
+    pub fn has_delta(&self) -> bool {
         match self {
-            Self::Phong { .. } => false,
+            Self::Phong { .. } | Self::Principled { .. } => false,
+            Self::Metal { roughness, .. } | Self::Plastic { roughness, .. } => {
+                *roughness == NumberSource::Constant(0.0)
+            }
             Self::Mirror { .. } | Self::Glass { .. } | Self::Pane { .. } => true,
+        }
+    }
+
+    /// Whether it depends on the direction of texture coordinates.
+    pub fn has_direction(&self) -> bool {
+        match self {
+            Self::Metal { anisotropy, .. } => *anisotropy != NumberSource::Constant(0.0),
+            Self::Phong { .. }
+            | Self::Mirror { .. }
+            | Self::Glass { .. }
+            | Self::Pane { .. }
+            | Self::Plastic { .. }
+            | Self::Principled { .. } => false,
         }
     }
 
@@ -167,7 +200,12 @@ impl MaterialKind {
     pub fn substance(&self) -> Option<[u64; 4]> {
         match *self {
             Self::Glass { ior, tint } => Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits)),
-            Self::Phong { .. } | Self::Mirror { .. } | Self::Pane { .. } => None,
+            Self::Phong { .. }
+            | Self::Mirror { .. }
+            | Self::Pane { .. }
+            | Self::Metal { .. }
+            | Self::Plastic { .. }
+            | Self::Principled { .. } => None,
         }
     }
 }
@@ -182,7 +220,7 @@ pub struct NormalMap {
 }
 
 /// Purpose of a texture's look-up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureUse {
     /// Colours.
     Color,
@@ -201,6 +239,10 @@ pub enum TextureRole {
     Specular,
     /// ka.
     Ambient,
+    /// Reflectance of microfacets, by normal incidence or by the index of refraction.
+    Facets,
+    /// Roughness, and other numbers of microfacets.
+    Roughness(PixelNumber),
     /// Radiance.
     Emission,
     /// Map that bends its normals.
@@ -213,7 +255,10 @@ impl TextureRole {
     /// Meaning of its numbers.
     pub fn texture_use(self) -> TextureUse {
         match self {
-            Self::Diffuse | Self::Specular | Self::Ambient | Self::Emission => TextureUse::Color,
+            Self::Diffuse | Self::Specular | Self::Ambient | Self::Facets | Self::Emission => {
+                TextureUse::Color
+            }
+            Self::Roughness(number) => TextureUse::Number(number),
             Self::NormalMap => TextureUse::Normal,
             Self::Opacity(number) => TextureUse::Number(number),
         }
@@ -253,6 +298,45 @@ pub enum MaterialKind {
         /// Transmittance of the glass at any angle, in [0, 1].
         tint: Vec3,
     },
+    /// Conductor of microfacets.
+    Metal {
+        /// Reflectance of the facets.
+        fresnel: FresnelSource,
+        /// The root of α, in [0, 1]; 0 is a mirror.
+        roughness: NumberSource,
+        /// Stretch of the lobe along u, in [−1, 1].
+        anisotropy: NumberSource,
+    },
+    /// A diffuse base under a dielectric coat of microfacets.
+    Plastic {
+        /// kd, in [0, 1].
+        diffuse: ColorSource,
+        /// Factor on what the coat reflects, in [0, 1].
+        specular: ColorSource,
+        /// Index of refraction, in [1, 10].
+        ior: f32,
+        /// The root of α, in [0, 1]; 0 is a smooth coat.
+        roughness: NumberSource,
+    },
+    /// The inputs of glTF. Colours and numbers are in [0, 1] but for `ior` and `specular_color`.
+    Principled {
+        /// Diffuse reflectance, or that of the metal at normal incidence.
+        color: ColorSource,
+        /// Weight of the metal.
+        metallic: NumberSource,
+        /// The root of α.
+        roughness: NumberSource,
+        /// Index of refraction, in [1, 10].
+        ior: f32,
+        /// Factor on the reflectance of what is no metal.
+        specular: NumberSource,
+        /// Factor on that reflectance at normal incidence, ≥ 0.
+        specular_color: ColorSource,
+        /// Weight of a clear coat.
+        clearcoat: NumberSource,
+        /// The root of its α.
+        clearcoat_roughness: NumberSource,
+    },
 }
 
 impl ColorSource {
@@ -261,6 +345,48 @@ impl ColorSource {
         match self {
             Self::Constant(_) => None,
             Self::Texture(index) => Some(*index),
+        }
+    }
+}
+
+impl MaterialKind {
+    /// Its colours, with their roles.
+    fn colors(&self) -> Vec<(&ColorSource, TextureRole)> {
+        match self {
+            Self::Phong { diffuse, specular, shininess: _, ambient } => vec![
+                (diffuse, TextureRole::Diffuse),
+                (specular, TextureRole::Specular),
+                (ambient.as_ref().unwrap_or(diffuse), TextureRole::Ambient),
+            ],
+            Self::Metal { fresnel: FresnelSource::Schlick(color), .. } => vec![(color, TextureRole::Facets)],
+            Self::Metal { fresnel: FresnelSource::Index { eta, k }, .. } => {
+                vec![(eta, TextureRole::Facets), (k, TextureRole::Facets)]
+            }
+            Self::Plastic { diffuse, specular, ior: _, roughness: _ } => vec![
+                (diffuse, TextureRole::Diffuse),
+                (diffuse, TextureRole::Ambient),
+                (specular, TextureRole::Specular),
+            ],
+            Self::Principled { color, specular_color, .. } => vec![
+                (color, TextureRole::Facets),
+                (color, TextureRole::Ambient),
+                (specular_color, TextureRole::Facets),
+            ],
+            Self::Mirror { reflectance: _ }
+            | Self::Glass { ior: _, tint: _ }
+            | Self::Pane { ior: _, tint: _ } => Vec::new(),
+        }
+    }
+
+    /// Its numbers that may be textures.
+    fn numbers(&self) -> Vec<NumberSource> {
+        match self {
+            Self::Metal { fresnel: _, roughness, anisotropy } => vec![*roughness, *anisotropy],
+            Self::Plastic { roughness, .. } => vec![*roughness],
+            Self::Principled { metallic, roughness, specular, clearcoat, clearcoat_roughness, .. } => {
+                vec![*metallic, *roughness, *specular, *clearcoat, *clearcoat_roughness]
+            }
+            Self::Phong { .. } | Self::Mirror { .. } | Self::Glass { .. } | Self::Pane { .. } => Vec::new(),
         }
     }
 }
@@ -275,21 +401,13 @@ impl Material {
     /// have several.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
         let Self { name: _, kind, emission, normal_map, opacity } = self;
-        let colors = match kind {
-            MaterialKind::Phong { diffuse, specular, shininess: _, ambient } => vec![
-                (diffuse, TextureRole::Diffuse),
-                (specular, TextureRole::Specular),
-                (ambient.as_ref().unwrap_or(diffuse), TextureRole::Ambient),
-            ],
-            MaterialKind::Mirror { reflectance: _ }
-            | MaterialKind::Glass { ior: _, tint: _ }
-            | MaterialKind::Pane { ior: _, tint: _ } => Vec::new(),
-        };
-        let colors = colors.into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
+        let colors = kind.colors().into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
+        let numbers = kind.numbers().into_iter().filter_map(|number| number.texture(PixelNumber::Luminance));
+        let numbers = numbers.map(|(texture, number)| (texture, TextureRole::Roughness(number)));
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
         let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
         let opacity = opacity.texture().map(|(texture, number)| (texture, TextureRole::Opacity(number)));
-        colors.chain(shown).chain(normals).chain(opacity).collect()
+        colors.chain(numbers).chain(shown).chain(normals).chain(opacity).collect()
     }
 }
 
@@ -318,17 +436,35 @@ impl Fingerprinted for ColorSource {
 impl Fingerprinted for OpacitySource {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
         let Self { value, cutoff } = self;
-        key.f32(*cutoff);
-        match *value {
-            NumberSource::Constant(value) => {
+        key.f32(*cutoff).add(value, of);
+    }
+}
+
+impl Fingerprinted for NumberSource {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        match *self {
+            Self::Constant(value) => {
                 key.index(0).f32(value);
             }
-            NumberSource::Texture { texture, channel } => {
+            Self::Texture { texture, channel } => {
                 key.index(1).flag(channel.is_some());
                 if let Some(channel) = channel {
                     key.choice(channel);
                 }
                 of.textures[texture].add_to(key, of);
+            }
+        }
+    }
+}
+
+impl Fingerprinted for FresnelSource {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        match self {
+            Self::Schlick(color) => {
+                key.index(0).add(color, of);
+            }
+            Self::Index { eta, k } => {
+                key.index(1).add(eta, of).add(k, of);
             }
         }
     }
@@ -365,6 +501,25 @@ impl Fingerprinted for MaterialKind {
             }
             Self::Pane { ior, tint } => {
                 key.index(3).f32(*ior).vec3(*tint);
+            }
+            Self::Metal { fresnel, roughness, anisotropy } => {
+                key.index(6).add(fresnel, of).add(roughness, of).add(anisotropy, of);
+            }
+            Self::Plastic { diffuse, specular, ior, roughness } => {
+                key.index(4).add(diffuse, of).add(specular, of).f32(*ior).add(roughness, of);
+            }
+            Self::Principled {
+                color,
+                metallic,
+                roughness,
+                ior,
+                specular,
+                specular_color,
+                clearcoat,
+                clearcoat_roughness,
+            } => {
+                key.index(5).add(color, of).add(metallic, of).add(roughness, of).f32(*ior);
+                key.add(specular, of).add(specular_color, of).add(clearcoat, of).add(clearcoat_roughness, of);
             }
         }
     }

@@ -1,6 +1,8 @@
 //! `[materials.*]`.
 
-use super::super::description::{ColorSource, Material, MaterialKind, OpacitySource};
+use super::super::description::{
+    ColorSource, FresnelSource, Material, MaterialKind, NumberSource, OpacitySource,
+};
 use super::common;
 use super::context::Issue;
 use super::key::Key;
@@ -8,6 +10,7 @@ use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
 use crate::choice;
+use crate::materials::metal::elements::Element;
 use crate::math::{DVec3, Vec3};
 
 /// The materials of a file.
@@ -46,6 +49,12 @@ choice! {
         Mirror = "mirror",
         /// A smooth dielectric.
         Glass = "glass",
+        /// A rough or smooth conductor.
+        Metal = "metal",
+        /// A diffuse base under a rough or smooth coat.
+        Plastic = "plastic",
+        /// The inputs of glTF.
+        Principled = "principled",
     }
 }
 
@@ -54,19 +63,22 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
     // Without knowing the type, no key can be called unknown.
     let kind = if key.is_given() { key.choice()? } else { Kind::Phong };
     let kind = match kind {
-        Kind::Phong => phong(table, textures),
-        Kind::Mirror => mirror(table),
-        Kind::Glass => glass(table),
+        Kind::Phong => Some(phong(table, textures)),
+        Kind::Mirror => Some(mirror(table)),
+        Kind::Glass => Some(glass(table)),
+        Kind::Metal => metal(table, textures),
+        Kind::Plastic => Some(plastic(table, textures)),
+        Kind::Principled => Some(principled(table, textures)),
     };
     let (emission, normal_map) = (common::emission(table, textures), common::normal_map(table, textures));
-    let opacity = if kind.is_glass() {
+    let opacity = if kind.as_ref().is_some_and(MaterialKind::is_glass) {
         common::refuse_opacity(table);
         OpacitySource::FULL
     } else {
         common::opacity(table, textures)
     };
     table.finish();
-    Some(Material { name, kind, emission, normal_map, opacity })
+    Some(Material { name, kind: kind?, emission, normal_map, opacity })
 }
 
 fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
@@ -108,6 +120,83 @@ fn warn_about_gain(kd_key: &Key<'_>, ks_key: &Key<'_>, kd: &ColorSource, ks: &Co
         .label(format!("diffuse + specular is {:.3} in {channel}", most))
         .help("keep `diffuse` + `specular` at or below 1 in every channel");
     kd_key.context.report(issue);
+}
+
+fn metal(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
+    let fresnel = fresnel(table, textures);
+    let anisotropy = table.optional("anisotropy").number_or_texture(textures, Limits::Between(-1.0, 1.0));
+    Some(MaterialKind::Metal {
+        roughness: fraction(table, textures, "roughness", 0.2),
+        anisotropy: anisotropy.unwrap_or(NumberSource::Constant(0.0)),
+        fresnel: fresnel?,
+    })
+}
+
+/// Range of the indices of refraction of coats.
+const COAT_IOR: Limits = Limits::Between(1.0, 10.0);
+
+fn plastic(table: &Table<'_>, textures: &Names) -> MaterialKind {
+    let color = |name, default| reflectance(table, textures, name, default);
+    MaterialKind::Plastic {
+        diffuse: color("diffuse", 0.7),
+        specular: color("specular", 1.0),
+        ior: table.optional("ior").number32(COAT_IOR).unwrap_or(1.5),
+        roughness: fraction(table, textures, "roughness", 0.1),
+    }
+}
+
+fn principled(table: &Table<'_>, textures: &Names) -> MaterialKind {
+    let number = |name, default| fraction(table, textures, name, default);
+    MaterialKind::Principled {
+        color: reflectance(table, textures, "color", 0.8),
+        metallic: number("metallic", 0.0),
+        roughness: number("roughness", 0.5),
+        ior: table.optional("ior").number32(COAT_IOR).unwrap_or(1.5),
+        specular: number("specular", 1.0),
+        specular_color: table
+            .optional("specular_color")
+            .color_or_texture(textures)
+            .unwrap_or(ColorSource::Constant(Vec3::ONE)),
+        clearcoat: number("clearcoat", 0.0),
+        clearcoat_roughness: number("clearcoat_roughness", 0.0),
+    }
+}
+
+/// A part of the light, or a texture.
+fn reflectance(table: &Table<'_>, textures: &Names, name: &'static str, default: f32) -> ColorSource {
+    let color = table.optional(name).fraction_or_texture(textures);
+    color.unwrap_or(ColorSource::Constant(Vec3::splat(default)))
+}
+
+/// A number in [0, 1], or a texture.
+fn fraction(table: &Table<'_>, textures: &Names, name: &'static str, default: f32) -> NumberSource {
+    let number = table.optional(name).number_or_texture(textures, Limits::Between(0.0, 1.0));
+    number.unwrap_or(NumberSource::Constant(default))
+}
+
+/// The reflectance of a metal, which it has by exactly one of three groups of keys.
+fn fresnel(table: &Table<'_>, textures: &Names) -> Option<FresnelSource> {
+    let [color, eta, k, element] = ["color", "eta", "k", "element"].map(|name| table.optional(name));
+    let is_index = eta.is_given() || k.is_given();
+    let count = [color.is_given(), is_index, element.is_given()].into_iter().filter(|given| *given).count();
+    if count > 1 {
+        let given = [&element, &k, &eta, &color].into_iter().find(|key| key.is_given());
+        let issue = Issue::error(given.and_then(Key::key_span)?, "this metal has its reflectance twice")
+            .help("a metal has exactly one of `color`, `eta` with `k`, and `element`");
+        table.context.report(issue);
+        return None;
+    }
+    if element.is_given() {
+        let [eta, k] = element.choice::<Element>()?.index().map(ColorSource::Constant);
+        return Some(FresnelSource::Index { eta, k });
+    }
+    if is_index {
+        let [eta, k] = ["eta", "k"].map(|name| table.required(name, "[0.2, 0.9, 1.1]"));
+        let [eta, k] = [eta, k].map(|key| key.color_or_texture(textures));
+        return Some(FresnelSource::Index { eta: eta?, k: k? });
+    }
+    let color = table.required("color", "[0.9, 0.8, 0.4]");
+    color.fraction_or_texture(textures).map(FresnelSource::Schlick)
 }
 
 fn mirror(table: &Table<'_>) -> MaterialKind {

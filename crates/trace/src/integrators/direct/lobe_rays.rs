@@ -42,7 +42,7 @@ impl Loops for LobeRays<'_> {
             let directions = row.bsdf.sample(LobeSet::Narrow, &row.normal, &[0.0; LANES], &u);
             let Response { bsdf, cosines } = row.response(&directions);
             let densities = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &directions, &bsdf);
-            let [_, narrow] = row.bsdf.parts(&bsdf);
+            let [_, narrow] = row.bsdf.parts(&directions, &bsdf);
             // Trace the rays above the surfaces.
             let mut sent = sharp & !row.hidden(&directions, folds);
             let mut ends = [-1.0; LANES];

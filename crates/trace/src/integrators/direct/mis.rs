@@ -19,6 +19,8 @@ pub enum CompetingTechnique {
     Nothing,
     /// The rays of paths that go on from the vertices.
     Paths,
+    /// Rays in the narrow lobes of the vertices, in which paths go on.
+    NarrowPaths,
     /// Rays in the glossy lobes of the vertices whose bits are set.
     Lobes(u32),
 }
@@ -32,7 +34,7 @@ impl CompetingTechnique {
     /// Whether these are rays in glossy lobes.
     pub fn are_lobes(self) -> bool {
         match self {
-            Self::Nothing | Self::Paths => false,
+            Self::Nothing | Self::Paths | Self::NarrowPaths => false,
             Self::Lobes(_) => true,
         }
     }
@@ -42,7 +44,7 @@ impl CompetingTechnique {
     pub fn rays_per_sample(self, count: u32) -> f32 {
         match self {
             Self::Nothing => 0.0,
-            Self::Paths => 1.0 / count as f32,
+            Self::Paths | Self::NarrowPaths => 1.0 / count as f32,
             Self::Lobes(_) => 1.0,
         }
     }
@@ -61,6 +63,7 @@ impl CompetingTechnique {
         let (lobes, start) = match self {
             Self::Nothing => return values,
             Self::Paths => (LobeSet::All, !0),
+            Self::NarrowPaths => (LobeSet::Narrow, !0),
             Self::Lobes(sharp) => (LobeSet::Narrow, sharp),
         };
         let densities = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf);
@@ -78,7 +81,7 @@ impl CompetingTechnique {
                 }
             }
             LobeSet::Narrow => {
-                let [wide, narrow] = row.bsdf.parts(&response.bsdf);
+                let [wide, narrow] = row.bsdf.parts(&samples.directions, &response.bsdf);
                 for i in 0..LANES {
                     let left = left_of_narrow(lane(&wide, i), lane(&narrow, i), weights[i]);
                     let value = lane(&values, i) * left;

@@ -21,6 +21,7 @@ use crate::integrators::transport::vertex::ShadingVertex;
 use crate::integrators::view::{Measure, Ways};
 use crate::lights::{Source, SourceRow};
 use crate::materials::RoughKind;
+use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes3, lane};
 use crate::scene::description::Shadows;
@@ -157,12 +158,13 @@ impl DirectLightQueue {
     }
 
     /// Lights all vertices and drops them; returns the rays for it. `gather` gives the light at a row that another technique
-    /// brings. If paths go on from the vertices, the rays of the next round are added to `next`.
+    /// brings. If paths go on from the vertices, the rays of the next round are added to `next`: by the continuation, or in lobes of
+    /// microfacets after `depth` scatterings.
     pub fn light(
         &mut self,
         tile: &TileContext<'_>,
         measure: Measure,
-        continuation: Option<Continuation>,
+        (continuation, depth): (Option<Continuation>, u32),
         gather: impl Fn(&VertexBatch) -> Option<Lanes3>,
         next: &mut Vec<PathRay>,
     ) -> Result<LightRays, Cancelled> {
@@ -172,7 +174,11 @@ impl DirectLightQueue {
         // Hard shadows are by light samples alone.
         let by_paths = continuation.is_some()
             && (!tile.behaviour.gathers || tile.settings.render.shadows == Shadows::Soft);
-        let scatters = continuation.filter(|continuation| continuation.leads_on);
+        let mirrors = || tile.behaviour.mirrors.then(|| Continuation::new(tile, depth, LobeSet::Narrow));
+        let of_row = |row: &VertexBatch| {
+            let own = if row.bsdf.sends_rays() { continuation.or_else(mirrors) } else { continuation };
+            own.filter(|continuation| continuation.leads_on)
+        };
         for first in (0..self.count).step_by(together) {
             let end = (first + together).min(self.count);
             // Sample the lights at each row; rays to picked lights wait in the pool.
@@ -203,8 +209,8 @@ impl DirectLightQueue {
                 self.note(number, measure, &arrived.light);
             }
             // Scatter the paths that go on.
-            if let Some(continuation) = scatters {
-                for row in &self.rows[first..end] {
+            for row in &self.rows[first..end] {
+                if let Some(continuation) = of_row(row) {
                     BsdfSampling { tile, row, used: row.used, continuation }.scatter(
                         &self.media,
                         &self.cones,
@@ -219,8 +225,11 @@ impl DirectLightQueue {
 
     /// Technique that competes with light samples.
     fn competing(&self, asked: Asked, tile: &TileContext<'_>, measure: Measure) -> CompetingTechnique {
+        let is_soft = tile.settings.render.shadows == Shadows::Soft;
         if asked.by_paths {
             CompetingTechnique::Paths
+        } else if self.rows[asked.number].bsdf.sends_rays() && tile.behaviour.mirrors {
+            if is_soft { CompetingTechnique::NarrowPaths } else { CompetingTechnique::Nothing }
         } else {
             CompetingTechnique::lobes(self.rows[asked.number].sharp(tile, measure) & asked.used)
         }
@@ -239,13 +248,14 @@ impl DirectLightQueue {
         let (instructions, used) = (tile.world.geometry.instructions(), asked.used);
         let plain = Lighting::<false> { tile, row, used, measure, competing, media };
         let weighed = Lighting::<true> { tile, row, used, measure, competing, media };
+        use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
         let sums = match (competing, tile.world.lights.selection(tile.behaviour.receivers)) {
-            (CompetingTechnique::Nothing, None) => instructions.run(plain),
-            (CompetingTechnique::Nothing, Some(selection)) => {
+            (Nothing, None) => instructions.run(plain),
+            (Nothing, Some(selection)) => {
                 instructions.run(Picking { lighting: plain, selection, number, pool: &mut pool })
             }
-            (CompetingTechnique::Paths | CompetingTechnique::Lobes(_), None) => instructions.run(weighed),
-            (CompetingTechnique::Paths | CompetingTechnique::Lobes(_), Some(selection)) => {
+            (Paths | NarrowPaths | Lobes(_), None) => instructions.run(weighed),
+            (Paths | NarrowPaths | Lobes(_), Some(selection)) => {
                 instructions.run(Picking { lighting: weighed, selection, number, pool: &mut pool })
             }
         };
@@ -263,7 +273,9 @@ impl DirectLightQueue {
                 let lobes = LobeRays { tile, row, sharp, measure, media, arrived };
                 tile.world.geometry.instructions().run(lobes)
             }
-            CompetingTechnique::Nothing | CompetingTechnique::Paths => arrived,
+            CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {
+                arrived
+            }
         }
     }
 

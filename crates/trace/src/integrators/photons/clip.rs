@@ -6,7 +6,7 @@ use arrayvec::ArrayVec;
 use super::kernel::weight_over;
 use super::map::{GatherPoint, LEAST_COSINE, REACH};
 use crate::geometry::{Aabb, Shape, ShapeHit};
-use crate::materials::{Bsdf, Material};
+use crate::materials::{Material, Rough};
 use crate::math::frame::Frame;
 use crate::math::{DVec2, DVec3};
 use crate::world::{Hit, MeshInstance, Object, World};
@@ -72,10 +72,8 @@ pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
 
 /// Whether photons are kept on a material.
 pub fn receives(material: &Material) -> bool {
-    match &material.bsdf {
-        Bsdf::Rough(rough) => rough.constant().is_none_or(|bsdf| !bsdf.is_black()),
-        Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => false,
-    }
+    let is_lit = |rough: &Rough| rough.constant().is_none_or(|bsdf| !bsdf.is_black());
+    material.bsdf.rough().is_some_and(is_lit)
 }
 
 /// A wall that stands on the plane of a kernel, with the middle before it: for points before it, the product with the normal is at

@@ -24,7 +24,8 @@ use crate::integrators::transport::walk::{MOST_HIDDEN, OpaqueHit, Reached, Strai
 use crate::integrators::view::Measure;
 use crate::integrators::{PACKET, RayCounters};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
-use crate::materials::{Bsdf, Pane};
+use crate::materials::bsdf::LobeSet;
+use crate::materials::{Bsdf, Coated, Pane, Rough};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
@@ -258,43 +259,68 @@ impl PhotonWavefront<'_> {
     }
 
     fn shade_surface(&mut self, path: &PathRay, vertex: &Vertex<'_>, lacks_photons: bool) {
-        let tile = self.tracing.tile;
         match &vertex.material.bsdf {
             // Light samples find direct light.
             Bsdf::Rough(_) if lacks_photons => {}
-            Bsdf::Rough(rough) => {
-                let bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
-                let bsdf = vertex.tinted_bsdf(bsdf);
-                if bsdf.is_black() {
-                    return;
-                }
-                // Store the photon; it stands for those that passed the surface as if it were not there.
-                let chance = chance(path, vertex, &mut self.counters.texture_lookups);
-                let all = PathRay { throughput: path.throughput / chance, ..*path };
-                self.store(&all, vertex.surface.point, vertex.normal);
-                if !(path.state.only_specular_before && self.goes_on()) {
-                    return;
-                }
-                // Let it wait for being scattered, if it came by mirrors and glass alone.
-                let shading = vertex.shading(&mut self.counters);
-                let medium = self.media.number(path.medium);
-                if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
-                    self.scatter_open();
-                    self.open.bsdf.prepare(bsdf.kind());
-                }
-                let i = self.open.used.trailing_ones() as usize;
-                let lit = ShadingVertex { path, place: 0, vertex, shading, bsdf };
-                self.open.put(i, tile, &lit, Measure::ALL, medium);
-                let counts = self.open.landed(i, vertex.to_eye);
-                set_lane(&mut self.open.throughput, i, path.throughput * counts);
-            }
+            Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough, Some(1.0)),
+            Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, lacks_photons),
             Bsdf::Mirror(mirror) if self.goes_on() => {
                 let shading = vertex.shading(&mut self.counters);
-                let ray = reflected(path, vertex, &shading, vertex.tinted(mirror.reflectance));
+                let reflectance = vertex.mirror_reflectance(mirror, &shading, true, &mut self.counters);
+                let ray = reflected(path, vertex, &shading, reflectance);
                 self.push(path, vertex, (shading.normal, 1.0), ray);
             }
             Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) => {}
         }
+    }
+
+    /// Stores a photon at a surface under a smooth coat, and lets the coat reflect it. One that came by mirrors and glass alone is
+    /// reflected as often as the coat reflects, and else scattered at the base. Others are scattered nowhere else, so that all of
+    /// them are reflected.
+    fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, lacks_photons: bool) {
+        let shading = vertex.shading(&mut self.counters);
+        let fresnel = vertex.coat_reflectance(coated, &shading);
+        let chooses = path.state.only_specular_before && !lacks_photons;
+        let is_reflected = !chooses || self.tracing.tile.chooses_reflection(path, fresnel);
+        if !lacks_photons {
+            let by_chance = (!is_reflected).then(|| 1.0 / (1.0 - fresnel));
+            self.shade_rough(path, vertex, &coated.base, by_chance);
+        }
+        if is_reflected && self.goes_on() {
+            let specular = coated.specular(&vertex.texture_point, &mut self.counters.texture_lookups);
+            let ray = reflected(path, vertex, &shading, specular * if chooses { 1.0 } else { fresnel });
+            self.push(path, vertex, (shading.normal, 1.0), ray);
+        }
+    }
+
+    /// Stores a photon at a rough surface. If there is a factor on its flux, and it came by mirrors and glass alone, it is scattered with
+    /// that factor.
+    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, scattered: Option<f32>) {
+        let tile = self.tracing.tile;
+        let bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
+        let bsdf = vertex.tinted_bsdf(bsdf);
+        if bsdf.is_black() {
+            return;
+        }
+        // Store the photon; it stands for those that passed the surface as if it were not there.
+        let chance = chance(path, vertex, &mut self.counters.texture_lookups);
+        let all = PathRay { throughput: path.throughput / chance, ..*path };
+        self.store(&all, vertex.surface.point, vertex.normal);
+        let Some(by_chance) = scattered.filter(|_| path.state.only_specular_before && self.goes_on()) else {
+            return;
+        };
+        // Let it wait for being scattered.
+        let shading = vertex.shading(&mut self.counters);
+        let medium = self.media.number(path.medium);
+        if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
+            self.scatter_open();
+            self.open.bsdf.prepare(bsdf.kind());
+        }
+        let i = self.open.used.trailing_ones() as usize;
+        let lit = ShadingVertex { path, place: 0, vertex, shading, bsdf };
+        self.open.put(i, tile, &lit, Measure::ALL, medium);
+        let counts = self.open.landed(i, vertex.to_eye) * by_chance;
+        set_lane(&mut self.open.throughput, i, path.throughput * counts);
     }
 
     fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: Medium) {
@@ -352,7 +378,7 @@ impl PhotonWavefront<'_> {
             set_lane(&mut row.normal, i, facet);
             row.bend[i] = UNBENT;
         }
-        let continuation = Continuation { leads_on: true, is_risked: false };
+        let continuation = Continuation { leads_on: true, is_risked: false, lobes: LobeSet::All };
         let used = row.used;
         BsdfSampling { tile: self.tracing.tile, row, used, continuation }.scatter(
             &self.media,

@@ -362,7 +362,7 @@ impl Specular {
     fn of(world: &World) -> Self {
         let mut own = Self { balls: Vec::new(), is_unbounded: false };
         for (id, object) in (0..).zip(world.geometry.objects()) {
-            let is_specular = |material: &Material| material.bsdf.is_delta();
+            let is_specular = |material: &Material| material.bsdf.has_delta();
             if world.materials_of(id).any(is_specular) {
                 own.balls.extend(object.ball());
                 own.is_unbounded |= object.ball().is_none();

@@ -68,9 +68,24 @@ impl Accumulator<'_> {
         }
     }
 
-    /// Whether it takes any ambient light of Phong surfaces.
-    pub fn takes_ambient(&self) -> bool {
-        self.parts().ambient
+    /// Whether it takes the ambient light of Phong surfaces that a path meets. Behind a rough surface it is light that this surface
+    /// reflects.
+    pub fn takes_ambient(&self, path: &PathRay) -> bool {
+        let parts = self.parts();
+        if path.state.only_specular_before {
+            parts.ambient
+        } else {
+            parts.are_reflected() && parts.ways.indirect
+        }
+    }
+
+    /// Adds ambient light that a path meets.
+    pub fn add_ambient(&mut self, path: &PathRay, radiance: Vec3) {
+        if path.state.only_specular_before {
+            self.add(path.slot, Part::Ambient, radiance);
+        } else if self.takes_ambient(path) {
+            self.add_arrived(path.slot, radiance, false);
+        }
     }
 
     /// Adds the light of lamps at the vertices of consecutive slots, all of which the camera sees.

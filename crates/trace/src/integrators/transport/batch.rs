@@ -6,7 +6,7 @@ use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
 use crate::integrators::view::{Measure, Parts};
 use crate::materials::BsdfRow;
-use crate::materials::bsdf::BsdfValues;
+use crate::materials::bsdf::{BsdfValues, Place};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane, truths};
 use crate::sampling::SamplerRow;
@@ -209,7 +209,8 @@ impl VertexBatch {
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.bend[i] = shading.bend.unwrap_or(UNBENT);
         // Set the BSDF.
-        self.bsdf.put(i, bsdf, measure.lobes(), shading.normal, vertex.to_eye);
+        let directions = Place { normal: shading.normal, to_eye: vertex.to_eye, tangent: vertex.tangent() };
+        self.bsdf.put(i, bsdf, measure.lobes(), &directions);
         // Copy the state of the path.
         (self.roulette_throughput[i], self.medium[i]) = (path.state.roulette_throughput, medium);
         set_lane(&mut self.throughput, i, path.throughput);

@@ -20,19 +20,21 @@ pub struct Continuation {
     pub leads_on: bool,
     /// Whether Russian roulette applies.
     pub is_risked: bool,
+    /// Lobes in which the paths go on.
+    pub lobes: LobeSet,
 }
 
 impl Continuation {
     /// Scatterings before Russian roulette begins.
     const SURE: u32 = 3;
 
-    /// The continuation from vertices after so many scatterings.
-    pub fn new(tile: &TileContext<'_>, depth: u32) -> Self {
+    /// The continuation in these lobes from vertices after so many scatterings.
+    pub fn new(tile: &TileContext<'_>, depth: u32, lobes: LobeSet) -> Self {
         let emits = || tile.world.materials.iter().any(|material| material.emission.shines());
         let max_depth = tile.settings.render.max_depth;
         let shines = || tile.world.lights.are_beyond() || emits();
         let leads_on = depth + 1 < max_depth || depth + 1 == max_depth && shines();
-        Self { leads_on, is_risked: depth >= Self::SURE }
+        Self { leads_on, is_risked: depth >= Self::SURE, lobes }
     }
 
     /// Survival probability of a path: the root of its throughput, as its part of the variance goes with the square of its
@@ -129,18 +131,22 @@ impl Loops for BsdfSampling<'_> {
         let are_narrow = row.bsdf.has_narrow_lobes();
         let [lobe, _] =
             if are_narrow { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; LANES]; 2] };
-        let directions = row.bsdf.sample(LobeSet::All, &row.normal, &lobe, &u);
+        let directions = row.bsdf.sample(continuation.lobes, &row.normal, &lobe, &u);
         // Evaluate the BSDF and the pdf there.
         let Response { bsdf, cosines } = row.response(&directions);
-        let densities = row.bsdf.pdf(LobeSet::All, &row.normal, &directions, &bsdf);
+        let densities = row.bsdf.pdf(continuation.lobes, &row.normal, &directions, &bsdf);
         let grey = row.bsdf.grey(&bsdf);
         let mut roulette_throughput = [0.0; LANES];
-        let mut factors = bsdf.f;
+        let f = match continuation.lobes {
+            LobeSet::All => bsdf.f,
+            LobeSet::Narrow => row.bsdf.parts(&directions, &bsdf)[1],
+        };
+        let mut factors = f;
         let mut alive = 0_u32;
         for i in 0..LANES {
             let share = cosines[i] / densities[i];
             roulette_throughput[i] = row.roulette_throughput[i] * grey[i] * share;
-            let factor = lane(&bsdf.f, i) * share;
+            let factor = lane(&f, i) * share;
             set_lane(&mut factors, i, factor);
             let brings = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);
             let bit = 1 << i;

@@ -6,7 +6,7 @@ use super::tile::TileContext;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Asked, Ray, SurfacePoint};
 use crate::integrators::RayCounters;
-use crate::materials::{Footprint, Material, RoughBsdf, TexturePoint};
+use crate::materials::{Coated, Footprint, Material, Mirror, RoughBsdf, TexturePoint};
 use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Sides};
@@ -23,6 +23,8 @@ pub struct Vertex<'a> {
     sides: Option<Sides>,
     /// Whether the path hits the front.
     pub is_front: bool,
+    /// Whether the surface has texture coordinates; looked up for materials with directions alone.
+    has_coordinates: bool,
     /// Unit direction to the viewer, from which the path comes.
     pub to_eye: Vec3,
     /// Geometric normal on the viewer's side.
@@ -71,7 +73,7 @@ impl<'a> Vertex<'a> {
 
     fn shaded(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
         let material = &tile.world.materials[tile.world.material_index(hit)];
-        let is_lit = !material.bsdf.is_delta();
+        let is_lit = material.bsdf.is_lit();
         let asked = Asked { uv: material.is_textured(), shadow_point: is_lit };
         let surface = tile.world.geometry.asked_surface(by, hit, asked);
         Self::at_surface(tile, path, (material, surface), hit, distance)
@@ -93,7 +95,7 @@ impl<'a> Vertex<'a> {
         if tile.pixel_spread > 0.0 {
             let tangents = [surface.dpdu, surface.dpdv];
             footprint = Footprint::of_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents);
-            if material.bsdf.is_delta() {
+            if material.bsdf.has_delta() {
                 curvature = side * tile.world.geometry.curvature(hit, &surface);
             }
         }
@@ -103,6 +105,7 @@ impl<'a> Vertex<'a> {
             color: tile.world.vertex_color(hit),
             curvature,
             material,
+            has_coordinates: !material.bsdf.has_direction() || tile.world.has_coordinates(hit.object),
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
             to_eye,
             normal: surface.normal * side,
@@ -162,6 +165,32 @@ impl<'a> Vertex<'a> {
     /// The beam after reflection or refraction here.
     pub fn bent_cone(&self, bend: Bend) -> Cone {
         self.cone.bent(bend, self.curvature, self.to_eye.dot(self.normal))
+    }
+
+    /// Reflectance of a mirror here, by the shading normal; with white in place of textures if colours are not shown.
+    pub fn mirror_reflectance(
+        &self,
+        mirror: &Mirror,
+        shading: &Shading,
+        is_colored: bool,
+        counters: &mut RayCounters,
+    ) -> Vec3 {
+        let cosine = shading.normal.dot(self.to_eye).abs().min(1.0);
+        if is_colored {
+            self.tinted(mirror.reflectance(cosine, &self.texture_point, &mut counters.texture_lookups))
+        } else {
+            mirror.bleached(cosine)
+        }
+    }
+
+    /// The part that a smooth coat here reflects, by the shading normal.
+    pub fn coat_reflectance(&self, coated: &Coated, shading: &Shading) -> f32 {
+        coated.fresnel(shading.normal.dot(self.to_eye).abs().min(1.0))
+    }
+
+    /// Derivative of the position by u; zero on a mesh without texture coordinates, whose barycentric ones say nothing about u.
+    pub fn tangent(&self) -> Vec3 {
+        if self.has_coordinates { self.surface.dpdu } else { Vec3::ZERO }
     }
 
     /// A ray that starts here.

@@ -40,15 +40,28 @@ impl Key<'_> {
 
     /// A colour ≥ 0 or a texture.
     pub(in super::super) fn color_or_texture(&self, textures: &Names) -> Option<ColorSource> {
+        self.color_or_texture_of(textures, Limits::AtLeast(0.0))
+    }
+
+    /// A colour of components in [0, 1] or a texture.
+    pub(in super::super) fn fraction_or_texture(&self, textures: &Names) -> Option<ColorSource> {
+        self.color_or_texture_of(textures, Limits::Between(0.0, 1.0))
+    }
+
+    fn color_or_texture_of(&self, textures: &Names, limits: Limits) -> Option<ColorSource> {
         if self.is_table() {
-            let table = self.inline_table()?;
-            let texture = table.required("texture", "\"name\"").name_in(textures);
-            table.finish();
-            return texture.map(ColorSource::Texture);
+            return self.texture(textures).map(ColorSource::Texture);
         }
         self.is_no_texture(textures, COLOR_OR_TEXTURE)?;
-        self.color_of(Limits::AtLeast(0.0), COLOR_OR_TEXTURE)
-            .map(|color| ColorSource::Constant(color.as_vec3()))
+        self.color_of(limits, COLOR_OR_TEXTURE).map(|color| ColorSource::Constant(color.as_vec3()))
+    }
+
+    /// The texture of `{ texture = "name" }`.
+    fn texture(&self, textures: &Names) -> Option<usize> {
+        let table = self.inline_table()?;
+        let texture = table.required("texture", "\"name\"").name_in(textures);
+        table.finish();
+        texture
     }
 
     /// Radiance: a colour ≥ 0, or a texture and what that is multiplied by.

@@ -1,0 +1,315 @@
+//! Checks of lobes of microfacets, for the tests of each kind: against a reference in `f64`, of samples against pdfs, and of albedos.
+
+use super::bsdf::{LobeSet, Place, RoughRow, ShownLobes};
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::random::unit as random;
+use crate::math::{DVec3, Vec3};
+
+use std::f64::consts::{PI, TAU};
+
+/// The values of α of the checks.
+pub const ALPHAS: [f32; 7] = [0.001, 0.004, 0.02, 0.05, 0.2, 0.5, 1.0];
+
+/// The cosines of the checks.
+pub const COSINES: [f64; 5] = [0.05, 0.15, 0.4, 0.8, 1.0];
+
+/// Tangent of the surfaces of the checks, along x.
+const TANGENT: Vec3 = Vec3::new(3.0, 0.0, 0.5);
+
+/// A unit direction by its cosine and azimuth.
+pub fn direction(cosine: f64, azimuth: f64) -> DVec3 {
+    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+    let (sin, cos) = libm::sincos(azimuth);
+    DVec3::new(sine * cos, sine * sin, cosine)
+}
+
+/// D·G/(4 cosθᵢ cosθₒ) of the formulas as they are written, about z.
+pub fn reference(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
+    let half = (one + other).normalize();
+    let stretched = (half.x / u).powi(2) + (half.y / v).powi(2) + half.z * half.z;
+    let distribution = 1.0 / (PI * u * v * stretched * stretched);
+    let lambda = |d: DVec3| {
+        let tangent2 = ((d.x * u).powi(2) + (d.y * v).powi(2)) / (d.z * d.z);
+        0.5 * ((1.0 + tangent2).sqrt() - 1.0)
+    };
+    distribution / (1.0 + lambda(one) + lambda(other)) / (4.0 * one.z * other.z)
+}
+
+/// A surface about z, seen from a direction.
+pub struct Subject<R: RoughRow> {
+    row: R,
+    to_eye: DVec3,
+    alphas: [f64; 2],
+}
+
+impl<R: RoughRow> Subject<R> {
+    /// The surface of a material; `alphas` are those of its narrow lobe.
+    pub fn new(point: &R::Point, alphas: [f32; 2], to_eye: DVec3) -> Self {
+        let mut row = R::EMPTY;
+        row.reset();
+        for i in 0..LANES {
+            let place = Place { normal: Vec3::Z, to_eye: to_eye.as_vec3(), tangent: TANGENT };
+            row.put(i, point, ShownLobes::ALL, &place);
+        }
+        Self { row, to_eye, alphas: alphas.map(f64::from) }
+    }
+
+    /// f, its wide part and the pdf for light from these directions.
+    pub fn values(&self, lobes: LobeSet, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
+        let mut all = Vec::new();
+        for some in directions.chunks(LANES) {
+            let mut rows = [[0.0; LANES], [0.0; LANES], [1.0; LANES]];
+            for (i, direction) in some.iter().enumerate() {
+                set_lane(&mut rows, i, direction.as_vec3());
+            }
+            let values = self.row.f(&rows);
+            let pdf = self.row.pdf(lobes, &normals(), &rows, &values);
+            let [wide, narrow] = self.row.parts(&rows, &values);
+            for i in 0..some.len() {
+                let (wide, narrow) = (lane(&wide, i).as_dvec3(), lane(&narrow, i).as_dvec3());
+                let f = lane(&values.f, i).as_dvec3();
+                assert!(
+                    (wide + narrow - f).abs().max_element() <= 2e-6 * f.max_element(),
+                    "the parts of {f}"
+                );
+                let alone = self.row.f_at(i, some[i].as_vec3()).as_dvec3();
+                assert!((alone - f).abs().max_element() <= 1e-5 * f.max_element(), "{alone} is not {f}");
+                all.push((f, wide, f64::from(pdf[i])));
+            }
+        }
+        all
+    }
+
+    /// Directions sampled by a grid of numbers, `side` × `side`, each with all choices of lobes in turns.
+    pub fn samples(&self, lobes: LobeSet, side: u32) -> Vec<DVec3> {
+        let mut next = random(5);
+        let mut all = Vec::new();
+        let (mut choices, mut u): (Lanes, [Lanes; 2]) = ([0.0; LANES], [[0.0; LANES]; 2]);
+        let place = |i: u32, next: f32| ((i as f32 + next) / side as f32).min(1.0 - f32::EPSILON);
+        let count = side * side;
+        for first in (0..count).step_by(LANES) {
+            for i in 0..LANES as u32 {
+                let number = first + i;
+                // Golden ratio: the choices are spread over the cells as well.
+                let choice = (f64::from(number) * 0.618_033_988_749_894_9).fract();
+                choices[i as usize] = choice as f32;
+                u[0][i as usize] = place(number % side, next());
+                u[1][i as usize] = place(number / side % side, next());
+            }
+            let directions: Lanes3 = self.row.sample(lobes, &normals(), &choices, &u);
+            all.extend((0..LANES).map(|i| lane(&directions, i).as_dvec3()));
+        }
+        all.truncate(count as usize);
+        all
+    }
+
+    /// The albedo of all lobes by their samples: the mean of f·cos/pdf.
+    pub fn sampled_albedo(&self, side: u32) -> DVec3 {
+        let samples = self.samples(LobeSet::All, side);
+        let values = self.values(LobeSet::All, &samples);
+        let sum: DVec3 = samples
+            .iter()
+            .zip(values)
+            .filter(|(direction, (_, _, pdf))| direction.z > 0.0 && *pdf > 0.0)
+            .map(|(direction, (f, _, pdf))| f * (direction.z / pdf))
+            .sum();
+        sum / samples.len() as f64
+    }
+
+    /// The albedo by quadrature of f: of the narrow lobe over half vectors, of the wide ones over directions.
+    pub fn albedo(&self) -> DVec3 {
+        let narrow: DVec3 = self
+            .half_vectors(192, 192)
+            .map(|(direction, weight)| (direction, weight * direction.z))
+            .collect::<Vec<_>>()
+            .chunks(LANES)
+            .map(|some| {
+                let directions: Vec<DVec3> = some.iter().map(|one| one.0).collect();
+                let values = self.values(LobeSet::All, &directions);
+                some.iter().zip(values).map(|((_, weight), (f, wide, _))| (f - wide) * *weight).sum::<DVec3>()
+            })
+            .sum();
+        let (rings, steps) = (128_u32, 64_u32);
+        let directions: Vec<DVec3> = (0..rings * steps)
+            .map(|i| {
+                let cosine2 = (f64::from(i / steps) + 0.5) / f64::from(rings);
+                direction(cosine2.sqrt(), f64::from(i % steps) / f64::from(steps) * TAU)
+            })
+            .collect();
+        let wide: DVec3 = self.values(LobeSet::All, &directions).iter().map(|(_, wide, _)| *wide).sum();
+        narrow + wide * (PI / f64::from(rings * steps))
+    }
+
+    /// Directions above the surface, mirrored at half vectors in equal steps of y and of the azimuth, each with the solid angle that
+    /// it stands for. (1 − y)² is the part of D outside of an angle, so that the tail has its steps.
+    fn half_vectors(&self, rings: u32, steps: u32) -> impl Iterator<Item = (DVec3, f64)> {
+        (0..rings * steps).filter_map(move |i| {
+            let y = (f64::from(i / steps) + 0.5) / f64::from(rings);
+            let phi = (f64::from(i % steps) + 0.5) / f64::from(steps) * TAU;
+            let (direction, solid_angle) = self.at_half_vector(y, phi)?;
+            Some((direction, solid_angle / f64::from(rings * steps)))
+        })
+    }
+
+    /// The direction at a place of the map of half vectors, and its solid angle for one unit of the map. `None` below the surface.
+    fn at_half_vector(&self, y: f64, phi: f64) -> Option<(DVec3, f64)> {
+        let [u, v] = self.alphas;
+        let outside = (1.0 - y) * (1.0 - y);
+        let slope = ((1.0 - outside) / outside).sqrt();
+        let (sin, cos) = libm::sincos(phi);
+        let half = DVec3::new(u * slope * cos, v * slope * sin, 1.0).normalize();
+        let cosine = half.dot(self.to_eye);
+        let direction = half * (2.0 * cosine) - self.to_eye;
+        let stretched = (half.x / u).powi(2) + (half.y / v).powi(2) + half.z * half.z;
+        let density = half.z / (PI * u * v * stretched * stretched);
+        (cosine > 0.0 && direction.z > 0.0).then(|| (direction, 4.0 * cosine * 2.0 * (1.0 - y) / density))
+    }
+
+    /// The place of a direction on the map of half vectors.
+    fn place(&self, direction: DVec3) -> [f64; 2] {
+        let [u, v] = self.alphas;
+        let half = (direction + self.to_eye).normalize();
+        let (x, y) = (half.x / u / half.z, half.y / v / half.z);
+        let slope2 = x * x + y * y;
+        [1.0 - 1.0 / (1.0 + slope2).sqrt(), libm::atan2(y, x).rem_euclid(TAU) / TAU]
+    }
+
+    /// Compares samples with the pdf by χ² over cells of the map of half vectors: at most six standard deviations above its mean.
+    pub fn check_samples(&self, what: &str, lobes: LobeSet) {
+        const CELLS: u32 = 16;
+        const FINE: u32 = 12;
+        let mut next = random(23);
+        let mut counts = vec![0.0; (CELLS * CELLS + 1) as usize];
+        let total = 400 * 400;
+        for _ in 0..total / LANES {
+            let mut numbers = || std::array::from_fn(|_| next());
+            let directions = self.row.sample(lobes, &normals(), &numbers(), &[numbers(), numbers()]);
+            for i in 0..LANES {
+                let direction = lane(&directions, i).as_dvec3();
+                let [y, turn] = self.place(direction);
+                let cell = |part: f64| ((part * f64::from(CELLS)) as u32).min(CELLS - 1);
+                let below = CELLS * CELLS;
+                let number = if direction.z > 0.0 { cell(y) * CELLS + cell(turn) } else { below };
+                counts[number as usize] += 1.0;
+            }
+        }
+        // Integrate the pdf over each cell; what is left is below the surface.
+        let side = CELLS * FINE;
+        let part = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
+        let places: Vec<(usize, DVec3, f64)> = (0..side * side)
+            .filter_map(|i| {
+                let (ring, step) = (i / side, i % side);
+                let (direction, solid_angle) = self.at_half_vector(part(ring), part(step) * TAU)?;
+                Some(((ring / FINE * CELLS + step / FINE) as usize, direction, solid_angle))
+            })
+            .collect();
+        let directions: Vec<DVec3> = places.iter().map(|place| place.1).collect();
+        let mut expected = vec![0.0; counts.len()];
+        for ((cell, _, solid_angle), (_, _, pdf)) in places.iter().zip(self.values(lobes, &directions)) {
+            expected[*cell] += pdf * solid_angle / f64::from(side * side) * total as f64;
+        }
+        let above: f64 = expected.iter().sum();
+        assert!(above < 1.003 * total as f64, "{what}: the pdf integrates to {}", above / total as f64);
+        expected[(CELLS * CELLS) as usize] = (total as f64 - above).max(0.0);
+        // Pool the cells of few samples.
+        let (mut sum, mut cells, mut rest) = (0.0, 0.0, [0.0; 2]);
+        for (count, expected) in counts.iter().zip(&expected) {
+            if *expected >= 20.0 {
+                sum += (count - expected).powi(2) / expected;
+                cells += 1.0;
+            } else {
+                rest = [rest[0] + count, rest[1] + expected];
+            }
+        }
+        assert!((rest[0] - rest[1]).abs() <= 6.0 * rest[1].sqrt() + 30.0, "{what}: {rest:?} in small cells");
+        assert!(sum < cells + 6.0 * (2.0_f64 * cells).sqrt(), "{what}: χ² {sum} over {cells} cells");
+    }
+}
+
+fn normals() -> Lanes3 {
+    [[0.0; LANES], [0.0; LANES], [1.0; LANES]]
+}
+
+/// Checks that light and viewer may change places, and that f is that of a reference, in many directions about the peak and all over.
+pub fn check_values<R: RoughRow>(
+    what: &str,
+    point: &R::Point,
+    alphas: [f32; 2],
+    reference: impl Fn(DVec3, DVec3) -> DVec3,
+) {
+    let mut next = random(9);
+    let least = alphas[0].min(alphas[1]);
+    let (reciprocity, error) = if least >= 0.05 { (1e-5, 2e-5) } else { (1e-3, 5e-3) };
+    for _ in 0..300 {
+        let to_eye = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3();
+        let there = Subject::<R>::new(point, alphas, to_eye);
+        let far = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU);
+        let near = there.at_half_vector(f64::from(0.98 * next()), f64::from(next()) * TAU);
+        let near = near.map_or(far, |(near, _)| near);
+        for light in [far, near].map(|light| light.as_vec3().as_dvec3()) {
+            if light.z < 0.02 {
+                continue;
+            }
+            let (f, _, _) = there.values(LobeSet::All, &[light])[0];
+            let (back, _, _) = Subject::<R>::new(point, alphas, light).values(LobeSet::All, &[to_eye])[0];
+            let size = f.max_element();
+            assert!(
+                (f - back).abs().max_element() <= reciprocity * size,
+                "{what}: {f} there, {back} back, from {light} to {to_eye}"
+            );
+            let exact = reference(to_eye.normalize(), light.normalize());
+            assert!(
+                (f - exact).abs().max_element() <= error * exact.max_element(),
+                "{what}: {f} is not {exact}, from {light} to {to_eye}"
+            );
+        }
+    }
+}
+
+/// Checks that each surface has the same bits of values, pdfs and samples among all others as alone.
+pub fn check_neighbours<R: RoughRow>(points: &[R::Point]) {
+    let mut next = random(31);
+    for first in 0..points.len() {
+        let to_eye: [Vec3; LANES] = std::array::from_fn(|_| {
+            direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3()
+        });
+        let mut light = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            set_lane(&mut light, i, direction(f64::from(next()), f64::from(next()) * TAU).as_vec3());
+        }
+        let (choices, u) =
+            (std::array::from_fn(|_| next()), [(); 2].map(|()| std::array::from_fn(|_| next())));
+        let row = |of: &dyn Fn(usize) -> bool| {
+            let mut row = R::EMPTY;
+            row.reset();
+            for i in (0..LANES).filter(|i| of(*i)) {
+                let place = Place { normal: Vec3::Z, to_eye: to_eye[i], tangent: TANGENT };
+                row.put(i, &points[(first + i) % points.len()], ShownLobes::ALL, &place);
+            }
+            row
+        };
+        let numbers = |row: &R, i: usize| {
+            let values = row.f(&light);
+            let mut bits: Vec<u32> = lane(&values.f, i).to_array().map(f32::to_bits).to_vec();
+            for lobes in [LobeSet::All, LobeSet::Narrow] {
+                bits.push(row.pdf(lobes, &normals(), &light, &values)[i].to_bits());
+                let sample = lane(&row.sample(lobes, &normals(), &choices, &u), i);
+                // Without a narrow lobe, no ray goes there.
+                if lobes == LobeSet::All || row.has_narrow_lobe(i) {
+                    bits.extend(sample.to_array().map(f32::to_bits));
+                }
+            }
+            bits.push(row.grey(&values)[i].to_bits());
+            bits
+        };
+        let all = row(&|_| true);
+        for i in 0..LANES {
+            assert_eq!(
+                numbers(&all, i),
+                numbers(&row(&|other| other == i), i),
+                "surface {}",
+                (first + i) % points.len()
+            );
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Metal: microfacets under Fresnel's equations for conductors, or under their approximation from a colour.
+
+pub mod elements;
+mod row;
+
+use std::sync::Arc;
+
+use super::bsdf::{RoughMaterial, RoughPoint};
+use super::footprint::TexturePoint;
+use super::fresnel::{conductor, schlick_weight};
+use super::microfacet;
+use super::number::Number;
+use super::texture::{Color, Texture};
+use crate::math::Vec3;
+pub use row::MetalRow;
+
+/// Row of metals that are the same in all azimuths.
+pub type RoundMetalRow = MetalRow<false>;
+
+/// Row of brushed metals.
+pub type BrushedMetalRow = MetalRow<true>;
+
+/// Reflection of a conductor, rough and of one lobe.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Metal {
+    /// Reflectance of its facets.
+    pub fresnel: MetalFresnel,
+    /// The root of α.
+    pub roughness: Number,
+    /// Stretch along u in [−1, 1].
+    pub anisotropy: Number,
+}
+
+/// Reflectance of a smooth conductor by the angle.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MetalFresnel {
+    /// Schlick's approximation, by the reflectance at normal incidence.
+    Schlick(Color),
+    /// Exact equations, by the complex index of refraction.
+    Index {
+        /// Its real part for red, green and blue.
+        eta: Color,
+        /// Its imaginary part.
+        k: Color,
+    },
+}
+
+/// [`MetalFresnel`] at one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FresnelPoint {
+    /// The reflectance at normal incidence, or η.
+    pub first: Vec3,
+    /// k; negative for Schlick's approximation.
+    pub second: Vec3,
+}
+
+/// [`Metal`] at one point: its textures looked up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MetalPoint {
+    /// Reflectance of its facets.
+    pub fresnel: FresnelPoint,
+    /// α along u and along v.
+    pub alphas: [f32; 2],
+}
+
+impl MetalFresnel {
+    /// Looks its textures up.
+    #[inline]
+    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> FresnelPoint {
+        match self {
+            Self::Schlick(color) => FresnelPoint::schlick(color.at(at, lookups)),
+            Self::Index { eta, k } => FresnelPoint { first: eta.at(at, lookups), second: k.at(at, lookups) },
+        }
+    }
+
+    /// With white in place of its textures.
+    pub fn bleached(&self) -> FresnelPoint {
+        let bleached = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
+        match self {
+            Self::Schlick(color) => FresnelPoint::schlick(bleached(color)),
+            Self::Index { eta, k } => FresnelPoint { first: bleached(eta), second: bleached(k) },
+        }
+    }
+
+    /// Its constant value. `None` if it has textures.
+    pub fn constant(&self) -> Option<FresnelPoint> {
+        match self {
+            Self::Schlick(color) => color.constant().map(FresnelPoint::schlick),
+            Self::Index { eta, k } => Some(FresnelPoint { first: eta.constant()?, second: k.constant()? }),
+        }
+    }
+
+    /// Its textures.
+    pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        let colors = match self {
+            Self::Schlick(color) => [Some(color), None],
+            Self::Index { eta, k } => [Some(eta), Some(k)],
+        };
+        colors.into_iter().flatten().filter_map(Color::texture)
+    }
+}
+
+impl FresnelPoint {
+    /// Schlick's approximation, by the reflectance at normal incidence, at most 1.
+    pub fn schlick(reflectance: Vec3) -> Self {
+        Self { first: reflectance.min(Vec3::ONE), second: Vec3::NEG_ONE }
+    }
+
+    /// With its colour multiplied by another one; an index of refraction is no colour.
+    fn tinted(self, color: Vec3) -> Self {
+        if self.second.x < 0.0 { Self { first: self.first * color, ..self } } else { self }
+    }
+
+    /// The reflectance by the cosine of the angle of incidence.
+    pub fn reflectance(&self, cosine: f32) -> Vec3 {
+        let of = |first, second| reflectance(first, second, cosine, schlick_weight(cosine));
+        let Self { first, second } = self;
+        Vec3::new(of(first.x, second.x), of(first.y, second.y), of(first.z, second.z))
+    }
+}
+
+/// Reflectance of a facet in one colour, given [`schlick_weight`] of the cosine of the angle to it.
+#[inline(always)]
+fn reflectance(first: f32, second: f32, cosine: f32, weight: f32) -> f32 {
+    let exact = conductor(cosine, first, second);
+    let approximate = first + (1.0 - first) * weight;
+    if second < 0.0 { approximate } else { exact }
+}
+
+impl RoughMaterial for Metal {
+    type Point = MetalPoint;
+
+    #[inline]
+    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> MetalPoint {
+        let roughness = self.roughness.at(at, lookups);
+        let anisotropy = self.anisotropy.at(at, lookups);
+        MetalPoint {
+            fresnel: self.fresnel.at(at, lookups),
+            alphas: microfacet::alphas(roughness, anisotropy.clamp(-1.0, 1.0)),
+        }
+    }
+
+    fn bleached(&self) -> MetalPoint {
+        let roughness = self.roughness.constant().unwrap_or(1.0);
+        let anisotropy = self.anisotropy.constant().unwrap_or(0.0);
+        MetalPoint { fresnel: self.fresnel.bleached(), alphas: microfacet::alphas(roughness, anisotropy) }
+    }
+
+    #[inline]
+    fn constant(&self) -> Option<MetalPoint> {
+        let alphas = microfacet::alphas(self.roughness.constant()?, self.anisotropy.constant()?);
+        Some(MetalPoint { fresnel: self.fresnel.constant()?, alphas })
+    }
+
+    #[inline]
+    fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+        self.fresnel.at(at, lookups).reflectance(1.0)
+    }
+
+    fn ambient_at(&self, _: &TexturePoint, _: &mut u64) -> Vec3 {
+        Vec3::ZERO
+    }
+
+    fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        let numbers = [&self.roughness, &self.anisotropy].into_iter().filter_map(Number::texture);
+        self.fresnel.textures().chain(numbers)
+    }
+
+    #[inline]
+    fn fills_rows(&self) -> bool {
+        !self.has_direction() && self.constant().is_some()
+    }
+
+    #[inline]
+    fn row_texture(&self) -> Option<&Texture> {
+        None
+    }
+
+    #[inline]
+    fn has_direction(&self) -> bool {
+        self.anisotropy.constant() != Some(0.0)
+    }
+}
+
+impl RoughPoint for MetalPoint {
+    #[inline]
+    fn is_black(&self) -> bool {
+        false
+    }
+
+    #[inline]
+    fn ambient(&self) -> Vec3 {
+        Vec3::ZERO
+    }
+
+    fn tinted(self, color: Vec3) -> Self {
+        Self { fresnel: self.fresnel.tinted(color), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,284 @@
+//! Surfaces of metal in rows of sixteen.
+
+use super::{FresnelPoint, Metal, MetalPoint, reflectance};
+use crate::materials::bsdf::{
+    BsdfValues, LobeSet, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
+};
+use crate::materials::fresnel::schlick_weight;
+use crate::materials::microfacet::{Half, Leg, facing, frame_along, mirrored};
+use crate::math::Vec3;
+use crate::math::frame::Frame;
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Truths, lane, set_lane, take, truths};
+
+/// Surfaces of metal, side by side, all in all azimuths alike or all brushed: a lane gets the bits that it would get alone. The values of f that are shared are the largest component of f, whatever is shown, and f for a
+/// reflectance of 1.
+#[derive(Clone, Debug)]
+pub struct MetalRow<const BRUSHED: bool> {
+    /// Unit normals that face the viewer.
+    normal: Lanes3,
+    /// Unit directions to the viewer.
+    to_eye: Lanes3,
+    /// Directions along u; without brushed surfaces anything.
+    tangent: Lanes3,
+    /// α along u and along v.
+    alphas: [Lanes; 2],
+    /// [`FresnelPoint::first`] and [`FresnelPoint::second`].
+    fresnel: [Lanes3; 2],
+    /// 1 where the lobe is shown, else 0.
+    shown: Lanes,
+    /// f in sr⁻¹ that is shown in place of the lobe.
+    unit: Lanes,
+    /// Whether any surface has an index of refraction in place of a colour.
+    has_index: bool,
+}
+
+/// Factor on the lobe for what is shown, and f in its place.
+#[inline(always)]
+fn shown_parts(shown: ShownLobes) -> [f32; 2] {
+    match shown {
+        ShownLobes::Of { specular, .. } => [if specular { 1.0 } else { 0.0 }, 0.0],
+        ShownLobes::Unit => [0.0, 1.0],
+    }
+}
+
+impl<const BRUSHED: bool> MetalRow<BRUSHED> {
+    #[inline(always)]
+    fn frame(&self, i: usize) -> Frame {
+        let normal = lane(&self.normal, i);
+        if BRUSHED { frame_along(normal, lane(&self.tangent, i)) } else { Frame::from_normal(normal) }
+    }
+
+    #[inline(always)]
+    fn alphas(&self, i: usize) -> [f32; 2] {
+        [self.alphas[0][i], self.alphas[1][i]]
+    }
+
+    /// The legs of the viewer and of a direction.
+    #[inline(always)]
+    fn legs(&self, i: usize, direction: Vec3) -> [Leg; 2] {
+        let to_eye = lane(&self.to_eye, i);
+        if BRUSHED {
+            let frame = self.frame(i);
+            [to_eye, direction].map(|one| Leg::anisotropic(&frame, one, self.alphas(i)))
+        } else {
+            [to_eye, direction].map(|one| Leg::isotropic(lane(&self.normal, i), one, self.alphas[0][i]))
+        }
+    }
+
+    /// f for a reflectance of 1, and the cosine between a direction and the half vector.
+    #[inline(always)]
+    fn lobe(&self, i: usize, direction: Vec3) -> [f32; 2] {
+        let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
+        let distribution = if BRUSHED {
+            half.anisotropic(&self.frame(i), self.alphas(i))
+        } else {
+            half.isotropic(self.alphas[0][i])
+        };
+        let [eye, light] = self.legs(i, direction);
+        [eye.reflected(&light, distribution), half.cosine()]
+    }
+
+    #[inline(always)]
+    fn set_fresnel(&mut self, i: usize, fresnel: &FresnelPoint) {
+        let FresnelPoint { first, second } = *fresnel;
+        set_lane(&mut self.fresnel[0], i, first);
+        set_lane(&mut self.fresnel[1], i, second);
+        self.has_index |= second.x >= 0.0;
+    }
+}
+
+impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
+    type Material = Metal;
+    type Point = MetalPoint;
+
+    const SENDS_RAYS: bool = true;
+
+    const EMPTY: Self = Self {
+        normal: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
+        to_eye: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
+        tangent: [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
+        alphas: [[1.0; LANES]; 2],
+        fresnel: [[[0.0; LANES]; 3], [[-1.0; LANES]; 3]],
+        shown: [0.0; LANES],
+        unit: [0.0; LANES],
+        has_index: false,
+    };
+
+    #[inline(always)]
+    fn reset(&mut self) {
+        self.has_index = false;
+    }
+
+    #[inline(always)]
+    fn put(&mut self, i: usize, bsdf: &MetalPoint, shown: ShownLobes, place: &Place) {
+        let &Place { normal, to_eye, tangent } = place;
+        set_lane(&mut self.normal, i, facing(normal, to_eye));
+        set_lane(&mut self.to_eye, i, to_eye);
+        set_lane(&mut self.tangent, i, tangent);
+        self.set_fresnel(i, &bsdf.fresnel);
+        // Without coordinates it is isotropic: the geometric mean of both is α.
+        let [u, v] = bsdf.alphas;
+        let mean = (u * v).sqrt();
+        let [u, v] = if tangent == Vec3::ZERO { [mean; 2] } else { [u, v] };
+        (self.alphas[0][i], self.alphas[1][i]) = (u, v);
+        [self.shown[i], self.unit[i]] = shown_parts(shown);
+    }
+
+    #[inline(always)]
+    fn fill(
+        &mut self,
+        material: &Metal,
+        _: Option<&UvRow>,
+        shown: &[(u32, ShownLobes)],
+        _: impl Folds,
+    ) -> u32 {
+        let MetalPoint { fresnel, alphas } = material.constant().unwrap_or_else(|| material.bleached());
+        for &(of, shown) in shown {
+            let (of, [part, unit]) = (truths(of), shown_parts(shown));
+            for axis in 0..3 {
+                take(&of, &[fresnel.first[axis]; LANES], &mut self.fresnel[0][axis]);
+                take(&of, &[fresnel.second[axis]; LANES], &mut self.fresnel[1][axis]);
+            }
+            take(&of, &[alphas[0]; LANES], &mut self.alphas[0]);
+            take(&of, &[alphas[1]; LANES], &mut self.alphas[1]);
+            take(&of, &[part; LANES], &mut self.shown);
+            take(&of, &[unit; LANES], &mut self.unit);
+        }
+        self.has_index |= fresnel.second.x >= 0.0;
+        0
+    }
+
+    #[inline(always)]
+    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
+        let mut facings = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let to_eye = -lane(directions, i);
+            set_lane(&mut self.to_eye, i, to_eye);
+            set_lane(&mut facings, i, facing(lane(normals, i), to_eye));
+        }
+        match of {
+            Some(of) => {
+                for axis in 0..3 {
+                    take(of, &facings[axis], &mut self.normal[axis]);
+                }
+            }
+            None => self.normal = facings,
+        }
+    }
+
+    #[inline(always)]
+    fn copy(&mut self, i: usize, other: &Self, from: usize) {
+        let [first, second] = &mut self.fresnel;
+        for (own, other) in [
+            (&mut self.normal, &other.normal),
+            (&mut self.to_eye, &other.to_eye),
+            (&mut self.tangent, &other.tangent),
+            (first, &other.fresnel[0]),
+            (second, &other.fresnel[1]),
+        ] {
+            set_lane(own, i, lane(other, from));
+        }
+        for (own, other) in self.alphas.iter_mut().zip(&other.alphas) {
+            own[i] = other[from];
+        }
+        (self.shown[i], self.unit[i]) = (other.shown[from], other.unit[from]);
+        self.has_index |= other.has_index;
+    }
+
+    #[inline(always)]
+    fn f(&self, directions: &Lanes3) -> BsdfValues {
+        let (mut white, mut cosines) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            [white[i], cosines[i]] = self.lobe(i, lane(directions, i));
+        }
+        // Multiply by the reflectance of the facets.
+        let mut f = [[0.0; LANES]; 3];
+        if self.has_index {
+            for axis in 0..3 {
+                let (first, second) = (&self.fresnel[0][axis], &self.fresnel[1][axis]);
+                for i in 0..LANES {
+                    let weight = schlick_weight(cosines[i]);
+                    f[axis][i] = white[i] * reflectance(first[i], second[i], cosines[i], weight);
+                }
+            }
+        } else {
+            for i in 0..LANES {
+                let weight = schlick_weight(cosines[i]);
+                let first = lane(&self.fresnel[0], i);
+                set_lane(&mut f, i, (first + (Vec3::ONE - first) * weight) * white[i]);
+            }
+        }
+        // Keep what is shown.
+        let mut largest = [0.0; LANES];
+        for i in 0..LANES {
+            let all = lane(&f, i);
+            largest[i] = all.max_element();
+            set_lane(&mut f, i, all * self.shown[i] + Vec3::splat(self.unit[i]));
+        }
+        BsdfValues { f, shared: [largest, white] }
+    }
+
+    #[inline(always)]
+    fn parts(&self, _: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
+        [[[0.0; LANES]; 3], values.f]
+    }
+
+    #[inline(always)]
+    fn grey(&self, values: &BsdfValues) -> Lanes {
+        values.shared[0]
+    }
+
+    #[inline(always)]
+    fn pdf(&self, _: LobeSet, _: &Lanes3, directions: &Lanes3, values: &BsdfValues) -> Lanes {
+        let mut densities = [0.0; LANES];
+        for i in 0..LANES {
+            let [eye, light] = self.legs(i, lane(directions, i));
+            densities[i] = eye.density_of(&light, values.shared[1][i]);
+        }
+        densities
+    }
+
+    #[inline(always)]
+    fn sample(&self, _: LobeSet, _: &Lanes3, _: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
+        let mut directions = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let u = [u[0][i], u[1][i]];
+            let direction = mirrored(&self.frame(i), lane(&self.to_eye, i), self.alphas(i), u);
+            set_lane(&mut directions, i, direction);
+        }
+        directions
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobes(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobe(&self, _: usize) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
+        let alpha = self.alphas[0][i].max(self.alphas[1][i]);
+        Some(NarrowLobe::of_microfacets(lane(&self.normal, i), lane(&self.to_eye, i), alpha, 1.0, 0.0))
+    }
+
+    #[inline(always)]
+    fn narrower_than(&self, _: u32, _: f32) -> u32 {
+        0
+    }
+
+    #[inline(always)]
+    fn even(&self, _: usize) -> Option<Vec3> {
+        None
+    }
+
+    #[inline(always)]
+    fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
+        let [white, cosine] = self.lobe(i, direction);
+        let fresnel = FresnelPoint { first: lane(&self.fresnel[0], i), second: lane(&self.fresnel[1], i) };
+        fresnel.reflectance(cosine) * (white * self.shown[i]) + Vec3::splat(self.unit[i])
+    }
+}

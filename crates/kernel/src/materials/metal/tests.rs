@@ -1,0 +1,134 @@
+//! Lobes of metal against the formulas in `f64`, their samples against the pdf, and their albedos against quadrature.
+
+use super::elements::Element;
+use super::*;
+use crate::choice::Choice;
+use crate::materials::bsdf::LobeSet;
+use crate::materials::lobe_checks::{
+    ALPHAS, COSINES, Subject, check_neighbours, check_values, direction, reference,
+};
+use crate::math::DVec3;
+
+/// α along u and v for each α: round, and long along u or along v.
+fn shapes(alpha: f32) -> [[f32; 2]; 3] {
+    [[alpha; 2], [alpha, (3.0 * alpha).min(1.0)], [(2.0 * alpha).min(1.0), alpha]]
+}
+
+fn schlick(alphas: [f32; 2]) -> MetalPoint {
+    MetalPoint { fresnel: FresnelPoint::schlick(Vec3::new(1.0, 0.78, 0.34)), alphas }
+}
+
+fn of_element(element: Element, alphas: [f32; 2]) -> MetalPoint {
+    let [first, second] = element.index();
+    MetalPoint { fresnel: FresnelPoint { first, second }, alphas }
+}
+
+#[test]
+fn values_are_those_of_the_formulas_and_reciprocal() {
+    for alphas in ALPHAS.into_iter().flat_map(shapes) {
+        let wide = alphas.map(f64::from);
+        let cosine = |o: DVec3, i: DVec3| (o + i).length() * 0.5;
+        let first = DVec3::new(1.0, 0.78, 0.34);
+        check_values::<BrushedMetalRow>(&format!("Schlick {alphas:?}"), &schlick(alphas), alphas, |o, i| {
+            let fresnel = first + (DVec3::ONE - first) * (1.0 - cosine(o, i)).powi(5);
+            fresnel * reference(o, i, wide)
+        });
+        let copper = of_element(Element::Copper, alphas);
+        check_values::<BrushedMetalRow>(&format!("copper {alphas:?}"), &copper, alphas, |o, i| {
+            let fresnel = copper.fresnel.reflectance(cosine(o, i) as f32).as_dvec3();
+            fresnel * reference(o, i, wide)
+        });
+    }
+}
+
+#[test]
+fn a_surface_gets_the_bits_that_it_gets_alone() {
+    let points =
+        ALPHAS.into_iter().flat_map(|alpha| [schlick([alpha; 2]), of_element(Element::Iron, [alpha; 2])]);
+    check_neighbours::<RoundMetalRow>(&points.collect::<Vec<_>>());
+    let points = ALPHAS.into_iter().flat_map(shapes).map(|alphas| of_element(Element::Iron, alphas));
+    check_neighbours::<BrushedMetalRow>(&points.collect::<Vec<_>>());
+}
+
+#[test]
+fn rows_of_round_lobes_have_the_values_of_brushed_ones() {
+    for alpha in ALPHAS {
+        let (point, at) = (schlick([alpha; 2]), direction(0.6, 0.3));
+        let round = Subject::<RoundMetalRow>::new(&point, [alpha; 2], at);
+        let brushed = Subject::<BrushedMetalRow>::new(&point, [alpha; 2], at);
+        let (one, other) = (round.sampled_albedo(64), brushed.sampled_albedo(64));
+        assert!((one - other).abs().max_element() < 1e-3, "α {alpha}: {one} and {other}");
+        round.check_samples(&format!("α {alpha}"), LobeSet::All);
+        let wide = [f64::from(alpha); 2];
+        check_values::<RoundMetalRow>(&format!("α {alpha}"), &point, [alpha; 2], |o, i| {
+            let first = DVec3::new(1.0, 0.78, 0.34);
+            (first + (DVec3::ONE - first) * (1.0 - (o + i).length() * 0.5).powi(5)) * reference(o, i, wide)
+        });
+    }
+}
+
+#[test]
+fn samples_are_drawn_by_their_density() {
+    // 21 lobes in five directions.
+    for alphas in ALPHAS.into_iter().flat_map(shapes) {
+        for cosine in COSINES {
+            let subject = Subject::<BrushedMetalRow>::new(&schlick(alphas), alphas, direction(cosine, 0.7));
+            subject.check_samples(&format!("α {alphas:?} at a cosine of {cosine}"), LobeSet::All);
+        }
+    }
+}
+
+#[test]
+fn samples_bring_the_albedo_that_quadrature_of_f_has_and_never_more_than_all() {
+    for alphas in ALPHAS.into_iter().flat_map(shapes) {
+        for cosine in COSINES {
+            for point in [schlick(alphas), of_element(Element::Gold, alphas)] {
+                let subject = Subject::<BrushedMetalRow>::new(&point, alphas, direction(cosine, 0.3));
+                let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
+                let what = format!("α {alphas:?} at a cosine of {cosine}: {sampled} is not {exact}");
+                assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
+                assert!(sampled.max_element() < 1.0 + 1e-3, "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_narrow_lobe_reflects_as_a_mirror_does() {
+    for element in Element::ALL {
+        for cosine in [0.3, 0.7, 1.0] {
+            let point = of_element(*element, [0.001; 2]);
+            let albedo = Subject::<BrushedMetalRow>::new(&point, [0.001; 2], direction(cosine, 0.0))
+                .sampled_albedo(64);
+            let mirror = point.fresnel.reflectance(cosine as f32).as_dvec3();
+            assert!((albedo - mirror).abs().max_element() < 1e-3, "{element:?}: {albedo} is not {mirror}");
+        }
+    }
+}
+
+#[test]
+fn elements_have_their_colours() {
+    // Reflectance at normal incidence: ((η − 1)² + k²)/((η + 1)² + k²).
+    for (element, known) in [
+        (Element::Gold, [0.968, 0.746, 0.372]),
+        (Element::Silver, [0.989, 0.984, 0.977]),
+        (Element::Copper, [0.921, 0.620, 0.520]),
+        (Element::Aluminium, [0.909, 0.916, 0.924]),
+        (Element::Iron, [0.528, 0.513, 0.493]),
+        (Element::Chromium, [0.550, 0.556, 0.555]),
+        (Element::Titanium, [0.614, 0.580, 0.541]),
+    ] {
+        let found = of_element(element, [1.0; 2]).fresnel.reflectance(1.0);
+        assert!((found - Vec3::from_array(known)).abs().max_element() < 1e-3, "{element:?}: {found}");
+    }
+}
+
+#[test]
+fn anisotropy_stretches_as_the_formula_says() {
+    // α/a along u and α·a along v with a = √(1 − .9·|anisotropy|).
+    let [u, v] = microfacet::alphas(0.5, 0.8);
+    let a = (1.0_f32 - 0.72).sqrt();
+    assert!((u - 0.25 / a).abs() < 1e-6 && (v - 0.25 * a).abs() < 1e-6);
+    assert_eq!(microfacet::alphas(0.5, -0.8), [v, u]);
+    assert_eq!(microfacet::alphas(0.5, 0.0), [0.25; 2]);
+}

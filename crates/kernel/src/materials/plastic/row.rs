@@ -1,0 +1,398 @@
+//! Surfaces of plastic in rows of sixteen.
+
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use super::{Plastic, PlasticPoint};
+use crate::materials::bsdf::{
+    BsdfValues, LobeSet, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
+};
+use crate::materials::fresnel::dielectric_outside;
+use crate::materials::lobe_albedo::{TERMS, evaluate, under_coat};
+use crate::materials::microfacet::{Half, Leg, facing, mirrored};
+use crate::materials::phong::lobes::about;
+use crate::math::Vec3;
+use crate::math::frame::Frame;
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane, take, truths};
+
+/// Surfaces of plastic, side by side. The values of f that are shared are the grey f of all lobes, and what the coat lets through on
+/// both ways.
+#[derive(Clone, Debug)]
+pub struct PlasticRow {
+    /// Unit normals that face the viewer.
+    normal: Lanes3,
+    /// Unit directions to the viewer.
+    to_eye: Lanes3,
+    /// [`PlasticPoint::base`].
+    base: Lanes3,
+    /// [`PlasticPoint::specular`].
+    specular: Lanes3,
+    /// [`PlasticPoint::ior`].
+    ior: Lanes,
+    /// [`PlasticPoint::alpha`].
+    alpha: Lanes,
+    /// Terms of the albedo of the coat.
+    terms: [Lanes; TERMS],
+    /// Mean albedo of the coat.
+    mean: Lanes,
+    /// Part of the light that the coat lets through on the way to the viewer.
+    left: Lanes,
+    /// Probability of choosing the coat's lobe.
+    share: Lanes,
+    /// 1 where the diffuse lobe is shown, else 0; likewise the coat's.
+    shown: [Lanes; 2],
+    /// f in sr⁻¹ that is shown in place of the lobes.
+    unit: Lanes,
+    /// Whether any surface has a lobe of the coat.
+    is_rough: bool,
+    /// Whether the coat of any surface is smooth.
+    is_smooth: bool,
+}
+
+/// Factors on the diffuse lobe and the coat's for what is shown, and f in their place.
+#[inline(always)]
+fn shown_parts(shown: ShownLobes) -> [f32; 3] {
+    let part = |is_taken: bool| if is_taken { 1.0 } else { 0.0 };
+    match shown {
+        ShownLobes::Of { diffuse, specular } => [part(diffuse), part(specular), 0.0],
+        ShownLobes::Unit => [0.0, 0.0, 1.0],
+    }
+}
+
+impl PlasticRow {
+    /// The albedo of a coat by a cosine ≥ 0.
+    #[inline(always)]
+    fn albedo(&self, i: usize, cosine: f32) -> f32 {
+        let rough = evaluate(cosine, |number| self.terms[number][i]);
+        if self.is_smooth {
+            let smooth = dielectric_outside(cosine, self.ior[i]);
+            if self.alpha[i] == 0.0 { smooth } else { rough }
+        } else {
+            rough
+        }
+    }
+
+    /// Part of the light that the coat lets through on both ways, for a direction; 0 from behind.
+    #[inline(always)]
+    fn through(&self, i: usize, direction: Vec3) -> f32 {
+        let cosine = lane(&self.normal, i).dot(direction);
+        let is_ahead = cosine > 0.0;
+        let left = 1.0 - self.albedo(i, if is_ahead { cosine } else { 0.0 });
+        if is_ahead { self.left[i] * left } else { 0.0 }
+    }
+
+    #[inline(always)]
+    fn legs(&self, i: usize, direction: Vec3) -> [Leg; 2] {
+        let normal = lane(&self.normal, i);
+        [lane(&self.to_eye, i), direction].map(|one| Leg::isotropic(normal, one, self.alpha[i]))
+    }
+
+    /// D of the coat for a direction, and the reflectance of its facets.
+    #[inline(always)]
+    fn facets(&self, i: usize, direction: Vec3) -> [f32; 2] {
+        let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
+        let alpha = self.alpha[i];
+        let distribution = half.isotropic(if alpha > 0.0 { alpha } else { 1.0 });
+        let fresnel = dielectric_outside(half.cosine(), self.ior[i]);
+        [if alpha > 0.0 { distribution } else { 0.0 }, fresnel]
+    }
+
+    /// f of the coat for a factor of 1.
+    #[inline(always)]
+    fn coat(&self, i: usize, direction: Vec3) -> f32 {
+        let [distribution, fresnel] = self.facets(i, direction);
+        let [eye, light] = self.legs(i, direction);
+        fresnel * eye.reflected(&light, distribution)
+    }
+
+    /// Computes what depends on the direction to the viewer.
+    #[inline(always)]
+    fn look(&mut self, i: usize) {
+        let cosine = lane(&self.normal, i).dot(lane(&self.to_eye, i));
+        let albedo = self.albedo(i, if cosine > 0.0 { cosine } else { 0.0 });
+        self.left[i] = 1.0 - albedo;
+        let diffuse = (1.0 - albedo) * (1.0 - self.mean[i]) * PI * lane(&self.base, i).max_element();
+        let specular = albedo * lane(&self.specular, i).max_element();
+        self.share[i] = specular / (specular + diffuse).max(f32::MIN_POSITIVE);
+    }
+
+    /// Sets what does not depend on directions, but for what is shown.
+    #[inline(always)]
+    fn set(&mut self, i: usize, bsdf: &PlasticPoint) {
+        set_lane(&mut self.base, i, bsdf.base);
+        set_lane(&mut self.specular, i, bsdf.specular);
+        (self.ior[i], self.alpha[i], self.mean[i]) = (bsdf.ior, bsdf.alpha, bsdf.albedo.mean);
+        for (own, term) in self.terms.iter_mut().zip(bsdf.albedo.terms) {
+            own[i] = term;
+        }
+        self.is_rough |= bsdf.alpha > 0.0;
+        self.is_smooth |= bsdf.alpha == 0.0;
+    }
+}
+
+impl RoughRow for PlasticRow {
+    type Material = Plastic;
+    type Point = PlasticPoint;
+
+    const SENDS_RAYS: bool = true;
+
+    const EMPTY: Self = Self {
+        normal: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
+        to_eye: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
+        base: [[0.0; LANES]; 3],
+        specular: [[0.0; LANES]; 3],
+        ior: [1.5; LANES],
+        alpha: [1.0; LANES],
+        terms: [[0.0; LANES]; TERMS],
+        mean: [0.0; LANES],
+        left: [1.0; LANES],
+        share: [0.0; LANES],
+        shown: [[0.0; LANES]; 2],
+        unit: [0.0; LANES],
+        is_rough: false,
+        is_smooth: false,
+    };
+
+    #[inline(always)]
+    fn reset(&mut self) {
+        (self.is_rough, self.is_smooth) = (false, false);
+    }
+
+    #[inline(always)]
+    fn put(&mut self, i: usize, bsdf: &PlasticPoint, shown: ShownLobes, place: &Place) {
+        set_lane(&mut self.normal, i, facing(place.normal, place.to_eye));
+        set_lane(&mut self.to_eye, i, place.to_eye);
+        self.set(i, bsdf);
+        [self.shown[0][i], self.shown[1][i], self.unit[i]] = shown_parts(shown);
+        self.look(i);
+    }
+
+    #[inline(always)]
+    fn fill(
+        &mut self,
+        material: &Plastic,
+        uv: Option<&UvRow>,
+        shown: &[(u32, ShownLobes)],
+        folds: impl Folds,
+    ) -> u32 {
+        let point = material.constant().unwrap_or_else(|| material.bleached());
+        let mut bases = [[point.base.x; LANES], [point.base.y; LANES], [point.base.z; LANES]];
+        if let (Some(texture), Some(uv)) = (material.row_texture(), uv) {
+            let diffuse = texture.lookup_row(uv);
+            let squared = point.ior * point.ior;
+            let returned = 1.0 - (1.0 - point.albedo.mean) / squared;
+            for i in 0..LANES {
+                let diffuse = lane(&diffuse, i).min(Vec3::ONE);
+                set_lane(&mut bases, i, under_coat(diffuse, returned) * (FRAC_1_PI / squared));
+            }
+        }
+        for &(of, shown) in shown {
+            let (of, [diffuse, specular, unit]) = (truths(of), shown_parts(shown));
+            for axis in 0..3 {
+                take(&of, &bases[axis], &mut self.base[axis]);
+                take(&of, &[point.specular[axis]; LANES], &mut self.specular[axis]);
+            }
+            for (own, term) in self.terms.iter_mut().zip(point.albedo.terms) {
+                take(&of, &[term; LANES], own);
+            }
+            for (value, own) in [
+                (point.ior, &mut self.ior),
+                (point.alpha, &mut self.alpha),
+                (point.albedo.mean, &mut self.mean),
+                (unit, &mut self.unit),
+            ] {
+                take(&of, &[value; LANES], own);
+            }
+            take(&of, &[diffuse; LANES], &mut self.shown[0]);
+            take(&of, &[specular; LANES], &mut self.shown[1]);
+        }
+        self.is_rough |= point.alpha > 0.0;
+        self.is_smooth |= point.alpha == 0.0;
+        let mut black = [0; LANES];
+        for i in 0..LANES {
+            let is_black = (lane(&bases, i) == Vec3::ZERO) & (point.specular == Vec3::ZERO);
+            black[i] = if is_black { TRUE } else { 0 };
+        }
+        folds.bits(&black)
+    }
+
+    #[inline(always)]
+    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
+        let mut facings = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let to_eye = -lane(directions, i);
+            set_lane(&mut self.to_eye, i, to_eye);
+            set_lane(&mut facings, i, facing(lane(normals, i), to_eye));
+        }
+        match of {
+            Some(of) => {
+                for axis in 0..3 {
+                    take(of, &facings[axis], &mut self.normal[axis]);
+                }
+            }
+            None => self.normal = facings,
+        }
+        for i in 0..LANES {
+            self.look(i);
+        }
+    }
+
+    #[inline(always)]
+    fn copy(&mut self, i: usize, other: &Self, from: usize) {
+        for (own, other) in [
+            (&mut self.normal, &other.normal),
+            (&mut self.to_eye, &other.to_eye),
+            (&mut self.base, &other.base),
+            (&mut self.specular, &other.specular),
+        ] {
+            set_lane(own, i, lane(other, from));
+        }
+        for (own, other) in [
+            (&mut self.ior, &other.ior),
+            (&mut self.alpha, &other.alpha),
+            (&mut self.mean, &other.mean),
+            (&mut self.left, &other.left),
+            (&mut self.share, &other.share),
+            (&mut self.unit, &other.unit),
+        ] {
+            own[i] = other[from];
+        }
+        for (own, other) in
+            self.terms.iter_mut().chain(&mut self.shown).zip(other.terms.iter().chain(&other.shown))
+        {
+            own[i] = other[from];
+        }
+        self.is_rough |= other.is_rough;
+        self.is_smooth |= other.is_smooth;
+    }
+
+    #[inline(always)]
+    fn f(&self, directions: &Lanes3) -> BsdfValues {
+        let (mut coat, mut through) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            through[i] = self.through(i, lane(directions, i));
+        }
+        if self.is_rough {
+            for i in 0..LANES {
+                coat[i] = self.coat(i, lane(directions, i));
+            }
+        }
+        let (mut f, mut grey) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        for i in 0..LANES {
+            let (base, specular) = (lane(&self.base, i), lane(&self.specular, i));
+            let value = base * (through[i] * self.shown[0][i]) + specular * (coat[i] * self.shown[1][i]);
+            set_lane(&mut f, i, value + Vec3::splat(self.unit[i]));
+            grey[i] = base.max_element() * through[i] + specular.max_element() * coat[i];
+        }
+        BsdfValues { f, shared: [grey, through] }
+    }
+
+    #[inline(always)]
+    fn parts(&self, _: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
+        let (mut wide, mut narrow) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        for axis in 0..3 {
+            for i in 0..LANES {
+                wide[axis][i] = self.base[axis][i] * (values.shared[1][i] * self.shown[0][i]);
+                let rest = values.f[axis][i] - wide[axis][i];
+                narrow[axis][i] = if rest > 0.0 { rest } else { 0.0 };
+            }
+        }
+        [wide, narrow]
+    }
+
+    #[inline(always)]
+    fn grey(&self, values: &BsdfValues) -> Lanes {
+        values.shared[0]
+    }
+
+    #[inline(always)]
+    fn pdf(&self, lobes: LobeSet, normals: &Lanes3, directions: &Lanes3, _: &BsdfValues) -> Lanes {
+        let (mut narrow, mut densities) = ([0.0; LANES], [0.0; LANES]);
+        if self.is_rough {
+            for i in 0..LANES {
+                let direction = lane(directions, i);
+                let [distribution, _] = self.facets(i, direction);
+                let [eye, light] = self.legs(i, direction);
+                let density = eye.density(distribution);
+                narrow[i] = if light.is_ahead() { density } else { 0.0 };
+            }
+        }
+        match lobes {
+            LobeSet::All => {
+                for i in 0..LANES {
+                    let cosine = lane(normals, i).dot(lane(directions, i));
+                    let wide = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
+                    densities[i] = self.share[i] * narrow[i] + (1.0 - self.share[i]) * wide;
+                }
+                densities
+            }
+            LobeSet::Narrow => narrow,
+        }
+    }
+
+    #[inline(always)]
+    fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
+        let mut directions = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let u = [u[0][i], u[1][i]];
+            let wide = about(lane(normals, i), u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
+            set_lane(&mut directions, i, wide);
+        }
+        if self.is_rough {
+            for i in 0..LANES {
+                let (u, alpha) = ([u[0][i], u[1][i]], self.alpha[i]);
+                let frame = Frame::from_normal(lane(&self.normal, i));
+                let narrow = mirrored(&frame, lane(&self.to_eye, i), [alpha; 2], u);
+                let is_narrow = match lobes {
+                    LobeSet::All => choices[i] < self.share[i],
+                    LobeSet::Narrow => alpha > 0.0,
+                };
+                let wide = lane(&directions, i);
+                let choose = |narrow: f32, wide: f32| if is_narrow { narrow } else { wide };
+                let chosen =
+                    Vec3::new(choose(narrow.x, wide.x), choose(narrow.y, wide.y), choose(narrow.z, wide.z));
+                set_lane(&mut directions, i, chosen);
+            }
+        }
+        directions
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobes(&self) -> bool {
+        self.is_rough
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobe(&self, i: usize) -> bool {
+        self.alpha[i] > 0.0
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
+        let (normal, to_eye) = (lane(&self.normal, i), lane(&self.to_eye, i));
+        let cosine = normal.dot(to_eye);
+        let reflectance = dielectric_outside(cosine, self.ior[i]) * lane(&self.specular, i).max_element();
+        let wide = self.left[i] * lane(&self.base, i).max_element() * (1.0 - self.mean[i]);
+        let lobe = || NarrowLobe::of_microfacets(normal, to_eye, self.alpha[i], reflectance, wide);
+        self.has_narrow_lobe(i).then(lobe)
+    }
+
+    #[inline(always)]
+    fn narrower_than(&self, _: u32, _: f32) -> u32 {
+        0
+    }
+
+    #[inline(always)]
+    fn even(&self, _: usize) -> Option<Vec3> {
+        None
+    }
+
+    #[inline(always)]
+    fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
+        let wide = lane(&self.base, i) * (self.through(i, direction) * self.shown[0][i]);
+        let mut narrow = Vec3::ZERO;
+        if self.is_rough {
+            narrow = lane(&self.specular, i) * (self.coat(i, direction) * self.shown[1][i]);
+        }
+        wide + narrow + Vec3::splat(self.unit[i])
+    }
+}

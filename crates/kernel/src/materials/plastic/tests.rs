@@ -1,0 +1,91 @@
+//! Lobes of plastic: values against the formulas, samples against the pdf, and white plastic as a furnace.
+
+use super::*;
+use crate::materials::bsdf::LobeSet;
+use crate::materials::lobe_checks::{
+    ALPHAS, COSINES, Subject, check_neighbours, check_values, direction, reference,
+};
+use crate::math::DVec3;
+
+fn plastic(diffuse: Vec3, specular: f32, ior: f32, alpha: f32) -> Plastic {
+    let [diffuse, specular] = [diffuse, Vec3::splat(specular)].map(Color::Constant);
+    Plastic::new(diffuse, specular, Number::Constant(alpha.sqrt()), ior)
+}
+
+fn point(plastic: &Plastic) -> PlasticPoint {
+    plastic.constant().expect("it has no textures")
+}
+
+const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);
+
+#[test]
+fn values_are_those_of_the_formulas_and_reciprocal() {
+    for (alpha, ior) in ALPHAS.into_iter().flat_map(|alpha| [(alpha, 1.5), (alpha, 1.2)]) {
+        let point = point(&plastic(RED, 0.9, ior, alpha));
+        let (eta, wide) = (f64::from(ior), [f64::from(alpha); 2]);
+        let mean = f64::from(point.albedo.mean);
+        let returned = 1.0 - (1.0 - mean) / (eta * eta);
+        let left = |cosine: f64| 1.0 - f64::from(point.albedo.at(cosine as f32));
+        check_values::<PlasticRow>(&format!("α {alpha}, η {ior}"), &point, [alpha; 2], |o, i| {
+            let fresnel = dielectric((o + i).length() * 0.5, eta);
+            let kd = RED.as_dvec3();
+            let base = kd / (DVec3::ONE - kd * returned) / (std::f64::consts::PI * eta * eta);
+            base * (left(o.z) * left(i.z)) + DVec3::splat(0.9 * fresnel * reference(o, i, wide))
+        });
+    }
+}
+
+#[test]
+fn a_surface_gets_the_bits_that_it_gets_alone() {
+    let points: Vec<PlasticPoint> = [0.0, 0.001, 0.05, 0.6]
+        .into_iter()
+        .flat_map(|alpha| [plastic(RED, 1.0, 1.5, alpha), plastic(Vec3::ZERO, 0.8, 1.3, alpha)])
+        .map(|one| point(&one))
+        .collect();
+    check_neighbours::<PlasticRow>(&points);
+}
+
+#[test]
+fn samples_are_drawn_by_their_density() {
+    for (alpha, cosine) in ALPHAS.into_iter().flat_map(|alpha| COSINES.map(|cosine| (alpha, cosine))) {
+        let subject = Subject::<PlasticRow>::new(
+            &point(&plastic(RED, 1.0, 1.5, alpha)),
+            [alpha; 2],
+            direction(cosine, 0.7),
+        );
+        subject.check_samples(&format!("the coat of α {alpha} at a cosine of {cosine}"), LobeSet::Narrow);
+        // In the map of a narrow lobe, the cells of the diffuse one are too large.
+        if alpha >= 0.2 {
+            subject.check_samples(&format!("α {alpha} at a cosine of {cosine}"), LobeSet::All);
+        }
+    }
+}
+
+#[test]
+fn white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has() {
+    for (alpha, ior) in ALPHAS.into_iter().flat_map(|alpha| [1.0, 1.33, 1.5, 2.5].map(|ior| (alpha, ior))) {
+        for cosine in COSINES {
+            let what = format!("α {alpha}, η {ior} at a cosine of {cosine}");
+            let white = point(&plastic(Vec3::ONE, 1.0, ior, alpha));
+            let subject = Subject::<PlasticRow>::new(&white, [alpha; 2], direction(cosine, 0.3));
+            let furnace = subject.sampled_albedo(192).x;
+            assert!((furnace - 1.0).abs() < 2e-3, "{what}: a white one reflects {furnace}");
+            let red = point(&plastic(RED, 1.0, ior, alpha));
+            let subject = Subject::<PlasticRow>::new(&red, [alpha; 2], direction(cosine, 0.3));
+            let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
+            assert!((sampled - exact).abs().max_element() < 1e-3, "{what}: {sampled} is not {exact}");
+        }
+    }
+}
+
+#[test]
+fn under_a_smooth_coat_the_base_has_what_fresnel_leaves() {
+    for ior in [1.0, 1.3, 1.5, 3.0] {
+        for cosine in COSINES {
+            let base = point(&plastic(Vec3::ONE, 1.0, ior, 0.0));
+            let subject = Subject::<PlasticRow>::new(&base, [1.0; 2], direction(cosine, 0.3));
+            let (albedo, fresnel) = (subject.sampled_albedo(192).x, dielectric(cosine, ior.into()));
+            assert!((albedo + fresnel - 1.0).abs() < 1e-3, "η {ior}: {albedo} and {fresnel}");
+        }
+    }
+}

@@ -1,0 +1,266 @@
+//! The principled material: glTF's inputs, on lobes of microfacets that keep to their energy.
+//!
+//! - Specular lobe: F is a mix, by `metallic`, of Schlick's approximation from `color`, and of that of a dielectric with
+//!   F0 = min(((ior − 1)/(ior + 1))² · specular_color, 1) · specular and F90 = specular.
+//! - Diffuse lobe: (1 − metallic) · color/π · (1 − E(μᵢ))(1 − E(μₒ))/(1 − Ē), with the albedo E of the dielectric lobe.
+//! - Clear coat c: everything below by (1 − c·E_c(μ)) for each of the two directions, and c times a lobe of F0 = .04.
+
+mod row;
+
+use std::f32::consts::FRAC_1_PI;
+use std::sync::{Arc, LazyLock};
+
+use super::bsdf::{RoughMaterial, RoughPoint};
+use super::footprint::TexturePoint;
+use super::lobe_albedo::{AlbedoTable, LobeAlbedo};
+use super::microfacet;
+use super::number::Number;
+use super::texture::{Color, Texture};
+use crate::math::Vec3;
+pub use row::PrincipledRow;
+
+/// Reflectance of the clear coat at normal incidence: that of an index of refraction of 1.5.
+const COAT_REFLECTANCE: f32 = 0.04;
+
+/// A principled material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Principled {
+    inputs: PrincipledInputs,
+    /// The albedos of its lobes: of the specular one, and of the coat. `None` for those whose roughness changes.
+    albedos: [Option<SchlickAlbedo>; 2],
+}
+
+/// The inputs of a principled material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PrincipledInputs {
+    /// Diffuse reflectance, or that of the metal at normal incidence.
+    pub color: Color,
+    /// Weight of the metal.
+    pub metallic: Number,
+    /// The root of α.
+    pub roughness: Number,
+    /// Index of refraction, ≥ 1.
+    pub ior: f32,
+    /// Factor on the reflectance of what is no metal.
+    pub specular: Number,
+    /// Factor on that reflectance at normal incidence.
+    pub specular_color: Color,
+    /// Weight of the clear coat.
+    pub clearcoat: Number,
+    /// The root of its α.
+    pub clearcoat_roughness: Number,
+}
+
+/// [`Principled`] at one point: its textures looked up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PrincipledPoint {
+    /// f in sr⁻¹ of the diffuse lobe, for light that has passed the lobes above it on both ways.
+    pub base: Vec3,
+    /// Reflectance at normal incidence of the specular lobe.
+    pub facets: Vec3,
+    /// The part of that which is the metal's.
+    pub metal: Vec3,
+    /// Its reflectance at grazing angles.
+    pub grazing: f32,
+    /// The reflectances of the dielectric among it.
+    pub dielectric: (Vec3, f32),
+    /// α of the specular lobe.
+    pub alpha: f32,
+    /// Albedos of the specular lobe by [`SchlickAlbedo`].
+    pub albedo: SchlickAlbedo,
+    /// Weight of the clear coat.
+    pub coat: f32,
+    /// Its α.
+    pub coat_alpha: f32,
+    /// Its albedo.
+    pub coat_albedo: LobeAlbedo,
+    /// Reflectance of ambient light.
+    pub ambient: Vec3,
+}
+
+/// Albedos of a lobe whose facets reflect 1 at normal incidence and 0 at grazing angles, and the reverse, by Schlick's approximation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SchlickAlbedo {
+    /// The albedo per reflectance at normal incidence.
+    pub normal: LobeAlbedo,
+    /// The albedo per reflectance at grazing angles.
+    pub grazing: LobeAlbedo,
+}
+
+impl SchlickAlbedo {
+    /// The albedos for one roughness.
+    fn of(roughness: f32) -> Self {
+        let [normal, grazing] = tables(Some(roughness));
+        Self { normal: normal.at(roughness), grazing: grazing.at(roughness) }
+    }
+
+    /// The albedos for any roughness, by tables.
+    fn between(roughness: f32) -> Self {
+        static TABLES: LazyLock<[AlbedoTable; 2]> = LazyLock::new(|| tables(None));
+        let [normal, grazing] = &*TABLES;
+        Self { normal: normal.at(roughness), grazing: grazing.at(roughness) }
+    }
+
+    /// The albedo of a coat of this reflectance at normal incidence, and 1 at grazing angles.
+    fn of_coat(&self, reflectance: f32) -> LobeAlbedo {
+        let sum = |normal: f32, grazing: f32| reflectance * normal + grazing;
+        LobeAlbedo {
+            terms: std::array::from_fn(|i| sum(self.normal.terms[i], self.grazing.terms[i])),
+            mean: sum(self.normal.mean, self.grazing.mean),
+        }
+    }
+}
+
+/// The two tables of [`SchlickAlbedo`].
+fn tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
+    let alpha = |roughness: f32| microfacet::alphas(roughness, 0.0)[0];
+    let weight = |cosine: f64| {
+        let rest = 1.0 - cosine;
+        rest * rest * rest * rest * rest
+    };
+    let normal = AlbedoTable::new(roughness, alpha, |cosine| 1.0 - weight(cosine));
+    [normal, AlbedoTable::new(roughness, alpha, weight)]
+}
+
+/// The inputs at one point.
+#[derive(Clone, Copy)]
+struct Inputs {
+    color: Vec3,
+    metallic: f32,
+    roughness: f32,
+    specular: f32,
+    specular_color: Vec3,
+    clearcoat: f32,
+    clearcoat_roughness: f32,
+}
+
+impl Principled {
+    /// The material of these inputs.
+    pub fn new(inputs: PrincipledInputs) -> Self {
+        let has_coat = inputs.clearcoat.constant() != Some(0.0);
+        let coat = inputs.clearcoat_roughness.constant().filter(|_| has_coat);
+        let albedos = [inputs.roughness.constant(), coat].map(|roughness| roughness.map(SchlickAlbedo::of));
+        // A coat without weight has any albedo.
+        let [specular, coat] = albedos;
+        Self { inputs, albedos: [specular, if has_coat { coat } else { specular }] }
+    }
+
+    fn point(&self, inputs: Inputs) -> PrincipledPoint {
+        let unit = |number: f32| number.clamp(0.0, 1.0);
+        let (color, metallic) = (inputs.color.min(Vec3::ONE), unit(inputs.metallic));
+        let specular = unit(inputs.specular);
+        let ior = self.inputs.ior;
+        let ratio = (ior - 1.0) / (ior + 1.0);
+        let reflectance = (inputs.specular_color * (ratio * ratio)).min(Vec3::ONE) * specular;
+        let [specular_albedo, coat_albedo] = self.albedos;
+        let albedo = specular_albedo.unwrap_or_else(|| SchlickAlbedo::between(unit(inputs.roughness)));
+        let of_coat = || SchlickAlbedo::between(unit(inputs.clearcoat_roughness));
+        let mean = reflectance * albedo.normal.mean + Vec3::splat(specular * albedo.grazing.mean);
+        let diffuse = color * (1.0 - metallic);
+        PrincipledPoint {
+            base: diffuse * FRAC_1_PI / (Vec3::ONE - mean).max(Vec3::splat(1e-3)),
+            facets: reflectance.lerp(color, metallic),
+            metal: color * metallic,
+            grazing: specular + (1.0 - specular) * metallic,
+            dielectric: (reflectance, specular),
+            alpha: microfacet::alphas(unit(inputs.roughness), 0.0)[0],
+            albedo,
+            coat: unit(inputs.clearcoat),
+            coat_alpha: microfacet::alphas(unit(inputs.clearcoat_roughness), 0.0)[0],
+            coat_albedo: coat_albedo.unwrap_or_else(of_coat).of_coat(COAT_REFLECTANCE),
+            ambient: diffuse,
+        }
+    }
+}
+
+impl RoughMaterial for Principled {
+    type Point = PrincipledPoint;
+
+    #[inline]
+    fn at(&self, at: &TexturePoint, lookups: &mut u64) -> PrincipledPoint {
+        let inputs = Inputs {
+            color: self.inputs.color.at(at, lookups),
+            metallic: self.inputs.metallic.at(at, lookups),
+            roughness: self.inputs.roughness.at(at, lookups),
+            specular: self.inputs.specular.at(at, lookups),
+            specular_color: self.inputs.specular_color.at(at, lookups),
+            clearcoat: self.inputs.clearcoat.at(at, lookups),
+            clearcoat_roughness: self.inputs.clearcoat_roughness.at(at, lookups),
+        };
+        self.point(inputs)
+    }
+
+    fn bleached(&self) -> PrincipledPoint {
+        let color = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
+        let number = |number: &Number| number.constant().unwrap_or(1.0);
+        self.point(Inputs {
+            color: color(&self.inputs.color),
+            metallic: number(&self.inputs.metallic),
+            roughness: number(&self.inputs.roughness),
+            specular: number(&self.inputs.specular),
+            specular_color: color(&self.inputs.specular_color),
+            clearcoat: number(&self.inputs.clearcoat),
+            clearcoat_roughness: number(&self.inputs.clearcoat_roughness),
+        })
+    }
+
+    fn constant(&self) -> Option<PrincipledPoint> {
+        Some(self.point(Inputs {
+            color: self.inputs.color.constant()?,
+            metallic: self.inputs.metallic.constant()?,
+            roughness: self.inputs.roughness.constant()?,
+            specular: self.inputs.specular.constant()?,
+            specular_color: self.inputs.specular_color.constant()?,
+            clearcoat: self.inputs.clearcoat.constant()?,
+            clearcoat_roughness: self.inputs.clearcoat_roughness.constant()?,
+        }))
+    }
+
+    #[inline]
+    fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+        self.inputs.color.at(at, lookups)
+    }
+
+    fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+        self.inputs.color.at(at, lookups) * (1.0 - self.inputs.metallic.at(at, lookups).clamp(0.0, 1.0))
+    }
+
+    fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        let PrincipledInputs { color, metallic, roughness, specular, specular_color, .. } = &self.inputs;
+        let PrincipledInputs { ior: _, clearcoat, clearcoat_roughness, .. } = &self.inputs;
+        let numbers = [metallic, roughness, specular, clearcoat, clearcoat_roughness];
+        let colors = [color, specular_color].into_iter().filter_map(Color::texture);
+        colors.chain(numbers.into_iter().filter_map(Number::texture))
+    }
+
+    #[inline]
+    fn fills_rows(&self) -> bool {
+        self.textures().next().is_none()
+    }
+
+    #[inline]
+    fn row_texture(&self) -> Option<&Texture> {
+        None
+    }
+}
+
+impl RoughPoint for PrincipledPoint {
+    #[inline]
+    fn is_black(&self) -> bool {
+        self.base == Vec3::ZERO && self.facets == Vec3::ZERO && self.grazing == 0.0 && self.coat == 0.0
+    }
+
+    #[inline]
+    fn ambient(&self) -> Vec3 {
+        self.ambient
+    }
+
+    fn tinted(self, color: Vec3) -> Self {
+        let metal = self.metal * color;
+        let facets = self.facets - self.metal + metal;
+        Self { base: self.base * color, facets, metal, ambient: self.ambient * color, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests;

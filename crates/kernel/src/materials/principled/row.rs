@@ -1,0 +1,431 @@
+//! Surfaces of principled materials in rows of sixteen.
+
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use super::{COAT_REFLECTANCE, Principled, PrincipledPoint};
+use crate::materials::bsdf::{
+    BsdfValues, LobeSet, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
+};
+use crate::materials::fresnel::schlick_weight;
+use crate::materials::lobe_albedo::{TERMS, evaluate};
+use crate::materials::microfacet::{Half, Leg, facing, mirrored};
+use crate::materials::phong::lobes::about;
+use crate::math::Vec3;
+use crate::math::frame::Frame;
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Truths, lane, set_lane, take, truths};
+
+/// Surfaces of principled materials, side by side. The values of f that are shared are the grey f of all lobes, and nothing.
+#[derive(Clone, Debug)]
+pub struct PrincipledRow {
+    /// Unit normals that face the viewer.
+    normal: Lanes3,
+    /// Unit directions to the viewer.
+    to_eye: Lanes3,
+    /// [`PrincipledPoint::base`].
+    base: Lanes3,
+    /// [`PrincipledPoint::facets`].
+    facets: Lanes3,
+    /// [`PrincipledPoint::grazing`].
+    grazing: Lanes,
+    /// [`PrincipledPoint::dielectric`].
+    dielectric: (Lanes3, Lanes),
+    /// [`PrincipledPoint::alpha`].
+    alpha: Lanes,
+    /// Terms of [`PrincipledPoint::albedo`].
+    terms: [[Lanes; TERMS]; 2],
+    /// [`PrincipledPoint::coat`].
+    coat: Lanes,
+    /// [`PrincipledPoint::coat_alpha`].
+    coat_alpha: Lanes,
+    /// Terms of [`PrincipledPoint::coat_albedo`].
+    coat_terms: [Lanes; TERMS],
+    /// Part of the light that the specular lobe leaves to the diffuse one on the way to the viewer.
+    left: Lanes3,
+    /// Part of the light that the coat lets through on the way to the viewer.
+    through: Lanes,
+    /// Probabilities of choosing the specular lobe, and the coat's.
+    shares: [Lanes; 2],
+    /// 1 where the diffuse lobe is shown, else 0; likewise the others.
+    shown: [Lanes; 2],
+    /// f in sr⁻¹ that is shown in place of the lobes.
+    unit: Lanes,
+    /// Whether any surface has a clear coat.
+    is_coated: bool,
+    /// Whether any surface has a diffuse lobe.
+    is_diffuse: bool,
+}
+
+/// Factors on the diffuse lobe and the others for what is shown, and f in their place.
+#[inline(always)]
+fn shown_parts(shown: ShownLobes) -> [f32; 3] {
+    let part = |is_taken: bool| if is_taken { 1.0 } else { 0.0 };
+    match shown {
+        ShownLobes::Of { diffuse, specular } => [part(diffuse), part(specular), 0.0],
+        ShownLobes::Unit => [0.0, 0.0, 1.0],
+    }
+}
+
+/// A cosine, or 0 if it is negative.
+#[inline(always)]
+fn ahead(cosine: f32) -> f32 {
+    if cosine > 0.0 { cosine } else { 0.0 }
+}
+
+impl PrincipledRow {
+    /// Albedo of the coat, with its weight, by a cosine ≥ 0.
+    #[inline(always)]
+    fn coat_albedo(&self, i: usize, cosine: f32) -> f32 {
+        self.coat[i] * evaluate(cosine, |number| self.coat_terms[number][i])
+    }
+
+    /// Albedos of the specular lobe by its reflectances at normal incidence and at grazing angles, by a cosine ≥ 0.
+    #[inline(always)]
+    fn albedos(&self, i: usize, cosine: f32) -> [f32; 2] {
+        [0, 1].map(|which| evaluate(cosine, |number| self.terms[which][number][i]))
+    }
+
+    /// Part of the light that the dielectric's specular lobe leaves, by a cosine ≥ 0.
+    #[inline(always)]
+    fn left_by_specular(&self, i: usize, cosine: f32) -> Vec3 {
+        let [normal, grazing] = self.albedos(i, cosine);
+        let (reflectance, of_grazing) = (lane(&self.dielectric.0, i), self.dielectric.1[i]);
+        Vec3::ONE - reflectance * normal - Vec3::splat(of_grazing * grazing)
+    }
+
+    #[inline(always)]
+    fn legs(&self, i: usize, direction: Vec3, alpha: f32) -> [Leg; 2] {
+        let normal = lane(&self.normal, i);
+        [lane(&self.to_eye, i), direction].map(|one| Leg::isotropic(normal, one, alpha))
+    }
+
+    /// Part of the light that the coat lets through on both ways.
+    #[inline(always)]
+    fn through_coat(&self, i: usize, cosine: f32) -> f32 {
+        if self.is_coated { self.through[i] * (1.0 - self.coat_albedo(i, ahead(cosine))) } else { 1.0 }
+    }
+
+    /// The diffuse f; 0 from behind.
+    #[inline(always)]
+    fn wide(&self, i: usize, direction: Vec3) -> Vec3 {
+        let cosine = lane(&self.normal, i).dot(direction);
+        let left = self.left_by_specular(i, ahead(cosine)) * lane(&self.left, i);
+        let through = if cosine > 0.0 { self.through_coat(i, cosine) } else { 0.0 };
+        lane(&self.base, i) * left * through
+    }
+
+    /// f of the specular lobe and the coat; 0 from behind.
+    #[inline(always)]
+    fn narrow(&self, i: usize, direction: Vec3) -> Vec3 {
+        let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
+        let weight = schlick_weight(half.cosine());
+        let [eye, light] = self.legs(i, direction, self.alpha[i]);
+        let facets = lane(&self.facets, i);
+        let reflectance = facets + (Vec3::splat(self.grazing[i]) - facets) * weight;
+        let white = eye.reflected(&light, half.isotropic(self.alpha[i]));
+        let specular = reflectance * (white * self.through_coat(i, light.cosine));
+        if self.is_coated {
+            let [eye, light] = self.legs(i, direction, self.coat_alpha[i]);
+            let white = eye.reflected(&light, half.isotropic(self.coat_alpha[i]));
+            let reflectance = COAT_REFLECTANCE + (1.0 - COAT_REFLECTANCE) * weight;
+            specular + Vec3::splat(self.coat[i] * reflectance * white)
+        } else {
+            specular
+        }
+    }
+
+    /// Pdfs of a direction in the specular lobe and in the coat's.
+    #[inline(always)]
+    fn densities(&self, i: usize, direction: Vec3) -> [f32; 2] {
+        let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
+        let of = |alpha: f32| {
+            let [eye, light] = self.legs(i, direction, alpha);
+            let density = eye.density(half.isotropic(alpha));
+            if light.is_ahead() { density } else { 0.0 }
+        };
+        [of(self.alpha[i]), if self.is_coated { of(self.coat_alpha[i]) } else { 0.0 }]
+    }
+
+    /// Computes what depends on the direction to the viewer.
+    #[inline(always)]
+    fn look(&mut self, i: usize) {
+        let cosine = ahead(lane(&self.normal, i).dot(lane(&self.to_eye, i)));
+        let coat = self.coat_albedo(i, cosine);
+        self.through[i] = 1.0 - coat;
+        let left = self.left_by_specular(i, cosine);
+        set_lane(&mut self.left, i, left);
+        let [normal, grazing] = self.albedos(i, cosine);
+        let specular = lane(&self.facets, i).max_element() * normal + self.grazing[i] * grazing;
+        let diffuse = (lane(&self.base, i) * left).max_element() * PI;
+        let below = (1.0 - coat) / (specular + diffuse).max(f32::MIN_POSITIVE);
+        // The coat has at least its part of the light, and the rest shares what passes it.
+        self.shares[0][i] = below * specular;
+        let of_coat = 1.0 - below * (specular + diffuse);
+        self.shares[1][i] = if self.coat[i] > 0.0 { of_coat } else { 0.0 };
+    }
+}
+
+impl RoughRow for PrincipledRow {
+    type Material = Principled;
+    type Point = PrincipledPoint;
+
+    const SENDS_RAYS: bool = true;
+
+    const EMPTY: Self = Self {
+        normal: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
+        to_eye: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
+        base: [[0.0; LANES]; 3],
+        facets: [[0.0; LANES]; 3],
+        grazing: [1.0; LANES],
+        dielectric: ([[0.0; LANES]; 3], [0.0; LANES]),
+        alpha: [1.0; LANES],
+        terms: [[[0.0; LANES]; TERMS]; 2],
+        coat: [0.0; LANES],
+        coat_alpha: [1.0; LANES],
+        coat_terms: [[0.0; LANES]; TERMS],
+        left: [[1.0; LANES]; 3],
+        through: [1.0; LANES],
+        shares: [[1.0; LANES], [0.0; LANES]],
+        shown: [[0.0; LANES]; 2],
+        unit: [0.0; LANES],
+        is_coated: false,
+        is_diffuse: false,
+    };
+
+    #[inline(always)]
+    fn reset(&mut self) {
+        (self.is_coated, self.is_diffuse) = (false, false);
+    }
+
+    #[inline(always)]
+    fn put(&mut self, i: usize, bsdf: &PrincipledPoint, shown: ShownLobes, place: &Place) {
+        set_lane(&mut self.normal, i, facing(place.normal, place.to_eye));
+        set_lane(&mut self.to_eye, i, place.to_eye);
+        set_lane(&mut self.base, i, bsdf.base);
+        set_lane(&mut self.facets, i, bsdf.facets);
+        set_lane(&mut self.dielectric.0, i, bsdf.dielectric.0);
+        (self.dielectric.1[i], self.grazing[i], self.alpha[i]) =
+            (bsdf.dielectric.1, bsdf.grazing, bsdf.alpha);
+        (self.coat[i], self.coat_alpha[i]) = (bsdf.coat, bsdf.coat_alpha);
+        for number in 0..TERMS {
+            self.terms[0][number][i] = bsdf.albedo.normal.terms[number];
+            self.terms[1][number][i] = bsdf.albedo.grazing.terms[number];
+            self.coat_terms[number][i] = bsdf.coat_albedo.terms[number];
+        }
+        [self.shown[0][i], self.shown[1][i], self.unit[i]] = shown_parts(shown);
+        self.is_coated |= bsdf.coat > 0.0;
+        self.is_diffuse |= bsdf.base != Vec3::ZERO;
+        self.look(i);
+    }
+
+    #[inline(always)]
+    fn fill(
+        &mut self,
+        material: &Principled,
+        _: Option<&UvRow>,
+        shown: &[(u32, ShownLobes)],
+        _: impl Folds,
+    ) -> u32 {
+        let point = material.constant().unwrap_or_else(|| material.bleached());
+        for &(of, shown) in shown {
+            let (of, [diffuse, specular, unit]) = (truths(of), shown_parts(shown));
+            for axis in 0..3 {
+                take(&of, &[point.base[axis]; LANES], &mut self.base[axis]);
+                take(&of, &[point.facets[axis]; LANES], &mut self.facets[axis]);
+                take(&of, &[point.dielectric.0[axis]; LANES], &mut self.dielectric.0[axis]);
+            }
+            for number in 0..TERMS {
+                take(&of, &[point.albedo.normal.terms[number]; LANES], &mut self.terms[0][number]);
+                take(&of, &[point.albedo.grazing.terms[number]; LANES], &mut self.terms[1][number]);
+                take(&of, &[point.coat_albedo.terms[number]; LANES], &mut self.coat_terms[number]);
+            }
+            for (value, own) in [
+                (point.dielectric.1, &mut self.dielectric.1),
+                (point.grazing, &mut self.grazing),
+                (point.alpha, &mut self.alpha),
+                (point.coat, &mut self.coat),
+                (point.coat_alpha, &mut self.coat_alpha),
+                (unit, &mut self.unit),
+            ] {
+                take(&of, &[value; LANES], own);
+            }
+            take(&of, &[diffuse; LANES], &mut self.shown[0]);
+            take(&of, &[specular; LANES], &mut self.shown[1]);
+        }
+        self.is_coated |= point.coat > 0.0;
+        self.is_diffuse |= point.base != Vec3::ZERO;
+        0
+    }
+
+    #[inline(always)]
+    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
+        let mut facings = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let to_eye = -lane(directions, i);
+            set_lane(&mut self.to_eye, i, to_eye);
+            set_lane(&mut facings, i, facing(lane(normals, i), to_eye));
+        }
+        match of {
+            Some(of) => {
+                for axis in 0..3 {
+                    take(of, &facings[axis], &mut self.normal[axis]);
+                }
+            }
+            None => self.normal = facings,
+        }
+        for i in 0..LANES {
+            self.look(i);
+        }
+    }
+
+    #[inline(always)]
+    fn copy(&mut self, i: usize, other: &Self, from: usize) {
+        for (own, other) in [
+            (&mut self.normal, &other.normal),
+            (&mut self.to_eye, &other.to_eye),
+            (&mut self.base, &other.base),
+            (&mut self.facets, &other.facets),
+            (&mut self.dielectric.0, &other.dielectric.0),
+            (&mut self.left, &other.left),
+        ] {
+            set_lane(own, i, lane(other, from));
+        }
+        for (own, other) in [
+            (&mut self.dielectric.1, &other.dielectric.1),
+            (&mut self.grazing, &other.grazing),
+            (&mut self.alpha, &other.alpha),
+            (&mut self.coat, &other.coat),
+            (&mut self.coat_alpha, &other.coat_alpha),
+            (&mut self.through, &other.through),
+            (&mut self.unit, &other.unit),
+        ] {
+            own[i] = other[from];
+        }
+        let own = self.terms.iter_mut().flatten().chain(&mut self.coat_terms);
+        let own = own.chain(&mut self.shares).chain(&mut self.shown);
+        let others = other.terms.iter().flatten().chain(&other.coat_terms);
+        for (own, other) in own.zip(others.chain(&other.shares).chain(&other.shown)) {
+            own[i] = other[from];
+        }
+        self.is_coated |= other.is_coated;
+        self.is_diffuse |= other.is_diffuse;
+    }
+
+    #[inline(always)]
+    fn f(&self, directions: &Lanes3) -> BsdfValues {
+        let (mut f, mut grey) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        for i in 0..LANES {
+            let narrow = self.narrow(i, lane(directions, i));
+            set_lane(&mut f, i, narrow * self.shown[1][i] + Vec3::splat(self.unit[i]));
+            grey[i] = narrow.max_element();
+        }
+        if self.is_diffuse {
+            for i in 0..LANES {
+                let wide = self.wide(i, lane(directions, i));
+                let sum = lane(&f, i) + wide * self.shown[0][i];
+                set_lane(&mut f, i, sum);
+                grey[i] += wide.max_element();
+            }
+        }
+        BsdfValues { f, shared: [grey, [0.0; LANES]] }
+    }
+
+    #[inline(always)]
+    fn parts(&self, directions: &Lanes3, _: &BsdfValues) -> [Lanes3; 2] {
+        let (mut wide, mut narrow) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        for i in 0..LANES {
+            let direction = lane(directions, i);
+            set_lane(&mut wide, i, self.wide(i, direction) * self.shown[0][i]);
+            let value = self.narrow(i, direction) * self.shown[1][i] + Vec3::splat(self.unit[i]);
+            set_lane(&mut narrow, i, value);
+        }
+        [wide, narrow]
+    }
+
+    #[inline(always)]
+    fn grey(&self, values: &BsdfValues) -> Lanes {
+        values.shared[0]
+    }
+
+    #[inline(always)]
+    fn pdf(&self, lobes: LobeSet, normals: &Lanes3, directions: &Lanes3, _: &BsdfValues) -> Lanes {
+        let mut densities = [0.0; LANES];
+        for i in 0..LANES {
+            let direction = lane(directions, i);
+            let [specular, coat] = self.densities(i, direction);
+            let (of_specular, of_coat) = (self.shares[0][i], self.shares[1][i]);
+            let narrow = of_specular * specular + of_coat * coat;
+            densities[i] = match lobes {
+                LobeSet::All => {
+                    let cosine = lane(normals, i).dot(direction);
+                    narrow + (1.0 - of_specular - of_coat) * ahead(cosine) * FRAC_1_PI
+                }
+                LobeSet::Narrow => narrow / (of_specular + of_coat).max(f32::MIN_POSITIVE),
+            };
+        }
+        densities
+    }
+
+    #[inline(always)]
+    fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
+        let mut directions = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let u = [u[0][i], u[1][i]];
+            let (of_specular, of_coat) = (self.shares[0][i], self.shares[1][i]);
+            let choice = match lobes {
+                LobeSet::All => choices[i],
+                LobeSet::Narrow => choices[i] * (of_specular + of_coat),
+            };
+            // The coat comes first, then the specular lobe.
+            let alpha = if choice < of_coat { self.coat_alpha[i] } else { self.alpha[i] };
+            let is_wide = match lobes {
+                LobeSet::All => choice >= of_coat + of_specular,
+                LobeSet::Narrow => false,
+            };
+            let frame = Frame::from_normal(lane(&self.normal, i));
+            let narrow = mirrored(&frame, lane(&self.to_eye, i), [alpha; 2], u);
+            let wide = about(lane(normals, i), u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
+            let choose = |wide: f32, narrow: f32| if is_wide { wide } else { narrow };
+            let chosen =
+                Vec3::new(choose(wide.x, narrow.x), choose(wide.y, narrow.y), choose(wide.z, narrow.z));
+            set_lane(&mut directions, i, chosen);
+        }
+        directions
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobes(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobe(&self, _: usize) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
+        let (normal, to_eye) = (lane(&self.normal, i), lane(&self.to_eye, i));
+        let reflectance = lane(&self.facets, i).max_element();
+        let wide = (lane(&self.base, i) * lane(&self.left, i)).max_element();
+        Some(NarrowLobe::of_microfacets(normal, to_eye, self.alpha[i], reflectance, wide))
+    }
+
+    #[inline(always)]
+    fn narrower_than(&self, _: u32, _: f32) -> u32 {
+        0
+    }
+
+    #[inline(always)]
+    fn even(&self, _: usize) -> Option<Vec3> {
+        None
+    }
+
+    #[inline(always)]
+    fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
+        let mut f = self.narrow(i, direction) * self.shown[1][i] + Vec3::splat(self.unit[i]);
+        if self.is_diffuse {
+            f += self.wide(i, direction) * self.shown[0][i];
+        }
+        f
+    }
+}

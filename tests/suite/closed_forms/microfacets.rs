@@ -1,0 +1,199 @@
+//! Metal, plastic and principled materials in every integrator.
+
+use glimt::integrators::View;
+use glimt::math::{DVec3, Vec3};
+use glimt::scene::description::{EmissionSource, Falloff, Integrator, Material, Shadows};
+
+use super::global::{by_paths, lamps_over_a_floor};
+use super::photons::{assert_same_light, both};
+use super::scenes::{
+    Build, emitter, glass, lat_long_sphere, matte, metal, phong, plastic, principled, scene,
+};
+use super::{assert_close, mean_and_error, v};
+
+/// Materials of lobes of every width.
+fn materials() -> Vec<(&'static str, Material)> {
+    vec![
+        ("narrow metal", metal(0.8, 0.1, 0.0)),
+        ("metal", metal(0.8, 0.5, 0.0)),
+        ("brushed metal", metal(0.8, 0.4, 0.8)),
+        ("wide metal", metal(0.8, 1.0, 0.0)),
+        ("narrow plastic", plastic(0.6, 0.1)),
+        ("plastic", plastic(0.6, 0.5)),
+        ("smooth plastic", plastic(0.6, 0.0)),
+        ("principled", principled(0.6, 0.3, 0.4)),
+    ]
+}
+
+/// A ball of a material alone under an even sky of radiance 1, seen at its edge.
+fn in_the_open(material: Material, depth: u32) -> Build {
+    scene()
+        .environment(1.0)
+        .sphere(v(0.0, 0.0, -5.0), 1.0, material)
+        .seen(DVec3::ZERO, v(0.7, 0.0, -4.0))
+        .depth(depth)
+}
+
+#[test]
+fn white_plastic_vanishes_in_a_furnace() {
+    for roughness in [0.0, 0.05, 0.2, 0.5, 0.8, 1.0] {
+        for at in [v(0.0, 0.0, -4.0), v(0.7, 0.0, -4.0), v(0.97, 0.0, -4.2)] {
+            let build = in_the_open(plastic(1.0, roughness), 1).seen(DVec3::ZERO, at);
+            for (what, build) in [("whitted", build.clone()), ("path", by_paths(build, 1))] {
+                let (mean, error) = mean_and_error(&build.values(1024, 16));
+                assert!(error < 5e-4, "{what}, roughness {roughness} at {at}: ± {error} says nothing");
+                assert!(
+                    (mean - 1.0).abs() < 2e-3 + 4.0 * error,
+                    "{what}, roughness {roughness} at {at}: {mean}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn smooth_metal_reflects_by_the_angle() {
+    // Schlick: F0 + (1 − F0)(1 − cosθ)⁵ at 60°.
+    let build = scene()
+        .environment(1.0)
+        .quad(v(-1.0, -1.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), metal(0.5, 0.0, 0.0))
+        .seen(v(-(3.0_f64.sqrt()), 0.0, 0.0), v(0.0, -1.0, 0.0));
+    for build in [build.clone(), by_paths(build, 4)] {
+        assert_close("at 60°", build.value(), 0.5 + 0.5 * 0.5_f64.powi(5));
+    }
+}
+
+#[test]
+fn every_technique_finds_the_same_light_of_lamps() {
+    for (material, kind) in materials() {
+        for (what, build) in lamps_over_a_floor(&kind) {
+            let whitted = build.clone().depth(1);
+            // Without occluders, unshadowed light is that of light samples alone.
+            let sampled = whitted.clone().shadows(Shadows::Off, 1);
+            let path = mean_and_error(&by_paths(build, 1).values(512, 16));
+            let others = [("whitted", &whitted, 512), ("light samples", &sampled, 2048)];
+            for (technique, build, samples) in others {
+                let (mean, error) = mean_and_error(&build.values(samples, 16));
+                let both = error.hypot(path.1);
+                let off = (mean - path.0).abs();
+                assert!(
+                    off < 5.0 * both + 1e-5 * mean,
+                    "{material}, {what}: {technique} {mean}, path {path:?}, ± {both}"
+                );
+                let is_narrow = technique == "light samples" && material.starts_with("narrow");
+                assert!(
+                    is_narrow || both < 0.03 * mean,
+                    "{material}, {what}, {technique}: ± {both} of {mean}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn samples_of_lobes_alone_find_the_light_of_a_lamp() {
+    // Light samples do not find a lamp within glass; without refraction, that glass changes nothing.
+    for (material, kind) in materials() {
+        let floor = scene()
+            .quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), kind)
+            .seen(v(-0.1, 0.1, 0.02), DVec3::ZERO);
+        let at = v(0.8, 0.9, 0.1);
+        let lit = by_paths(floor.clone().sphere(at, 0.6, emitter(2.0)), 2);
+        let hidden = by_paths(floor.sphere(at, 0.6, emitter(2.0)).sphere(at, 0.65, glass(1.0)), 3);
+        let (both, lobes) = (mean_and_error(&lit.values(1024, 16)), mean_and_error(&hidden.values(4096, 16)));
+        let error = both.1.hypot(lobes.1);
+        assert!(error < 0.02 * both.0, "{material}: {both:?}, {lobes:?}");
+        assert!((both.0 - lobes.0).abs() < 5.0 * error, "{material}: {both:?}, by lobes {lobes:?}");
+    }
+}
+
+#[test]
+fn whitted_shows_what_rough_lobes_mirror() {
+    // One more surface behind the lobe: a wide board that shines as a lamp, and one that is lit.
+    for (material, kind) in materials() {
+        let build = scene()
+            .quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), kind)
+            .quad(v(1.0, 0.0, -4.0), v(0.0, 0.0, 8.0), v(0.0, 4.0, 0.0), matte(0.7))
+            .point_light(v(-3.0, 5.0, 0.0), 40.0, Falloff::Square)
+            .seen(v(-0.1, 0.1, 0.02), DVec3::ZERO);
+        // What the diffuse lobe sends on is missing in whitted: compare the specular parts.
+        let part = |build: Build| mean_and_error(&build.viewed(View::Specular).values(512, 16));
+        let (whitted, path) = (part(build.clone().depth(2)), part(by_paths(build, 2)));
+        if material == "smooth plastic" {
+            continue;
+        }
+        let error = whitted.1.hypot(path.1);
+        assert!(error < 0.02 * path.0, "{material}: {whitted:?}, {path:?}");
+        assert!((whitted.0 - path.0).abs() < 5.0 * error, "{material}: {whitted:?}, by paths {path:?}");
+    }
+}
+
+#[test]
+fn photons_and_paths_see_the_same_light_of_smooth_coats_and_metals() {
+    let room = |depth: u32| {
+        scene()
+            .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), plastic(0.6, 0.0))
+            .quad(v(-1.0, 0.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), matte(0.7))
+            .quad(v(1.0, 0.0, 1.0), v(0.0, 0.0, -2.0), v(0.0, 2.0, 0.0), metal(0.9, 0.3, 0.0))
+            .sphere(v(-0.4, 0.35, 0.0), 0.35, metal(0.8, 0.0, 0.0))
+            .quad(v(-0.5, 1.9, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(4.0))
+            .pictured(v(0.0, 1.0, 3.5), v(0.2, 0.6, -0.9), 30.0, 12, 12)
+            .depth(depth)
+    };
+    for depth in [1, 2, 4] {
+        let means = both(&room(depth), depth, [256, 16], (20_000, 0.05));
+        assert_same_light(&format!("depth {depth}"), means, 8e-3, 3e-3);
+    }
+}
+
+#[test]
+fn the_parts_of_pictures_of_rough_reflections_add_up() {
+    let build = scene()
+        .quad(v(-5.0, -1.0, 5.0), v(10.0, 0.0, 0.0), v(0.0, 0.0, -20.0), plastic(0.5, 0.3))
+        .sphere(v(-1.2, 0.0, -6.0), 1.0, metal(0.9, 0.3, 0.0))
+        .sphere(v(1.2, 0.0, -6.0), 1.0, plastic(0.6, 0.0))
+        .sphere(v(0.0, 1.5, -6.5), 0.6, principled(0.7, 0.2, 0.3))
+        .cuboid(v(0.0, -0.75, -4.0), v(0.6, 0.5, 0.6), DVec3::ZERO, phong(0.5, 0.4, 20.0, 0.0))
+        .quad(v(-1.0, 3.0, -7.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, 2.0), emitter(4.0))
+        .point_light(v(3.0, 4.0, 0.0), 20.0, Falloff::Square)
+        .environment(0.2)
+        .background(0.3)
+        .with(|scene| scene.render.ambient = Vec3::new(0.2, 0.1, 0.3))
+        .pictured(v(0.0, 1.0, 1.0), v(0.0, 0.0, -6.0), 40.0, 24, 16);
+    for integrator in [Integrator::Whitted, Integrator::Path] {
+        let build = build.clone().with(|scene| scene.render.integrator = integrator);
+        let picture = |name: &str| {
+            let view = View::named(name).unwrap_or_else(|| panic!("there is no view {name}"));
+            build.clone().viewed(view).picture(8, 3)
+        };
+        let parts = ["ambient", "diffuse", "specular", "emission"].map(picture);
+        for (pixel, beauty) in picture("beauty").into_iter().enumerate() {
+            let sum: DVec3 = parts.iter().map(|part| part[pixel]).sum();
+            let off = (sum - beauty).abs().max_element();
+            assert!(off <= 2e-5 * beauty.max_element().max(1.0), "{integrator:?}, {pixel}: {sum} {beauty}");
+        }
+    }
+}
+
+#[test]
+fn a_round_mesh_of_metal_has_no_black_edge() {
+    // Where normals turn away from the viewer, what is reflected is still that of the sky.
+    let ball = lat_long_sphere(12, 16, 1.0, DVec3::ZERO);
+    let build = scene()
+        .environment(1.0)
+        .mesh(ball, [DVec3::ONE, DVec3::ZERO, v(0.0, 0.0, -5.0)], metal(0.9, 0.2, 0.0))
+        .smooth()
+        .pictured(DVec3::ZERO, v(0.0, 0.0, -5.0), 24.0, 48, 48);
+    let darkest = build.picture(64, 0).iter().map(|color| color.x).fold(f64::MAX, f64::min);
+    assert!(darkest > 0.6, "{darkest}");
+}
+
+#[test]
+fn lamps_of_metal_shine() {
+    // Emission and reflection add up.
+    let mut lamp = metal(0.9, 0.5, 0.0);
+    let dark = mean_and_error(&in_the_open(lamp.clone(), 1).values(256, 16));
+    lamp.emission = EmissionSource::constant(Vec3::splat(2.0));
+    let lit = mean_and_error(&in_the_open(lamp, 1).values(256, 16));
+    assert!((lit.0 - dark.0 - 2.0).abs() < 5.0 * dark.1.hypot(lit.1) + 1e-5, "{lit:?} {dark:?}");
+}
