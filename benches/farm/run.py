@@ -9,7 +9,8 @@ work over the mean. --large measures 2560 x 1600 pixels, 8 parts alone.
 
 The efficiency of N parts is the processor time of a single run over that of all parts and their merge:
 (set-up + work + write) / (N set-up + work + N write + merge), where the merge takes a part that grows with the bytes of the picture and
-one that grows with N. Work is divided without rest as long as there are tiles (without photons) or blocks of 16 passes (with them).
+one that grows with N. Work is divided without rest among tiles of 32 x 32 pixels, and with photons among blocks of 16 passes: if there
+are more parts than tiles, the others are empty; if there are more parts than blocks, several trace the photons of each block.
 """
 
 import argparse
@@ -51,7 +52,11 @@ def part(program, scene, options, index, count, folder):
     work, write = seconds["photons"] + seconds["render"], seconds["write"]
     # What no stage has: the start of the program, its report, its end.
     rest = total - sum(seconds.values())
-    return {"setup": sum(seconds[name] for name in SETUP) + rest, "work": work, "write": write, "bytes": size}
+    photons = report.get("photons") or {"seconds": 0.0, "passes": 0}
+    tracing = photons["seconds"] / sum(stage["seconds"] for stage in report["stages"] if stage["name"] == "render")
+    setup = sum(seconds[name] for name in SETUP) + rest
+    blocks = -(-photons["passes"] // 16)
+    return {"setup": setup, "work": work, "write": write, "bytes": size, "tracing": tracing, "blocks": blocks}
 
 
 def least(rounds, measure):
@@ -105,7 +110,8 @@ def table(scene, options, arguments, counts, folder):
 
 
 def foretell(single, last, opening):
-    """Prints the efficiency of up to 10,000 parts, for this picture and for one whose work is a night on two cores."""
+    """Prints the efficiency of up to 10,000 parts, for this picture and for one whose work is a night on two cores. With photons, the
+    longer one has more passes."""
     print("\n| parts | efficiency | with 16 hours of work |\n| --- | --- | --- |")
     for count in FORETOLD:
         def of(work):
@@ -113,7 +119,9 @@ def foretell(single, last, opening):
             # A part that is nearly empty is written in no time; its set-up stays.
             each = single["setup"] + last["write"] * last["count"] / max(count, last["count"])
             merge = last["merge"] + opening * count if count > 1 else 0.0
-            return alone / (alone if count == 1 else work + count * each + merge)
+            again = max(1.0, count / (single["blocks"] * work / single["work"])) if single["blocks"] else 1.0
+            all_work = work * (1.0 + single["tracing"] * (again - 1.0))
+            return alone / (alone if count == 1 else all_work + count * each + merge)
 
         print(f"| {count} | {of(single['work']):.3f} | {of(16 * 3600.0):.4f} |")
 

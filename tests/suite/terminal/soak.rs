@@ -118,12 +118,12 @@ impl Figures {
         }
     }
 
-    fn say(&self, when: &str) {
+    fn words(&self, when: &str) -> String {
         let Self { minutes, memory_kib, handles, threads, temporary } = self;
-        eprintln!(
-            "{when}: {minutes:.1} min, memory {:.1} MiB, {handles} handles, {threads} threads, {temporary} temporary files",
-            *memory_kib as f32 / 1024.0
-        );
+        let memory = *memory_kib as f32 / 1024.0;
+        format!(
+            "{when}: {minutes:.1} min, memory {memory:.1} MiB, {handles} handles, {threads} threads, {temporary} temporary files"
+        )
     }
 }
 
@@ -234,7 +234,7 @@ fn soak() {
         images += 2;
         figures.push(Figures::of(&lives, own, begin));
         if images % 20 == 2 {
-            figures[figures.len() - 1].say("now");
+            eprintln!("{}", figures[figures.len() - 1].words("now"));
         }
         next = Instant::now() + PAUSE;
     }
@@ -242,9 +242,9 @@ fn soak() {
     assert!(figures.len() >= 3, "some minutes, please");
     let (first, middle, last) = (figures[0], figures[figures.len() / 2], figures[figures.len() - 1]);
     eprintln!("{events} events, {images} images as by --once; ended as (signal, code): {ends:?}");
-    [("start", first), ("middle", middle), ("end", last)]
-        .iter()
-        .for_each(|(when, figures)| figures.say(when));
+    for (when, figures) in [("start", first), ("middle", middle), ("end", last)] {
+        eprintln!("{}", figures.words(when));
+    }
     let most = figures.iter().map(|figures| figures.memory_kib).max().unwrap_or_default();
     eprintln!("most memory at a look: {:.1} MiB", most as f32 / 1024.0);
     lives.press("q");

@@ -33,7 +33,7 @@ pub(in crate::pipeline) fn render(
         };
         let (plan, most_bytes) = (rendering.plan, rendering.most_film_bytes);
         let state = || FilmState::new(key, plan, most_bytes, convergence, rendering.share.clone());
-        let empty = films.put(&state).map_err(Stop::work)?;
+        let empty = films.put(state).map_err(Stop::work)?;
         let is_of_use = match rendering.keeping.filter(|_| !rendering.force) {
             Some(keeping) => keeping.resume(empty, wanted)?,
             None => true,
