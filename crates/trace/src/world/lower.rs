@@ -31,7 +31,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
         })),
         MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Even(*reflectance)),
         MaterialKind::Metal { fresnel, roughness, anisotropy } => {
-            metal(fresnel_of(fresnel, &color), number(roughness), number(anisotropy))
+            metal(fresnel_of(fresnel, color), number(roughness), number(anisotropy))
         }
         MaterialKind::Plastic { diffuse, specular, ior, roughness } => {
             plastic(color(diffuse), color(specular), number(roughness), *ior)
