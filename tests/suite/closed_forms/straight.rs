@@ -147,7 +147,7 @@ fn a_half_there_surface_shows_the_mean_of_both() {
     for build in [seen.clone(), path(seen)] {
         assert_mean("both", &build.values(256, 64), 0.25 * 4.0 + 0.75);
     }
-    // A mirror that is not there at all, and one that is there by its cutoff.
+    // Black mirrors of some opacity, with cutoffs.
     let cut = |opacity, cutoff| {
         let mut material = veiled(mirror(0.0), opacity);
         material.opacity.cutoff = cutoff;
@@ -250,7 +250,7 @@ fn a_furnace_with_panes_and_veils_stays_one() {
         .sphere(v(0.0, 0.0, -6.0), 1.5, pane(1.0))
         .sphere(v(0.5, 0.5, -6.0), 2.5, veiled(mirror(1.0), 0.4));
     let build = sheet(sheet(build, -2.0, 30.0, pane(1.0)), -2.5, -50.0, veiled(pane(1.0), 0.5)).depth(10_000);
-    assert_mean("by paths", &path(build.clone()).values(256, 64), 1.0);
+    assert_mean("by paths", &path(build).values(256, 64), 1.0);
     // Without anything diffuse, whitted has all light.
     let clear =
         sheet(sheet(scene().environment(1.0), -2.0, 30.0, pane(1.0)), -4.0, -50.0, pane(1.0)).depth(60);

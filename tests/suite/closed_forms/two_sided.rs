@@ -61,7 +61,7 @@ fn a_mesh_lamp_lights_both_sides_alike() {
         triangles: triangles.to_vec(),
         ..TriangleMesh::default()
     };
-    // The sides of the quads are told by the order of corners, and by a placement that mirrors.
+    // The order of corners says which side is the front, a placement that mirrors keeps it.
     for (name, mesh) in [
         ("down", of(&[[0, 1, 2], [0, 2, 3]])),
         ("up", of(&[[0, 2, 1], [0, 3, 2]])),

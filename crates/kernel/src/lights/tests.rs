@@ -204,7 +204,7 @@ fn the_samples_of_both_sides_fill_all_directions_in_which_the_shape_is_seen() {
                 sum += if light.pdf(from, Vec3::Y, &met) > 0.0 { part } else { 0.0 };
             }
             assert!(
-                (sum - seen).abs() < 1e-3 * seen,
+                (sum - seen).abs() <= 1e-3 * seen,
                 "{shape:?} from {from}: {sum} of {seen} sr are sampled"
             );
             // The weights of the samples add up to the same solid angle.

@@ -20,7 +20,7 @@ impl Pane {
         2.0 * side / (1.0 + side)
     }
 
-    /// What goes straight on at the cosine of an angle of incidence.
+    /// Part that goes straight on at the cosine of an angle of incidence.
     #[inline]
     pub fn transmittance(&self, cosine: f32) -> Vec3 {
         self.tint * (1.0 - self.reflectance(cosine))

@@ -89,8 +89,6 @@ impl Moved {
     }
 
     /// Repeated and moved coordinates, side by side.
-    #[cold]
-    #[inline(never)]
     fn row(&self, uv: &[[f64; LANES]; 2], repeat: DVec2) -> [[f64; LANES]; 2] {
         let mut row = *uv;
         for i in 0..LANES {
@@ -163,13 +161,23 @@ impl Texture {
     /// [`Texture::lookup`] side by side, for a texture without mip levels.
     #[inline(always)]
     pub fn lookup_row(&self, uv: &[[f64; LANES]; 2]) -> Lanes3 {
-        let (texels, size) = (&*self.texels, size(&self.texels));
-        let (moved, mut uv, mut repeat) = (&self.moved, uv, self.repeat.as_dvec2());
-        let row;
-        if let Some(moved) = moved {
-            row = moved.row(uv, repeat);
-            (uv, repeat) = (&row, DVec2::ONE);
+        match &self.moved {
+            None => self.repeated_row(uv, self.repeat.as_dvec2()),
+            Some(moved) => self.moved_row(moved, uv),
         }
+    }
+
+    /// [`Texture::lookup_row`] of a texture whose coordinates are moved.
+    #[cold]
+    #[inline(never)]
+    fn moved_row(&self, moved: &Moved, uv: &[[f64; LANES]; 2]) -> Lanes3 {
+        self.repeated_row(&moved.row(uv, self.repeat.as_dvec2()), DVec2::ONE)
+    }
+
+    /// [`Texture::lookup_row`] at coordinates times a factor.
+    #[inline(always)]
+    fn repeated_row(&self, uv: &[[f64; LANES]; 2], repeat: DVec2) -> Lanes3 {
+        let (texels, size) = (&*self.texels, size(&self.texels));
         let folded = [self.wrap.fold_row(&uv[0], repeat.x), self.wrap.fold_row(&uv[1], repeat.y)];
         let extent = [texels.width as i32, texels.height as i32];
         let (mut first, mut part) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);

@@ -44,7 +44,7 @@ impl Passable {
     }
 }
 
-/// What is left of the light on the rays of a packet.
+/// Light that is left on the rays of a packet.
 pub struct Weakened {
     /// A bit for each ray on which nothing is left.
     pub occluded: u32,
@@ -61,7 +61,7 @@ impl World {
         self.passable.is_some()
     }
 
-    /// What is left of the light on the segments of a packet, each with its light. `traced` are the bits of the rays that have an
+    /// Light that is left on the segments of a packet, each with its lamp. `traced` are the bits of the rays that have an
     /// end.
     #[cold]
     #[inline(never)]

@@ -182,7 +182,7 @@ pub fn walk<'a, W: Walker<'a>>(
     walker.reach(&path, Reached::Hidden, true);
 }
 
-/// What a path does at a surface that light may pass straight on.
+/// Continuation of a path at a surface that light may pass.
 #[cold]
 #[inline(never)]
 fn straight<'a, W: Walker<'a>>(

@@ -16,7 +16,7 @@ pub(super) struct Survey<'a> {
     /// Place of a slash that ends the first such corner of a face, with its number missing; `tobj` takes the corner for one
     /// without a slash.
     pub(super) open_corner: Option<usize>,
-    /// Number of vertices, and the places of the colours of those that have one.
+    /// Number of vertices, and the places of the colours among them.
     vertices: usize,
     colors: Vec<Range<usize>>,
 }
