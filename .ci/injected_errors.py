@@ -34,6 +34,8 @@ MICROFACETS = "closed_forms::microfacets::"
 METAL = "materials::metal::tests::"
 PLASTIC = "materials::plastic::tests::"
 PRINCIPLED = "materials::principled::tests::"
+STRAIGHT = "closed_forms::straight::"
+TWO_SIDED = "closed_forms::two_sided::"
 
 # Fault, file, where the expression in ⟦⟧ is, what stands in its place, the test that must fail.
 FAULTS = [
@@ -64,6 +66,16 @@ FAULTS = [
      "reflectance + 0.05", GLOBAL + "mirrors_and_glass_are_followed_as_by_whitted"),
     ("a glossy density off by a factor", "materials/phong/lobes.rs", "let glossy = ⟦(self.shininess + 1.0) * (0.5 * FRAC_1_PI)⟧ * gloss;",
      "(self.shininess + 2.0) * (0.5 * FRAC_1_PI)", "materials::phong::lobes::tests::the_glossy_lobe_is_drawn_by_its_density_however_narrow"),
+    ("a pane that reflects as one side", "materials/pane.rs", "⟦2.0 * side / (1.0 + side)⟧", "side",
+     STRAIGHT + "a_pane_before_a_lamp_by_angle"),
+    ("a veil that stops shadow rays", "materials/mod.rs", "through * there + ⟦Vec3::splat(1.0 - there)⟧", "Vec3::ZERO",
+     STRAIGHT + "shadows_are_as_deep_as_the_product_of_what_is_there"),
+    ("a lamp behind a pane weighed from the pane", "integrators/transport/walk.rs", "path.ray.origin = ⟦self.origin⟧;",
+     "path.ray.origin", STRAIGHT + "a_lamp_lights_through_panes"),
+    ("the back of a lamp weighed as its front", "lights/area/mod.rs", "Side::Back => ⟦LightHit { normal: -met.normal, ..*met }⟧",
+     "*met", TWO_SIDED + "flat_lamps_light_both_sides_alike"),
+    ("textures turned the other way", "materials/texture.rs", "DVec2::new(⟦by.x * cos - by.y * sin⟧,",
+     "by.x * cos + by.y * sin", "materials::texture::tests::coordinates_are_repeated_then_turned_then_moved"),
     ("1 % too much of a lobe", "materials/phong/lobes.rs", "1.0 / (⟦f64::from(self.shininess) + 1.0⟧)",
      "f64::from(self.shininess) * 0.99 + 1.0", "materials::phong::lobes::tests::the_glossy_lobe_is_drawn_by_its_density_however_narrow"),
     ("the wrong side of a lobe", "materials/phong/lobes.rs", "let local = ⟦Vec3::new(sine * cos_phi, sine * sin_phi, cosine)⟧;",

@@ -57,6 +57,24 @@ fn each_edit_redoes_only_what_reads_it() {
 }
 
 #[test]
+fn opacity_and_vertex_colours_redo_only_what_reads_them() {
+    let mut bench = Bench::new(SCENE);
+    assert_statuses(&bench.done().0, "dddddsdd");
+    let mut expect = |from: &str, to: &str, statuses: &str| {
+        bench.edit(from, to);
+        let (report, unchanged) = bench.done();
+        assert_statuses(&report, statuses);
+        assert!(!unchanged, "{to}");
+    };
+    expect("diffuse = [0.5, 0.5, 0.5]", "diffuse = [0.5, 0.5, 0.5]\nopacity = 0.5", "drrrrsdd");
+    expect("translate = [0, 0, 0]", "translate = [0, 0, 0]\nvertex_colors = true", "drrrrsdd");
+    // What emits is a light, which its opacity weakens.
+    expect("opacity = 0.5", "opacity = 0.5\nemission = [1, 1, 1]", "drrrdsdd");
+    expect("opacity = 0.5", "opacity = 0.25", "drrrdsdd");
+    expect("emission = [1, 1, 1]", "emission = [1, 1, 1]\nemission_sides = \"both\"", "drrrdsdd");
+}
+
+#[test]
 fn files_that_a_mesh_names_are_part_of_it() {
     let mut bench = Bench::new(SCENE);
     bench.write("one.mtl", "newmtl a\nKd 1 0 0\n");
