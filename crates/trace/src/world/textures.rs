@@ -115,7 +115,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
     };
     let (used_materials, own_materials) = in_use(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
-        let (textures, is_delta) = (material.textures().into_iter(), material.kind.is_delta());
+        let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta());
         for (texture, role) in textures.filter(|(_, role)| lookups.has(*role, is_delta)) {
             add(NeededTexture {
                 source: declared_source(scene, texture, role.texture_use()),

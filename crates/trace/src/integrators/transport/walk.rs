@@ -201,7 +201,7 @@ fn straight<'a, W: Walker<'a>>(
             whole.medium = walker.tile().without_open(whole.medium);
             walker.meet_pane(&whole, vertex, OpaqueHit::Own(hit), pane)
         }
-        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) => Straight::Stays,
+        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => Straight::Stays,
     }
 }
 
@@ -211,7 +211,7 @@ fn straight<'a, W: Walker<'a>>(
 fn is_touched<'a, W: Walker<'a>>(walker: &mut W, path: &PathRay, vertex: &Vertex<'a>) -> bool {
     match &vertex.material.bsdf {
         Bsdf::Pane(_) => false,
-        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) => {
+        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => {
             is_there(walker.tile(), path, vertex, walker.lookups())
         }
     }
