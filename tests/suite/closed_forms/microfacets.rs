@@ -1,5 +1,6 @@
 //! Metal, plastic and principled materials in every integrator.
 
+use glimt::choice::Choice;
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{EmissionSource, Falloff, Integrator, Material, Shadows};

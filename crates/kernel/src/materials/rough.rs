@@ -33,6 +33,8 @@ macro_rules! kinds {
         pub enum RoughBsdf { $($(#[$doc])* $kind(<$material as RoughMaterial>::Point)),+ }
 
         /// Rough surfaces of one kind, side by side.
+        // Rows are reused, not moved.
+        #[allow(clippy::large_enum_variant)]
         #[derive(Clone, Debug)]
         pub enum BsdfRow { $($(#[$doc])* $kind($row)),+ }
 
