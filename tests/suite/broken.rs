@@ -206,6 +206,21 @@ const BROKEN: &[(&str, &[Said])] = &[
         ],
     ),
     (
+        "microfacets",
+        &[
+            (9, 1, "[materials.none] needs `color`; `color` is missing"),
+            (11, 13, "`roughness` must be between 0 and 1; found 1.5"),
+            (16, 1, "this metal has its reflectance twice"),
+            (17, 14, "`anisotropy` must be between -1 and 1; found -2"),
+            (19, 1, "[materials.half] needs `k`; `k` is missing"),
+            (25, 11, r#"`element` cannot be "alumminium"; did you mean "aluminium"?"#),
+            (29, 12, "`diffuse` must be between 0 and 1; found 2"),
+            (30, 7, "`ior` must be between 1 and 10; found 0.5"),
+            (31, 1, "unknown key `shininess` in [materials.coat]"),
+            (37, 12, r#"`metallic` must be a number, or { texture = "name" }; found the name of a texture"#),
+        ],
+    ),
+    (
         "missing_files",
         &[
             (3, 11, "there is no file …/files/orbiter.txt"),

@@ -383,7 +383,7 @@ fn a_table_of_required_keys_alone_is_enough() {
     let outcome = parse(example(|table, key| !is_kept(table, key)).into(), &path);
     assert_eq!(errors(&outcome.diagnostics), [""; 0]);
     let scene = outcome.scene.expect("a scene");
-    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (10, 6, 3));
+    assert_eq!((scene.objects.len(), scene.lights.len(), scene.materials.len()), (10, 3, 6));
     assert_eq!(scene.output, None);
 }
 
@@ -483,6 +483,7 @@ fn the_ends_of_the_promised_ranges_are_in_them() {
         "[materials.a]\ntype = \"metal\"\neta = 1",
         "[materials.a]\ntype = \"metal\"\ncolor = 1.5",
         "[materials.a]\ntype = \"metal\"\ncolor = 1\nanisotropy = 1.5",
+        "[materials.a]\ntype = \"principled\"\ncolor = { texture = \"b\" }\nroughness = { texture = \"b\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
         "[materials.a]\ntype = \"plastic\"\nior = 0.9",
         "[materials.a]\ntype = \"principled\"\ntransmission = 0.5",
         "[render]\nwidth = 0",

@@ -31,7 +31,9 @@ fn head(heading: &str) -> Option<String> {
     let code = heading.strip_prefix('`')?.strip_suffix('`')?;
     let kind = code.strip_prefix("type = ");
     Some(match kind {
-        Some(r#""phong""# | r#""mirror""# | r#""glass""#) => format!("[materials.it]\n{code}\n"),
+        Some(
+            r#""phong""# | r#""mirror""# | r#""glass""# | r#""metal""# | r#""plastic""# | r#""principled""#,
+        ) => format!("[materials.it]\n{code}\n"),
         Some(_) => format!("[[light]]\n{code}\n"),
         None => format!("{}\n", code.replace("NAME", "it")),
     })
@@ -102,7 +104,15 @@ impl Table {
         // The mesh of the example has none.
         let is_bare = self.head.starts_with("[[mesh]]") && without != "material";
         let material = if is_bare { "material = \"wall\"\n" } else { "" };
-        format!("{camera}{WALL}{}{lines}{material}{line}\n", self.head)
+        // A metal has exactly one of three groups of keys.
+        let group = match without {
+            _ if !self.head.contains("\"metal\"") => "",
+            "color" | "element" => "",
+            "eta" => "k = 1\n",
+            "k" => "eta = 1\n",
+            _ => "color = 1\n",
+        };
+        format!("{camera}{WALL}{}{lines}{material}{group}{line}\n", self.head)
     }
 
     /// Returns the diagnostics of a value of a key.
@@ -179,7 +189,7 @@ impl Key {
 #[test]
 fn the_page_has_the_keys_of_every_table() {
     let tables = tables();
-    assert_eq!(tables.len(), 23);
+    assert_eq!(tables.len(), 26);
     for table in tables {
         let text = table.scene("", "zzz = 1");
         let outcome = parse(text.into(), &root().join("scenes/page.toml"));

@@ -8,7 +8,7 @@ pub mod fresnel;
 pub mod glass;
 pub mod lobe_albedo;
 #[cfg(test)]
-mod lobe_checks;
+mod lobe_tests;
 pub mod metal;
 pub mod microfacet;
 pub mod mipmaps;

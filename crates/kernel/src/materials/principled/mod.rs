@@ -145,7 +145,7 @@ impl Principled {
         Self { inputs, albedos: [specular, if has_coat { coat } else { specular }] }
     }
 
-    fn point(&self, inputs: Inputs) -> PrincipledPoint {
+    fn point(&self, inputs: &Inputs) -> PrincipledPoint {
         let unit = |number: f32| number.clamp(0.0, 1.0);
         let (color, metallic) = (inputs.color.min(Vec3::ONE), unit(inputs.metallic));
         let specular = unit(inputs.specular);
@@ -187,13 +187,13 @@ impl RoughMaterial for Principled {
             clearcoat: self.inputs.clearcoat.at(at, lookups),
             clearcoat_roughness: self.inputs.clearcoat_roughness.at(at, lookups),
         };
-        self.point(inputs)
+        self.point(&inputs)
     }
 
     fn bleached(&self) -> PrincipledPoint {
         let color = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         let number = |number: &Number| number.constant().unwrap_or(1.0);
-        self.point(Inputs {
+        self.point(&Inputs {
             color: color(&self.inputs.color),
             metallic: number(&self.inputs.metallic),
             roughness: number(&self.inputs.roughness),
@@ -205,7 +205,7 @@ impl RoughMaterial for Principled {
     }
 
     fn constant(&self) -> Option<PrincipledPoint> {
-        Some(self.point(Inputs {
+        Some(self.point(&Inputs {
             color: self.inputs.color.constant()?,
             metallic: self.inputs.metallic.constant()?,
             roughness: self.inputs.roughness.constant()?,
