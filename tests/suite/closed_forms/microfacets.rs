@@ -41,8 +41,8 @@ fn white_plastic_vanishes_in_a_furnace() {
         for at in [v(0.0, 0.0, -4.0), v(0.7, 0.0, -4.0), v(0.97, 0.0, -4.2)] {
             let build = in_the_open(plastic(1.0, roughness), 1).seen(DVec3::ZERO, at);
             for (what, build) in [("whitted", build.clone()), ("path", by_paths(build, 1))] {
-                let (mean, error) = mean_and_error(&build.values(1024, 16));
-                assert!(error < 1e-3, "{what}, roughness {roughness} at {at}: ± {error} says nothing");
+                let (mean, error) = mean_and_error(&build.values(2048, 16));
+                assert!(error < 5e-4, "{what}, roughness {roughness} at {at}: ± {error} says nothing");
                 assert!(
                     (mean - 1.0).abs() < 2e-3 + 4.0 * error,
                     "{what}, roughness {roughness} at {at}: {mean}"
@@ -73,8 +73,8 @@ fn every_technique_finds_the_same_light_of_lamps() {
             let sampled = whitted.clone().shadows(Shadows::Off, 1);
             let path = mean_and_error(&by_paths(build, 1).values(512, 16));
             let others = [("whitted", &whitted, 512), ("light samples", &sampled, 2048)];
-            // Half of a sun is behind a ball.
-            let others = if what == "half a sun" { &others[..1] } else { &others[..] };
+            // One of the two balls is before the other, and half of a sun is behind a ball.
+            let others = if ["two", "half a sun"].contains(&what) { &others[..1] } else { &others[..] };
             for &(technique, build, samples) in others {
                 let (mean, error) = mean_and_error(&build.values(samples, 16));
                 let both = error.hypot(path.1);
