@@ -21,6 +21,8 @@ PICTURES = {
     "water.jpg": "--width 480 --height 360 --samples 128",
     "lamps.jpg": "--width 480 --height 300 --samples 64",
     "environment.jpg": "--width 480 --height 300 --samples 128",
+    "metals.jpg": "--width 480 --height 266 --samples 256",
+    "leaves.jpg": "--width 480 --height 360 --samples 256",
     "textures.png": "--width 320 --height 240 --samples 128",
     "ring.png": "--width 480 --height 320 --samples 64",
     "shapes.png": "--width 480 --height 300 --samples 96",
