@@ -149,7 +149,7 @@ fn an_owner_that_cannot_be_kept_is_said() {
         let output = loop {
             match process.output() {
                 Err(error) if error.kind() == std::io::ErrorKind::ExecutableFileBusy => {
-                    std::thread::yield_now()
+                    std::thread::yield_now();
                 }
                 other => break other.expect("it runs"),
             }
