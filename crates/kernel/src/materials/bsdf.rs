@@ -202,6 +202,16 @@ pub trait RoughRow: Clone {
     /// Whether a surface has a narrow lobe, shown or not.
     fn has_narrow_lobe(&self, i: usize) -> bool;
 
+    /// A bit for each surface that has a narrow lobe, shown or not.
+    #[inline(always)]
+    fn narrow_lobes(&self) -> u32 {
+        let mut narrow = 0;
+        for i in 0..LANES {
+            narrow |= u32::from(self.has_narrow_lobe(i)) << i;
+        }
+        narrow
+    }
+
     /// The narrow lobe of a surface. `None` if it has none.
     fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe>;
 

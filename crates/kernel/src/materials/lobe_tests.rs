@@ -295,7 +295,7 @@ pub fn check_neighbours<R: RoughRow>(points: &[R::Point]) {
                 bits.push(row.pdf(lobes, &normals(), &light, &values)[i].to_bits());
                 let sample = lane(&row.sample(lobes, &normals(), &choices, &u), i);
                 // Without a narrow lobe, no ray goes there.
-                if lobes == LobeSet::All || row.has_narrow_lobe(i) {
+                if lobes == LobeSet::All || row.narrow_lobes() & 1 << i != 0 {
                     bits.extend(sample.to_array().map(f32::to_bits));
                 }
             }

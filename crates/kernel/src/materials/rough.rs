@@ -12,9 +12,10 @@ use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, Lanes, Lanes3, Truths};
 
-/// Makes the sums over all kinds of the three traits, whose functions have the same meaning.
+/// Makes the sums over all kinds of the three traits, whose functions have the same meaning. `kept` is how a [`BsdfRow`] keeps
+/// a row: the commonest kind in its place, others by pointer, so that they do not spread the rows of scenes without them.
 macro_rules! kinds {
-    ($($(#[$doc:meta])* $kind:ident($material:ty, $row:ty)),+ $(,)?) => {
+    ($($(#[$doc:meta])* $kind:ident($material:ty, $row:ty, kept: $kept:ty)),+ $(,)?) => {
         /// Kind of a rough BSDF.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum RoughKind { $($(#[$doc])* $kind),+ }
@@ -33,10 +34,10 @@ macro_rules! kinds {
         pub enum RoughBsdf { $($(#[$doc])* $kind(<$material as RoughMaterial>::Point)),+ }
 
         /// Rough surfaces of one kind, side by side.
-        // Rows stay where they are; a row that fills less of its place touches no more of it.
+        // Phong rows stay where they are: a pointer to them would cost every scene.
         #[allow(clippy::large_enum_variant)]
         #[derive(Clone, Debug)]
-        pub enum BsdfRow { $($(#[$doc])* $kind($row)),+ }
+        pub enum BsdfRow { $($(#[$doc])* $kind($kept)),+ }
 
         impl Rough {
             /// Its kind.
@@ -147,7 +148,7 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn prepare(&mut self, kind: RoughKind) {
                 if self.kind() != kind {
-                    *self = match kind { $(RoughKind::$kind => Self::$kind(<$row as RoughRow>::EMPTY)),+ };
+                    *self = match kind { $(RoughKind::$kind => Self::$kind(<$kept>::from(<$row as RoughRow>::EMPTY))),+ };
                 }
             }
 
@@ -236,10 +237,10 @@ macro_rules! kinds {
                 match self { $(Self::$kind(row) => row.has_narrow_lobes()),+ }
             }
 
-            /// [`RoughRow::has_narrow_lobe`].
+            /// [`RoughRow::narrow_lobes`].
             #[inline(always)]
-            pub fn has_narrow_lobe(&self, i: usize) -> bool {
-                match self { $(Self::$kind(row) => row.has_narrow_lobe(i)),+ }
+            pub fn narrow_lobes(&self) -> u32 {
+                match self { $(Self::$kind(row) => row.narrow_lobes()),+ }
             }
 
             /// [`RoughRow::narrow_lobe`].
@@ -271,15 +272,15 @@ macro_rules! kinds {
 
 kinds! {
     /// The normalised Phong model.
-    Phong(Phong, PhongRow),
+    Phong(Phong, PhongRow, kept: PhongRow),
     /// A conductor of microfacets, the same in all azimuths.
-    Metal(Metal, RoundMetalRow),
+    Metal(Metal, RoundMetalRow, kept: Box<RoundMetalRow>),
     /// A conductor of microfacets that are long along u or along v.
-    BrushedMetal(Metal, BrushedMetalRow),
+    BrushedMetal(Metal, BrushedMetalRow, kept: Box<BrushedMetalRow>),
     /// A diffuse base under a coat of microfacets.
-    Plastic(Plastic, PlasticRow),
+    Plastic(Plastic, PlasticRow, kept: Box<PlasticRow>),
     /// The inputs of glTF.
-    Principled(Principled, PrincipledRow),
+    Principled(Principled, PrincipledRow, kept: Box<PrincipledRow>),
 }
 
 impl BsdfRow {

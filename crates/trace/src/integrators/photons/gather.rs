@@ -48,6 +48,7 @@ impl Loops for Gathering<'_> {
         let [looks, choices] = row.sampler(tile).pairs(&row.path, Decision::Gather, 0, 1);
         let Some(most_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let Ways { caustic, indirect, .. } = measure.ways();
+        let narrow = row.bsdf.narrow_lobes();
         for i in lanes(row.used) {
             let (_, _, sample) = tile.block.place(row.slot[i]);
             let pass = maps.pass(sample);
@@ -56,7 +57,7 @@ impl Loops for Gathering<'_> {
             // Choose the maps that hold light for the vertex.
             let look = GatherPoint { point, normal, most_depth };
             // At a surface without a glossy lobe, photons carry the light from a caustic, and the path from there leaves it out.
-            let gathers_bounced = indirect && !row.bsdf.has_narrow_lobe(i);
+            let gathers_bounced = indirect && narrow & 1 << i == 0;
             let gathers_caustic =
                 if only_specular_before { caustic } else { indirect && row.after_gloss & 1 << i != 0 };
             // Choose the maps to look up by chance.

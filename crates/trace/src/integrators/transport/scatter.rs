@@ -92,6 +92,7 @@ impl BsdfSampling<'_> {
         let row = self.row;
         let scattered = self.tile.world.geometry.instructions().run(self);
         let starts = row.starts(&scattered.directions);
+        let narrow = row.bsdf.narrow_lobes();
         let of_lobe = |density: f32| move |cone: &Cone| cone.scattered(density);
         // Make a path of each that goes on.
         next.extend(lanes(scattered.alive).map(|i| {
@@ -107,7 +108,7 @@ impl BsdfSampling<'_> {
                     roulette_throughput: scattered.roulette_throughput[i],
                     only_specular_before: false,
                     one_diffuse_before: row.only_specular_before & 1 << i != 0,
-                    is_after_gloss: row.bsdf.has_narrow_lobe(i),
+                    is_after_gloss: narrow & 1 << i != 0,
                 },
                 cone: cones
                     .get(row.place[i] as usize)
