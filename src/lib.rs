@@ -12,9 +12,9 @@
 //! | [`math`] | numbers, vectors, transforms, colour |
 //! | [`control`] | the cancel token and the progress sink |
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
-//! | [`accel`] | trees over boxes and ids, where a closure tests the shape; trees of boxes (by vector instructions) and of planes over triangles |
+//! | [`accel`] | a bounding volume hierarchy over any shapes, where a closure tests each; over triangles, one by vector instructions, and a k-d tree |
 //! | [`sampling`] | sample streams, warps, distributions |
-//! | [`materials`] | rough BSDFs in rows (phong), mirror, glass; texture lookup, normal maps, Fresnel |
+//! | [`materials`] | rough BSDFs in rows (phong, metal, plastic, principled), smooth coats, mirror, glass, panes; opacity; texture lookup, normal maps, Fresnel |
 //! | [`lights`] | lights without extent (`delta`), from beyond the scene (`infinite`), and shapes that emit (`area`); a tree over many lights; photon emission |
 //! | [`scene`] | the scene file: parsing, validation, diagnostics, the lowered description |
 //! | [`assets`] | bytes → meshes, textures, orbiter cameras |
@@ -49,36 +49,42 @@
 //!
 //! ## The life of a save
 //!
-//! From the event of the watcher to the first cell on the screen, and to the written file:
+//! From the event of the watcher to the picture on the screen, and to the written file. `OUT/` stands for `crates/files/src/output/`:
 //!
-//! 1. `pipeline/watch/mod.rs`: hints of the system, then contents that differ. `cli/live.rs` forwards the news.
+//! 1. `pipeline/watch/mod.rs`: the system hints at a change; the watcher compares contents and reports
+//!    only real differences. `cli/live.rs` forwards them.
 //! 2. `tui/run.rs` receives it as an event (`tui/event.rs`); `tui/update/mod.rs` notes the change.
-//! 3. `tui/update/request.rs` makes a request; `tui/run.rs` sends it.
+//! 3. `tui/update/request.rs` makes a request; `tui/run.rs` sends it. The first cell that changes is the header's: it says
+//!    that a render runs.
 //! 4. `pipeline/worker.rs`: the mailbox of one request; a newer request cancels the render under way.
 //! 5. `pipeline/engine/mod.rs`: `pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes, textures, accel, lights and photons, each reused
-//!    if its key in `keys.rs` is that of before.
-//! 6. `pipeline/render/scheduler.rs` starts passes; `render/first_picture.rs` comes first, `pipeline/trace.rs`
-//!    renders tiles on the pool.
+//!    if its key in `pipeline/keys.rs` is that of before. A broken scene ends here: the picture before it stays.
+//! 6. `pipeline/render/scheduler.rs` starts passes, `pipeline/trace.rs` renders tiles on the pool. A large picture begins with a coarse
+//!    one, `pipeline/render/first_picture.rs`; with photons, `engine/mod.rs` shows one before it traces them.
 //! 7. `integrators/mod.rs` renders a tile: see below. `pipeline/render/film_state.rs` adds its samples to the film.
-//! 8. `pipeline/render/preview.rs` puts a preview into the slot and says so.
+//! 8. `pipeline/render/preview.rs` puts a preview into the slot; `cli/live.rs` tells the front end.
 //! 9. `tui/presenter.rs` takes it when its time comes, `tui/view/preview.rs` makes cells of it, `tui/paint/mod.rs` the cheapest
 //!    bytes, and `tui/writer.rs` writes them.
-//! 10. `pipeline/stages/write.rs` encodes the finished picture; `output/write.rs` renames the temporary file into its place.
+//! 10. `pipeline/stages/write.rs` encodes the finished picture; `OUT/write.rs` renames the temporary file into its place.
 //!
 //! ## The life of a ray
 //!
 //! From the camera to the film; all files are in `integrators/` but where another room is named:
 //!
-//! 1. `mod.rs`: the tile's samples, the settings that count, and by `method.rs` the behaviour of rays; `transport/tile.rs` holds them.
+//! 1. `mod.rs`: takes the tile's samples and the settings that count; `method.rs` derives how rays behave; `transport/tile.rs` stores all.
 //! 2. `transport/camera.rs` makes rows of sixteen rays; `eye.rs` follows them round by round.
 //! 3. `transport/packet.rs` intersects a row: `world/geometry.rs`, then the trees of `accel/wide_bvh/`.
-//! 4. Plain surfaces go into a row of vertices at once, `transport/batch.rs`, with BSDFs of one kind, `materials/rough.rs`.
+//! 4. `packet.rs` puts surfaces of simple materials into rows of sixteen vertices, `transport/batch.rs`; all BSDFs of a row are of
+//!    one kind, `materials/rough.rs`.
 //! 5. Others go one by one: `transport/walk.rs` passes parts of one glass (`crossing.rs`), `vertex.rs` prepares the surface.
 //! 6. At mirrors and glass, `transport/interface.rs` makes the rays of the next round.
 //! 7. `direct/queue.rs` lights rows: `all_lights.rs` or `picked.rs` sample lights, `mis.rs` weighs, `shadow_rays.rs` traces.
 //! 8. `direct/lobe_rays.rs` finds lights in narrow lobes; `photons/gather.rs` adds photons, which `photons/emit.rs` has traced.
 //! 9. `transport/scatter.rs` scatters paths that go on, for the next round.
 //! 10. `transport/accumulator.rs` sums what the view shows, by sample; `film/sums.rs` adds samples to pixels.
+//!
+//! CONTRIBUTING tells, step by step, how to add a key, a shape, a light, a material, an integrator; `tests/README.md` where tests go
+//! and how to run one.
 //!
 //! ## The arrows
 //!

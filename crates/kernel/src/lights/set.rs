@@ -129,9 +129,9 @@ impl Lights {
         Ok(Self { all, ..lights })
     }
 
-    /// Most lamps of a scene whose paths sample all lamps at each vertex; of more, vertices pick some. Measured in rooms of 1 to
-    /// 32 lamps.
-    const MOST_BY_PATHS: usize = 8;
+    /// Most lamps of a scene whose paths sample all lamps at each vertex; of more, vertices pick one. Measured in rooms of 3 to
+    /// 12 lamps.
+    const MOST_BY_PATHS: usize = 3;
 
     /// Set of lights from which vertices pick. `None` if they sample all lights.
     pub fn selection(&self, receivers: Receivers) -> Option<Selection<'_>> {
