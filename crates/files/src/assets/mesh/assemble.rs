@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::Source;
 use super::normals::fill_missing_normals;
+use super::places::shared;
 use super::polygon::triangulate;
 use crate::assets::{AssetError, Dropped, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
@@ -46,6 +47,19 @@ impl Faces {
         self.corners.reserve(3 * triangles);
     }
 
+    /// Gives corners at one place the same vertex, the first of them.
+    fn join(&mut self, positions: &[Vec3], token: &CancelToken) -> Result<(), Cancelled> {
+        let mut first: Vec<u32> = (0..positions.len() as u32).collect();
+        for place in shared(positions, token)? {
+            place.iter().for_each(|&vertex| first[vertex as usize] = place[0]);
+        }
+        self.corners.par_iter_mut().for_each(|corner| *corner = first[*corner as usize]);
+        Ok(())
+    }
+
+    /// Most corners that vertices of 32 bits can number.
+    pub(super) const MOST_CORNERS: usize = u32::MAX as usize;
+
     /// Number of faces.
     pub(super) fn len(&self) -> usize {
         if self.arities.is_empty() { self.corners.len() / 3 } else { self.arities.len() }
@@ -62,6 +76,8 @@ pub(super) struct Parsed {
     /// In sRGB.
     pub(super) colors: Vec<[u8; 3]>,
     pub(super) faces: Faces,
+    /// Whether each face has vertices of its own, of which those at one place become one.
+    pub(super) has_corners_apart: bool,
     pub(super) face_materials: Vec<u32>,
     pub(super) materials: Vec<FileMaterial>,
     pub(super) warnings: Vec<String>,
@@ -82,7 +98,8 @@ pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh
         normals,
         uvs,
         colors,
-        faces,
+        mut faces,
+        has_corners_apart,
         face_materials,
         materials,
         warnings,
@@ -91,6 +108,9 @@ pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh
         pictures,
     } = parsed;
     let (origin, positions) = around_origin(positions, &faces);
+    if has_corners_apart {
+        faces.join(&positions, source.watch.token)?;
+    }
     let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
     let mut cutter = Cutter::new(&positions, &face_materials, most_triangles);
     cutter.cut_all(source, &faces)?;

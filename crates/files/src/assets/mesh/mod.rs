@@ -1,4 +1,4 @@
-//! Mesh files: OBJ with MTL, OFF, PLY. Each parser gives the numbers as the file has them; `assemble` makes a mesh of
+//! Mesh files: OBJ with MTL, OFF, PLY, STL. Each parser gives the numbers as the file has them; `assemble` makes a mesh of
 //! them that keeps the invariants of [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
 
 mod assemble;
@@ -9,6 +9,7 @@ mod off;
 mod places;
 mod ply;
 mod polygon;
+mod stl;
 mod text;
 
 use std::path::Path;
@@ -23,7 +24,7 @@ pub use normals::vertex_normals;
 const FILE_LIMIT: u64 = 4 << 30;
 
 /// The endings that [`load`] knows.
-pub const ENDINGS: [&str; 3] = ["obj", "off", "ply"];
+pub const ENDINGS: [&str; 4] = ["obj", "off", "ply", "stl"];
 
 /// Reads a mesh file; its ending, in any case, chooses the format.
 ///
@@ -41,7 +42,8 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
         "obj" => (obj::parse, read::text),
         "off" => (off::parse, read::lettered),
         "ply" => (ply::parse, read::lettered),
-        _ => return Err(AssetError::unreadable(path, "meshes end in .obj, .off or .ply")),
+        "stl" => (stl::parse, read::bytes),
+        _ => return Err(AssetError::unreadable(path, "meshes end in .obj, .off, .ply or .stl")),
     };
     let watch = Watch { progress, token };
     let bytes = read(path, FILE_LIMIT, watch)?;
@@ -103,7 +105,9 @@ mod tests {
     fn the_ending_chooses_in_any_case() {
         let off = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
         assert_eq!(try_bytes("A.OFF", off).expect("read").mesh.triangles, [[0, 1, 2]]);
-        assert!(try_bytes("a.xyz", off).expect_err("refused").to_string().contains(".obj, .off or .ply"));
+        assert!(
+            try_bytes("a.xyz", off).expect_err("refused").to_string().contains(".obj, .off, .ply or .stl")
+        );
     }
 
     #[test]
@@ -153,7 +157,7 @@ mod tests {
     fn wordy() -> impl Strategy<Value = String> {
         let words = "OFF COFF STOFF 4OFF ply format ascii binary_little_endian 1.0 element vertex face property \
                      list uchar int float x y z vertex_indices end_header v vt vn f l g o usemtl mtllib \
-                     newmtl 0 1 2 3 4 -1 1/1 1//1 2/3/4 7 1e999 nan -inf 4000000000 99999999999999999999 . # \\";
+                     newmtl solid facet normal outer loop vertex endloop endfacet endsolid 0 1 2 3 4 -1 1/1 1//1 2/3/4 7 1e999 nan -inf 4000000000 99999999999999999999 . # \\";
         let words: Vec<&str> = words.split_whitespace().collect();
         let word = (proptest::sample::select(words), proptest::sample::select(vec![" ", "\n", "\r\n", "\t"]));
         proptest::collection::vec(word, 0..60)
@@ -167,7 +171,7 @@ mod tests {
                 let _ = try_bytes(&format!("a.{ending}"), &bytes);
                 let _ = try_bytes(&format!("a.{ending}"), text.as_bytes());
             }
-            for start in ["OFF\n3 1 0\n", "ply\nformat ascii 1.0\n", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"] {
+            for start in ["OFF\n3 1 0\n", "ply\nformat ascii 1.0\n", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "solid\nfacet normal 0 0 1\nouter loop\n"] {
                 for ending in ENDINGS {
                     let _ = try_bytes(&format!("a.{ending}"), format!("{start}{text}").as_bytes());
                 }
