@@ -206,7 +206,28 @@ fn what_does_not_belong_together_is_named_and_nothing_is_written() {
     let said = desk.expect("merge 1.png 2.part 3.part --progress none", 2);
     assert!(said.contains("cannot write 1.png: it is a part"), "{said}");
     desk.expect("compare 1.png away.png", 2);
+    // The name of the picture comes first.
+    let said = desk.expect("merge 1.part 2.part 3.part out.png --progress none", 2);
+    assert!(said.contains("cannot write 1.part: it is a part; name the picture first"), "{said}");
     assert_eq!(names.len(), 3);
+}
+
+#[test]
+fn a_joined_picture_takes_the_place_of_nothing_that_it_is_made_of() {
+    let desk = desk();
+    parts(&desk, 2, "");
+    // A copy elsewhere, as where parts were rendered on other machines.
+    fs::create_dir(desk.path("elsewhere")).expect("a folder");
+    fs::copy(desk.path("tiles.ppm"), desk.path("elsewhere/copy.ppm")).expect("copied");
+    for name in ["tiles.ppm", "elsewhere/copy.ppm"] {
+        for options in ["", "--watch"] {
+            let said = desk.expect(&format!("merge {name} 1.part 2.part {options} --progress none"), 2);
+            let reason = format!("cannot write {name}: the parts were rendered from it (tiles.ppm)");
+            assert!(said.contains(&reason), "{said}");
+            assert_eq!(desk.bytes(name), TILES.as_bytes());
+        }
+    }
+    desk.expect("merge joined.ppm 1.part 2.part --progress none", 0);
 }
 
 #[test]
@@ -215,7 +236,10 @@ fn what_is_there_is_joined_if_that_is_asked_for() {
     desk.expect("room.toml --once --progress none -o one.exr", 0);
     parts(&desk, 4, "");
     let said = desk.expect("merge some.exr 4.part 1.part none.part --partial", 0);
-    assert!(said.contains("warning: 2 of 4 parts are missing: 2/4, 3/4"), "{said}");
+    assert!(
+        said.contains("warning: 2 of 4 parts are missing: 2/4, 3/4; the picture is made of the others"),
+        "{said}"
+    );
     let said = desk.expect("merge all.exr 4.part 3.part 2.part 1.part --partial", 0);
     assert!(!said.contains("missing"), "{said}");
     assert!(

@@ -63,11 +63,12 @@ impl Merge<'_> {
     fn try_run(&self) -> Result<Exit, Exit> {
         let format = self.check_output()?;
         let parts = if self.args.watch { self.watched()? } else { self.opened()? };
+        self.check_inputs(&parts)?;
         let merged = self.merged(&parts, self.args.partial, "merge")?;
         let Some(finish) = parts.first().and_then(|part| part.head.picture.finish()) else {
             return Err(self.console.fail(Exit::WRONG, "the parts do not say how their picture is finished"));
         };
-        self.write(format, &finish, &merged)?;
+        self.write(format, &finish, &merged, &parts)?;
         self.say_missing(&merged);
         Ok(Exit::DONE)
     }
@@ -75,7 +76,6 @@ impl Merge<'_> {
     /// Checks before the work that the output can be written, and is none of the parts.
     fn check_output(&self) -> Result<Format, Exit> {
         let out = &self.args.out;
-        let format = Format::of(out).map_err(|error| self.console.fail(Exit::WRONG, &error.to_string()))?;
         let kept = self.args.parts.iter().find(|part| is_one_file(part, out));
         if kept.is_some() || part::is_part(out) {
             let message = format!(
@@ -84,8 +84,26 @@ impl Merge<'_> {
             );
             return Err(self.console.fail(Exit::WRONG, &message));
         }
+        let format = Format::of(out).map_err(|error| self.console.fail(Exit::WRONG, &error.to_string()))?;
         output::check_target(out).map_err(|error| self.console.fail(Exit::FAILED, &error.to_string()))?;
         Ok(format)
+    }
+
+    /// Checks before the work that the picture does not take the place of a file that it was made of.
+    fn check_inputs(&self, parts: &[PartFile]) -> Result<(), Exit> {
+        match self.refused_input(parts, &self.args.out) {
+            Some(message) => Err(self.console.fail(Exit::WRONG, &message)),
+            None => Ok(()),
+        }
+    }
+
+    /// Why the picture must not be written to a file: the parts were made of it. `None` if they were not.
+    fn refused_input(&self, parts: &[PartFile], path: &Path) -> Option<String> {
+        let name = part::input_in_place_of(parts, path)?;
+        let out = self.args.out.display();
+        Some(format!(
+            "cannot write {out}: the parts were rendered from it ({name}); choose another name for the picture"
+        ))
     }
 
     /// Opens all parts; every one that is wrong is named.
@@ -216,14 +234,20 @@ impl Merge<'_> {
         }
     }
 
-    fn write(&self, format: Format, finish: &Finish, merged: &Merged) -> Result<(), Exit> {
+    fn write(
+        &self,
+        format: Format,
+        finish: &Finish,
+        merged: &Merged,
+        parts: &[PartFile],
+    ) -> Result<(), Exit> {
         let (out, token) = (&self.args.out, self.token);
         let film = &merged.film;
-        let may_replace = |real: &Path| match self.args.parts.iter().any(|part| is_one_file(part, real)) {
-            true => {
-                Err(OutputError::Refused { reason: format!("cannot write {}: it is a part", out.display()) })
-            }
-            false => Ok(()),
+        let may_replace = |real: &Path| {
+            let is_part = self.args.parts.iter().any(|part| is_one_file(part, real));
+            let why = is_part.then(|| format!("cannot write {}: it is a part", out.display()));
+            let why = why.or_else(|| self.refused_input(parts, real));
+            why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
         };
         let is_kept = |path: &Path| self.args.parts.iter().any(|part| is_one_file(part, path));
         let tell = |what: String| self.console.say(&format!("warning: {what}"));
@@ -243,8 +267,8 @@ impl Merge<'_> {
 
     fn say_missing(&self, merged: &Merged) {
         if !merged.missing.is_empty() {
-            let (missing, count) = (merged.missing.clone(), merged.count);
-            self.console.say(&format!("warning: {}", PartError::Missing { missing, count }));
+            let missing = part::missing_parts(&merged.missing, merged.count);
+            self.console.say(&format!("warning: {missing}; the picture is made of the others"));
         }
     }
 }

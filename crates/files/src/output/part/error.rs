@@ -90,7 +90,7 @@ pub enum PartError {
         count: u32,
     },
     /// Some parts are not there.
-    #[error("{} of {count} parts are missing: {}; render them with --shard, or join what is there with --partial", missing.len(), in_a_row(missing, *count))]
+    #[error("{}; render them with --shard, or join what is there with --partial", missing_parts(missing, *count))]
     Missing {
         /// Their numbers.
         missing: Vec<u32>,
@@ -103,6 +103,11 @@ pub enum PartError {
     /// The work was stopped.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
+}
+
+/// `2 of 8 parts are missing: 3/8, 4/8`: the names of some of them.
+pub fn missing_parts(missing: &[u32], count: u32) -> String {
+    format!("{} of {count} parts are missing: {}", missing.len(), in_a_row(missing, count))
 }
 
 /// `1/8, 3/8, 4/8`: at most some of them.

@@ -50,6 +50,14 @@ pub struct Trait {
     pub value: String,
 }
 
+impl Head {
+    /// The name of a file that the picture was made of and that has this hash, in hexadecimal digits. `None` if there is none.
+    pub(super) fn input_of_hash(&self, hash: &str) -> Option<&str> {
+        let is_it = |one: &&Trait| one.name.starts_with(FILE) && one.value == hash;
+        self.identity.iter().find(is_it).map(|one| name_of(&one.name))
+    }
+}
+
 /// Part of a picture that a file holds.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShareHead {

@@ -19,10 +19,10 @@ mod merge;
 mod read;
 mod save;
 
-pub use error::{PartError, WhichPart};
+pub use error::{PartError, WhichPart, missing_parts};
 pub use head::{Head, Kind, PictureHead, ShareHead, ToneHead, Trait, differences};
 pub use merge::{Merged, check, merge};
-pub use read::{PartFile, is_part};
+pub use read::{PartFile, input_in_place_of, is_part};
 pub use save::save;
 
 /// The first bytes of a file. Like those of PNG, they are changed by whatever takes the file for a text.

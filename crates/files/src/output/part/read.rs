@@ -35,6 +35,15 @@ pub fn is_part(path: &Path) -> bool {
     open(path).and_then(|mut file| file.read_exact(&mut mark)).is_ok() && mark == MARK
 }
 
+/// The name of the file that one of these pictures was made of and whose content a file on disk has. `None` if there is none, or the
+/// file cannot be read: an image must not be written in its place, wherever the parts were rendered.
+pub fn input_in_place_of<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(open(path).ok()?).ok()?;
+    let hash = hasher.finalize().to_hex();
+    parts.iter().find_map(|part| part.head.input_of_hash(&hash))
+}
+
 impl PartFile {
     /// Opens a file and reads all of it.
     ///
