@@ -43,6 +43,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             ior,
             specular,
             specular_color,
+            transmission,
             clearcoat,
             clearcoat_roughness,
         } => Bsdf::Rough(Rough::Principled(Principled::new(PrincipledInputs {
@@ -52,10 +53,13 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             ior: *ior,
             specular: number(specular),
             specular_color: color(specular_color),
+            transmission: number(transmission),
             clearcoat: number(clearcoat),
             clearcoat_roughness: number(clearcoat_roughness),
         }))),
-        MaterialKind::Glass { ior, tint } => Bsdf::Glass(Glass::new(*ior, *tint)),
+        MaterialKind::Glass { ior, tint, roughness } => {
+            Bsdf::Glass(Glass::new(*ior, *tint).with_roughness(number(roughness)))
+        }
         MaterialKind::Pane { ior, tint } => Bsdf::Pane(Pane { ior: *ior, tint: *tint }),
     };
     let emission = emission(scene, images, &material.emission);

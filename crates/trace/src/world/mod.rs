@@ -94,6 +94,8 @@ pub struct World {
     bodies: Arc<Bodies>,
     /// Whether any body of glass is open.
     has_open_glass: bool,
+    /// Whether the surface of any glass is rough.
+    has_rough_glass: bool,
     /// The closed shapes of glass that the lens may be in, with their materials.
     glass_at_eye: Vec<(u32, u32)>,
     /// Whether any material has a texture with mip levels.
@@ -195,6 +197,12 @@ impl World {
     pub fn has_coordinates(&self, object: u32) -> bool {
         let mesh = self.geometry.objects()[object as usize].mesh();
         mesh.is_none_or(|mesh| !mesh.tree.loaded().mesh.uvs.is_empty())
+    }
+
+    /// Whether the surface of any glass is rough.
+    #[inline]
+    pub fn has_rough_glass(&self) -> bool {
+        self.has_rough_glass
     }
 
     /// Whether any material has a texture with mip levels, for which rays must know the width of their beams.
