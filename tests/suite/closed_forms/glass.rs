@@ -187,9 +187,9 @@ fn a_white_furnace_seen_from_within_a_ball() {
 fn absorption_along_a_slab_and_a_ball() {
     // Straight through d of tint a: (1 − R)²·aᵈ, R = .04; with all reflections (1 − R)²aᵈ/(1 − R²a²ᵈ).
     let tint = DVec3::new(0.5, 0.9, 0.25);
-    let tinted = tinted(1.5, tint);
-    let ball = scene().sphere(v(0.0, -0.75, 0.0), 0.75, tinted.clone()).seen(v(0.0, 2.0, 0.0), DVec3::ZERO);
-    for (build, d) in [(slab(0.0, tinted), 1.0), (ball, 1.5)] {
+    let green = tinted(1.5, tint);
+    let ball = scene().sphere(v(0.0, -0.75, 0.0), 0.75, green.clone()).seen(v(0.0, 2.0, 0.0), DVec3::ZERO);
+    for (build, d) in [(slab(0.0, green), 1.0), (ball, 1.5)] {
         let lit = lit_from_below(build);
         let straight = lit.clone().depth(2).color();
         let all: Vec<DVec3> = (0..64).map(|seed| lit.clone().depth(60).picture(16, seed)[0]).collect();

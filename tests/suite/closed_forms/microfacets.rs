@@ -8,7 +8,8 @@ use glimt::scene::description::{EmissionSource, Falloff, Integrator, Material, S
 use super::global::{by_paths, lamps_over_a_floor};
 use super::photons::{assert_same_light, both};
 use super::scenes::{
-    Build, emitter, glass, lat_long_sphere, matte, metal, phong, plastic, principled, scene,
+    Build, emitter, frosted, glass, lat_long_sphere, matte, metal, phong, plastic, principled, scene,
+    translucent,
 };
 use super::{assert_close, mean_and_error, v};
 
@@ -23,6 +24,8 @@ fn materials() -> Vec<(&'static str, Material)> {
         ("plastic", plastic(0.6, 0.5)),
         ("smooth plastic", plastic(0.6, 0.0)),
         ("principled", principled(0.6, 0.3, 0.4)),
+        ("rough glass", frosted(1.5, 0.5)),
+        ("sheet", translucent(0.6, 0.4, 0.5)),
     ]
 }
 

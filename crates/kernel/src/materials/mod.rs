@@ -39,7 +39,7 @@ pub use opacity::Opacity;
 pub use pane::Pane;
 pub use phong::Phong;
 pub use plastic::Plastic;
-pub use principled::{Principled, PrincipledInputs};
+pub use principled::{EmissionCoat, Principled, PrincipledInputs};
 pub use rough::{BsdfRow, Rough, RoughBsdf, RoughKind};
 
 use crate::math::Vec3;

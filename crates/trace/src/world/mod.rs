@@ -173,12 +173,13 @@ impl World {
         self.colored.as_ref().is_some_and(|colored| colored[object as usize])
     }
 
-    /// A material and its rough BSDF. `None` if anything bends its normals, its emission is textured, light may pass it straight
-    /// on, or rows are not filled with the BSDF.
+    /// A material and its rough BSDF. `None` if anything bends its normals, its emission is not the same everywhere, light may
+    /// pass it straight on, or rows are not filled with the BSDF.
     pub fn plain_rough(&self, material: usize) -> Option<(&Material, &Rough)> {
         let material = &self.materials[material];
-        if material.normal_map.is_some() || material.emission.texture.is_some() || material.opacity.is_some()
-        {
+        let emission = &material.emission;
+        let is_even = emission.texture.is_none() && emission.coat.is_none();
+        if material.normal_map.is_some() || !is_even || material.opacity.is_some() {
             return None;
         }
         match &material.bsdf {

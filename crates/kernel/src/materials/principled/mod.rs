@@ -126,6 +126,44 @@ impl SchlickAlbedo {
     }
 }
 
+/// A clear coat over what emits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EmissionCoat {
+    /// Its weight.
+    weight: Number,
+    /// The root of its α.
+    roughness: Number,
+    /// Its albedo. `None` if the roughness changes.
+    albedo: Option<LobeAlbedo>,
+}
+
+impl EmissionCoat {
+    /// The coat of this weight and roughness. `None` if it has no weight.
+    pub fn new(weight: Number, roughness: Number) -> Option<Self> {
+        if weight.constant() == Some(0.0) {
+            return None;
+        }
+        let albedo = roughness.constant().map(|one| SchlickAlbedo::of(one).of_coat(COAT_REFLECTANCE));
+        Some(Self { weight, roughness, albedo })
+    }
+
+    /// Part of the light that it lets through, by the cosine of the direction; adds to `lookups`.
+    pub fn left(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> f32 {
+        let weight = self.weight.at(at, lookups).clamp(0.0, 1.0);
+        let between = |roughness: f32| SchlickAlbedo::between(roughness.clamp(0.0, 1.0));
+        let albedo = match self.albedo {
+            Some(albedo) => albedo,
+            None => between(self.roughness.at(at, lookups)).of_coat(COAT_REFLECTANCE),
+        };
+        1.0 - weight * albedo.at(cosine.abs())
+    }
+
+    /// Its textures.
+    pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        [&self.weight, &self.roughness].into_iter().filter_map(Number::texture)
+    }
+}
+
 /// The two tables of [`SchlickAlbedo`].
 fn tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
     let alpha = |roughness: f32| microfacet::alphas(roughness, 0.0)[0];

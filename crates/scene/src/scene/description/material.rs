@@ -251,6 +251,8 @@ pub enum TextureRole {
     NormalMap,
     /// The chance that it is there.
     Opacity(PixelNumber),
+    /// Clear coat over what emits.
+    EmissionCoat(PixelNumber),
 }
 
 impl TextureRole {
@@ -262,7 +264,7 @@ impl TextureRole {
             }
             Self::Roughness(number) => TextureUse::Number(number),
             Self::NormalMap => TextureUse::Normal,
-            Self::Opacity(number) => TextureUse::Number(number),
+            Self::Opacity(number) | Self::EmissionCoat(number) => TextureUse::Number(number),
         }
     }
 }
@@ -409,6 +411,22 @@ impl Material {
         self.emission.scale != Vec3::ZERO
     }
 
+    /// Weight and roughness of the clear coat over what it emits. `None` without emission or coat.
+    pub fn emission_coat(&self) -> Option<[NumberSource; 2]> {
+        match self.kind {
+            MaterialKind::Principled { clearcoat, clearcoat_roughness, .. } => {
+                let has_coat = self.emits() && clearcoat != NumberSource::Constant(0.0);
+                has_coat.then_some([clearcoat, clearcoat_roughness])
+            }
+            MaterialKind::Phong { .. }
+            | MaterialKind::Mirror { .. }
+            | MaterialKind::Glass { .. }
+            | MaterialKind::Pane { .. }
+            | MaterialKind::Metal { .. }
+            | MaterialKind::Plastic { .. } => None,
+        }
+    }
+
     /// The textures that it looks up, as indices into [`Scene::textures`](super::Scene::textures), each with its role; one may
     /// have several.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
@@ -419,7 +437,10 @@ impl Material {
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
         let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
         let opacity = opacity.texture().map(|(texture, number)| (texture, TextureRole::Opacity(number)));
-        colors.chain(numbers).chain(shown).chain(normals).chain(opacity).collect()
+        let coat = self.emission_coat().into_iter().flatten();
+        let coat = coat.filter_map(|number| number.texture(PixelNumber::Luminance));
+        let coat = coat.map(|(texture, number)| (texture, TextureRole::EmissionCoat(number)));
+        colors.chain(numbers).chain(shown).chain(normals).chain(opacity).chain(coat).collect()
     }
 }
 

@@ -126,7 +126,7 @@ impl<'a> Vertex<'a> {
     pub fn emitted(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.state.density > 0.0;
         let at = if is_shared { TexturePoint::sharp(self.surface.uv) } else { self.texture_point };
-        self.material.emission.at(&at, &mut counters.texture_lookups)
+        self.material.emission.at(&at, self.normal.dot(self.to_eye), &mut counters.texture_lookups)
     }
 
     /// A colour of the material, multiplied by the vertex colour.
