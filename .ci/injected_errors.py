@@ -177,7 +177,7 @@ FAULTS = [
     ("a clear coat that takes nothing from the light", "materials/principled/row.rs",
      "if self.is_coated { ⟦self.through[i] * (1.0 - self.coat_albedo(i, ahead(cosine)))⟧ }", "1.0",
      PRINCIPLED + "values_are_those_of_the_formulas_and_reciprocal"),
-    ("a clear coat chosen too often", "materials/principled/row.rs", "let alpha = if choice < ⟦of_coat⟧ {", "1.3 * of_coat",
+    ("a clear coat chosen too often", "materials/principled/row.rs", "let alpha = if (choice < ⟦of_coat⟧) & !THROUGH {", "1.3 * of_coat",
      PRINCIPLED + "samples_are_drawn_by_their_density"),
     ("paths at a smooth coat not divided by their chance", "integrators/eye.rs",
      "let by_chance = if both { 1.0 } else { ⟦1.0 / (1.0 - fresnel)⟧ };", "1.0", MICROFACETS + "white_plastic_vanishes_in_a_furnace"),

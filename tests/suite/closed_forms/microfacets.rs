@@ -123,7 +123,7 @@ fn whitted_shows_what_rough_lobes_mirror() {
             .point_light(v(-3.0, 5.0, 0.0), 40.0, Falloff::Square)
             .seen(v(-0.1, 0.1, 0.02), DVec3::ZERO);
         // What the diffuse lobe sends on is missing in whitted: compare the specular parts.
-        let part = |build: Build| mean_and_error(&build.viewed(View::Specular).values(512, 16));
+        let part = |build: Build| mean_and_error(&build.viewed(View::Specular).values(1024, 16));
         let (whitted, path) = (part(build.clone().depth(2)), part(by_paths(build, 2)));
         if material == "smooth plastic" {
             continue;

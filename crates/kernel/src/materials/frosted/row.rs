@@ -8,8 +8,8 @@ use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 
-/// Surfaces of rough glass, side by side: with light that they reflect, or that comes through. The values of f that are shared are f of
-/// the lobe, whatever is shown, twice.
+/// Surfaces of rough glass, side by side: their reflection, or their transmission. The values of f that are shared are f of the lobe,
+/// whatever is shown, twice.
 #[derive(Clone, Debug)]
 pub struct GlassRow<const THROUGH: bool> {
     /// Unit normals that face the viewer.

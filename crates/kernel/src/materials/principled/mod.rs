@@ -69,7 +69,7 @@ pub struct PrincipledPoint {
     pub grazing: f32,
     /// The reflectances of the dielectric among it.
     pub dielectric: (Vec3, f32),
-    /// What the dielectric does not reflect and goes through: factor on (1 − F)·D·G/(4 cosθᵢ cosθₒ).
+    /// Factor on (1 − F)·D·G/(4 cosθᵢ cosθₒ) for the light that goes through.
     pub transmission: Vec3,
     /// α of the specular lobe.
     pub alpha: f32,
