@@ -34,6 +34,8 @@ MICROFACETS = "closed_forms::microfacets::"
 METAL = "materials::metal::tests::"
 PLASTIC = "materials::plastic::tests::"
 PRINCIPLED = "materials::principled::tests::"
+FROSTED = "closed_forms::frosted::"
+ROUGH_GLASS = "materials::frosted::tests::"
 STRAIGHT = "closed_forms::straight::"
 TWO_SIDED = "closed_forms::two_sided::"
 
@@ -175,12 +177,47 @@ FAULTS = [
     ("a clear coat that takes nothing from the light", "materials/principled/row.rs",
      "if self.is_coated { ⟦self.through[i] * (1.0 - self.coat_albedo(i, ahead(cosine)))⟧ }", "1.0",
      PRINCIPLED + "values_are_those_of_the_formulas_and_reciprocal"),
-    ("a clear coat chosen too often", "materials/principled/row.rs", "let alpha = if choice < ⟦of_coat⟧ {", "1.3 * of_coat",
+    ("a clear coat chosen too often", "materials/principled/row.rs", "let alpha = if (choice < ⟦of_coat⟧) & !THROUGH {", "1.3 * of_coat",
      PRINCIPLED + "samples_are_drawn_by_their_density"),
     ("paths at a smooth coat not divided by their chance", "integrators/eye.rs",
      "let by_chance = if both { 1.0 } else { ⟦1.0 / (1.0 - fresnel)⟧ };", "1.0", MICROFACETS + "white_plastic_vanishes_in_a_furnace"),
     ("a smooth coat throws too much", "integrators/photons/emit.rs", "specular * ⟦if chooses { 1.0 } else { fresnel }⟧", "1.0",
      MICROFACETS + "photons_and_paths_see_the_same_light_of_smooth_coats_and_metals"),
+    ("the Jacobian of refraction dropped", "materials/frosted/row.rs",
+     "transmittance(cosines, indices) / ⟦half.squared⟧;", "1.0", ROUGH_GLASS + "what_comes_through_is_what_the_formulas_say_and_reciprocal"),
+    ("the Jacobian of the wrong side", "materials/frosted/row.rs", "let value = value * (⟦self.far[i] * self.far[i]⟧);",
+     "self.near[i] * self.near[i]", ROUGH_GLASS + "reflection_and_transmission_are_what_quadrature_of_f_has_and_never_more_than_all"),
+    ("η swapped in the transmission", "materials/frosted/row.rs", "let indices = ⟦[self.near[i], self.far[i]]⟧;",
+     "[self.far[i], self.near[i]]", ROUGH_GLASS + "what_comes_through_is_what_the_formulas_say_and_reciprocal"),
+    ("η swapped in the reflection", "materials/frosted/row.rs",
+     "let reflectance = dielectric_either(half.cosine(), ⟦self.far[i] / self.near[i]⟧);", "self.near[i] / self.far[i]",
+     ROUGH_GLASS + "what_is_reflected_is_what_the_formulas_say_and_reciprocal"),
+    ("glass that is refracted by the wrong η", "materials/frosted/row.rs", "⟦refracted_at(half, to_eye, eta)⟧ } else {",
+     "refracted_at(half, to_eye, 1.0 / eta)", ROUGH_GLASS + "samples_of_both_sides_are_drawn_by_their_density"),
+    ("G by the wrong side of glass", "materials/frosted/row.rs", "let lit = ⟦if THROUGH { -normal } else { normal }⟧;", "normal",
+     ROUGH_GLASS + "what_comes_through_is_what_the_formulas_say_and_reciprocal"),
+    ("both sides of glass go on", "materials/frosted/row.rs", "if ⟦is_mirrored == THROUGH⟧ { useless }", "false",
+     ROUGH_GLASS + "a_path_goes_on_at_exactly_one_side"),
+    ("Fresnel's reflectance of glass dropped", "materials/frosted/row.rs",
+     "return ⟦reflectance⟧ * eye.reflected", "1.0", ROUGH_GLASS + "samples_of_both_sides_are_drawn_by_their_density"),
+    ("a boundary that lets 1 % too much through", "materials/fresnel.rs", "⟦2.0⟧ * ((n_1 * n_2) * (cos_1 * cos_2)) * inverse",
+     "2.02", ROUGH_GLASS + "reflection_and_transmission_are_what_quadrature_of_f_has_and_never_more_than_all"),
+    ("light that goes through by F in place of 1 − F", "materials/principled/row.rs",
+     "let left = Vec3::ONE - ⟦(facets + (Vec3::splat(grazing) - facets) * weight)⟧;", "(facets + (Vec3::splat(grazing) - facets) * (1.0 - weight))",
+     PRINCIPLED + "what_goes_through_is_the_lobe_mirrored_to_the_other_side"),
+    ("a sheet whose light goes through too often", "materials/principled/row.rs",
+     "LobeSet::All => ⟦1.0 - of_through⟧,", "1.0 - 1.3 * of_through", PRINCIPLED + "samples_of_both_sides_are_drawn_by_their_density"),
+    ("light from behind the wrong side", "integrators/transport/vertex.rs", "sides: ⟦self.sides.map(turned)⟧, ..*self",
+     "self.sides", FROSTED + "every_technique_finds_the_same_light_that_comes_through"),
+    ("the medium of the wrong side", "integrators/eye.rs", "&PathRay { medium: ⟦far⟧, ..*path }", "path.medium",
+     FROSTED + "whitted_follows_rough_glass_as_paths_do"),
+    ("of touching glasses the earlier one is rough", "integrators/transport/crossing.rs",
+     "let later = ⟦near.glass().max(far.glass())⟧?;", "near.glass().or(far.glass())",
+     FROSTED + "of_touching_glasses_the_later_one_is_rough_or_smooth"),
+    ("photons that keep their basic flux", "integrators/photons/emit.rs", "path.throughput * (counts / ⟦(eta * eta)⟧)", "1.0",
+     FROSTED + "photons_scatter_at_rough_glass_to_both_sides"),
+    ("photons that do not go through", "integrators/photons/emit.rs", "if ⟦self.open_behind.used != 0⟧ {", "false",
+     FROSTED + "photons_scatter_at_rough_glass_to_both_sides"),
     ("rays of rough lobes counted beside light samples", "integrators/direct/mis.rs",
      "Self::Paths | Self::NarrowPaths => ⟦1.0 / count as f32⟧,", "0.0", MICROFACETS + "every_technique_finds_the_same_light_of_lamps"),
 ]

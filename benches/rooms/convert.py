@@ -1,4 +1,4 @@
-"""A scene file of glimt as Mitsuba's dictionary: diffuse, mirror and glass, lamps, textures, a sky, quads, boxes, spheres, disks,
+"""A scene file of glimt as Mitsuba's dictionary: diffuse, mirror, glass, panes, metal by `eta` and `k`, and plastic, lamps, textures, a sky, quads, boxes, spheres, disks,
 cylinders and meshes. What has no equal there, or is not written yet, ends the translation with its name."""
 
 import numpy as np
@@ -121,9 +121,25 @@ class Conversion:
         table = self.content["materials"][name]
         where = f"[materials.{name}]"
         kind = table.get("type", "phong")
+        # α of its microfacets.
+        alpha = table.get("roughness", {"plastic": 0.1, "metal": 0.2}.get(kind, 0.0)) ** 2
+        rough = {"distribution": "ggx", "alpha": max(alpha, 1e-3)} if alpha > 0 else {}
+        outside = {"int_ior": table.get("ior", 1.5), "ext_ior": 1.0}
+        if kind == "glass" and table.get("thin"):
+            known(table, where, "type", "ior", "thin", "tint")
+            return {"type": "thindielectric", **outside, "specular_transmittance": self.rgb(table.get("tint", 1))}, None
         if kind == "glass":
-            known(table, where, "type", "ior")
-            return {"type": "dielectric", "int_ior": table.get("ior", 1.5), "ext_ior": 1.0}, None
+            known(table, where, "type", "ior", "roughness")
+            return {"type": "roughdielectric" if rough else "dielectric", **outside, **rough}, None
+        if kind == "metal":
+            known(table, where, "type", "eta", "k", "roughness")
+            index = {"eta": self.rgb(table["eta"]), "k": self.rgb(table["k"])}
+            return {"type": "twosided", "b": {"type": "roughconductor" if rough else "conductor", **index, **rough}}, None
+        if kind == "plastic":
+            known(table, where, "type", "diffuse", "ior", "roughness")
+            base = {"diffuse_reflectance": self.rgb(table.get("diffuse", 0.7)), "nonlinear": True}
+            coat = {"type": "roughplastic" if rough else "plastic", **outside, **rough, **base}
+            return {"type": "twosided", "b": coat}, None
         if kind == "mirror":
             known(table, where, "type", "reflectance")
             reflectance = self.rgb(table.get("reflectance", 0.9))

@@ -218,6 +218,9 @@ const BROKEN: &[(&str, &[Said])] = &[
             (30, 7, "`ior` must be between 1 and 10; found 0.5"),
             (31, 1, "unknown key `shininess` in [materials.coat]"),
             (37, 12, r#"`metallic` must be a number, or { texture = "name" }; found the name of a texture"#),
+            (42, 13, "a thin pane is smooth"),
+            (46, 13, "`roughness` must be between 0 and 1; found -1"),
+            (50, 16, "`transmission` must be between 0 and 1; found 2"),
         ],
     ),
     (

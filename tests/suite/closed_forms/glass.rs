@@ -5,10 +5,10 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
 use glimt::materials::fresnel::{dielectric, refract};
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{Material, MaterialKind, Mesh, Shape};
+use glimt::scene::description::{Material, Mesh, Shape};
 use glimt::world::Geometry;
 
-use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, lat_long_sphere, plain, scene};
+use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, lat_long_sphere, scene, tinted};
 use super::{assert_close, assert_mean, v};
 
 /// Horizontal and downward step of a ray at an angle to the vertical.
@@ -187,9 +187,9 @@ fn a_white_furnace_seen_from_within_a_ball() {
 fn absorption_along_a_slab_and_a_ball() {
     // Straight through d of tint a: (1 − R)²·aᵈ, R = .04; with all reflections (1 − R)²aᵈ/(1 − R²a²ᵈ).
     let tint = DVec3::new(0.5, 0.9, 0.25);
-    let tinted = plain(MaterialKind::Glass { ior: 1.5, tint });
-    let ball = scene().sphere(v(0.0, -0.75, 0.0), 0.75, tinted.clone()).seen(v(0.0, 2.0, 0.0), DVec3::ZERO);
-    for (build, d) in [(slab(0.0, tinted), 1.0), (ball, 1.5)] {
+    let green = tinted(1.5, tint);
+    let ball = scene().sphere(v(0.0, -0.75, 0.0), 0.75, green.clone()).seen(v(0.0, 2.0, 0.0), DVec3::ZERO);
+    for (build, d) in [(slab(0.0, green), 1.0), (ball, 1.5)] {
         let lit = lit_from_below(build);
         let straight = lit.clone().depth(2).color();
         let all: Vec<DVec3> = (0..64).map(|seed| lit.clone().depth(60).picture(16, seed)[0]).collect();
@@ -203,7 +203,7 @@ fn absorption_along_a_slab_and_a_ball() {
     // Through a ball at the angle θ: the chord is 2R·cos θ', T = (1 − R(θ))²·a^chord.
     let h = 0.7_f64;
     let ball = scene()
-        .sphere(DVec3::ZERO, 1.0, plain(MaterialKind::Glass { ior: 1.5, tint }))
+        .sphere(DVec3::ZERO, 1.0, tinted(1.5, tint))
         .background(1.0)
         .depth(2)
         .seen(v(h, 3.0, 0.0), v(h, 0.0, 0.0));

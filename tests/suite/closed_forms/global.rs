@@ -7,7 +7,7 @@ use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{ColorSource, Falloff, Integrator, Material, MaterialKind, Shadows, Shape};
 
 use super::distant::sun;
-use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, plain, scene};
+use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tinted};
 use super::{assert_close, assert_mean, lambert, mean_and_error, v};
 
 /// A scene that is rendered by paths.
@@ -410,10 +410,9 @@ fn light_inside_glass_is_tinted_on_its_way_from_the_lamp_as_well() {
     // Floor, lamp and eye are in one glass: tint^(lamp to floor) · tint^(floor to eye).
     let tint = 0.5_f64;
     let inside = || {
-        let glass = MaterialKind::Glass { ior: 1.5, tint: DVec3::splat(tint) };
+        let glass = tinted(1.5, DVec3::splat(tint));
         let floor = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
-        let room =
-            scene().shape(floor, matte(0.6)).cuboid(DVec3::Y, v(8.0, 6.0, 8.0), DVec3::ZERO, plain(glass));
+        let room = scene().shape(floor, matte(0.6)).cuboid(DVec3::Y, v(8.0, 6.0, 8.0), DVec3::ZERO, glass);
         room.seen(v(0.0, 1.5, 0.0), DVec3::ZERO)
     };
     let to_eye = tint.powf(1.5);

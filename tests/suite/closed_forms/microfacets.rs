@@ -8,7 +8,8 @@ use glimt::scene::description::{EmissionSource, Falloff, Integrator, Material, S
 use super::global::{by_paths, lamps_over_a_floor};
 use super::photons::{assert_same_light, both};
 use super::scenes::{
-    Build, emitter, glass, lat_long_sphere, matte, metal, phong, plastic, principled, scene,
+    Build, emitter, frosted, glass, lat_long_sphere, matte, metal, phong, plastic, principled, scene,
+    translucent,
 };
 use super::{assert_close, mean_and_error, v};
 
@@ -23,6 +24,8 @@ fn materials() -> Vec<(&'static str, Material)> {
         ("plastic", plastic(0.6, 0.5)),
         ("smooth plastic", plastic(0.6, 0.0)),
         ("principled", principled(0.6, 0.3, 0.4)),
+        ("rough glass", frosted(1.5, 0.5)),
+        ("sheet", translucent(0.6, 0.4, 0.5)),
     ]
 }
 
@@ -120,7 +123,7 @@ fn whitted_shows_what_rough_lobes_mirror() {
             .point_light(v(-3.0, 5.0, 0.0), 40.0, Falloff::Square)
             .seen(v(-0.1, 0.1, 0.02), DVec3::ZERO);
         // What the diffuse lobe sends on is missing in whitted: compare the specular parts.
-        let part = |build: Build| mean_and_error(&build.viewed(View::Specular).values(512, 16));
+        let part = |build: Build| mean_and_error(&build.viewed(View::Specular).values(1024, 16));
         let (whitted, path) = (part(build.clone().depth(2)), part(by_paths(build, 2)));
         if material == "smooth plastic" {
             continue;

@@ -9,6 +9,7 @@ mod facets;
 mod far;
 mod film;
 mod footprints;
+mod frosted;
 mod glass;
 mod global;
 mod hard;

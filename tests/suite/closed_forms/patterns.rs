@@ -102,7 +102,7 @@ fn by_directions(build: &Build) -> f64 {
             let surface = world.geometry.surface(&ray, &hit);
             if surface.normal.dot(ray.direction) < 0.0 {
                 let emission = &world.materials[world.material_index(&hit)].emission;
-                sum += f64::from(emission.at(&TexturePoint::sharp(surface.uv), &mut 0).x);
+                sum += f64::from(emission.at(&TexturePoint::sharp(surface.uv), 1.0, &mut 0).x);
             }
         }
     }

@@ -357,18 +357,34 @@ pub fn principled(color: f32, metallic: f32, roughness: f32) -> Material {
         ior: 1.5,
         specular: number(1.0),
         specular_color: ColorSource::Constant(Vec3::ONE),
+        transmission: number(0.0),
         clearcoat: number(0.5),
         clearcoat_roughness: number(0.1),
     })
 }
 
 pub fn glass(ior: f32) -> Material {
-    plain(MaterialKind::Glass { ior, tint: DVec3::ONE })
+    tinted(ior, DVec3::ONE)
+}
+
+/// Rough glass.
+pub fn frosted(ior: f32, roughness: f32) -> Material {
+    let roughness = NumberSource::Constant(roughness);
+    plain(MaterialKind::Glass { ior, tint: DVec3::ONE, roughness })
+}
+
+/// A principled material under a clear coat, which transmits this part of the light.
+pub fn translucent(color: f32, roughness: f32, transmission: f32) -> Material {
+    let mut material = principled(color, 0.0, roughness);
+    if let MaterialKind::Principled { transmission: own, .. } = &mut material.kind {
+        *own = NumberSource::Constant(transmission);
+    }
+    material
 }
 
 /// Glass of this transmittance per unit of length.
 pub fn tinted(ior: f32, tint: DVec3) -> Material {
-    plain(MaterialKind::Glass { ior, tint })
+    plain(MaterialKind::Glass { ior, tint, roughness: NumberSource::Constant(0.0) })
 }
 
 /// A material of a mesh file by its illumination model: 2 is matte grey, 9 glass.

@@ -4,10 +4,10 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::materials::Glass;
 use glimt::math::transform::rotation_xyz;
 use glimt::math::{DMat3, DVec3, Vec3};
-use glimt::scene::description::{MaterialKind, Shape};
+use glimt::scene::description::Shape;
 
 use super::glass::boxes;
-use super::scenes::{AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, plain, scene};
+use super::scenes::{self, AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, scene};
 use super::{Random, assert_close, mean_and_error, v};
 
 /// Unpolarised reflectance between indices `n` and `m` of a ray whose sine in air is `sine`, by Fresnel's amplitudes.
@@ -303,7 +303,7 @@ fn glass_that_stands_on_something_opaque() {
 #[test]
 fn tints_count_where_their_glass_is() {
     // Straight down through 1 of one tint and 2 of another, of one index: no surface between them reflects.
-    let tinted = |tint: f64| plain(MaterialKind::Glass { ior: 1.5, tint: DVec3::splat(tint) });
+    let tinted = |tint: f64| scenes::tinted(1.5, DVec3::splat(tint));
     let level = Turned::by(DVec3::ZERO);
     let r = fresnel(1.0, 1.5, 0.0);
     for first in [false, true] {
@@ -322,7 +322,7 @@ fn tints_count_where_their_glass_is() {
 fn where_glasses_overlap_the_later_counts() {
     // From y = 2 to 0 and from 1 to −1: between 1 and 0 the later one.
     let level = Turned::by(DVec3::ZERO);
-    let tinted = |ior: f32, tint: f64| plain(MaterialKind::Glass { ior, tint: DVec3::splat(tint) });
+    let tinted = |ior: f32, tint: f64| scenes::tinted(ior, DVec3::splat(tint));
     for (order, exact) in [([0, 1], 0.5 * 0.8 * 0.8), ([1, 0], 0.5 * 0.5 * 0.8)] {
         let own = [
             (level.cuboid(v(-9.0, 0.0, -9.0), v(9.0, 2.0, 9.0)), tinted(1.0, 0.5)),

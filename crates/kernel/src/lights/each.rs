@@ -94,7 +94,8 @@ impl Lights {
         for i in lanes(used) {
             let weight = lane(&row.weights, i);
             if let Some(texture) = lights[i].emission_texture().filter(|_| weight != Vec3::ZERO) {
-                let weight = weight * texture.at(lane(&row.targets, i), row.sources.part[i]);
+                let (target, direction) = (lane(&row.targets, i), lane(&row.directions, i));
+                let weight = weight * texture.at(target, row.sources.part[i], direction);
                 set_lane(&mut row.weights, i, weight);
                 lookups += 1;
             }

@@ -1,7 +1,11 @@
 //! The interface of rough BSDFs: lobes that are not δ, in rows of sixteen surfaces of one kind.
 //!
-//! A kind is a file that implements the three traits, and a line in the table of [`rough`](super::rough). No other file tells kinds
+//! A kind is a file that implements the traits, and a line in the table of [`rough`](super::rough). No other file tells kinds
 //! apart: an integrator asks a [`BsdfRow`](super::BsdfRow) for `f`, `pdf` and `sample` of all lanes at once.
+//!
+//! A row has the light of one side. A surface that also lets light through is two vertices, whose BSDFs are of two kinds: one is lit
+//! from the viewer's side, the other from behind, with its shading normal there. Both take the same random numbers, by which
+//! [`RoughRow::sample`] goes on at exactly one of them; the pdfs are those of one ray from both.
 //!
 //! A kind may have a narrow lobe beside its wide ones, whose light has rays of its own: see [`LobeSet::Narrow`].
 
@@ -56,7 +60,7 @@ pub struct BsdfValues {
 /// Directions at a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
-    /// Unit shading normal on the viewer's side.
+    /// Unit shading normal on the side of the light: the viewer's, but for light that comes through the surface.
     pub normal: Vec3,
     /// Unit direction to the viewer.
     pub to_eye: Vec3,
@@ -148,8 +152,6 @@ pub trait RoughPoint {
 
 /// Rough surfaces of one kind, side by side. All functions run inside of loops for each instruction set.
 pub trait RoughRow: Clone {
-    /// The material.
-    type Material: RoughMaterial<Point = Self::Point>;
     /// The material at one point.
     type Point: RoughPoint;
 
@@ -164,19 +166,6 @@ pub trait RoughRow: Clone {
 
     /// Sets a surface.
     fn put(&mut self, i: usize, bsdf: &Self::Point, shown: ShownLobes, place: &Place);
-
-    /// Sets the surfaces of some lanes to a material, looked up at these texture coordinates, or bleached without them. Each entry
-    /// of `shown` replaces those before it. Returns a bit for each surface that reflects nothing.
-    fn fill(
-        &mut self,
-        material: &Self::Material,
-        uv: Option<&UvRow>,
-        shown: &[(u32, ShownLobes)],
-        folds: impl Folds,
-    ) -> u32;
-
-    /// Sets shading normals on the viewer's side, and directions from the viewer; in these lanes only, if any are given.
-    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3);
 
     /// Takes a surface of another row.
     fn copy(&mut self, i: usize, other: &Self, from: usize);
@@ -223,4 +212,23 @@ pub trait RoughRow: Clone {
 
     /// f in sr⁻¹ of the shown lobes of a surface for light from a direction.
     fn f_at(&self, i: usize, direction: Vec3) -> Vec3;
+}
+
+/// Rows of surfaces that have this BSDF for all of their light, whatever is around them.
+pub trait MaterialRow: RoughRow {
+    /// The material.
+    type Material: RoughMaterial<Point = Self::Point>;
+
+    /// Sets the surfaces of some lanes to a material, looked up at these texture coordinates, or bleached without them. Each entry
+    /// of `shown` replaces those before it. Returns a bit for each surface that reflects nothing.
+    fn fill(
+        &mut self,
+        material: &Self::Material,
+        uv: Option<&UvRow>,
+        shown: &[(u32, ShownLobes)],
+        folds: impl Folds,
+    ) -> u32;
+
+    /// Sets shading normals on the viewer's side, and directions from the viewer; in these lanes only, if any are given.
+    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3);
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::footprint::TexturePoint;
+use super::principled::EmissionCoat;
 use super::texture::Texture;
 use crate::choice;
 use crate::math::Vec3;
@@ -26,6 +27,8 @@ pub struct Emission {
     pub texture: Option<Arc<Texture>>,
     /// Sides that emit.
     pub sides: EmissionSides,
+    /// Clear coat that weakens the radiance by its direction. `None` if there is none.
+    pub coat: Option<Arc<EmissionCoat>>,
 }
 
 impl Emission {
@@ -34,7 +37,7 @@ impl Emission {
 
     /// The same emission everywhere on the front.
     pub const fn constant(scale: Vec3) -> Self {
-        Self { scale, texture: None, sides: EmissionSides::Front }
+        Self { scale, texture: None, sides: EmissionSides::Front, coat: None }
     }
 
     /// Whether it may be above 0 somewhere.
@@ -57,11 +60,12 @@ impl Emission {
         self.shines() && (is_front || self.is_two_sided())
     }
 
-    /// The radiance at texture coordinates; adds to `lookups`.
+    /// The radiance at texture coordinates, by the cosine of its direction; adds to `lookups`.
     #[inline]
-    pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        let Some(texture) = self.texture.as_ref().filter(|_| self.shines()) else { return self.scale };
+    pub fn at(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> Vec3 {
+        let left = self.coat.as_ref().map_or(1.0, |coat| coat.left(at, cosine, lookups));
+        let Some(texture) = self.texture.as_ref().filter(|_| self.shines()) else { return self.scale * left };
         *lookups += 1;
-        self.scale * texture.lookup(at)
+        self.scale * texture.lookup(at) * left
     }
 }

@@ -22,12 +22,34 @@ pub fn dielectric(cos_incident: f32, eta: f32) -> (f32, Option<f32>) {
 /// [`dielectric`] from outside in `f32`, for rows: `eta` ≥ 1.
 #[inline(always)]
 pub fn dielectric_outside(cos_incident: f32, eta: f32) -> f32 {
-    let cos_t = ((eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident).sqrt();
+    by_root(cos_incident, eta, (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident)
+}
+
+/// [`dielectric`] from either side in `f32`, for rows; 1 for total internal reflection.
+#[inline(always)]
+pub fn dielectric_either(cos_incident: f32, eta: f32) -> f32 {
+    let squared = (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
+    by_root(cos_incident, eta, if squared > 0.0 { squared } else { 0.0 })
+}
+
+/// The reflectance, given the squared cosine of the transmitted direction times η².
+#[inline(always)]
+fn by_root(cos_incident: f32, eta: f32, cos2_t: f32) -> f32 {
+    let cos_t = cos2_t.sqrt();
     let squared = eta * eta;
     // Both cosines are multiplied by η. At grazing angles without a boundary nothing is divided by 0.
     let parallel = (squared * cos_incident - cos_t) / (squared * cos_incident + cos_t).max(f32::MIN_POSITIVE);
     let perpendicular = (cos_incident - cos_t) / (cos_incident + cos_t).max(f32::MIN_POSITIVE);
     0.5 * (parallel * parallel + perpendicular * perpendicular)
+}
+
+/// The part that a boundary lets through, of unpolarised light, by both cosines to its normal and both indices of refraction: the same
+/// to the bit from either side, and without cancellation.
+#[inline(always)]
+pub fn transmittance([cos_1, cos_2]: [f32; 2], [n_1, n_2]: [f32; 2]) -> f32 {
+    let (parallel, perpendicular) = (n_2 * cos_1 + n_1 * cos_2, n_1 * cos_1 + n_2 * cos_2);
+    let inverse = 1.0 / (parallel * parallel) + 1.0 / (perpendicular * perpendicular);
+    2.0 * ((n_1 * n_2) * (cos_1 * cos_2)) * inverse
 }
 
 /// Unpolarised reflectance of a conductor of index η and extinction k (Born and Wolf, *Principles of Optics*, section 14.2).
@@ -79,6 +101,21 @@ mod tests {
                     (exact - found).abs() < 2e-6 || eta == 1.0 && cosine == 0.0,
                     "{eta} {cosine}: {found}"
                 );
+            }
+        }
+    }
+
+    #[test]
+    fn both_sides_of_a_boundary_agree() {
+        for eta in [0.4_f32, 0.75, 1.01, 1.5, 2.5] {
+            for step in 1..=1000_u16 {
+                let cosine = f32::from(step) / 1000.0;
+                let (exact, through) = dielectric(cosine, eta);
+                assert!((exact - dielectric_either(cosine, eta)).abs() < 2e-5, "{eta} {cosine}");
+                let Some(beyond) = through else { continue };
+                let there = transmittance([cosine, beyond], [1.0, eta]);
+                assert!((1.0 - exact - there).abs() < 2e-5, "{eta} {cosine}: {there}");
+                assert_eq!(there, transmittance([beyond, cosine], [eta, 1.0]));
             }
         }
     }

@@ -1,27 +1,50 @@
-//! Smooth glass.
+//! Glass that fills its shape.
 
+use super::footprint::TexturePoint;
+use super::microfacet;
+use super::number::Number;
 use crate::math::elementary::exp2;
 use crate::math::{DVec3, Vec3};
 
-/// A smooth dielectric that fills its shape.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A dielectric that fills its shape, smooth or rough.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Glass {
     /// Index of refraction inside; outside is 1.
     pub ior: f32,
     /// Transmittance per unit of length inside, as precise as `f32` allows.
     pub tint: Vec3,
+    /// The root of α; the constant 0 if it is smooth.
+    pub roughness: Number,
     /// Halvings of light per unit of length. In scenes that are small for their unit, the tint of a coloured pane is too small for
     /// `f32`, and in large ones too near to 1.
     density: Vec3,
 }
 
 impl Glass {
-    /// Glass with a transmittance in [0, 1] per unit of length inside.
+    /// Smooth glass with a transmittance in [0, 1] per unit of length inside.
     pub fn new(ior: f32, tint: DVec3) -> Self {
         // Opaque glass gets a large density, as ∞ over no distance would be NaN.
         let halvings =
             |part: f64| if part < 1.0 { (-libm::log2(part)).min(f32::MAX.into()) as f32 } else { 0.0 };
-        Self { ior, tint: tint.as_vec3(), density: Vec3::from_array(tint.to_array().map(halvings)) }
+        let density = Vec3::from_array(tint.to_array().map(halvings));
+        Self { ior, tint: tint.as_vec3(), roughness: Number::Constant(0.0), density }
+    }
+
+    /// The glass with a surface of this roughness.
+    pub fn with_roughness(self, roughness: Number) -> Self {
+        Self { roughness, ..self }
+    }
+
+    /// Whether its surface is smooth.
+    #[inline]
+    pub fn is_smooth(&self) -> bool {
+        self.roughness.constant() == Some(0.0)
+    }
+
+    /// α of its surface. `None` if it is smooth.
+    #[inline]
+    pub fn alpha(&self, at: &TexturePoint, lookups: &mut u64) -> Option<f32> {
+        (!self.is_smooth()).then(|| microfacet::alphas(self.roughness.at(at, lookups), 0.0)[0])
     }
 
     /// Transmittance over `distance` inside (Beer's law).

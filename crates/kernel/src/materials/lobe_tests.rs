@@ -35,23 +35,61 @@ pub fn reference(one: DVec3, other: DVec3, [u, v]: [f64; 2]) -> f64 {
     distribution / (1.0 + lambda(one) + lambda(other)) / (4.0 * one.z * other.z)
 }
 
+/// The light of a narrow lobe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// Facets mirror it.
+    Mirrored,
+    /// Facets refract it; the index of refraction on its side is so many times that on the viewer's.
+    Refracted(f64),
+    /// Facets mirror it, and it comes from the other side.
+    Through,
+}
+
+impl Light {
+    /// The sign of z on its side.
+    fn side(self) -> f64 {
+        match self {
+            Self::Mirrored => 1.0,
+            Self::Refracted(_) | Self::Through => -1.0,
+        }
+    }
+}
+
 /// A surface about z, seen from a direction.
 pub struct Subject<R: RoughRow> {
     row: R,
     to_eye: DVec3,
     alphas: [f64; 2],
+    light: Light,
 }
 
 impl<R: RoughRow> Subject<R> {
     /// The surface of a material; `alphas` are those of its narrow lobe.
     pub fn new(point: &R::Point, alphas: [f32; 2], to_eye: DVec3) -> Self {
+        Self::lit(point, alphas, to_eye, Light::Mirrored)
+    }
+
+    /// [`Subject::new`] with other light.
+    pub fn lit(point: &R::Point, alphas: [f32; 2], to_eye: DVec3, light: Light) -> Self {
         let mut row = R::EMPTY;
         row.reset();
         for i in 0..LANES {
-            let place = Place { normal: Vec3::Z, to_eye: to_eye.as_vec3(), tangent: TANGENT };
+            let normal = Vec3::Z * light.side() as f32;
+            let place = Place { normal, to_eye: to_eye.as_vec3(), tangent: TANGENT };
             row.put(i, point, ShownLobes::ALL, &place);
         }
-        Self { row, to_eye, alphas: alphas.map(f64::from) }
+        Self { row, to_eye, alphas: alphas.map(f64::from), light }
+    }
+
+    /// Normals on the side of the light.
+    fn normals(&self) -> Lanes3 {
+        [[0.0; LANES], [0.0; LANES], [self.light.side() as f32; LANES]]
+    }
+
+    /// The height of a direction above the surface, on the side of the light.
+    fn height(&self, direction: DVec3) -> f64 {
+        direction.z * self.light.side()
     }
 
     /// f, its wide part and the pdf for light from these directions.
@@ -63,7 +101,7 @@ impl<R: RoughRow> Subject<R> {
                 set_lane(&mut rows, i, direction.as_vec3());
             }
             let values = self.row.f(&rows);
-            let pdf = self.row.pdf(lobes, &normals(), &rows, &values);
+            let pdf = self.row.pdf(lobes, &self.normals(), &rows, &values);
             let [wide, narrow] = self.row.parts(&rows, &values);
             for i in 0..some.len() {
                 let (wide, narrow) = (lane(&wide, i).as_dvec3(), lane(&narrow, i).as_dvec3());
@@ -96,7 +134,7 @@ impl<R: RoughRow> Subject<R> {
                 u[0][i as usize] = place(number % side, next());
                 u[1][i as usize] = place(number / side % side, next());
             }
-            let directions: Lanes3 = self.row.sample(lobes, &normals(), &choices, &u);
+            let directions: Lanes3 = self.row.sample(lobes, &self.normals(), &choices, &u);
             all.extend((0..LANES).map(|i| lane(&directions, i).as_dvec3()));
         }
         all.truncate(count as usize);
@@ -105,22 +143,46 @@ impl<R: RoughRow> Subject<R> {
 
     /// The albedo of all lobes by their samples: the mean of f·cos/pdf.
     pub fn sampled_albedo(&self, side: u32) -> DVec3 {
-        let samples = self.samples(LobeSet::All, side);
+        self.mean_of(self.samples(LobeSet::All, side))
+    }
+
+    /// [`Subject::sampled_albedo`] with sixteen choices for each place of the grid.
+    pub fn albedo_by_choices(&self, side: u32) -> DVec3 {
+        let mut next = random(6);
+        let mut samples = Vec::new();
+        for number in 0..side * side {
+            let [x, y] =
+                [number % side, number / side].map(|i| ((i as f32 + next()) / side as f32).min(0.999_999_9));
+            let choices = std::array::from_fn(|i| ((i as f32 + next()) / LANES as f32).min(0.999_999_9));
+            let u = [[x; LANES], [y; LANES]];
+            let directions = self.row.sample(LobeSet::All, &self.normals(), &choices, &u);
+            samples.extend((0..LANES).map(|i| lane(&directions, i).as_dvec3()));
+        }
+        self.mean_of(samples)
+    }
+
+    /// The mean of f·cos/pdf.
+    fn mean_of(&self, samples: Vec<DVec3>) -> DVec3 {
         let values = self.values(LobeSet::All, &samples);
         let sum: DVec3 = samples
             .iter()
             .zip(values)
-            .filter(|(direction, (_, _, pdf))| direction.z > 0.0 && *pdf > 0.0)
-            .map(|(direction, (f, _, pdf))| f * (direction.z / pdf))
+            .filter(|(direction, (_, _, pdf))| self.height(**direction) > 0.0 && *pdf > 0.0)
+            .map(|(direction, (f, _, pdf))| f * (self.height(*direction) / pdf))
             .sum();
         sum / samples.len() as f64
     }
 
     /// The albedo by quadrature of f: of the narrow lobe over half vectors, of the wide ones over directions.
     pub fn albedo(&self) -> DVec3 {
+        self.albedo_by_rings(192)
+    }
+
+    /// [`Subject::albedo`] by so many rings of half vectors.
+    pub fn albedo_by_rings(&self, rings: u32) -> DVec3 {
         let narrow: DVec3 = self
-            .half_vectors(192, 192)
-            .map(|(direction, weight)| (direction, weight * direction.z))
+            .half_vectors(rings, 192)
+            .map(|(direction, weight)| (direction, weight * self.height(direction)))
             .collect::<Vec<_>>()
             .chunks(LANES)
             .map(|some| {
@@ -140,7 +202,7 @@ impl<R: RoughRow> Subject<R> {
         narrow + wide * (PI / f64::from(rings * steps))
     }
 
-    /// Directions above the surface, mirrored at half vectors in equal steps of y and of the azimuth, each with the solid angle that
+    /// Directions above the surface, by half vectors in equal steps of y and of the azimuth, each with the solid angle that
     /// it stands for. (1 − y)² is the part of D outside of an angle, so that the tail has its steps.
     fn half_vectors(&self, rings: u32, steps: u32) -> impl Iterator<Item = (DVec3, f64)> {
         (0..rings * steps).filter_map(move |i| {
@@ -152,23 +214,42 @@ impl<R: RoughRow> Subject<R> {
     }
 
     /// The direction at a place of the map of half vectors, and its solid angle for one unit of the map. `None` below the surface.
-    fn at_half_vector(&self, y: f64, phi: f64) -> Option<(DVec3, f64)> {
+    pub fn at_half_vector(&self, y: f64, phi: f64) -> Option<(DVec3, f64)> {
         let [u, v] = self.alphas;
         let outside = (1.0 - y) * (1.0 - y);
         let slope = ((1.0 - outside) / outside).sqrt();
         let (sin, cos) = libm::sincos(phi);
         let half = DVec3::new(u * slope * cos, v * slope * sin, 1.0).normalize();
         let cosine = half.dot(self.to_eye);
-        let direction = half * (2.0 * cosine) - self.to_eye;
+        let mirrored = half * (2.0 * cosine) - self.to_eye;
+        // The solid angle of directions for one of half vectors.
+        let (direction, spread) = match self.light {
+            Light::Mirrored => (mirrored, 4.0 * cosine),
+            Light::Through => (DVec3::new(mirrored.x, mirrored.y, -mirrored.z), 4.0 * cosine),
+            Light::Refracted(eta) => {
+                let beyond = (eta * eta - 1.0 + cosine * cosine).sqrt();
+                if beyond.is_nan() {
+                    return None;
+                }
+                let direction = (half * (cosine - beyond) - self.to_eye) / eta;
+                (direction, (cosine - beyond).powi(2) / (eta * beyond))
+            }
+        };
         let stretched = (half.x / u).powi(2) + (half.y / v).powi(2) + half.z * half.z;
         let density = half.z / (PI * u * v * stretched * stretched);
-        (cosine > 0.0 && direction.z > 0.0).then(|| (direction, 4.0 * cosine * 2.0 * (1.0 - y) / density))
+        let is_seen = cosine > 0.0 && self.height(direction) > 0.0;
+        is_seen.then(|| (direction, spread * 2.0 * (1.0 - y) / density))
     }
 
     /// The place of a direction on the map of half vectors.
     fn place(&self, direction: DVec3) -> [f64; 2] {
         let [u, v] = self.alphas;
-        let half = (direction + self.to_eye).normalize();
+        let sum = match self.light {
+            Light::Mirrored => direction + self.to_eye,
+            Light::Through => DVec3::new(direction.x, direction.y, -direction.z) + self.to_eye,
+            Light::Refracted(eta) => self.to_eye + direction * eta,
+        };
+        let half = if sum.z < 0.0 { -sum } else { sum }.normalize();
         let (x, y) = (half.x / u / half.z, half.y / v / half.z);
         let slope2 = x * x + y * y;
         [1.0 - 1.0 / (1.0 + slope2).sqrt(), libm::atan2(y, x).rem_euclid(TAU) / TAU]
@@ -177,30 +258,31 @@ impl<R: RoughRow> Subject<R> {
     /// Compares samples with the pdf by χ² over cells of the map of half vectors: at most six standard deviations above its mean.
     pub fn check_samples(&self, what: &str, lobes: LobeSet) {
         const CELLS: u32 = 16;
-        const FINE: u32 = 12;
+        // Before total reflection, refraction ends as a root does.
+        let fine = if let Light::Refracted(_) = self.light { 36 } else { 12 };
         let mut next = random(23);
         let mut counts = vec![0.0; (CELLS * CELLS + 1) as usize];
         let total = 400 * 400;
         for _ in 0..total / LANES {
             let mut numbers = || std::array::from_fn(|_| next());
-            let directions = self.row.sample(lobes, &normals(), &numbers(), &[numbers(), numbers()]);
+            let directions = self.row.sample(lobes, &self.normals(), &numbers(), &[numbers(), numbers()]);
             for i in 0..LANES {
                 let direction = lane(&directions, i).as_dvec3();
                 let [y, turn] = self.place(direction);
                 let cell = |part: f64| ((part * f64::from(CELLS)) as u32).min(CELLS - 1);
                 let below = CELLS * CELLS;
-                let number = if direction.z > 0.0 { cell(y) * CELLS + cell(turn) } else { below };
+                let number = if self.height(direction) > 0.0 { cell(y) * CELLS + cell(turn) } else { below };
                 counts[number as usize] += 1.0;
             }
         }
         // Integrate the pdf over each cell; what is left is below the surface.
-        let side = CELLS * FINE;
+        let side = CELLS * fine;
         let part = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
         let places: Vec<(usize, DVec3, f64)> = (0..side * side)
             .filter_map(|i| {
                 let (ring, step) = (i / side, i % side);
                 let (direction, solid_angle) = self.at_half_vector(part(ring), part(step) * TAU)?;
-                Some(((ring / FINE * CELLS + step / FINE) as usize, direction, solid_angle))
+                Some(((ring / fine * CELLS + step / fine) as usize, direction, solid_angle))
             })
             .collect();
         let directions: Vec<DVec3> = places.iter().map(|place| place.1).collect();
@@ -224,10 +306,6 @@ impl<R: RoughRow> Subject<R> {
         assert!((rest[0] - rest[1]).abs() <= 6.0 * rest[1].sqrt() + 30.0, "{what}: {rest:?} in small cells");
         assert!(sum < cells + 6.0 * (2.0_f64 * cells).sqrt(), "{what}: χ² {sum} over {cells} cells");
     }
-}
-
-fn normals() -> Lanes3 {
-    [[0.0; LANES], [0.0; LANES], [1.0; LANES]]
 }
 
 /// Checks that light and viewer may change places, and that f is that of a reference, in many directions about the peak and all over.
@@ -268,6 +346,12 @@ pub fn check_values<R: RoughRow>(
 
 /// Checks that each surface has the same bits of values, pdfs and samples among all others as alone.
 pub fn check_neighbours<R: RoughRow>(points: &[R::Point]) {
+    check_neighbours_lit::<R>(points, Light::Mirrored);
+}
+
+/// [`check_neighbours`] with other light.
+pub fn check_neighbours_lit<R: RoughRow>(points: &[R::Point], lit: Light) {
+    let normals = [[0.0; LANES], [0.0; LANES], [lit.side() as f32; LANES]];
     let mut next = random(31);
     for first in 0..points.len() {
         let to_eye: [Vec3; LANES] = std::array::from_fn(|_| {
@@ -275,7 +359,8 @@ pub fn check_neighbours<R: RoughRow>(points: &[R::Point]) {
         });
         let mut light = [[0.0; LANES]; 3];
         for i in 0..LANES {
-            set_lane(&mut light, i, direction(f64::from(next()), f64::from(next()) * TAU).as_vec3());
+            let way = direction(f64::from(next()), f64::from(next()) * TAU);
+            set_lane(&mut light, i, DVec3::new(way.x, way.y, way.z * lit.side()).as_vec3());
         }
         let (choices, u) =
             (std::array::from_fn(|_| next()), [(); 2].map(|()| std::array::from_fn(|_| next())));
@@ -283,7 +368,8 @@ pub fn check_neighbours<R: RoughRow>(points: &[R::Point]) {
             let mut row = R::EMPTY;
             row.reset();
             for i in (0..LANES).filter(|i| of(*i)) {
-                let place = Place { normal: Vec3::Z, to_eye: to_eye[i], tangent: TANGENT };
+                let place =
+                    Place { normal: Vec3::Z * lit.side() as f32, to_eye: to_eye[i], tangent: TANGENT };
                 row.put(i, &points[(first + i) % points.len()], ShownLobes::ALL, &place);
             }
             row
@@ -292,8 +378,8 @@ pub fn check_neighbours<R: RoughRow>(points: &[R::Point]) {
             let values = row.f(&light);
             let mut bits: Vec<u32> = lane(&values.f, i).to_array().map(f32::to_bits).to_vec();
             for lobes in [LobeSet::All, LobeSet::Narrow] {
-                bits.push(row.pdf(lobes, &normals(), &light, &values)[i].to_bits());
-                let sample = lane(&row.sample(lobes, &normals(), &choices, &u), i);
+                bits.push(row.pdf(lobes, &normals, &light, &values)[i].to_bits());
+                let sample = lane(&row.sample(lobes, &normals, &choices, &u), i);
                 // Without a narrow lobe, no ray goes there.
                 if lobes == LobeSet::All || row.narrow_lobes() & 1 << i != 0 {
                     bits.extend(sample.to_array().map(f32::to_bits));

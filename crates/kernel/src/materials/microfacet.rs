@@ -45,7 +45,7 @@ pub fn facing(normal: Vec3, to_eye: Vec3) -> Vec3 {
 /// The unnormalised half vector of two unit directions, by a unit normal.
 #[derive(Clone, Copy)]
 pub struct Half {
-    /// Squared length, (2 cosθ)² of the angle θ to either direction.
+    /// Squared length; of a reflection (2 cosθ)² of the angle θ to either direction.
     pub squared: f32,
     /// Component along the normal.
     pub along: f32,
@@ -62,7 +62,16 @@ impl Half {
         Self { squared: sum.length_squared(), along, across: sum - normal * along }
     }
 
-    /// Cosine between it and either direction.
+    /// The half vector of a refraction: the sum of the directions by the indices of refraction around them (Walter et al. 2007,
+    /// section 5.3), but for its sign; and that sum.
+    #[inline(always)]
+    pub fn refracted(normal: Vec3, [one, other]: [Vec3; 2], [of_one, of_other]: [f32; 2]) -> (Self, Vec3) {
+        let sum = one * of_one + other * of_other;
+        let along = sum.dot(normal);
+        (Self { squared: sum.length_squared(), along, across: sum - normal * along }, sum)
+    }
+
+    /// Cosine between it and either direction of a reflection.
     #[inline(always)]
     pub fn cosine(&self) -> f32 {
         0.5 * self.squared.sqrt()
@@ -165,10 +174,32 @@ pub fn frame_along(normal: Vec3, tangent: Vec3) -> Frame {
 /// Visible Normals*, JCGT 7(4), 2018). It may be behind the surface, where nothing is reflected.
 #[inline(always)]
 pub fn mirrored(frame: &Frame, to_eye: Vec3, alphas: [f32; 2], u: [f32; 2]) -> Vec3 {
-    let local = Vec3::new(frame.s.dot(to_eye), frame.t.dot(to_eye), frame.n.dot(to_eye));
-    let half = frame.to_world(visible_normal(local, alphas, u));
+    mirrored_at(facet(frame, to_eye, alphas, u), to_eye)
+}
+
+/// A direction, mirrored at a facet of this unit normal.
+#[inline(always)]
+pub fn mirrored_at(half: Vec3, to_eye: Vec3) -> Vec3 {
     let direction = half * (2.0 * half.dot(to_eye)) - to_eye;
     direction * (1.0 / direction.length_squared().sqrt())
+}
+
+/// The direction of light that a facet of this unit normal refracts towards a viewer; `eta` is the index of refraction there, divided by
+/// that around the viewer. Any unit direction for total internal reflection.
+#[inline(always)]
+pub fn refracted_at(half: Vec3, to_eye: Vec3, eta: f32) -> Vec3 {
+    let cosine = half.dot(to_eye);
+    let squared = (eta - 1.0) * (eta + 1.0) + cosine * cosine;
+    let root = if squared > 0.0 { squared } else { 0.0 }.sqrt();
+    let direction = half * (cosine - root) - to_eye;
+    direction * (1.0 / direction.length_squared().sqrt())
+}
+
+/// Samples the unit normal of a facet that is visible from a direction.
+#[inline(always)]
+pub fn facet(frame: &Frame, to_eye: Vec3, alphas: [f32; 2], u: [f32; 2]) -> Vec3 {
+    let local = Vec3::new(frame.s.dot(to_eye), frame.t.dot(to_eye), frame.n.dot(to_eye));
+    frame.to_world(visible_normal(local, alphas, u))
 }
 
 /// Samples a unit normal, visible from a direction, all in the frame of the surface.

@@ -5,6 +5,7 @@ pub mod coated;
 pub mod emission;
 pub mod footprint;
 pub mod fresnel;
+pub mod frosted;
 pub mod glass;
 pub mod lobe_albedo;
 #[cfg(test)]
@@ -27,6 +28,7 @@ pub mod texture;
 pub use coated::Coated;
 pub use emission::{Emission, EmissionSides};
 pub use footprint::{Footprint, TexturePoint};
+pub use frosted::GlassPoint;
 pub use glass::Glass;
 pub use metal::{Metal, MetalFresnel};
 pub use mipmaps::Mipmaps;
@@ -37,7 +39,7 @@ pub use opacity::Opacity;
 pub use pane::Pane;
 pub use phong::Phong;
 pub use plastic::Plastic;
-pub use principled::{Principled, PrincipledInputs};
+pub use principled::{EmissionCoat, Principled, PrincipledInputs};
 pub use rough::{BsdfRow, Rough, RoughBsdf, RoughKind};
 
 use crate::math::Vec3;
@@ -62,7 +64,8 @@ impl Material {
             Bsdf::Rough(rough) => rough.has_textures() || rough.has_direction(),
             Bsdf::Mirror(mirror) => mirror.textures().next().is_some(),
             Bsdf::Coated(coated) => coated.textures().next().is_some() || coated.base.has_textures(),
-            Bsdf::Glass(_) | Bsdf::Pane(_) => false,
+            Bsdf::Glass(glass) => glass.roughness.texture().is_some(),
+            Bsdf::Pane(_) => false,
         };
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         in_bsdf || self.normal_map.is_some() || self.emission.texture.is_some() || of_opacity.is_some()
@@ -97,7 +100,8 @@ impl Material {
             Bsdf::Coated(coated) => {
                 coated.base.is_mipmapped() || coated.textures().any(|texture| texture.mipmaps.is_some())
             }
-            Bsdf::Glass(_) | Bsdf::Pane(_) => false,
+            Bsdf::Glass(glass) => glass.roughness.texture().is_some_and(|texture| texture.mipmaps.is_some()),
+            Bsdf::Pane(_) => false,
         };
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         let of_normals = self.normal_map.as_ref().map(|map| &map.texture);
@@ -113,7 +117,7 @@ pub enum Bsdf {
     Rough(Rough),
     /// A perfect mirror.
     Mirror(Mirror),
-    /// A smooth dielectric.
+    /// A smooth or rough dielectric.
     Glass(Glass),
     /// A thin pane of glass.
     Pane(Pane),
@@ -127,7 +131,8 @@ impl Bsdf {
     pub fn has_delta(&self) -> bool {
         match self {
             Self::Rough(_) => false,
-            Self::Mirror(_) | Self::Glass(_) | Self::Pane(_) | Self::Coated(_) => true,
+            Self::Glass(glass) => glass.is_smooth(),
+            Self::Mirror(_) | Self::Pane(_) | Self::Coated(_) => true,
         }
     }
 

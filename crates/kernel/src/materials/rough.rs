@@ -1,9 +1,11 @@
 //! The table of rough BSDFs, and the sum of them all: an enum for a material, for a point, and for a row.
 
 use super::bsdf::{
-    BsdfValues, LobeSet, NarrowLobe, Place, RoughMaterial, RoughPoint, RoughRow, ShownLobes, UvRow,
+    BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughPoint, RoughRow, ShownLobes,
+    UvRow,
 };
 use super::footprint::TexturePoint;
+use super::frosted::GlassRow;
 use super::metal::{BrushedMetalRow, Metal, RoundMetalRow};
 use super::phong::{Phong, PhongRow};
 use super::plastic::{Plastic, PlasticRow};
@@ -12,17 +14,21 @@ use super::texture::Texture;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, Lanes, Lanes3, Truths};
 
-/// Makes the sums over all kinds of the three traits, whose functions have the same meaning. `kept` is how a [`BsdfRow`] keeps
-/// a row: the commonest kind in its place, others by pointer, so that they do not spread the rows of scenes without them.
+/// Makes the sums over all kinds of the traits, whose functions have the same meaning. Kinds that `materials` lists are those of
+/// whole materials; `parts` lists kinds that surfaces of other materials have for a part of their light. `kept` is how a [`BsdfRow`]
+/// keeps a row: the commonest kind in its place, others by pointer, so that they do not spread the rows of scenes without them.
 macro_rules! kinds {
-    ($($(#[$doc:meta])* $kind:ident($material:ty, $row:ty, kept: $kept:ty)),+ $(,)?) => {
+    (
+        materials { $($(#[$doc:meta])* $kind:ident($material:ty, $row:ty, kept: $kept:ty)),+ $(,)? }
+        parts { $($(#[$part_doc:meta])* $part:ident($part_row:ty)),+ $(,)? }
+    ) => {
         /// Kind of a rough BSDF.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum RoughKind { $($(#[$doc])* $kind),+ }
+        pub enum RoughKind { $($(#[$doc])* $kind,)+ $($(#[$part_doc])* $part),+ }
 
         impl RoughKind {
             /// All kinds.
-            pub const ALL: &[Self] = &[$(Self::$kind),+];
+            pub const ALL: &[Self] = &[$(Self::$kind,)+ $(Self::$part),+];
         }
 
         /// A rough material of any kind.
@@ -31,13 +37,16 @@ macro_rules! kinds {
 
         /// A rough material of any kind at one point.
         #[derive(Clone, Copy, Debug, PartialEq)]
-        pub enum RoughBsdf { $($(#[$doc])* $kind(<$material as RoughMaterial>::Point)),+ }
+        pub enum RoughBsdf {
+            $($(#[$doc])* $kind(<$row as RoughRow>::Point),)+
+            $($(#[$part_doc])* $part(<$part_row as RoughRow>::Point)),+
+        }
 
         /// Rough surfaces of one kind, side by side.
         // Phong rows stay where they are: a pointer to them would cost every scene.
         #[allow(clippy::large_enum_variant)]
         #[derive(Clone, Debug)]
-        pub enum BsdfRow { $($(#[$doc])* $kind($kept)),+ }
+        pub enum BsdfRow { $($(#[$doc])* $kind($kept),)+ $($(#[$part_doc])* $part(Box<$part_row>)),+ }
 
         impl Rough {
             /// Its kind.
@@ -110,24 +119,36 @@ macro_rules! kinds {
             /// Its kind.
             #[inline(always)]
             pub fn kind(&self) -> RoughKind {
-                match self { $(Self::$kind(_) => RoughKind::$kind),+ }
+                match self {
+                    $(Self::$kind(_) => RoughKind::$kind,)+
+                    $(Self::$part(_) => RoughKind::$part),+
+                }
             }
 
             /// [`RoughPoint::is_black`].
             #[inline]
             pub fn is_black(&self) -> bool {
-                match self { $(Self::$kind(own) => own.is_black()),+ }
+                match self {
+                    $(Self::$kind(own) => own.is_black(),)+
+                    $(Self::$part(own) => own.is_black()),+
+                }
             }
 
             /// [`RoughPoint::ambient`].
             #[inline]
             pub fn ambient(&self) -> Vec3 {
-                match self { $(Self::$kind(own) => own.ambient()),+ }
+                match self {
+                    $(Self::$kind(own) => own.ambient(),)+
+                    $(Self::$part(own) => own.ambient()),+
+                }
             }
 
             /// [`RoughPoint::tinted`].
             pub fn tinted(self, color: Vec3) -> Self {
-                match self { $(Self::$kind(own) => Self::$kind(own.tinted(color))),+ }
+                match self {
+                    $(Self::$kind(own) => Self::$kind(own.tinted(color)),)+
+                    $(Self::$part(own) => Self::$part(own.tinted(color))),+
+                }
             }
         }
 
@@ -135,27 +156,39 @@ macro_rules! kinds {
             /// Its kind.
             #[inline(always)]
             pub fn kind(&self) -> RoughKind {
-                match self { $(Self::$kind(_) => RoughKind::$kind),+ }
+                match self {
+                    $(Self::$kind(_) => RoughKind::$kind,)+
+                    $(Self::$part(_) => RoughKind::$part),+
+                }
             }
 
             /// [`RoughRow::SENDS_RAYS`].
             #[inline(always)]
             pub fn sends_rays(&self) -> bool {
-                match self { $(Self::$kind(_) => <$row as RoughRow>::SENDS_RAYS),+ }
+                match self {
+                    $(Self::$kind(_) => <$row as RoughRow>::SENDS_RAYS,)+
+                    $(Self::$part(_) => <$part_row as RoughRow>::SENDS_RAYS),+
+                }
             }
 
             /// Makes it a row of a kind, of any content.
             #[inline(always)]
             pub fn prepare(&mut self, kind: RoughKind) {
                 if self.kind() != kind {
-                    *self = match kind { $(RoughKind::$kind => Self::$kind(<$kept>::from(<$row as RoughRow>::EMPTY))),+ };
+                    *self = match kind {
+                        $(RoughKind::$kind => Self::$kind(<$kept>::from(<$row as RoughRow>::EMPTY)),)+
+                        $(RoughKind::$part => Self::$part(Box::new(<$part_row as RoughRow>::EMPTY))),+
+                    };
                 }
             }
 
             /// [`RoughRow::reset`].
             #[inline(always)]
             pub fn reset(&mut self) {
-                match self { $(Self::$kind(row) => row.reset()),+ }
+                match self {
+                    $(Self::$kind(row) => row.reset(),)+
+                    $(Self::$part(row) => row.reset()),+
+                }
             }
 
             /// [`RoughRow::put`], of a BSDF of the row's kind.
@@ -164,9 +197,12 @@ macro_rules! kinds {
                 $(if let (Self::$kind(row), RoughBsdf::$kind(bsdf)) = (&mut *self, bsdf) {
                     row.put(i, bsdf, shown, place);
                 })+
+                $(if let (Self::$part(row), RoughBsdf::$part(bsdf)) = (&mut *self, bsdf) {
+                    row.put(i, bsdf, shown, place);
+                })+
             }
 
-            /// [`RoughRow::fill`], with a material of the row's kind.
+            /// [`MaterialRow::fill`], with a material of the row's kind.
             #[inline(always)]
             pub fn fill(
                 &mut self,
@@ -181,10 +217,13 @@ macro_rules! kinds {
                 0
             }
 
-            /// [`RoughRow::orient`].
+            /// [`MaterialRow::orient`].
             #[inline(always)]
             pub fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
-                match self { $(Self::$kind(row) => row.orient(of, normals, directions)),+ }
+                match self {
+                    $(Self::$kind(row) => row.orient(of, normals, directions),)+
+                    $(Self::$part(_) => {}),+
+                }
             }
 
             /// [`RoughRow::copy`], from a row of the same kind.
@@ -193,24 +232,36 @@ macro_rules! kinds {
                 $(if let (Self::$kind(row), Self::$kind(other)) = (&mut *self, other) {
                     row.copy(i, other, from);
                 })+
+                $(if let (Self::$part(row), Self::$part(other)) = (&mut *self, other) {
+                    row.copy(i, other, from);
+                })+
             }
 
             /// [`RoughRow::f`].
             #[inline(always)]
             pub fn f(&self, directions: &Lanes3) -> BsdfValues {
-                match self { $(Self::$kind(row) => row.f(directions)),+ }
+                match self {
+                    $(Self::$kind(row) => row.f(directions),)+
+                    $(Self::$part(row) => row.f(directions)),+
+                }
             }
 
             /// [`RoughRow::parts`].
             #[inline(always)]
             pub fn parts(&self, directions: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
-                match self { $(Self::$kind(row) => row.parts(directions, values)),+ }
+                match self {
+                    $(Self::$kind(row) => row.parts(directions, values),)+
+                    $(Self::$part(row) => row.parts(directions, values)),+
+                }
             }
 
             /// [`RoughRow::grey`].
             #[inline(always)]
             pub fn grey(&self, values: &BsdfValues) -> Lanes {
-                match self { $(Self::$kind(row) => row.grey(values)),+ }
+                match self {
+                    $(Self::$kind(row) => row.grey(values),)+
+                    $(Self::$part(row) => row.grey(values)),+
+                }
             }
 
             /// [`RoughRow::pdf`].
@@ -222,55 +273,80 @@ macro_rules! kinds {
                 directions: &Lanes3,
                 values: &BsdfValues,
             ) -> Lanes {
-                match self { $(Self::$kind(row) => row.pdf(lobes, normals, directions, values)),+ }
+                match self {
+                    $(Self::$kind(row) => row.pdf(lobes, normals, directions, values),)+
+                    $(Self::$part(row) => row.pdf(lobes, normals, directions, values)),+
+                }
             }
 
             /// [`RoughRow::sample`].
             #[inline(always)]
             pub fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
-                match self { $(Self::$kind(row) => row.sample(lobes, normals, choices, u)),+ }
+                match self {
+                    $(Self::$kind(row) => row.sample(lobes, normals, choices, u),)+
+                    $(Self::$part(row) => row.sample(lobes, normals, choices, u)),+
+                }
             }
 
             /// [`RoughRow::has_narrow_lobes`].
             #[inline(always)]
             pub fn has_narrow_lobes(&self) -> bool {
-                match self { $(Self::$kind(row) => row.has_narrow_lobes()),+ }
+                match self {
+                    $(Self::$kind(row) => row.has_narrow_lobes(),)+
+                    $(Self::$part(row) => row.has_narrow_lobes()),+
+                }
             }
 
             /// [`RoughRow::narrow_lobes`].
             #[inline(always)]
             pub fn narrow_lobes(&self) -> u32 {
-                match self { $(Self::$kind(row) => row.narrow_lobes()),+ }
+                match self {
+                    $(Self::$kind(row) => row.narrow_lobes(),)+
+                    $(Self::$part(row) => row.narrow_lobes()),+
+                }
             }
 
             /// [`RoughRow::narrow_lobe`].
             #[inline(always)]
             pub fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
-                match self { $(Self::$kind(row) => row.narrow_lobe(i)),+ }
+                match self {
+                    $(Self::$kind(row) => row.narrow_lobe(i),)+
+                    $(Self::$part(row) => row.narrow_lobe(i)),+
+                }
             }
 
             /// [`RoughRow::narrower_than`].
             #[inline(always)]
             pub fn narrower_than(&self, of: u32, exponent: f32) -> u32 {
-                match self { $(Self::$kind(row) => row.narrower_than(of, exponent)),+ }
+                match self {
+                    $(Self::$kind(row) => row.narrower_than(of, exponent),)+
+                    $(Self::$part(row) => row.narrower_than(of, exponent)),+
+                }
             }
 
             /// [`RoughRow::even`].
             #[inline(always)]
             pub fn even(&self, i: usize) -> Option<Vec3> {
-                match self { $(Self::$kind(row) => row.even(i)),+ }
+                match self {
+                    $(Self::$kind(row) => row.even(i),)+
+                    $(Self::$part(row) => row.even(i)),+
+                }
             }
 
             /// [`RoughRow::f_at`].
             #[inline(always)]
             pub fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
-                match self { $(Self::$kind(row) => row.f_at(i, direction)),+ }
+                match self {
+                    $(Self::$kind(row) => row.f_at(i, direction),)+
+                    $(Self::$part(row) => row.f_at(i, direction)),+
+                }
             }
         }
     };
 }
 
 kinds! {
+    materials {
     /// The normalised Phong model.
     Phong(Phong, PhongRow, kept: PhongRow),
     /// A conductor of microfacets, the same in all azimuths.
@@ -280,7 +356,33 @@ kinds! {
     /// A diffuse base under a coat of microfacets.
     Plastic(Plastic, PlasticRow, kept: Box<PlasticRow>),
     /// The inputs of glTF.
-    Principled(Principled, PrincipledRow, kept: Box<PrincipledRow>),
+    Principled(Principled, PrincipledRow<false>, kept: Box<PrincipledRow<false>>),
+    }
+    parts {
+    /// The reflection of rough glass.
+    GlassReflection(GlassRow<false>),
+    /// The transmission of rough glass.
+    GlassTransmission(GlassRow<true>),
+    /// The transmission of a principled material.
+    PrincipledTransmission(PrincipledRow<true>),
+    }
+}
+
+impl RoughBsdf {
+    /// The BSDF for light that comes through the surface, which is of another kind. `None` if none comes.
+    #[inline]
+    pub fn behind(&self) -> Option<Self> {
+        match self {
+            Self::GlassReflection(glass) => Some(Self::GlassTransmission(*glass)),
+            Self::Principled(point) => point.transmits().then_some(Self::PrincipledTransmission(*point)),
+            Self::Phong(_)
+            | Self::Metal(_)
+            | Self::BrushedMetal(_)
+            | Self::Plastic(_)
+            | Self::GlassTransmission(_)
+            | Self::PrincipledTransmission(_) => None,
+        }
+    }
 }
 
 impl BsdfRow {

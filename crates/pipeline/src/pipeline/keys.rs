@@ -91,6 +91,9 @@ fn described_lights(scene: &Scene, of: &Referents<'_>) -> Key {
                     .add(&object.shape, of)
                     .add(&material.emission, of)
                     .add(&material.opacity, of);
+                for number in material.emission_coat().iter().flatten() {
+                    key.add(number, of);
+                }
             }
             // The file's own materials may emit.
             None => {

@@ -24,14 +24,14 @@ use super::transport::scatter::Continuation;
 use super::transport::scratch::Scratch;
 use super::transport::tile::TileContext;
 use super::transport::vertex::{ShadingVertex, Vertex};
-use super::transport::walk::{OpaqueHit, Reached, Straight, Walker, walk};
+use super::transport::walk::{Change, OpaqueHit, Reached, Straight, Walker, walk};
 use super::view::Measure;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::materials::bsdf::LobeSet;
-use crate::materials::{Bsdf, Coated, Mirror, Pane, Rough};
+use crate::materials::{Bsdf, Coated, GlassPoint, Mirror, Pane, Rough, RoughBsdf};
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
 use crate::scene::description::Shadows;
@@ -166,9 +166,12 @@ impl<'a> Walker<'a> for Wavefront<'a, '_> {
                     }
                 }
             }
-            Reached::Glass(vertex, hit, far) => {
+            Reached::Glass(vertex, hit, Change { far, rough }) => {
                 if self.arrive(path, vertex, OpaqueHit::Own(hit)) {
-                    self.shade_glass(path, vertex, far);
+                    match rough {
+                        Some(rough) => self.shade_rough_glass(path, vertex, rough, far),
+                        None => self.shade_glass(path, vertex, far),
+                    }
                 }
             }
             Reached::Hidden if self.goes_on() => self.next.push(*path),
@@ -419,10 +422,27 @@ impl Wavefront<'_, '_> {
         if bsdf.is_black() {
             return;
         }
+        self.light_rough(path, vertex, bsdf, path.medium);
+    }
+
+    /// Queues the vertices of a rough surface for direct light, with the medium behind it.
+    fn light_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: RoughBsdf, far: Medium) {
+        let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
-        let lit = ShadingVertex { path, place: self.place, vertex, shading, bsdf };
+        let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
         let measure = if path.state.only_specular_before { self.accumulator.measure } else { Measure::ALL };
-        self.direct.push(self.tile, &lit, measure);
+        self.direct.push(tile, &ShadingVertex { path, place, vertex, shading, bsdf }, measure);
+        // Light that comes through has a vertex of its own; a share of the light that arrives is that of the viewer's side.
+        if let Some((bsdf, shading)) = behind.filter(|_| measure != Measure::ArrivingShare) {
+            let (path, vertex) = (&PathRay { medium: far, ..*path }, &vertex.behind());
+            self.direct.push(tile, &ShadingVertex { path, place, vertex, shading, bsdf }, measure);
+        }
+    }
+
+    fn shade_rough_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: GlassPoint, far: Medium) {
+        if self.accumulator.takes_reflected() {
+            self.light_rough(path, vertex, RoughBsdf::GlassReflection(rough), far);
+        }
     }
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {

@@ -17,6 +17,8 @@ impl World {
         let camera = parts.camera.as_ref().unwrap_or(&scene.camera);
         let camera = Camera::new(camera, parts.orbiter.as_ref()).seen_from(geometry.origin());
         let is_mipmapped = materials.iter().any(Material::is_mipmapped);
+        let is_rough = |material: &Material| material.bsdf.glass().is_some_and(|glass| !glass.is_smooth());
+        let has_rough_glass = materials.iter().any(is_rough);
         let bodies = parts.bodies.clone().unwrap_or_else(|| Arc::new(bodies_of(scene, parts)));
         let world = Self {
             camera,
@@ -25,6 +27,7 @@ impl World {
             object_materials,
             lights,
             has_open_glass: bodies.has_open(),
+            has_rough_glass,
             bodies,
             glass_at_eye: Vec::new(),
             is_mipmapped,

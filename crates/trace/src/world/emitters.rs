@@ -38,7 +38,7 @@ pub fn lights(
     let points = points.map(|light| described(light, geometry.origin()));
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let shining = scene.materials.iter().map(|material| {
-        let emission = lit(emission(scene, images, &material.emission));
+        let emission = lit(emission(scene, images, material));
         Shining::new(emission, opacity(scene, images, &material.opacity))
     });
     let shining: Vec<Shining> = shining.collect();
@@ -141,14 +141,15 @@ impl Shining {
         self.opacity.as_ref().map_or(bounds, |opacity| bounds.times(Vec3::splat(opacity.mean())))
     }
 
-    /// The factor that differs from point to point, with these texture coordinates.
+    /// The factor that differs from point to point or by direction, with these texture coordinates.
     fn texture(&self, chart: Chart) -> Option<EmissionTexture> {
-        EmissionTexture::new(self.emission.texture.as_ref(), self.opacity.as_ref(), chart)
+        let Emission { texture, coat, .. } = &self.emission;
+        EmissionTexture::under_coat(texture.as_ref(), self.opacity.as_ref(), coat.as_ref(), chart)
     }
 
-    /// Whether anything differs from point to point.
+    /// Whether anything differs from point to point, or by direction.
     fn is_textured(&self) -> bool {
-        self.emission.texture.is_some() || self.opacity.is_some()
+        self.emission.texture.is_some() || self.opacity.is_some() || self.emission.coat.is_some()
     }
 }
 

@@ -9,13 +9,13 @@ use crate::assets::FileMaterial;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Color, Moved, Texture, TextureFilter, Wrap};
 use crate::materials::{
-    Bsdf, Coated, Emission, Glass, Material, Metal, MetalFresnel, Mirror, NormalMap, Number, Opacity, Pane,
-    Phong, Plastic, Principled, PrincipledInputs, Rough,
+    Bsdf, Coated, Emission, EmissionCoat, Glass, Material, Metal, MetalFresnel, Mirror, NormalMap, Number,
+    Opacity, Pane, Phong, Plastic, Principled, PrincipledInputs, Rough,
 };
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{
-    self, ColorSource, EmissionSource, FresnelSource, MaterialKind, NumberSource, OpacitySource, PixelNumber,
-    Scene, TextureUse,
+    self, ColorSource, FresnelSource, MaterialKind, NumberSource, OpacitySource, PixelNumber, Scene,
+    TextureUse,
 };
 
 /// A material of the scene file.
@@ -43,6 +43,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             ior,
             specular,
             specular_color,
+            transmission,
             clearcoat,
             clearcoat_roughness,
         } => Bsdf::Rough(Rough::Principled(Principled::new(PrincipledInputs {
@@ -52,13 +53,16 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             ior: *ior,
             specular: number(specular),
             specular_color: color(specular_color),
+            transmission: number(transmission),
             clearcoat: number(clearcoat),
             clearcoat_roughness: number(clearcoat_roughness),
         }))),
-        MaterialKind::Glass { ior, tint } => Bsdf::Glass(Glass::new(*ior, *tint)),
+        MaterialKind::Glass { ior, tint, roughness } => {
+            Bsdf::Glass(Glass::new(*ior, *tint).with_roughness(number(roughness)))
+        }
         MaterialKind::Pane { ior, tint } => Bsdf::Pane(Pane { ior: *ior, tint: *tint }),
     };
-    let emission = emission(scene, images, &material.emission);
+    let emission = emission(scene, images, material);
     let normal_map = material.normal_map.map(|map| NormalMap {
         texture: declared_texture(scene, images, map.texture, TextureUse::Normal),
         strength: map.strength,
@@ -100,9 +104,15 @@ fn fresnel_of(source: &FresnelSource, color: impl Fn(&ColorSource) -> Color) -> 
 }
 
 /// Emission of a material of the scene file.
-pub fn emission(scene: &Scene, images: &Images, emission: &EmissionSource) -> Emission {
+pub fn emission(scene: &Scene, images: &Images, material: &description::Material) -> Emission {
+    let emission = &material.emission;
+    let coat = material.emission_coat().and_then(|numbers| {
+        let [weight, roughness] =
+            numbers.map(|number| declared_number(scene, images, &number, PixelNumber::Luminance));
+        EmissionCoat::new(weight, roughness).map(Arc::new)
+    });
     let texture = emission.texture.map(|index| declared_texture(scene, images, index, TextureUse::Color));
-    Emission { scale: emission.scale, texture, sides: emission.sides }
+    Emission { scale: emission.scale, texture, sides: emission.sides, coat }
 }
 
 /// Kind of a material of a mesh file. Models 3, 5 and 8 of the MTL format with a highlight are mirrors, 4, 6, 7 and 9 glass.

@@ -94,6 +94,8 @@ pub struct World {
     bodies: Arc<Bodies>,
     /// Whether any body of glass is open.
     has_open_glass: bool,
+    /// Whether the surface of any glass is rough.
+    has_rough_glass: bool,
     /// The closed shapes of glass that the lens may be in, with their materials.
     glass_at_eye: Vec<(u32, u32)>,
     /// Whether any material has a texture with mip levels.
@@ -171,12 +173,13 @@ impl World {
         self.colored.as_ref().is_some_and(|colored| colored[object as usize])
     }
 
-    /// A material and its rough BSDF. `None` if anything bends its normals, its emission is textured, light may pass it straight
-    /// on, or rows are not filled with the BSDF.
+    /// A material and its rough BSDF. `None` if anything bends its normals, its emission is not the same everywhere, light may
+    /// pass it straight on, or rows are not filled with the BSDF.
     pub fn plain_rough(&self, material: usize) -> Option<(&Material, &Rough)> {
         let material = &self.materials[material];
-        if material.normal_map.is_some() || material.emission.texture.is_some() || material.opacity.is_some()
-        {
+        let emission = &material.emission;
+        let is_even = emission.texture.is_none() && emission.coat.is_none();
+        if material.normal_map.is_some() || !is_even || material.opacity.is_some() {
             return None;
         }
         match &material.bsdf {
@@ -195,6 +198,12 @@ impl World {
     pub fn has_coordinates(&self, object: u32) -> bool {
         let mesh = self.geometry.objects()[object as usize].mesh();
         mesh.is_none_or(|mesh| !mesh.tree.loaded().mesh.uvs.is_empty())
+    }
+
+    /// Whether the surface of any glass is rough.
+    #[inline]
+    pub fn has_rough_glass(&self) -> bool {
+        self.has_rough_glass
     }
 
     /// Whether any material has a texture with mip levels, for which rays must know the width of their beams.

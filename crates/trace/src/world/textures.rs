@@ -94,7 +94,7 @@ impl Lookups {
             TextureRole::Specular => self.specular,
             TextureRole::Facets | TextureRole::Roughness(_) => self.diffuse || self.specular,
             TextureRole::Ambient => self.ambient,
-            TextureRole::Emission => self.lights,
+            TextureRole::Emission | TextureRole::EmissionCoat(_) => self.lights,
             TextureRole::NormalMap => self.normals || self.delta_normals && is_delta,
             TextureRole::Opacity(_) => true,
         }

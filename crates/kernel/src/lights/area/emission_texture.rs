@@ -1,21 +1,23 @@
-//! Emission textures: lamps whose radiance differs from point to point, by a texture or by their opacity.
+//! Emission textures: lamps whose radiance differs from point to point, by a texture or by their opacity, or by direction under a
+//! clear coat.
 //!
 //! Samples of a quad follow its texture; samples of other shapes do not. Each sample is multiplied by the texture at its
 //! point. Pdfs are those of the emitter, and exact.
 
 use std::sync::Arc;
 
-use crate::geometry::Shape;
 use crate::geometry::triangle::weights;
+use crate::geometry::{RayF64, Shape};
 use crate::materials::texture::Texture;
-use crate::materials::{Opacity, TexturePoint};
+use crate::materials::{EmissionCoat, Opacity, TexturePoint};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// Factor on the radiance of a lamp, from point to point.
+/// Factor on the radiance of a lamp, from point to point and from direction to direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmissionTexture {
     texture: Option<Arc<Texture>>,
     opacity: Option<Opacity>,
+    coat: Option<Arc<EmissionCoat>>,
     chart: Chart,
 }
 
@@ -42,8 +44,25 @@ pub struct Patch {
 impl EmissionTexture {
     /// The factor by a texture and by the opacity of a lamp with these texture coordinates. `None` if there is neither.
     pub fn new(texture: Option<&Arc<Texture>>, opacity: Option<&Opacity>, chart: Chart) -> Option<Self> {
-        let is_any = texture.is_some() || opacity.is_some();
-        is_any.then(|| Self { texture: texture.cloned(), opacity: opacity.cloned(), chart })
+        Self::under_coat(texture, opacity, None, chart)
+    }
+
+    /// [`EmissionTexture::new`] under a clear coat.
+    pub fn under_coat(
+        texture: Option<&Arc<Texture>>,
+        opacity: Option<&Opacity>,
+        coat: Option<&Arc<EmissionCoat>>,
+        chart: Chart,
+    ) -> Option<Self> {
+        let is_any = texture.is_some() || opacity.is_some() || coat.is_some();
+        let own =
+            || Self { texture: texture.cloned(), opacity: opacity.cloned(), coat: coat.cloned(), chart };
+        is_any.then(own)
+    }
+
+    /// Whether the factor differs from point to point, in every direction.
+    pub fn has_places(&self) -> bool {
+        self.texture.is_some() || self.opacity.is_some()
     }
 
     /// Factor at texture coordinates.
@@ -66,14 +85,51 @@ impl EmissionTexture {
         across.into_iter().flatten().reduce(finer).unwrap_or([1.0; 2])
     }
 
-    /// Factor at a point of the lamp; `primitive` is the triangle of the mesh that contains the point.
+    /// Factor at a point of the lamp, for light along a direction; `primitive` is the triangle of the mesh that contains the point.
     #[inline]
-    pub fn at(&self, point: Vec3, primitive: u32) -> Vec3 {
+    pub fn at(&self, point: Vec3, primitive: u32, direction: Vec3) -> Vec3 {
+        self.at_place(point, primitive) * self.left_by_coat(point, primitive, direction)
+    }
+
+    /// [`EmissionTexture::at`], without the coat.
+    pub fn at_place(&self, point: Vec3, primitive: u32) -> Vec3 {
         self.lookup(self.chart.uv(point.as_dvec3(), primitive))
+    }
+
+    /// Part of the light along a direction that the clear coat lets through.
+    pub fn left_by_coat(&self, point: Vec3, primitive: u32, direction: Vec3) -> f32 {
+        let Some(coat) = &self.coat else { return 1.0 };
+        let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
+        let at = TexturePoint::sharp(self.chart.uv(point, primitive));
+        // At a rim, rounding may leave no normal.
+        let normal = self.chart.normal(point, primitive, direction);
+        coat.left(&at, normal.map_or(1.0, |normal| normal.dot(direction)) as f32, &mut 0)
     }
 }
 
+/// Length of the ray that finds the normal at a point, in sizes of the lamp.
+const PROBE: f64 = 1e-3;
+
 impl Chart {
+    /// The unit normal at a point that is seen along a direction, either way. `None` if nothing is there.
+    fn normal(&self, point: DVec3, primitive: u32, direction: DVec3) -> Option<DVec3> {
+        match self {
+            Self::Shape(shape) => {
+                let size = f64::from(shape.bounds()?.extent().max_element());
+                // Approach the point on the side from which it is seen.
+                let ray =
+                    RayF64 { origin: point - direction * (PROBE * size), direction, t_max: f64::INFINITY };
+                let hit = shape.intersect(&ray)?;
+                Some(shape.surface(&ray, &hit).normal.as_dvec3())
+            }
+            Self::Triangles(patches) => {
+                let index = patches.binary_search_by_key(&primitive, |patch| patch.primitive).ok()?;
+                let [a, b, c] = patches[index].corners;
+                (b - a).cross(c - a).try_normalize()
+            }
+        }
+    }
+
     fn uv(&self, point: DVec3, primitive: u32) -> DVec2 {
         let patches = match self {
             Self::Shape(shape) => return shape.uv_at(point),

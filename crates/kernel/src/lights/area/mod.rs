@@ -224,7 +224,7 @@ fn bounds(shape: &Shape, radiance: Vec3) -> Option<LightBounds> {
 impl AreaLight {
     /// The light with an emission texture, by which a quad is sampled as well.
     pub fn with_texture(mut self, texture: EmissionTexture) -> Self {
-        if let Emitter::Quad(quad) = &self.shape {
+        if let (Emitter::Quad(quad), true) = (&self.shape, texture.has_places()) {
             // The edges of a back are in the other order.
             let ordered = |[u, v]: [f64; 2]| match self.side {
                 Side::Front => [u, v],
@@ -248,7 +248,10 @@ impl AreaLight {
             Source::Primitive(_, primitive) => primitive,
             Source::Object(_) | Source::Nothing => 0,
         };
-        Some(LightSample { weight: sample.weight * texture.at(target, primitive), ..sample })
+        Some(LightSample {
+            weight: sample.weight * texture.at(target, primitive, sample.direction),
+            ..sample
+        })
     }
 
     /// [`AreaLight::sample`] without its emission texture.

@@ -15,6 +15,7 @@ mod surface;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
+use super::area::EmissionTexture;
 use super::delta::{Falloff, PointLight};
 use super::light::{Family, Light};
 use super::set::Lights;
@@ -245,7 +246,12 @@ impl PhotonSource {
                 let (direction, ratio) =
                     self.directed(place.from, &Sends::Front(place.normal), targets, u, by_cosine);
                 let start = Start::Surface { point: place.point, error: place.error, normal };
-                Some(Made { start, direction, flux: place.flux, ratio })
+                // A clear coat weakens what leaves in this direction.
+                let left = |texture: &Box<EmissionTexture>| {
+                    texture.left_by_coat(place.point, place.primitive, -direction)
+                };
+                let flux = place.flux * light.texture.as_ref().map_or(1.0, left);
+                Some(Made { start, direction, flux, ratio })
             }
         }
     }

@@ -48,6 +48,8 @@ pub struct Place {
     /// Emitted radiance integrated by the cosine, over the pdf of such places: the mean is the power of the light, in
     /// W.
     pub flux: Vec3,
+    /// The triangle of a mesh.
+    pub primitive: u32,
 }
 
 /// A point of a piece.
@@ -124,7 +126,7 @@ impl Surface {
             On::Shape { reach, .. } => error(rounded, reach),
             On::Mesh { rounding } => error(rounded, 0.0) + Vec3::splat(rounding),
         };
-        Place { point: rounded, from: point, normal, error, flux }
+        Place { point: rounded, from: point, normal, error, flux, primitive: place.primitive }
     }
 }
 
@@ -155,10 +157,11 @@ impl On {
     }
 }
 
-/// Radiance of a place, W·sr⁻¹·m⁻².
+/// Radiance of a place, W·sr⁻¹·m⁻², but for a clear coat.
 fn radiance(light: &AreaLight, place: &OnPiece) -> Vec3 {
     let texture = light.texture.as_ref();
-    light.radiance * texture.map_or(Vec3::ONE, |texture| texture.at(place.point.as_vec3(), place.primitive))
+    light.radiance
+        * texture.map_or(Vec3::ONE, |texture| texture.at_place(place.point.as_vec3(), place.primitive))
 }
 
 /// Upper bound on the lengths from which the points of a shape are computed. `None` if the shape is infinite.

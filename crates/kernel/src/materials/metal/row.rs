@@ -2,7 +2,7 @@
 
 use super::{FresnelPoint, Metal, MetalPoint, reflectance};
 use crate::materials::bsdf::{
-    BsdfValues, LobeSet, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
+    BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
 };
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::microfacet::{Half, Leg, facing, frame_along, mirrored};
@@ -88,7 +88,6 @@ impl<const BRUSHED: bool> MetalRow<BRUSHED> {
 }
 
 impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
-    type Material = Metal;
     type Point = MetalPoint;
 
     const SENDS_RAYS: bool = true;
@@ -122,48 +121,6 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
         let [u, v] = if tangent == Vec3::ZERO { [mean; 2] } else { [u, v] };
         (self.alphas[0][i], self.alphas[1][i]) = (u, v);
         [self.shown[i], self.unit[i]] = shown_parts(shown);
-    }
-
-    #[inline(always)]
-    fn fill(
-        &mut self,
-        material: &Metal,
-        _: Option<&UvRow>,
-        shown: &[(u32, ShownLobes)],
-        _: impl Folds,
-    ) -> u32 {
-        let MetalPoint { fresnel, alphas } = material.constant().unwrap_or_else(|| material.bleached());
-        for &(of, shown) in shown {
-            let (of, [part, unit]) = (truths(of), shown_parts(shown));
-            for axis in 0..3 {
-                take(&of, &[fresnel.first[axis]; LANES], &mut self.fresnel[0][axis]);
-                take(&of, &[fresnel.second[axis]; LANES], &mut self.fresnel[1][axis]);
-            }
-            take(&of, &[alphas[0]; LANES], &mut self.alphas[0]);
-            take(&of, &[alphas[1]; LANES], &mut self.alphas[1]);
-            take(&of, &[part; LANES], &mut self.shown);
-            take(&of, &[unit; LANES], &mut self.unit);
-        }
-        self.has_index |= fresnel.second.x >= 0.0;
-        0
-    }
-
-    #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
-        let mut facings = [[0.0; LANES]; 3];
-        for i in 0..LANES {
-            let to_eye = -lane(directions, i);
-            set_lane(&mut self.to_eye, i, to_eye);
-            set_lane(&mut facings, i, facing(lane(normals, i), to_eye));
-        }
-        match of {
-            Some(of) => {
-                for axis in 0..3 {
-                    take(of, &facings[axis], &mut self.normal[axis]);
-                }
-            }
-            None => self.normal = facings,
-        }
     }
 
     #[inline(always)]
@@ -280,5 +237,51 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
         let [white, cosine] = self.lobe(i, direction);
         let fresnel = FresnelPoint { first: lane(&self.fresnel[0], i), second: lane(&self.fresnel[1], i) };
         fresnel.reflectance(cosine) * (white * self.shown[i]) + Vec3::splat(self.unit[i])
+    }
+}
+
+impl<const BRUSHED: bool> MaterialRow for MetalRow<BRUSHED> {
+    type Material = Metal;
+
+    #[inline(always)]
+    fn fill(
+        &mut self,
+        material: &Metal,
+        _: Option<&UvRow>,
+        shown: &[(u32, ShownLobes)],
+        _: impl Folds,
+    ) -> u32 {
+        let MetalPoint { fresnel, alphas } = material.constant().unwrap_or_else(|| material.bleached());
+        for &(of, shown) in shown {
+            let (of, [part, unit]) = (truths(of), shown_parts(shown));
+            for axis in 0..3 {
+                take(&of, &[fresnel.first[axis]; LANES], &mut self.fresnel[0][axis]);
+                take(&of, &[fresnel.second[axis]; LANES], &mut self.fresnel[1][axis]);
+            }
+            take(&of, &[alphas[0]; LANES], &mut self.alphas[0]);
+            take(&of, &[alphas[1]; LANES], &mut self.alphas[1]);
+            take(&of, &[part; LANES], &mut self.shown);
+            take(&of, &[unit; LANES], &mut self.unit);
+        }
+        self.has_index |= fresnel.second.x >= 0.0;
+        0
+    }
+
+    #[inline(always)]
+    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
+        let mut facings = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let to_eye = -lane(directions, i);
+            set_lane(&mut self.to_eye, i, to_eye);
+            set_lane(&mut facings, i, facing(lane(normals, i), to_eye));
+        }
+        match of {
+            Some(of) => {
+                for axis in 0..3 {
+                    take(of, &facings[axis], &mut self.normal[axis]);
+                }
+            }
+            None => self.normal = facings,
+        }
     }
 }

@@ -2,7 +2,9 @@
 
 use super::lobes::{Lobes, gloss};
 use super::{Phong, PhongBsdf};
-use crate::materials::bsdf::{BsdfValues, LobeSet, NarrowLobe, Place, RoughRow, ShownLobes, UvRow};
+use crate::materials::bsdf::{
+    BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughRow, ShownLobes, UvRow,
+};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane, take, truths};
 
@@ -92,7 +94,6 @@ fn black(colors: &Lanes3, folds: impl Folds) -> u32 {
 }
 
 impl RoughRow for PhongRow {
-    type Material = Phong;
     type Point = PhongBsdf;
 
     const SENDS_RAYS: bool = false;
@@ -121,44 +122,6 @@ impl RoughRow for PhongRow {
         self.albedos[0][i] = bsdf.diffuse.max_element();
         self.albedos[1][i] = bsdf.specular.max_element();
         self.is_glossy |= bsdf.specular != Vec3::ZERO;
-    }
-
-    #[inline(always)]
-    fn fill(
-        &mut self,
-        material: &Phong,
-        uv: Option<&UvRow>,
-        shown: &[(u32, ShownLobes)],
-        folds: impl Folds,
-    ) -> u32 {
-        let diffuse = match (material.diffuse.texture(), uv) {
-            (Some(texture), Some(uv)) => texture.lookup_row(uv),
-            (Some(_) | None, _) => {
-                let Vec3 { x, y, z } = material.diffuse.constant().unwrap_or(Vec3::ONE);
-                [[x; LANES], [y; LANES], [z; LANES]]
-            }
-        };
-        let specular = material.specular.constant().unwrap_or(Vec3::ONE);
-        for &(of, shown) in shown {
-            self.set(of, shown, &diffuse, specular, material.shininess);
-        }
-        if specular == Vec3::ZERO { black(&diffuse, folds) } else { 0 }
-    }
-
-    #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
-        let mut all = [[0.0; LANES]; 3];
-        for i in 0..LANES {
-            set_lane(&mut all, i, mirrored(lane(normals, i), -lane(directions, i)));
-        }
-        match of {
-            Some(of) => {
-                for axis in 0..3 {
-                    take(of, &all[axis], &mut self.mirrored_eye[axis]);
-                }
-            }
-            None => self.mirrored_eye = all,
-        }
     }
 
     #[inline(always)]
@@ -287,6 +250,48 @@ impl RoughRow for PhongRow {
             f += specular * gloss(lane(&self.mirrored_eye, i), direction, self.shininess[i]);
         }
         f
+    }
+}
+
+impl MaterialRow for PhongRow {
+    type Material = Phong;
+
+    #[inline(always)]
+    fn fill(
+        &mut self,
+        material: &Phong,
+        uv: Option<&UvRow>,
+        shown: &[(u32, ShownLobes)],
+        folds: impl Folds,
+    ) -> u32 {
+        let diffuse = match (material.diffuse.texture(), uv) {
+            (Some(texture), Some(uv)) => texture.lookup_row(uv),
+            (Some(_) | None, _) => {
+                let Vec3 { x, y, z } = material.diffuse.constant().unwrap_or(Vec3::ONE);
+                [[x; LANES], [y; LANES], [z; LANES]]
+            }
+        };
+        let specular = material.specular.constant().unwrap_or(Vec3::ONE);
+        for &(of, shown) in shown {
+            self.set(of, shown, &diffuse, specular, material.shininess);
+        }
+        if specular == Vec3::ZERO { black(&diffuse, folds) } else { 0 }
+    }
+
+    #[inline(always)]
+    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
+        let mut all = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            set_lane(&mut all, i, mirrored(lane(normals, i), -lane(directions, i)));
+        }
+        match of {
+            Some(of) => {
+                for axis in 0..3 {
+                    take(of, &all[axis], &mut self.mirrored_eye[axis]);
+                }
+            }
+            None => self.mirrored_eye = all,
+        }
     }
 }
 

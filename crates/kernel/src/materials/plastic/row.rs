@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::{Plastic, PlasticPoint};
 use crate::materials::bsdf::{
-    BsdfValues, LobeSet, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
+    BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
 };
 use crate::materials::fresnel::dielectric_outside;
 use crate::materials::lobe_albedo::{TERMS, evaluate, under_coat};
@@ -130,7 +130,6 @@ impl PlasticRow {
 }
 
 impl RoughRow for PlasticRow {
-    type Material = Plastic;
     type Point = PlasticPoint;
 
     const SENDS_RAYS: bool = true;
@@ -164,76 +163,6 @@ impl RoughRow for PlasticRow {
         self.set(i, bsdf);
         [self.shown[0][i], self.shown[1][i], self.unit[i]] = shown_parts(shown);
         self.look(i);
-    }
-
-    #[inline(always)]
-    fn fill(
-        &mut self,
-        material: &Plastic,
-        uv: Option<&UvRow>,
-        shown: &[(u32, ShownLobes)],
-        folds: impl Folds,
-    ) -> u32 {
-        let point = material.constant().unwrap_or_else(|| material.bleached());
-        let mut bases = [[point.base.x; LANES], [point.base.y; LANES], [point.base.z; LANES]];
-        if let (Some(texture), Some(uv)) = (material.row_texture(), uv) {
-            let diffuse = texture.lookup_row(uv);
-            let squared = point.ior * point.ior;
-            let returned = 1.0 - (1.0 - point.albedo.mean) / squared;
-            for i in 0..LANES {
-                let diffuse = lane(&diffuse, i).min(Vec3::ONE);
-                set_lane(&mut bases, i, under_coat(diffuse, returned) * (FRAC_1_PI / squared));
-            }
-        }
-        for &(of, shown) in shown {
-            let (of, [diffuse, specular, unit]) = (truths(of), shown_parts(shown));
-            for axis in 0..3 {
-                take(&of, &bases[axis], &mut self.base[axis]);
-                take(&of, &[point.specular[axis]; LANES], &mut self.specular[axis]);
-            }
-            for (own, term) in self.terms.iter_mut().zip(point.albedo.terms) {
-                take(&of, &[term; LANES], own);
-            }
-            for (value, own) in [
-                (point.ior, &mut self.ior),
-                (point.alpha, &mut self.alpha),
-                (point.albedo.mean, &mut self.mean),
-                (unit, &mut self.unit),
-            ] {
-                take(&of, &[value; LANES], own);
-            }
-            take(&of, &[diffuse; LANES], &mut self.shown[0]);
-            take(&of, &[specular; LANES], &mut self.shown[1]);
-        }
-        self.is_rough |= point.alpha > 0.0;
-        self.is_smooth |= point.alpha == 0.0;
-        let mut black = [0; LANES];
-        for i in 0..LANES {
-            let is_black = (lane(&bases, i) == Vec3::ZERO) & (point.specular == Vec3::ZERO);
-            black[i] = if is_black { TRUE } else { 0 };
-        }
-        folds.bits(&black)
-    }
-
-    #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
-        let mut facings = [[0.0; LANES]; 3];
-        for i in 0..LANES {
-            let to_eye = -lane(directions, i);
-            set_lane(&mut self.to_eye, i, to_eye);
-            set_lane(&mut facings, i, facing(lane(normals, i), to_eye));
-        }
-        match of {
-            Some(of) => {
-                for axis in 0..3 {
-                    take(of, &facings[axis], &mut self.normal[axis]);
-                }
-            }
-            None => self.normal = facings,
-        }
-        for i in 0..LANES {
-            self.look(i);
-        }
     }
 
     #[inline(always)]
@@ -394,5 +323,79 @@ impl RoughRow for PlasticRow {
             narrow = lane(&self.specular, i) * (self.coat(i, direction) * self.shown[1][i]);
         }
         wide + narrow + Vec3::splat(self.unit[i])
+    }
+}
+
+impl MaterialRow for PlasticRow {
+    type Material = Plastic;
+
+    #[inline(always)]
+    fn fill(
+        &mut self,
+        material: &Plastic,
+        uv: Option<&UvRow>,
+        shown: &[(u32, ShownLobes)],
+        folds: impl Folds,
+    ) -> u32 {
+        let point = material.constant().unwrap_or_else(|| material.bleached());
+        let mut bases = [[point.base.x; LANES], [point.base.y; LANES], [point.base.z; LANES]];
+        if let (Some(texture), Some(uv)) = (material.row_texture(), uv) {
+            let diffuse = texture.lookup_row(uv);
+            let squared = point.ior * point.ior;
+            let returned = 1.0 - (1.0 - point.albedo.mean) / squared;
+            for i in 0..LANES {
+                let diffuse = lane(&diffuse, i).min(Vec3::ONE);
+                set_lane(&mut bases, i, under_coat(diffuse, returned) * (FRAC_1_PI / squared));
+            }
+        }
+        for &(of, shown) in shown {
+            let (of, [diffuse, specular, unit]) = (truths(of), shown_parts(shown));
+            for axis in 0..3 {
+                take(&of, &bases[axis], &mut self.base[axis]);
+                take(&of, &[point.specular[axis]; LANES], &mut self.specular[axis]);
+            }
+            for (own, term) in self.terms.iter_mut().zip(point.albedo.terms) {
+                take(&of, &[term; LANES], own);
+            }
+            for (value, own) in [
+                (point.ior, &mut self.ior),
+                (point.alpha, &mut self.alpha),
+                (point.albedo.mean, &mut self.mean),
+                (unit, &mut self.unit),
+            ] {
+                take(&of, &[value; LANES], own);
+            }
+            take(&of, &[diffuse; LANES], &mut self.shown[0]);
+            take(&of, &[specular; LANES], &mut self.shown[1]);
+        }
+        self.is_rough |= point.alpha > 0.0;
+        self.is_smooth |= point.alpha == 0.0;
+        let mut black = [0; LANES];
+        for i in 0..LANES {
+            let is_black = (lane(&bases, i) == Vec3::ZERO) & (point.specular == Vec3::ZERO);
+            black[i] = if is_black { TRUE } else { 0 };
+        }
+        folds.bits(&black)
+    }
+
+    #[inline(always)]
+    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
+        let mut facings = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let to_eye = -lane(directions, i);
+            set_lane(&mut self.to_eye, i, to_eye);
+            set_lane(&mut facings, i, facing(lane(normals, i), to_eye));
+        }
+        match of {
+            Some(of) => {
+                for axis in 0..3 {
+                    take(of, &facings[axis], &mut self.normal[axis]);
+                }
+            }
+            None => self.normal = facings,
+        }
+        for i in 0..LANES {
+            self.look(i);
+        }
     }
 }

@@ -2,7 +2,10 @@
 //!
 //! - Specular lobe: F is a mix, by `metallic`, of Schlick's approximation from `color`, and of that of a dielectric with
 //!   F0 = min(((ior − 1)/(ior + 1))² · specular_color, 1) · specular and F90 = specular.
-//! - Diffuse lobe: (1 − metallic) · color/π · (1 − E(μᵢ))(1 − E(μₒ))/(1 − Ē), with the albedo E of the dielectric lobe.
+//! - Diffuse lobe: (1 − metallic)(1 − transmission) · color/π · (1 − E(μᵢ))(1 − E(μₒ))/(1 − Ē), with the albedo E of the dielectric
+//!   lobe.
+//! - Transmission of a thin sheet: the specular lobe, mirrored to the other side, (1 − metallic) · transmission · color · (1 − F) with
+//!   the dielectric's F. Surfaces that transmit are two vertices, as [`bsdf`](super::bsdf) says.
 //! - Clear coat c: everything below by (1 − c·E_c(μ)) for each of the two directions, and c times a lobe of F0 = .04.
 
 mod row;
@@ -45,6 +48,8 @@ pub struct PrincipledInputs {
     pub specular: Number,
     /// Factor on that reflectance at normal incidence.
     pub specular_color: Color,
+    /// Part of the light below the dielectric that goes through in place of being scattered.
+    pub transmission: Number,
     /// Weight of the clear coat.
     pub clearcoat: Number,
     /// The root of its α.
@@ -64,6 +69,8 @@ pub struct PrincipledPoint {
     pub grazing: f32,
     /// The reflectances of the dielectric among it.
     pub dielectric: (Vec3, f32),
+    /// Factor on (1 − F)·D·G/(4 cosθᵢ cosθₒ) for the light that goes through.
+    pub transmission: Vec3,
     /// α of the specular lobe.
     pub alpha: f32,
     /// Albedos of the specular lobe by [`SchlickAlbedo`].
@@ -76,6 +83,14 @@ pub struct PrincipledPoint {
     pub coat_albedo: LobeAlbedo,
     /// Reflectance of ambient light.
     pub ambient: Vec3,
+}
+
+impl PrincipledPoint {
+    /// Whether any light goes through.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        self.transmission != Vec3::ZERO
+    }
 }
 
 /// Albedos of a lobe whose facets reflect 1 at normal incidence and 0 at grazing angles, and the reverse, by Schlick's approximation.
@@ -111,6 +126,44 @@ impl SchlickAlbedo {
     }
 }
 
+/// A clear coat over what emits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EmissionCoat {
+    /// Its weight.
+    weight: Number,
+    /// The root of its α.
+    roughness: Number,
+    /// Its albedo. `None` if the roughness changes.
+    albedo: Option<LobeAlbedo>,
+}
+
+impl EmissionCoat {
+    /// The coat of this weight and roughness. `None` if it has no weight.
+    pub fn new(weight: Number, roughness: Number) -> Option<Self> {
+        if weight.constant() == Some(0.0) {
+            return None;
+        }
+        let albedo = roughness.constant().map(|one| SchlickAlbedo::of(one).of_coat(COAT_REFLECTANCE));
+        Some(Self { weight, roughness, albedo })
+    }
+
+    /// Part of the light that it lets through, by the cosine of the direction; adds to `lookups`.
+    pub fn left(&self, at: &TexturePoint, cosine: f32, lookups: &mut u64) -> f32 {
+        let weight = self.weight.at(at, lookups).clamp(0.0, 1.0);
+        let between = |roughness: f32| SchlickAlbedo::between(roughness.clamp(0.0, 1.0));
+        let albedo = match self.albedo {
+            Some(albedo) => albedo,
+            None => between(self.roughness.at(at, lookups)).of_coat(COAT_REFLECTANCE),
+        };
+        1.0 - weight * albedo.at(cosine.abs())
+    }
+
+    /// Its textures.
+    pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        [&self.weight, &self.roughness].into_iter().filter_map(Number::texture)
+    }
+}
+
 /// The two tables of [`SchlickAlbedo`].
 fn tables(roughness: Option<f32>) -> [AlbedoTable; 2] {
     let alpha = |roughness: f32| microfacet::alphas(roughness, 0.0)[0];
@@ -130,6 +183,7 @@ struct Inputs {
     roughness: f32,
     specular: f32,
     specular_color: Vec3,
+    transmission: f32,
     clearcoat: f32,
     clearcoat_roughness: f32,
 }
@@ -156,13 +210,16 @@ impl Principled {
         let albedo = specular_albedo.unwrap_or_else(|| SchlickAlbedo::between(unit(inputs.roughness)));
         let of_coat = || SchlickAlbedo::between(unit(inputs.clearcoat_roughness));
         let mean = reflectance * albedo.normal.mean + Vec3::splat(specular * albedo.grazing.mean);
-        let diffuse = color * (1.0 - metallic);
+        let below = color * (1.0 - metallic);
+        let through = unit(inputs.transmission);
+        let diffuse = below * (1.0 - through);
         PrincipledPoint {
             base: diffuse * FRAC_1_PI / (Vec3::ONE - mean).max(Vec3::splat(1e-3)),
             facets: reflectance.lerp(color, metallic),
             metal: color * metallic,
             grazing: specular + (1.0 - specular) * metallic,
             dielectric: (reflectance, specular),
+            transmission: below * through,
             alpha: microfacet::alphas(unit(inputs.roughness), 0.0)[0],
             albedo,
             coat: unit(inputs.clearcoat),
@@ -184,6 +241,7 @@ impl RoughMaterial for Principled {
             roughness: self.inputs.roughness.at(at, lookups),
             specular: self.inputs.specular.at(at, lookups),
             specular_color: self.inputs.specular_color.at(at, lookups),
+            transmission: self.inputs.transmission.at(at, lookups),
             clearcoat: self.inputs.clearcoat.at(at, lookups),
             clearcoat_roughness: self.inputs.clearcoat_roughness.at(at, lookups),
         };
@@ -199,6 +257,7 @@ impl RoughMaterial for Principled {
             roughness: number(&self.inputs.roughness),
             specular: number(&self.inputs.specular),
             specular_color: color(&self.inputs.specular_color),
+            transmission: number(&self.inputs.transmission),
             clearcoat: number(&self.inputs.clearcoat),
             clearcoat_roughness: number(&self.inputs.clearcoat_roughness),
         })
@@ -211,6 +270,7 @@ impl RoughMaterial for Principled {
             roughness: self.inputs.roughness.constant()?,
             specular: self.inputs.specular.constant()?,
             specular_color: self.inputs.specular_color.constant()?,
+            transmission: self.inputs.transmission.constant()?,
             clearcoat: self.inputs.clearcoat.constant()?,
             clearcoat_roughness: self.inputs.clearcoat_roughness.constant()?,
         }))
@@ -222,20 +282,23 @@ impl RoughMaterial for Principled {
     }
 
     fn ambient_at(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
-        self.inputs.color.at(at, lookups) * (1.0 - self.inputs.metallic.at(at, lookups).clamp(0.0, 1.0))
+        let [metallic, transmission] = [&self.inputs.metallic, &self.inputs.transmission]
+            .map(|number| number.at(at, lookups).clamp(0.0, 1.0));
+        self.inputs.color.at(at, lookups) * (1.0 - metallic) * (1.0 - transmission)
     }
 
     fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         let PrincipledInputs { color, metallic, roughness, specular, specular_color, .. } = &self.inputs;
-        let PrincipledInputs { ior: _, clearcoat, clearcoat_roughness, .. } = &self.inputs;
-        let numbers = [metallic, roughness, specular, clearcoat, clearcoat_roughness];
+        let PrincipledInputs { ior: _, transmission, clearcoat, clearcoat_roughness, .. } = &self.inputs;
+        let numbers = [metallic, roughness, specular, transmission, clearcoat, clearcoat_roughness];
         let colors = [color, specular_color].into_iter().filter_map(Color::texture);
         colors.chain(numbers.into_iter().filter_map(Number::texture))
     }
 
     #[inline]
     fn fills_rows(&self) -> bool {
-        self.textures().next().is_none()
+        // A row has the light of one side.
+        self.inputs.transmission.constant() == Some(0.0) && self.textures().next().is_none()
     }
 
     #[inline]
@@ -247,7 +310,8 @@ impl RoughMaterial for Principled {
 impl RoughPoint for PrincipledPoint {
     #[inline]
     fn is_black(&self) -> bool {
-        self.base == Vec3::ZERO && self.facets == Vec3::ZERO && self.grazing == 0.0 && self.coat == 0.0
+        let is_dark = self.base == Vec3::ZERO && self.facets == Vec3::ZERO && !self.transmits();
+        is_dark && self.grazing == 0.0 && self.coat == 0.0
     }
 
     #[inline]
@@ -258,7 +322,8 @@ impl RoughPoint for PrincipledPoint {
     fn tinted(self, color: Vec3) -> Self {
         let metal = self.metal * color;
         let facets = self.facets - self.metal + metal;
-        Self { base: self.base * color, facets, metal, ambient: self.ambient * color, ..self }
+        let (base, transmission) = (self.base * color, self.transmission * color);
+        Self { base, facets, metal, transmission, ambient: self.ambient * color, ..self }
     }
 }
 

@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use super::{COAT_REFLECTANCE, Principled, PrincipledPoint};
 use crate::materials::bsdf::{
-    BsdfValues, LobeSet, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
+    BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
 };
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate};
@@ -14,12 +14,13 @@ use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Truths, lane, set_lane, take, truths};
 
-/// Surfaces of principled materials, side by side. The values of f that are shared are the grey f of all lobes, and nothing.
+/// Surfaces of principled materials, side by side: with light that they reflect, or that comes through. The values of f that are
+/// shared are the grey f of all lobes, and nothing.
 #[derive(Clone, Debug)]
-pub struct PrincipledRow {
-    /// Unit normals that face the viewer.
+pub struct PrincipledRow<const THROUGH: bool> {
+    /// Unit normals that face the viewer; for light that comes through, those on the other side.
     normal: Lanes3,
-    /// Unit directions to the viewer.
+    /// Unit directions to the viewer; for light that comes through, mirrored to the other side.
     to_eye: Lanes3,
     /// [`PrincipledPoint::base`].
     base: Lanes3,
@@ -29,6 +30,8 @@ pub struct PrincipledRow {
     grazing: Lanes,
     /// [`PrincipledPoint::dielectric`].
     dielectric: (Lanes3, Lanes),
+    /// [`PrincipledPoint::transmission`].
+    transmission: Lanes3,
     /// [`PrincipledPoint::alpha`].
     alpha: Lanes,
     /// Terms of [`PrincipledPoint::albedo`].
@@ -45,6 +48,8 @@ pub struct PrincipledRow {
     through: Lanes,
     /// Probabilities of choosing the specular lobe, and the coat's.
     shares: [Lanes; 2],
+    /// Probability of choosing the light that comes through.
+    through_share: Lanes,
     /// 1 where the diffuse lobe is shown, else 0; likewise the others.
     shown: [Lanes; 2],
     /// f in sr⁻¹ that is shown in place of the lobes.
@@ -53,6 +58,8 @@ pub struct PrincipledRow {
     is_coated: bool,
     /// Whether any surface has a diffuse lobe.
     is_diffuse: bool,
+    /// Whether light comes through any surface.
+    transmits: bool,
 }
 
 /// Factors on the diffuse lobe and the others for what is shown, and f in their place.
@@ -71,7 +78,7 @@ fn ahead(cosine: f32) -> f32 {
     if cosine > 0.0 { cosine } else { 0.0 }
 }
 
-impl PrincipledRow {
+impl<const THROUGH: bool> PrincipledRow<THROUGH> {
     /// Albedo of the coat, with its weight, by a cosine ≥ 0.
     #[inline(always)]
     fn coat_albedo(&self, i: usize, cosine: f32) -> f32 {
@@ -133,6 +140,18 @@ impl PrincipledRow {
         }
     }
 
+    /// f of the light that comes through.
+    #[inline(always)]
+    fn transmitted(&self, i: usize, direction: Vec3) -> Vec3 {
+        let half = Half::of(lane(&self.normal, i), lane(&self.to_eye, i), direction);
+        let weight = schlick_weight(half.cosine());
+        let [eye, light] = self.legs(i, direction, self.alpha[i]);
+        let (facets, grazing) = (lane(&self.dielectric.0, i), self.dielectric.1[i]);
+        let left = Vec3::ONE - (facets + (Vec3::splat(grazing) - facets) * weight);
+        let white = eye.reflected(&light, half.isotropic(self.alpha[i]));
+        lane(&self.transmission, i) * left * (white * self.through_coat(i, light.cosine))
+    }
+
     /// Pdfs of a direction in the specular lobe and in the coat's.
     #[inline(always)]
     fn densities(&self, i: usize, direction: Vec3) -> [f32; 2] {
@@ -156,16 +175,23 @@ impl PrincipledRow {
         let [normal, grazing] = self.albedos(i, cosine);
         let specular = lane(&self.facets, i).max_element() * normal + self.grazing[i] * grazing;
         let diffuse = (lane(&self.base, i) * left).max_element() * PI;
-        let below = (1.0 - coat) / (specular + diffuse).max(f32::MIN_POSITIVE);
+        let mut all = specular + diffuse;
+        let mut through = 0.0;
+        if self.transmits {
+            let left = lane(&self.transmission, i) * (left + Vec3::splat(normal + grazing - 1.0));
+            through = ahead(left.max_element());
+            all += through;
+        }
+        let below = (1.0 - coat) / all.max(f32::MIN_POSITIVE);
         // The coat has at least its part of the light, and the rest shares what passes it.
         self.shares[0][i] = below * specular;
-        let of_coat = 1.0 - below * (specular + diffuse);
+        self.through_share[i] = below * through;
+        let of_coat = 1.0 - below * all;
         self.shares[1][i] = if self.coat[i] > 0.0 { of_coat } else { 0.0 };
     }
 }
 
-impl RoughRow for PrincipledRow {
-    type Material = Principled;
+impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     type Point = PrincipledPoint;
 
     const SENDS_RAYS: bool = true;
@@ -177,6 +203,7 @@ impl RoughRow for PrincipledRow {
         facets: [[0.0; LANES]; 3],
         grazing: [1.0; LANES],
         dielectric: ([[0.0; LANES]; 3], [0.0; LANES]),
+        transmission: [[0.0; LANES]; 3],
         alpha: [1.0; LANES],
         terms: [[[0.0; LANES]; TERMS]; 2],
         coat: [0.0; LANES],
@@ -185,22 +212,27 @@ impl RoughRow for PrincipledRow {
         left: [[1.0; LANES]; 3],
         through: [1.0; LANES],
         shares: [[1.0; LANES], [0.0; LANES]],
+        through_share: [0.0; LANES],
         shown: [[0.0; LANES]; 2],
         unit: [0.0; LANES],
         is_coated: false,
         is_diffuse: false,
+        transmits: false,
     };
 
     #[inline(always)]
     fn reset(&mut self) {
-        (self.is_coated, self.is_diffuse) = (false, false);
+        (self.is_coated, self.is_diffuse, self.transmits) = (false, false, false);
     }
 
     #[inline(always)]
     fn put(&mut self, i: usize, bsdf: &PrincipledPoint, shown: ShownLobes, place: &Place) {
-        set_lane(&mut self.normal, i, facing(place.normal, place.to_eye));
-        set_lane(&mut self.to_eye, i, place.to_eye);
+        let normal = facing(if THROUGH { -place.normal } else { place.normal }, place.to_eye);
+        let mirrored = place.to_eye - normal * (2.0 * normal.dot(place.to_eye));
+        set_lane(&mut self.normal, i, if THROUGH { -normal } else { normal });
+        set_lane(&mut self.to_eye, i, if THROUGH { mirrored } else { place.to_eye });
         set_lane(&mut self.base, i, bsdf.base);
+        set_lane(&mut self.transmission, i, bsdf.transmission);
         set_lane(&mut self.facets, i, bsdf.facets);
         set_lane(&mut self.dielectric.0, i, bsdf.dielectric.0);
         (self.dielectric.1[i], self.grazing[i], self.alpha[i]) =
@@ -214,8 +246,188 @@ impl RoughRow for PrincipledRow {
         [self.shown[0][i], self.shown[1][i], self.unit[i]] = shown_parts(shown);
         self.is_coated |= bsdf.coat > 0.0;
         self.is_diffuse |= bsdf.base != Vec3::ZERO;
+        self.transmits |= bsdf.transmits();
         self.look(i);
     }
+
+    #[inline(always)]
+    fn copy(&mut self, i: usize, other: &Self, from: usize) {
+        for (own, other) in [
+            (&mut self.normal, &other.normal),
+            (&mut self.to_eye, &other.to_eye),
+            (&mut self.base, &other.base),
+            (&mut self.facets, &other.facets),
+            (&mut self.dielectric.0, &other.dielectric.0),
+            (&mut self.transmission, &other.transmission),
+            (&mut self.left, &other.left),
+        ] {
+            set_lane(own, i, lane(other, from));
+        }
+        for (own, other) in [
+            (&mut self.dielectric.1, &other.dielectric.1),
+            (&mut self.grazing, &other.grazing),
+            (&mut self.alpha, &other.alpha),
+            (&mut self.coat, &other.coat),
+            (&mut self.coat_alpha, &other.coat_alpha),
+            (&mut self.through, &other.through),
+            (&mut self.through_share, &other.through_share),
+            (&mut self.unit, &other.unit),
+        ] {
+            own[i] = other[from];
+        }
+        let own = self.terms.iter_mut().flatten().chain(&mut self.coat_terms);
+        let own = own.chain(&mut self.shares).chain(&mut self.shown);
+        let others = other.terms.iter().flatten().chain(&other.coat_terms);
+        for (own, other) in own.zip(others.chain(&other.shares).chain(&other.shown)) {
+            own[i] = other[from];
+        }
+        self.is_coated |= other.is_coated;
+        self.is_diffuse |= other.is_diffuse;
+        self.transmits |= other.transmits;
+    }
+
+    #[inline(always)]
+    fn f(&self, directions: &Lanes3) -> BsdfValues {
+        let (mut f, mut grey) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        for i in 0..LANES {
+            let direction = lane(directions, i);
+            let narrow = if THROUGH { self.transmitted(i, direction) } else { self.narrow(i, direction) };
+            set_lane(&mut f, i, narrow * self.shown[1][i] + Vec3::splat(self.unit[i]));
+            grey[i] = narrow.max_element();
+        }
+        if self.is_diffuse && !THROUGH {
+            for i in 0..LANES {
+                let wide = self.wide(i, lane(directions, i));
+                let sum = lane(&f, i) + wide * self.shown[0][i];
+                set_lane(&mut f, i, sum);
+                grey[i] += wide.max_element();
+            }
+        }
+        BsdfValues { f, shared: [grey, [0.0; LANES]] }
+    }
+
+    #[inline(always)]
+    fn parts(&self, directions: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
+        if THROUGH {
+            return [[[0.0; LANES]; 3], values.f];
+        }
+        let (mut wide, mut narrow) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        for i in 0..LANES {
+            let direction = lane(directions, i);
+            set_lane(&mut wide, i, self.wide(i, direction) * self.shown[0][i]);
+            let value = self.narrow(i, direction) * self.shown[1][i] + Vec3::splat(self.unit[i]);
+            set_lane(&mut narrow, i, value);
+        }
+        [wide, narrow]
+    }
+
+    #[inline(always)]
+    fn grey(&self, values: &BsdfValues) -> Lanes {
+        values.shared[0]
+    }
+
+    #[inline(always)]
+    fn pdf(&self, lobes: LobeSet, normals: &Lanes3, directions: &Lanes3, _: &BsdfValues) -> Lanes {
+        let mut densities = [0.0; LANES];
+        for i in 0..LANES {
+            let direction = lane(directions, i);
+            let [specular, coat] = self.densities(i, direction);
+            let (of_specular, of_coat) = (self.shares[0][i], self.shares[1][i]);
+            let of_through = self.through_share[i];
+            let narrow =
+                if THROUGH { of_through * specular } else { of_specular * specular + of_coat * coat };
+            densities[i] = match lobes {
+                LobeSet::All if THROUGH => narrow,
+                LobeSet::All => {
+                    let cosine = lane(normals, i).dot(direction);
+                    narrow + (1.0 - of_specular - of_coat - of_through) * ahead(cosine) * FRAC_1_PI
+                }
+                LobeSet::Narrow => narrow / (of_specular + of_coat + of_through).max(f32::MIN_POSITIVE),
+            };
+        }
+        densities
+    }
+
+    #[inline(always)]
+    fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
+        let mut directions = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let u = [u[0][i], u[1][i]];
+            let (of_specular, of_coat) = (self.shares[0][i], self.shares[1][i]);
+            let of_through = self.through_share[i];
+            let choice = match lobes {
+                LobeSet::All => choices[i],
+                LobeSet::Narrow => choices[i] * (of_specular + of_coat + of_through),
+            };
+            // The coat comes first, then the specular lobe; what goes through comes last.
+            let last = match lobes {
+                LobeSet::All => 1.0 - of_through,
+                LobeSet::Narrow => of_specular + of_coat,
+            };
+            let is_through = (of_through > 0.0) & (choice >= last);
+            let alpha = if (choice < of_coat) & !THROUGH { self.coat_alpha[i] } else { self.alpha[i] };
+            let is_wide = match lobes {
+                LobeSet::All => choice >= of_coat + of_specular,
+                LobeSet::Narrow => false,
+            };
+            let frame = Frame::from_normal(lane(&self.normal, i));
+            let narrow = mirrored(&frame, lane(&self.to_eye, i), [alpha; 2], u);
+            let wide = about(lane(normals, i), u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
+            let is_wide = is_wide & !THROUGH;
+            let choose = |wide: f32, narrow: f32| if is_wide { wide } else { narrow };
+            let chosen =
+                Vec3::new(choose(wide.x, narrow.x), choose(wide.y, narrow.y), choose(wide.z, narrow.z));
+            // Where it goes on at the other side, the direction is of no use.
+            let useless = -lane(&self.normal, i);
+            let keep = |own: f32, useless: f32| if is_through == THROUGH { own } else { useless };
+            let kept =
+                Vec3::new(keep(chosen.x, useless.x), keep(chosen.y, useless.y), keep(chosen.z, useless.z));
+            set_lane(&mut directions, i, kept);
+        }
+        directions
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobes(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobe(&self, _: usize) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
+        let (normal, to_eye) = (lane(&self.normal, i), lane(&self.to_eye, i));
+        let reflectance = lane(&self.facets, i).max_element();
+        let wide = if THROUGH { 0.0 } else { (lane(&self.base, i) * lane(&self.left, i)).max_element() };
+        Some(NarrowLobe::of_microfacets(normal, to_eye, self.alpha[i], reflectance, wide))
+    }
+
+    #[inline(always)]
+    fn narrower_than(&self, _: u32, _: f32) -> u32 {
+        0
+    }
+
+    #[inline(always)]
+    fn even(&self, _: usize) -> Option<Vec3> {
+        None
+    }
+
+    #[inline(always)]
+    fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
+        let narrow = if THROUGH { self.transmitted(i, direction) } else { self.narrow(i, direction) };
+        let mut f = narrow * self.shown[1][i] + Vec3::splat(self.unit[i]);
+        if self.is_diffuse && !THROUGH {
+            f += self.wide(i, direction) * self.shown[0][i];
+        }
+        f
+    }
+}
+
+impl MaterialRow for PrincipledRow<false> {
+    type Material = Principled;
 
     #[inline(always)]
     fn fill(
@@ -275,157 +487,5 @@ impl RoughRow for PrincipledRow {
         for i in 0..LANES {
             self.look(i);
         }
-    }
-
-    #[inline(always)]
-    fn copy(&mut self, i: usize, other: &Self, from: usize) {
-        for (own, other) in [
-            (&mut self.normal, &other.normal),
-            (&mut self.to_eye, &other.to_eye),
-            (&mut self.base, &other.base),
-            (&mut self.facets, &other.facets),
-            (&mut self.dielectric.0, &other.dielectric.0),
-            (&mut self.left, &other.left),
-        ] {
-            set_lane(own, i, lane(other, from));
-        }
-        for (own, other) in [
-            (&mut self.dielectric.1, &other.dielectric.1),
-            (&mut self.grazing, &other.grazing),
-            (&mut self.alpha, &other.alpha),
-            (&mut self.coat, &other.coat),
-            (&mut self.coat_alpha, &other.coat_alpha),
-            (&mut self.through, &other.through),
-            (&mut self.unit, &other.unit),
-        ] {
-            own[i] = other[from];
-        }
-        let own = self.terms.iter_mut().flatten().chain(&mut self.coat_terms);
-        let own = own.chain(&mut self.shares).chain(&mut self.shown);
-        let others = other.terms.iter().flatten().chain(&other.coat_terms);
-        for (own, other) in own.zip(others.chain(&other.shares).chain(&other.shown)) {
-            own[i] = other[from];
-        }
-        self.is_coated |= other.is_coated;
-        self.is_diffuse |= other.is_diffuse;
-    }
-
-    #[inline(always)]
-    fn f(&self, directions: &Lanes3) -> BsdfValues {
-        let (mut f, mut grey) = ([[0.0; LANES]; 3], [0.0; LANES]);
-        for i in 0..LANES {
-            let narrow = self.narrow(i, lane(directions, i));
-            set_lane(&mut f, i, narrow * self.shown[1][i] + Vec3::splat(self.unit[i]));
-            grey[i] = narrow.max_element();
-        }
-        if self.is_diffuse {
-            for i in 0..LANES {
-                let wide = self.wide(i, lane(directions, i));
-                let sum = lane(&f, i) + wide * self.shown[0][i];
-                set_lane(&mut f, i, sum);
-                grey[i] += wide.max_element();
-            }
-        }
-        BsdfValues { f, shared: [grey, [0.0; LANES]] }
-    }
-
-    #[inline(always)]
-    fn parts(&self, directions: &Lanes3, _: &BsdfValues) -> [Lanes3; 2] {
-        let (mut wide, mut narrow) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-        for i in 0..LANES {
-            let direction = lane(directions, i);
-            set_lane(&mut wide, i, self.wide(i, direction) * self.shown[0][i]);
-            let value = self.narrow(i, direction) * self.shown[1][i] + Vec3::splat(self.unit[i]);
-            set_lane(&mut narrow, i, value);
-        }
-        [wide, narrow]
-    }
-
-    #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> Lanes {
-        values.shared[0]
-    }
-
-    #[inline(always)]
-    fn pdf(&self, lobes: LobeSet, normals: &Lanes3, directions: &Lanes3, _: &BsdfValues) -> Lanes {
-        let mut densities = [0.0; LANES];
-        for i in 0..LANES {
-            let direction = lane(directions, i);
-            let [specular, coat] = self.densities(i, direction);
-            let (of_specular, of_coat) = (self.shares[0][i], self.shares[1][i]);
-            let narrow = of_specular * specular + of_coat * coat;
-            densities[i] = match lobes {
-                LobeSet::All => {
-                    let cosine = lane(normals, i).dot(direction);
-                    narrow + (1.0 - of_specular - of_coat) * ahead(cosine) * FRAC_1_PI
-                }
-                LobeSet::Narrow => narrow / (of_specular + of_coat).max(f32::MIN_POSITIVE),
-            };
-        }
-        densities
-    }
-
-    #[inline(always)]
-    fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
-        let mut directions = [[0.0; LANES]; 3];
-        for i in 0..LANES {
-            let u = [u[0][i], u[1][i]];
-            let (of_specular, of_coat) = (self.shares[0][i], self.shares[1][i]);
-            let choice = match lobes {
-                LobeSet::All => choices[i],
-                LobeSet::Narrow => choices[i] * (of_specular + of_coat),
-            };
-            // The coat comes first, then the specular lobe.
-            let alpha = if choice < of_coat { self.coat_alpha[i] } else { self.alpha[i] };
-            let is_wide = match lobes {
-                LobeSet::All => choice >= of_coat + of_specular,
-                LobeSet::Narrow => false,
-            };
-            let frame = Frame::from_normal(lane(&self.normal, i));
-            let narrow = mirrored(&frame, lane(&self.to_eye, i), [alpha; 2], u);
-            let wide = about(lane(normals, i), u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
-            let choose = |wide: f32, narrow: f32| if is_wide { wide } else { narrow };
-            let chosen =
-                Vec3::new(choose(wide.x, narrow.x), choose(wide.y, narrow.y), choose(wide.z, narrow.z));
-            set_lane(&mut directions, i, chosen);
-        }
-        directions
-    }
-
-    #[inline(always)]
-    fn has_narrow_lobes(&self) -> bool {
-        true
-    }
-
-    #[inline(always)]
-    fn has_narrow_lobe(&self, _: usize) -> bool {
-        true
-    }
-
-    #[inline(always)]
-    fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
-        let (normal, to_eye) = (lane(&self.normal, i), lane(&self.to_eye, i));
-        let reflectance = lane(&self.facets, i).max_element();
-        let wide = (lane(&self.base, i) * lane(&self.left, i)).max_element();
-        Some(NarrowLobe::of_microfacets(normal, to_eye, self.alpha[i], reflectance, wide))
-    }
-
-    #[inline(always)]
-    fn narrower_than(&self, _: u32, _: f32) -> u32 {
-        0
-    }
-
-    #[inline(always)]
-    fn even(&self, _: usize) -> Option<Vec3> {
-        None
-    }
-
-    #[inline(always)]
-    fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
-        let mut f = self.narrow(i, direction) * self.shown[1][i] + Vec3::splat(self.unit[i]);
-        if self.is_diffuse {
-            f += self.wide(i, direction) * self.shown[0][i];
-        }
-        f
     }
 }

@@ -3,11 +3,16 @@
 use super::*;
 use crate::materials::bsdf::LobeSet;
 use crate::materials::lobe_tests::{
-    ALPHAS, COSINES, Subject, check_neighbours, check_values, direction, reference,
+    ALPHAS, COSINES, Light, Subject, check_neighbours, check_neighbours_lit, check_values, direction,
+    reference,
 };
 use crate::math::DVec3;
 
 fn principled(color: Vec3, metallic: f32, alpha: f32, coat: [f32; 2]) -> Principled {
+    transmitting(color, metallic, 0.0, alpha, coat)
+}
+
+fn transmitting(color: Vec3, metallic: f32, transmission: f32, alpha: f32, coat: [f32; 2]) -> Principled {
     let number = Number::Constant;
     Principled::new(PrincipledInputs {
         color: Color::Constant(color),
@@ -16,6 +21,7 @@ fn principled(color: Vec3, metallic: f32, alpha: f32, coat: [f32; 2]) -> Princip
         ior: 1.6,
         specular: number(0.8),
         specular_color: Color::Constant(Vec3::new(1.0, 0.6, 1.2)),
+        transmission: number(transmission),
         clearcoat: number(coat[0]),
         clearcoat_roughness: number(coat[1].sqrt()),
     })
@@ -50,7 +56,7 @@ fn values_are_those_of_the_formulas_and_reciprocal() {
             + DVec3::splat(0.8 * f64::from(point.albedo.grazing.mean));
         let c = f64::from(coat[0]);
         let through = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.at(cosine as f32));
-        check_values::<PrincipledRow>(
+        check_values::<PrincipledRow<false>>(
             &format!("α {alpha}, metallic {metallic}"),
             &point,
             [alpha; 2],
@@ -79,7 +85,7 @@ fn a_surface_gets_the_bits_that_it_gets_alone() {
         })
         .map(|one| point(&one))
         .collect();
-    check_neighbours::<PrincipledRow>(&points);
+    check_neighbours::<PrincipledRow<false>>(&points);
 }
 
 #[test]
@@ -87,7 +93,7 @@ fn samples_are_drawn_by_their_density() {
     for (alpha, metallic, coat) in subjects() {
         for cosine in COSINES {
             let point = point(&principled(RED, metallic, alpha, coat));
-            let subject = Subject::<PrincipledRow>::new(&point, [alpha; 2], direction(cosine, 0.7));
+            let subject = Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], direction(cosine, 0.7));
             let what = format!("α {alpha}, metallic {metallic} at a cosine of {cosine}");
             subject.check_samples(&what, LobeSet::Narrow);
             if alpha >= 0.2 {
@@ -103,7 +109,8 @@ fn albedos_are_those_of_quadrature_and_never_above_one() {
         for cosine in COSINES {
             for color in [RED, Vec3::ONE] {
                 let point = point(&principled(color, metallic, alpha, coat));
-                let subject = Subject::<PrincipledRow>::new(&point, [alpha; 2], direction(cosine, 0.3));
+                let subject =
+                    Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], direction(cosine, 0.3));
                 let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());
                 let what = format!(
                     "α {alpha}, metallic {metallic} at a cosine of {cosine}: {sampled} is not {exact}"
@@ -113,4 +120,92 @@ fn albedos_are_those_of_quadrature_and_never_above_one() {
             }
         }
     }
+}
+
+/// Parts of the light that go through.
+const TRANSMISSIONS: [f32; 2] = [0.6, 1.0];
+
+#[test]
+fn what_goes_through_is_the_lobe_mirrored_to_the_other_side() {
+    for ((alpha, metallic, coat), transmission) in
+        subjects().filter(|one| one.1 < 1.0).flat_map(|one| TRANSMISSIONS.map(|part| (one, part)))
+    {
+        let point = point(&transmitting(RED, metallic, transmission, alpha, coat));
+        let f0 = DVec3::new(1.0, 0.6, 1.2) * (0.6_f64 / 2.6).powi(2) * 0.8;
+        let c = f64::from(coat[0]);
+        let left = |cosine: f64| 1.0 - c * f64::from(point.coat_albedo.at(cosine as f32));
+        let (part, m) = (f64::from(transmission), f64::from(metallic));
+        for (number, cosine) in COSINES.into_iter().enumerate() {
+            let to_eye = direction(cosine, 0.7).as_vec3().as_dvec3();
+            let subject = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], to_eye, Light::Through);
+            for trial in 0..40_u32 {
+                let (y, turn) = (f64::from(trial) / 41.0, f64::from(trial) * 2.4 + number as f64);
+                let Some((light, _)) = subject.at_half_vector(y, turn) else { continue };
+                let light = light.as_vec3().as_dvec3();
+                if light.z > -0.02 {
+                    continue;
+                }
+                let (o, i) = (to_eye.normalize(), DVec3::new(light.x, light.y, -light.z).normalize());
+                let weight = (1.0 - (o + i).length() * 0.5).powi(5);
+                let fresnel = f0 + (DVec3::splat(0.8) - f0) * weight;
+                let lobe = reference(o, i, [f64::from(alpha); 2]) * left(o.z) * left(i.z);
+                let exact = RED.as_dvec3() * (DVec3::ONE - fresnel) * (part * (1.0 - m) * lobe);
+                let found = subject.values(LobeSet::All, &[light])[0].0;
+                let error = if alpha >= 0.05 { 3e-5 } else { 5e-3 };
+                let what = format!("α {alpha}, {transmission}, {cosine}: {found} is not {exact}");
+                assert!((found - exact).abs().max_element() <= error * exact.max_element(), "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn samples_of_both_sides_are_drawn_by_their_density() {
+    for (alpha, metallic, coat) in subjects().filter(|one| one.1 < 1.0) {
+        for cosine in COSINES {
+            let point = point(&transmitting(RED, metallic, 0.6, alpha, coat));
+            let at = direction(cosine, 0.7);
+            let behind = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], at, Light::Through);
+            let front = Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], at);
+            let what = format!("α {alpha}, metallic {metallic} at a cosine of {cosine}");
+            for lobes in [LobeSet::Narrow, LobeSet::All] {
+                behind.check_samples(&format!("behind, {lobes:?}, {what}"), lobes);
+                if lobes == LobeSet::Narrow || alpha >= 0.2 {
+                    front.check_samples(&format!("before, {lobes:?}, {what}"), lobes);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn both_sides_together_have_the_albedo_of_quadrature_and_never_more_than_all() {
+    for ((alpha, metallic, coat), transmission) in
+        subjects().flat_map(|one| TRANSMISSIONS.map(|part| (one, part)))
+    {
+        for cosine in COSINES {
+            let point = point(&transmitting(Vec3::ONE, metallic, transmission, alpha, coat));
+            let at = direction(cosine, 0.3);
+            let behind = Subject::<PrincipledRow<true>>::lit(&point, [alpha; 2], at, Light::Through);
+            let front = Subject::<PrincipledRow<false>>::new(&point, [alpha; 2], at);
+            let sampled = front.sampled_albedo(192) + behind.sampled_albedo(192);
+            let exact = front.albedo() + behind.albedo();
+            let what =
+                format!("α {alpha}, metallic {metallic}, {transmission} at {cosine}: {sampled}, {exact}");
+            assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
+            assert!(sampled.max_element() < 1.0 + 2e-3, "{what}");
+        }
+    }
+}
+
+#[test]
+fn a_surface_that_light_goes_through_gets_the_bits_that_it_gets_alone() {
+    let points: Vec<PrincipledPoint> = subjects()
+        .flat_map(|(alpha, metallic, coat)| {
+            [0.0, 0.6, 1.0].map(|part| transmitting(RED, metallic, part, alpha, coat))
+        })
+        .map(|one| point(&one))
+        .collect();
+    check_neighbours::<PrincipledRow<false>>(&points);
+    check_neighbours_lit::<PrincipledRow<true>>(&points, Light::Through);
 }

@@ -8,7 +8,7 @@ use super::Staged;
 use super::textures::Textures;
 use crate::control::{CancelToken, Cancelled};
 use crate::lights::{Lights, Receivers, SkyMap};
-use crate::scene::description::{Scene, TextureUse};
+use crate::scene::description::{PixelNumber, Scene, TextureUse};
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, Geometry, TextureSource};
 
@@ -58,8 +58,10 @@ fn patterns(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     let shining = scene.materials.iter().filter(|material| material.emits());
     let textures = shining.flat_map(|material| {
         let emission = material.emission.texture.map(|texture| (texture, TextureUse::Color));
-        let opacity = material.opacity.texture();
-        emission.into_iter().chain(opacity.map(|(texture, number)| (texture, TextureUse::Number(number))))
+        let coat = material.emission_coat().into_iter().flatten();
+        let coat = coat.filter_map(|number| number.texture(PixelNumber::Luminance));
+        let numbers = material.opacity.texture().into_iter().chain(coat);
+        emission.into_iter().chain(numbers.map(|(texture, number)| (texture, TextureUse::Number(number))))
     });
     textures.map(|(texture, used)| world::declared_source(scene, texture, used))
 }

@@ -171,10 +171,10 @@ impl MaterialKind {
     pub fn has_delta(&self) -> bool {
         match self {
             Self::Phong { .. } | Self::Principled { .. } => false,
-            Self::Metal { roughness, .. } | Self::Plastic { roughness, .. } => {
-                *roughness == NumberSource::Constant(0.0)
-            }
-            Self::Mirror { .. } | Self::Glass { .. } | Self::Pane { .. } => true,
+            Self::Metal { roughness, .. }
+            | Self::Plastic { roughness, .. }
+            | Self::Glass { roughness, .. } => *roughness == NumberSource::Constant(0.0),
+            Self::Mirror { .. } | Self::Pane { .. } => true,
         }
     }
 
@@ -196,10 +196,12 @@ impl MaterialKind {
         self.substance().is_some()
     }
 
-    /// The bits of what glass is made of: index of refraction and transmittance. `None` if it is not glass.
+    /// The bits of what glass is made of: index of refraction and transmittance, however rough its surface is. `None` if it is not glass.
     pub fn substance(&self) -> Option<[u64; 4]> {
         match *self {
-            Self::Glass { ior, tint } => Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits)),
+            Self::Glass { ior, tint, roughness: _ } => {
+                Some([f64::from(ior), tint.x, tint.y, tint.z].map(f64::to_bits))
+            }
             Self::Phong { .. }
             | Self::Mirror { .. }
             | Self::Pane { .. }
@@ -249,6 +251,8 @@ pub enum TextureRole {
     NormalMap,
     /// The chance that it is there.
     Opacity(PixelNumber),
+    /// Clear coat over what emits.
+    EmissionCoat(PixelNumber),
 }
 
 impl TextureRole {
@@ -260,7 +264,7 @@ impl TextureRole {
             }
             Self::Roughness(number) => TextureUse::Number(number),
             Self::NormalMap => TextureUse::Normal,
-            Self::Opacity(number) => TextureUse::Number(number),
+            Self::Opacity(number) | Self::EmissionCoat(number) => TextureUse::Number(number),
         }
     }
 }
@@ -284,12 +288,14 @@ pub enum MaterialKind {
         /// Reflectance.
         reflectance: Vec3,
     },
-    /// Smooth dielectric.
+    /// Smooth or rough dielectric.
     Glass {
         /// Index of refraction inside, in [0.1, 10]; below 1: thinner than what is outside, as a bubble in water.
         ior: f32,
         /// Transmittance per unit of length inside, in [0, 1].
         tint: DVec3,
+        /// The root of α, in [0, 1]; 0 is smooth.
+        roughness: NumberSource,
     },
     /// A pane of smooth glass without thickness.
     Pane {
@@ -332,6 +338,8 @@ pub enum MaterialKind {
         specular: NumberSource,
         /// Factor on that reflectance at normal incidence, ≥ 0.
         specular_color: ColorSource,
+        /// Part of the light below the specular lobe that goes through.
+        transmission: NumberSource,
         /// Weight of a clear coat.
         clearcoat: NumberSource,
         /// The root of its α.
@@ -373,7 +381,7 @@ impl MaterialKind {
                 (specular_color, TextureRole::Facets),
             ],
             Self::Mirror { reflectance: _ }
-            | Self::Glass { ior: _, tint: _ }
+            | Self::Glass { ior: _, tint: _, roughness: _ }
             | Self::Pane { ior: _, tint: _ } => Vec::new(),
         }
     }
@@ -382,11 +390,17 @@ impl MaterialKind {
     fn numbers(&self) -> Vec<NumberSource> {
         match self {
             Self::Metal { fresnel: _, roughness, anisotropy } => vec![*roughness, *anisotropy],
-            Self::Plastic { roughness, .. } => vec![*roughness],
-            Self::Principled { metallic, roughness, specular, clearcoat, clearcoat_roughness, .. } => {
-                vec![*metallic, *roughness, *specular, *clearcoat, *clearcoat_roughness]
-            }
-            Self::Phong { .. } | Self::Mirror { .. } | Self::Glass { .. } | Self::Pane { .. } => Vec::new(),
+            Self::Plastic { roughness, .. } | Self::Glass { roughness, .. } => vec![*roughness],
+            Self::Principled {
+                metallic,
+                roughness,
+                specular,
+                transmission,
+                clearcoat,
+                clearcoat_roughness,
+                ..
+            } => vec![*metallic, *roughness, *specular, *transmission, *clearcoat, *clearcoat_roughness],
+            Self::Phong { .. } | Self::Mirror { .. } | Self::Pane { .. } => Vec::new(),
         }
     }
 }
@@ -395,6 +409,22 @@ impl Material {
     /// Whether what has it is a light.
     pub fn emits(&self) -> bool {
         self.emission.scale != Vec3::ZERO
+    }
+
+    /// Weight and roughness of the clear coat over what it emits. `None` without emission or coat.
+    pub fn emission_coat(&self) -> Option<[NumberSource; 2]> {
+        match self.kind {
+            MaterialKind::Principled { clearcoat, clearcoat_roughness, .. } => {
+                let has_coat = self.emits() && clearcoat != NumberSource::Constant(0.0);
+                has_coat.then_some([clearcoat, clearcoat_roughness])
+            }
+            MaterialKind::Phong { .. }
+            | MaterialKind::Mirror { .. }
+            | MaterialKind::Glass { .. }
+            | MaterialKind::Pane { .. }
+            | MaterialKind::Metal { .. }
+            | MaterialKind::Plastic { .. } => None,
+        }
     }
 
     /// The textures that it looks up, as indices into [`Scene::textures`](super::Scene::textures), each with its role; one may
@@ -407,7 +437,10 @@ impl Material {
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
         let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
         let opacity = opacity.texture().map(|(texture, number)| (texture, TextureRole::Opacity(number)));
-        colors.chain(numbers).chain(shown).chain(normals).chain(opacity).collect()
+        let coat = self.emission_coat().into_iter().flatten();
+        let coat = coat.filter_map(|number| number.texture(PixelNumber::Luminance));
+        let coat = coat.map(|(texture, number)| (texture, TextureRole::EmissionCoat(number)));
+        colors.chain(numbers).chain(shown).chain(normals).chain(opacity).chain(coat).collect()
     }
 }
 
@@ -496,8 +529,8 @@ impl Fingerprinted for MaterialKind {
             Self::Mirror { reflectance } => {
                 key.index(1).vec3(*reflectance);
             }
-            Self::Glass { ior, tint } => {
-                key.index(2).f32(*ior).dvec3(*tint);
+            Self::Glass { ior, tint, roughness } => {
+                key.index(2).f32(*ior).dvec3(*tint).add(roughness, of);
             }
             Self::Pane { ior, tint } => {
                 key.index(3).f32(*ior).vec3(*tint);
@@ -515,11 +548,13 @@ impl Fingerprinted for MaterialKind {
                 ior,
                 specular,
                 specular_color,
+                transmission,
                 clearcoat,
                 clearcoat_roughness,
             } => {
                 key.index(5).add(color, of).add(metallic, of).add(roughness, of).f32(*ior);
-                key.add(specular, of).add(specular_color, of).add(clearcoat, of).add(clearcoat_roughness, of);
+                key.add(specular, of).add(specular_color, of).add(transmission, of);
+                key.add(clearcoat, of).add(clearcoat_roughness, of);
             }
         }
     }

@@ -47,7 +47,7 @@ choice! {
         Phong = "phong",
         /// A perfect mirror.
         Mirror = "mirror",
-        /// A smooth dielectric.
+        /// A smooth or rough dielectric.
         Glass = "glass",
         /// A rough or smooth conductor.
         Metal = "metal",
@@ -65,7 +65,7 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
     let kind = match kind {
         Kind::Phong => Some(phong(table, textures)),
         Kind::Mirror => Some(mirror(table)),
-        Kind::Glass => Some(glass(table)),
+        Kind::Glass => glass(table, textures),
         Kind::Metal => metal(table, textures),
         Kind::Plastic => Some(plastic(table, textures)),
         Kind::Principled => Some(principled(table, textures)),
@@ -157,6 +157,7 @@ fn principled(table: &Table<'_>, textures: &Names) -> MaterialKind {
             .optional("specular_color")
             .color_or_texture(textures)
             .unwrap_or(ColorSource::Constant(Vec3::ONE)),
+        transmission: number("transmission", 0.0),
         clearcoat: number("clearcoat", 0.0),
         clearcoat_roughness: number("clearcoat_roughness", 0.0),
     }
@@ -203,13 +204,21 @@ fn mirror(table: &Table<'_>) -> MaterialKind {
     MaterialKind::Mirror { reflectance: table.optional("reflectance").fraction().unwrap_or(Vec3::splat(0.9)) }
 }
 
-fn glass(table: &Table<'_>) -> MaterialKind {
+fn glass(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
     let ior = table.optional("ior").number32(Limits::Between(0.1, 10.0)).unwrap_or(1.5);
     let tint = table.optional("tint").exact_fraction().unwrap_or(DVec3::ONE);
     let thin = table.optional("thin");
+    let rough = table.optional("roughness");
+    let roughness = fraction(table, textures, "roughness", 0.0);
     // Whoever writes it wrongly hardly means glass that fills its shape.
-    match thin.flag().unwrap_or(thin.is_given()) {
-        true => MaterialKind::Pane { ior, tint: tint.as_vec3() },
-        false => MaterialKind::Glass { ior, tint },
+    if !thin.flag().unwrap_or(thin.is_given()) {
+        return Some(MaterialKind::Glass { ior, tint, roughness });
     }
+    if roughness != NumberSource::Constant(0.0) {
+        let issue = Issue::error(rough.span()?, "a thin pane is smooth")
+            .help("leave out `thin`, and give rough glass a thickness: a box in place of a quad");
+        table.context.report(issue);
+        return None;
+    }
+    Some(MaterialKind::Pane { ior, tint: tint.as_vec3() })
 }

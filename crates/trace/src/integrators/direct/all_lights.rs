@@ -192,7 +192,8 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         mut values: Lanes3,
     ) -> Lanes3 {
         for i in lanes(active) {
-            let color = pattern.at(lane(&samples.targets, i), samples.sources.part[i]);
+            let (target, direction) = (lane(&samples.targets, i), lane(&samples.directions, i));
+            let color = pattern.at(target, samples.sources.part[i], direction);
             let color = match self.measure {
                 Measure::Radiance(_) => color,
                 Measure::ArrivingShare => Vec3::splat(luminance(color)),

@@ -200,7 +200,7 @@ impl TileContext<'_> {
             return Vec3::ZERO;
         }
         let at = TexturePoint::sharp(uv);
-        let mut radiance = emission.at(&at, lookups);
+        let mut radiance = emission.at(&at, normal.dot(ray.direction), lookups);
         if let Some(opacity) = &material.opacity {
             radiance *= opacity.at(&at, lookups);
         }

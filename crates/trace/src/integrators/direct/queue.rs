@@ -36,7 +36,7 @@ pub struct DirectLightQueue {
     /// Index of the row for single vertices of each kind of BSDF. If no row in use has this index, the row is full or there is
     /// none.
     open: [usize; RoughKind::ALL.len()],
-    /// Light of lamps at the vertex of each path of the round.
+    /// Light of lamps at the vertices of each path of the round.
     arrived: Vec<Vec3>,
     /// Media of the vertices.
     media: Media,
@@ -279,7 +279,7 @@ impl DirectLightQueue {
         }
     }
 
-    /// Stores the light that arrives at a row.
+    /// Adds the light that arrives at a row: a path has two vertices at a surface that lets light through.
     fn note(&mut self, number: usize, measure: Measure, arrived: &Lanes3) {
         let row = &self.rows[number];
         let light = match measure {
@@ -290,12 +290,12 @@ impl DirectLightQueue {
             Some(first) => {
                 let own = &mut self.arrived[first as usize..][..LANES];
                 for (i, own) in own.iter_mut().enumerate() {
-                    *own = lane(&light, i);
+                    *own += lane(&light, i);
                 }
             }
             None => {
                 for i in lanes(row.used) {
-                    self.arrived[row.place[i] as usize] = lane(&light, i);
+                    self.arrived[row.place[i] as usize] += lane(&light, i);
                 }
             }
         }

@@ -73,7 +73,8 @@ pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
 /// Whether photons are kept on a material.
 pub fn receives(material: &Material) -> bool {
     let is_lit = |rough: &Rough| rough.constant().is_none_or(|bsdf| !bsdf.is_black());
-    material.bsdf.rough().is_some_and(is_lit)
+    let is_rough_glass = || material.bsdf.glass().is_some_and(|glass| !glass.is_smooth());
+    material.bsdf.rough().is_some_and(is_lit) || is_rough_glass()
 }
 
 /// A wall that stands on the plane of a kernel, with the middle before it: for points before it, the product with the normal is at

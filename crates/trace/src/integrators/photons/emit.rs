@@ -20,12 +20,14 @@ use crate::integrators::transport::ray::{PathRay, PathState};
 use crate::integrators::transport::scatter::{BsdfSampling, Continuation};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, Vertex};
-use crate::integrators::transport::walk::{MOST_HIDDEN, OpaqueHit, Reached, Straight, Walker, chance, walk};
+use crate::integrators::transport::walk::{
+    Change, MOST_HIDDEN, OpaqueHit, Reached, Straight, Walker, chance, walk,
+};
 use crate::integrators::view::Measure;
 use crate::integrators::{PACKET, RayCounters};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
 use crate::materials::bsdf::LobeSet;
-use crate::materials::{Bsdf, Coated, Pane, Rough};
+use crate::materials::{Bsdf, Coated, Pane, Rough, RoughBsdf};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
@@ -72,6 +74,7 @@ impl PhotonTracing<'_> {
             references: vec![0.0; count as usize],
             next: Vec::new(),
             open: VertexBatch::EMPTY,
+            open_behind: VertexBatch::EMPTY,
             media: Media::default(),
             crossing: CrossingMemory::default(),
             shots: EmittedPhotons::default(),
@@ -136,6 +139,8 @@ struct PhotonWavefront<'a> {
     next: Vec<PathRay>,
     /// Row for single vertices.
     open: VertexBatch,
+    /// Row for those whose light comes through the surface.
+    open_behind: VertexBatch,
     /// Media of the photons at single vertices.
     media: Media,
     crossing: CrossingMemory,
@@ -161,7 +166,12 @@ impl<'a> Walker<'a> for PhotonWavefront<'a> {
                 let lacks_photons = self.depth == 0 && !has_passed;
                 self.shade_surface(path, vertex, lacks_photons);
             }
-            Reached::Glass(vertex, _, far) => self.shade_glass(path, vertex, far),
+            Reached::Glass(vertex, _, Change { far, rough: None }) => self.shade_glass(path, vertex, far),
+            // Light samples find direct light.
+            Reached::Glass(..) if self.depth == 0 && !has_passed => {}
+            Reached::Glass(vertex, _, Change { far, rough: Some(rough) }) => {
+                self.leave_photon(path, vertex, RoughBsdf::GlassReflection(rough), (far, Some(1.0)));
+            }
             Reached::Nothing | Reached::Hidden => {}
         }
     }
@@ -296,12 +306,22 @@ impl PhotonWavefront<'_> {
     /// Stores a photon at a rough surface. If there is a factor on its flux, and it came by mirrors and glass alone, it is scattered with
     /// that factor.
     fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, scattered: Option<f32>) {
-        let tile = self.tracing.tile;
         let bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
         let bsdf = vertex.tinted_bsdf(bsdf);
-        if bsdf.is_black() {
-            return;
+        if !bsdf.is_black() {
+            self.leave_photon(path, vertex, bsdf, (path.medium, scattered));
         }
+    }
+
+    /// [`PhotonWavefront::shade_rough`] with a known BSDF, and the medium behind the surface.
+    fn leave_photon(
+        &mut self,
+        path: &PathRay,
+        vertex: &Vertex<'_>,
+        bsdf: RoughBsdf,
+        (far, scattered): (Medium, Option<f32>),
+    ) {
+        let tile = self.tracing.tile;
         // Store the photon; it stands for those that passed the surface as if it were not there.
         let chance = chance(path, vertex, &mut self.counters.texture_lookups);
         let all = PathRay { throughput: path.throughput / chance, ..*path };
@@ -311,6 +331,7 @@ impl PhotonWavefront<'_> {
         };
         // Let it wait for being scattered.
         let shading = vertex.shading(&mut self.counters);
+        let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
         let medium = self.media.number(path.medium);
         if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
             self.scatter_open();
@@ -321,6 +342,18 @@ impl PhotonWavefront<'_> {
         self.open.put(i, tile, &lit, Measure::ALL, medium);
         let counts = self.open.landed(i, vertex.to_eye) * by_chance;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
+        // It may go on behind the surface, where another medium changes its basic flux.
+        let Some((bsdf, shading)) = behind else { return };
+        let eta = ior(tile.world, far) / ior(tile.world, path.medium);
+        let medium = self.media.number(far);
+        if self.open_behind.used == ALL || self.open_behind.bsdf.kind() != bsdf.kind() {
+            self.scatter_open();
+            self.open_behind.bsdf.prepare(bsdf.kind());
+        }
+        let i = self.open_behind.used.trailing_ones() as usize;
+        let lit = ShadingVertex { path, place: 0, vertex: &vertex.behind(), shading, bsdf };
+        self.open_behind.put(i, tile, &lit, Measure::ALL, medium);
+        set_lane(&mut self.open_behind.throughput, i, path.throughput * (counts / (eta * eta)));
     }
 
     fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: Medium) {
@@ -366,6 +399,12 @@ impl PhotonWavefront<'_> {
         self.scatter(&mut open);
         open.reset();
         self.open = open;
+        if self.open_behind.used != 0 {
+            let mut open = std::mem::replace(&mut self.open_behind, VertexBatch::EMPTY);
+            self.scatter(&mut open);
+            open.reset();
+            self.open_behind = open;
+        }
     }
 
     /// Scatters photons at the vertices of a row: directions are drawn by the cosine with the facet, as the adjoint has it.

@@ -20,6 +20,15 @@ pub struct Crossing {
     pub opaque: Option<Hit>,
 }
 
+/// The glass whose surface a boundary of two media has: the later one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Boundary {
+    /// Its material there.
+    pub material: u32,
+    /// Its hit by the ray between the sides. `None` if the path itself hits it, or it is known only as one around the far side.
+    pub hit: Option<Hit>,
+}
+
 /// Memory for the search of near surfaces.
 #[derive(Default)]
 pub struct CrossingMemory {
@@ -83,6 +92,24 @@ impl TileContext<'_> {
         // Enter those whose fronts are here, and those around the place.
         let far = crossed(true).chain(around).fold(far, Medium::entered);
         [arrived, near, far]
+    }
+
+    /// The surface that counts between two media, at a hit after [`TileContext::crossing`]. `None` if both are air.
+    pub fn boundary(&self, hit: &Hit, [near, far]: [Medium; 2], memory: &CrossingMemory) -> Option<Boundary> {
+        let later = near.glass().max(far.glass())?;
+        let own = self.world.material_index(hit) as u32;
+        if self.world.body(hit.object) == later.body && self.world.is_glass(own) {
+            return Some(Boundary { material: own, hit: None });
+        }
+        // The path hits another one of the surfaces that touch there.
+        let of_body = memory.near.iter().find_map(|thing| match *thing {
+            Near::Surface { hit, material, .. } => {
+                let is_later = self.world.body(hit.object) == later.body && self.world.is_glass(material);
+                is_later.then_some(Boundary { material, hit: Some(hit) })
+            }
+            Near::Around { .. } => None,
+        });
+        Some(of_body.unwrap_or(Boundary { material: later.material, hit: None }))
     }
 
     /// The closed bodies of a medium.

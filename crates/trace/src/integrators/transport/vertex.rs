@@ -126,7 +126,7 @@ impl<'a> Vertex<'a> {
     pub fn emitted(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.state.density > 0.0;
         let at = if is_shared { TexturePoint::sharp(self.surface.uv) } else { self.texture_point };
-        self.material.emission.at(&at, &mut counters.texture_lookups)
+        self.material.emission.at(&at, self.normal.dot(self.to_eye), &mut counters.texture_lookups)
     }
 
     /// A colour of the material, multiplied by the vertex colour.
@@ -144,6 +144,12 @@ impl<'a> Vertex<'a> {
     /// Sets the starts of rays that leave.
     pub fn start_between(&mut self, sides: Sides) {
         self.sides = Some(sides);
+    }
+
+    /// The vertex for light that comes through the surface: on the side that the viewer does not see.
+    pub fn behind(&self) -> Self {
+        let turned = |Sides { before, beyond }: Sides| Sides { before: beyond, beyond: before };
+        Self { normal: -self.normal, side: -self.side, sides: self.sides.map(turned), ..*self }
     }
 
     /// The interpolated normal, bent by a normal map, on the front side.
@@ -208,10 +214,13 @@ impl<'a> Vertex<'a> {
     /// around a corner of a closed surface. Otherwise the origin is on the facet itself, and nothing behind it is visible; so
     /// it is at vertices that the camera does not see, where the way up would cost a ray without a visible difference.
     pub fn shadow_origin(&self, tile: &TileContext<'_>, only_specular_before: bool) -> ShadowOrigin {
-        if let Some(sides) = self.sides {
-            return ShadowOrigin { point: sides.before, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
-        }
         let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
+        if let Some(sides) = self.sides {
+            // No ray of rough glass passes its own facet on the way.
+            let is_bent = shading_normal != normal && self.material.bsdf.glass().is_some();
+            let horizon = is_bent.then_some(self.normal);
+            return ShadowOrigin { point: sides.before, start: Ray::NO_TRIANGLE, horizon, lift: None };
+        }
         let on_facet = offset_origin(point, error, self.normal, self.normal);
         let is_traced = tile.settings.render.shadows != Shadows::Off;
         let (is_above, end) = way_up(on_facet, shadow_point, self.normal, error);
@@ -256,6 +265,13 @@ pub struct Lift {
     pub to: Vec3,
     /// The end of the way: 1 at the point, and a margin for the error.
     pub end: f32,
+}
+
+impl Shading {
+    /// The normals on the other side.
+    pub fn behind(&self) -> Self {
+        Self { normal: -self.normal, smooth_normal: -self.smooth_normal, bend: self.bend }
+    }
 }
 
 /// Shading normals on the viewer's side.

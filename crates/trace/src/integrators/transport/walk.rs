@@ -6,16 +6,16 @@
 
 use super::crossing::{Crossing, CrossingMemory};
 use super::interface::STRAIGHT;
-use super::medium::{Medium, absorption};
+use super::medium::{Medium, absorption, ior};
 use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::Vertex;
 use crate::geometry::{Ray, ShapeHit, SurfacePoint};
 use crate::integrators::RayCounters;
-use crate::materials::{Bsdf, Pane, TexturePoint};
+use crate::materials::{Bsdf, GlassPoint, Pane, TexturePoint};
 use crate::math::Vec3;
 use crate::sampling::Decision;
-use crate::world::{Hit, MOST_STRAIGHT};
+use crate::world::{Hit, MOST_STRAIGHT, Sides};
 
 /// Most surfaces without a change of glass that a ray passes in one walk.
 pub const MOST_HIDDEN: usize = 64;
@@ -24,12 +24,21 @@ pub const MOST_HIDDEN: usize = 64;
 pub enum Reached<'v, 'a> {
     /// An opaque surface.
     Opaque(&'v Vertex<'a>, OpaqueHit),
-    /// A change of glass at a hit, and the medium beyond it.
-    Glass(&'v Vertex<'a>, Hit, Medium),
+    /// A change of glass at a hit.
+    Glass(&'v Vertex<'a>, Hit, Change),
     /// None: the ray leaves the scene.
     Nothing,
     /// One more surface within glass, after [`MOST_HIDDEN`] of them.
     Hidden,
+}
+
+/// Change of glass at a surface.
+#[derive(Clone, Copy)]
+pub struct Change {
+    /// The medium beyond it.
+    pub far: Medium,
+    /// The rough surface there. `None` if it is smooth, or both media refract alike.
+    pub rough: Option<GlassPoint>,
 }
 
 /// Owner of walking paths: the wavefront of the eye, or that of the photons.
@@ -164,8 +173,13 @@ pub fn walk<'a, W: Walker<'a>>(
         // Stop at a change of glass.
         if near.glass() != far.glass() {
             vertex.start_between(sides);
+            let rough = if tile.world.has_rough_glass() {
+                rough(walker, &path, (&vertex, &hit), (sides, far))
+            } else {
+                None
+            };
             let hit = way.straighten(&mut path, hit);
-            return walker.reach(&path, Reached::Glass(&vertex, hit, far), has_passed);
+            return walker.reach(&path, Reached::Glass(&vertex, hit, Change { far, rough }), has_passed);
         }
         // Pass on, as nothing changes here.
         (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
@@ -180,6 +194,31 @@ pub fn walk<'a, W: Walker<'a>>(
         }
     }
     walker.reach(&path, Reached::Hidden, true);
+}
+
+/// The rough surface between a path's medium and that beyond a hit. `None` if it is smooth, or both media refract alike.
+#[cold]
+#[inline(never)]
+fn rough<'a, W: Walker<'a>>(
+    walker: &mut W,
+    path: &PathRay,
+    (vertex, hit): (&Vertex<'a>, &Hit),
+    (sides, far): (Sides, Medium),
+) -> Option<GlassPoint> {
+    let tile = walker.tile();
+    let indices = [path.medium, far].map(|medium| ior(tile.world, medium));
+    if indices[0] == indices[1] {
+        return None;
+    }
+    let boundary = tile.boundary(hit, [path.medium, far], walker.crossing())?;
+    let glass = tile.world.materials[boundary.material as usize].bsdf.glass()?;
+    let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
+    let at = match touching {
+        Some(other) => Vertex::touching(tile, path, (sides, &other), hit.shape.t).texture_point,
+        None => vertex.texture_point,
+    };
+    let alpha = glass.alpha(&at, walker.lookups())?;
+    Some(GlassPoint { near: indices[0], far: indices[1], alpha })
 }
 
 /// Continuation of a path at a surface that light may pass.

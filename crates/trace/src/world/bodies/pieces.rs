@@ -7,7 +7,7 @@ use crate::assets::LoadedMesh;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::DVec3;
-use crate::scene::description::{MaterialKind, Mesh, Object, Scene, Shape, Sheet};
+use crate::scene::description::{MaterialKind, Mesh, NumberSource, Object, Scene, Shape, Sheet};
 
 /// Number of chords of a circular rim: they are the same points for every rim on one circle.
 const CHORDS: usize = 32;
@@ -231,7 +231,8 @@ fn substance_of(scene: &Scene, meshes: &[&LoadedMesh], object: &Object) -> Subst
     match (object.material, object.shape.mesh()) {
         (Some(index), _) => scene.materials[index].kind.substance(),
         (None, Some(mesh)) => {
-            let of = |(ior, tint)| MaterialKind::Glass { ior, tint }.substance();
+            let roughness = NumberSource::Constant(0.0);
+            let of = |(ior, tint)| MaterialKind::Glass { ior, tint, roughness }.substance();
             let mut each = meshes[mesh.file].materials.iter().filter_map(file_glass).filter_map(of);
             let first = each.next()?;
             each.all(|other| other == first).then_some(first)

@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""Means of regions of the scenes of this folder, by glimt and by Mitsuba 3: how far they are apart, in standard errors and in percent.
+
+    python benches/materials/means.py BINARY [SCENE...] [--samples N] [--pictures N] [--side PIXELS]
+
+In an environment with mitsuba and numpy; the variant is llvm_ad_rgb where DRJIT_LIBLLVM_PATH is set, else scalar_rgb. A picture is
+cut into 4 x 3 regions; the errors are those of some pictures of each program, of seeds of their own.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+
+mi.set_variant("llvm_ad_rgb" if "DRJIT_LIBLLVM_PATH" in os.environ else "scalar_rgb")
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "rooms"))
+from convert import Conversion  # noqa: E402
+
+REGIONS = (3, 4)
+
+
+def regions(picture):
+    """Mean colours of the regions, row by row."""
+    rows = np.array_split(picture, REGIONS[0], axis=0)
+    return np.array([part.mean(axis=(0, 1)) for row in rows for part in np.array_split(row, REGIONS[1], axis=1)])
+
+
+def by_mitsuba(file, content, size, options, made):
+    scene = mi.load_dict(Conversion(mi, content, file.parent, size, made).scene())
+    for seed in range(options.pictures):
+        yield np.array(mi.render(scene, spp=options.samples, seed=seed))
+
+
+def by_glimt(file, size, options, made):
+    out = made / "picture.exr"
+    call = [options.binary, file, "--once", "-o", out, "--progress", "none", "--integrator", options.integrator]
+    call += ["--width", size[0], "--height", size[1], "--samples", options.samples]
+    for seed in range(options.pictures):
+        subprocess.run([str(word) for word in [*call, "--seed", seed]], check=True)
+        yield np.array(mi.Bitmap(str(out)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+
+
+def compare(file, options, made):
+    content = tomllib.loads(file.read_text())
+    width, height = content["render"]["width"], content["render"]["height"]
+    scale = min(1, options.side / max(width, height))
+    size = (round(width * scale), round(height * scale))
+    ways = [by_glimt(file, size, options, made), by_mitsuba(file, content, size, options, made)]
+    (own, own_error), (other, other_error) = (mean_and_error([regions(one) for one in way]) for way in ways)
+    off, error = own / other - 1, np.hypot(own_error, other_error) / other
+    print(f"{file.stem}: worst region {np.abs(off).max():.3%}, root mean square {np.sqrt((off**2).mean()):.3%}, ± {error.max():.3%}")
+    for number, (one, noise) in enumerate(zip(off, error)):
+        told = "  ".join(f"{100 * x:+7.3f} ± {100 * y:.3f} %" for x, y in zip(one, noise))
+        print(f"  {number // REGIONS[1] + 1},{number % REGIONS[1] + 1}  {told}")
+
+
+def mean_and_error(values):
+    return np.mean(values, axis=0), np.std(values, axis=0, ddof=1) / np.sqrt(len(values))
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("binary")
+    parser.add_argument("scenes", nargs="*")
+    parser.add_argument("--samples", type=int, default=256)
+    parser.add_argument("--pictures", type=int, default=8)
+    parser.add_argument("--side", type=int, default=160)
+    parser.add_argument("--integrator", default="path")
+    options = parser.parse_args()
+    files = [Path(one) for one in options.scenes] or sorted(HERE.glob("*.toml"))
+    with tempfile.TemporaryDirectory() as made:
+        for file in files:
+            compare(file, options, Path(made))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,24 @@
+#!/usr/bin/env python3
+"""Metals under a sky and rough glass before a lamp, by glimt and by Mitsuba: processor seconds x error of each, and the ratio.
+
+    python3 benches/materials/run.py [SCENE...] [--rounds N] [--seeds N] [--samples N] [--glimt BINARY]...
+
+It is ../rooms/run.py with the scenes of this folder: metals.toml and glass.toml, or those that are named.
+"""
+
+import os
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "mitsuba"))
+import run  # noqa: E402
+
+if __name__ == "__main__":
+    run.HOME.mkdir(parents=True, exist_ok=True)
+    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": run.llvm(), "GLIMT_MITSUBA_HOME": str(run.HOME)}
+    given = sys.argv[1:]
+    named = given[:1] and not given[0].startswith("-")
+    scenes = [] if named else [str(HERE / "metals.toml"), str(HERE / "glass.toml")]
+    command = [str(run.python()), str(HERE.parent / "rooms" / "compare.py"), *scenes, *given]
+    os.execve(command[0], command, environment)

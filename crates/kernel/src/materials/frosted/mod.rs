@@ -1,0 +1,47 @@
+//! Rough glass: a boundary of two dielectrics by microfacets, which reflect and refract (Walter, Marschner, Li, Torrance, *Microfacet
+//! Models for Refraction through Rough Surfaces*, EGSR 2007).
+//!
+//! With Fresnel's reflectance F of a facet, n the indices of refraction, o the direction to the viewer and i that of the light:
+//!
+//! - reflection f = F·D·G/(4 cosθᵢ cosθₒ), with the facet's normal h along o + i;
+//! - transmission f = |o·h| |i·h| (1 − F)·D·G·nᵢ²/(cosθᵢ cosθₒ |nₒ o + nᵢ i|²), with h along nₒ o + nᵢ i. Light is basic radiance,
+//!   L/n², so that nᵢ² stands where radiance has nₒ², and f/nᵢ² is the same in both directions.
+//!
+//! A surface is two vertices, as [`bsdf`](super::bsdf) says. Both sample the same facet; of its reflection and its refraction, chance
+//! takes one, by F. So f·cosθᵢ over the pdf is G/G₁ for each.
+
+mod row;
+
+use super::bsdf::RoughPoint;
+use crate::math::Vec3;
+pub use row::GlassRow;
+
+/// Rough glass at one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GlassPoint {
+    /// Index of refraction on the viewer's side.
+    pub near: f32,
+    /// Index of refraction on the other side; not that of the viewer's.
+    pub far: f32,
+    /// α.
+    pub alpha: f32,
+}
+
+impl RoughPoint for GlassPoint {
+    #[inline]
+    fn is_black(&self) -> bool {
+        false
+    }
+
+    #[inline]
+    fn ambient(&self) -> Vec3 {
+        Vec3::ZERO
+    }
+
+    fn tinted(self, _: Vec3) -> Self {
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests;

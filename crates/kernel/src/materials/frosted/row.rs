@@ -1,0 +1,213 @@
+//! Surfaces of rough glass in rows of sixteen.
+
+use super::GlassPoint;
+use crate::materials::bsdf::{BsdfValues, LobeSet, NarrowLobe, Place, RoughRow, ShownLobes};
+use crate::materials::fresnel::{dielectric_either, transmittance};
+use crate::materials::microfacet::{Half, Leg, facet, facing, mirrored_at, refracted_at};
+use crate::math::Vec3;
+use crate::math::frame::Frame;
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+
+/// Surfaces of rough glass, side by side: their reflection, or their transmission. The values of f that are shared are f of the lobe,
+/// whatever is shown, twice.
+#[derive(Clone, Debug)]
+pub struct GlassRow<const THROUGH: bool> {
+    /// Unit normals that face the viewer.
+    normal: Lanes3,
+    /// Unit directions to the viewer.
+    to_eye: Lanes3,
+    /// [`GlassPoint::near`].
+    near: Lanes,
+    /// [`GlassPoint::far`].
+    far: Lanes,
+    /// [`GlassPoint::alpha`].
+    alpha: Lanes,
+    /// 1 where the lobe is shown, else 0.
+    shown: Lanes,
+    /// f in sr⁻¹ that is shown in place of the lobe.
+    unit: Lanes,
+}
+
+/// Factor on the lobe for what is shown, and f in its place.
+#[inline(always)]
+fn shown_parts(shown: ShownLobes) -> [f32; 2] {
+    match shown {
+        ShownLobes::Of { specular, .. } => [if specular { 1.0 } else { 0.0 }, 0.0],
+        ShownLobes::Unit => [0.0, 1.0],
+    }
+}
+
+impl<const THROUGH: bool> GlassRow<THROUGH> {
+    /// The legs of the viewer and of a direction, each by the normal on its side.
+    #[inline(always)]
+    fn legs(&self, i: usize, direction: Vec3) -> [Leg; 2] {
+        let normal = lane(&self.normal, i);
+        let lit = if THROUGH { -normal } else { normal };
+        let eye = Leg::isotropic(normal, lane(&self.to_eye, i), self.alpha[i]);
+        [eye, Leg::isotropic(lit, direction, self.alpha[i])]
+    }
+
+    /// f of the lobe.
+    #[inline(always)]
+    fn lobe(&self, i: usize, direction: Vec3) -> f32 {
+        let [eye, light] = self.legs(i, direction);
+        let (normal, to_eye) = (lane(&self.normal, i), lane(&self.to_eye, i));
+        if !THROUGH {
+            let half = Half::of(normal, to_eye, direction);
+            let reflectance = dielectric_either(half.cosine(), self.far[i] / self.near[i]);
+            return reflectance * eye.reflected(&light, half.isotropic(self.alpha[i]));
+        }
+        let indices = [self.near[i], self.far[i]];
+        let (half, sum) = Half::refracted(normal, [to_eye, direction], indices);
+        // The facet faces the viewer as the surface does, and lets light through if the light is behind both.
+        let scale = if half.along > 0.0 { 1.0 } else { -1.0 } / half.squared.sqrt();
+        let cosines = [scale * to_eye.dot(sum), -scale * direction.dot(sum)];
+        let is_through = (cosines[0] > LEAST_COSINE) & (cosines[1] > LEAST_COSINE);
+        let by_facet = cosines[0] * cosines[1] * transmittance(cosines, indices) / half.squared;
+        let value = 4.0 * (by_facet * eye.reflected(&light, half.isotropic(self.alpha[i])));
+        let value = value * (self.far[i] * self.far[i]);
+        // Indices that are equal but for rounding have no half vector.
+        if is_through & (value < f32::MAX) { value } else { 0.0 }
+    }
+}
+
+/// Least cosine between a facet's normal and a direction.
+const LEAST_COSINE: f32 = 1e-6;
+
+impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
+    type Point = GlassPoint;
+
+    const SENDS_RAYS: bool = true;
+
+    const EMPTY: Self = Self {
+        normal: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
+        to_eye: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
+        near: [1.0; LANES],
+        far: [1.5; LANES],
+        alpha: [1.0; LANES],
+        shown: [0.0; LANES],
+        unit: [0.0; LANES],
+    };
+
+    #[inline(always)]
+    fn reset(&mut self) {}
+
+    #[inline(always)]
+    fn put(&mut self, i: usize, bsdf: &GlassPoint, shown: ShownLobes, place: &Place) {
+        let normal = if THROUGH { -place.normal } else { place.normal };
+        set_lane(&mut self.normal, i, facing(normal, place.to_eye));
+        set_lane(&mut self.to_eye, i, place.to_eye);
+        (self.near[i], self.far[i], self.alpha[i]) = (bsdf.near, bsdf.far, bsdf.alpha);
+        [self.shown[i], self.unit[i]] = shown_parts(shown);
+    }
+
+    #[inline(always)]
+    fn copy(&mut self, i: usize, other: &Self, from: usize) {
+        for (own, other) in [(&mut self.normal, &other.normal), (&mut self.to_eye, &other.to_eye)] {
+            set_lane(own, i, lane(other, from));
+        }
+        for (own, other) in [
+            (&mut self.near, &other.near),
+            (&mut self.far, &other.far),
+            (&mut self.alpha, &other.alpha),
+            (&mut self.shown, &other.shown),
+            (&mut self.unit, &other.unit),
+        ] {
+            own[i] = other[from];
+        }
+    }
+
+    #[inline(always)]
+    fn f(&self, directions: &Lanes3) -> BsdfValues {
+        let (mut lobe, mut shown) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            lobe[i] = self.lobe(i, lane(directions, i));
+        }
+        for i in 0..LANES {
+            shown[i] = lobe[i] * self.shown[i] + self.unit[i];
+        }
+        BsdfValues { f: [shown; 3], shared: [lobe; 2] }
+    }
+
+    #[inline(always)]
+    fn parts(&self, _: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
+        [[[0.0; LANES]; 3], values.f]
+    }
+
+    #[inline(always)]
+    fn grey(&self, values: &BsdfValues) -> Lanes {
+        values.shared[0]
+    }
+
+    #[inline(always)]
+    fn pdf(&self, _: LobeSet, _: &Lanes3, directions: &Lanes3, values: &BsdfValues) -> Lanes {
+        let mut densities = [0.0; LANES];
+        for i in 0..LANES {
+            let [eye, light] = self.legs(i, lane(directions, i));
+            densities[i] = eye.density_of(&light, values.shared[1][i]);
+        }
+        densities
+    }
+
+    #[inline(always)]
+    fn sample(&self, _: LobeSet, _: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
+        let mut directions = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let (normal, to_eye, alpha) = (lane(&self.normal, i), lane(&self.to_eye, i), self.alpha[i]);
+            let half = facet(&Frame::from_normal(normal), to_eye, [alpha; 2], [u[0][i], u[1][i]]);
+            // Chance chooses between both sides, and where it goes on at the other one, the direction is of no use.
+            let eta = self.far[i] / self.near[i];
+            let is_mirrored = choices[i] < dielectric_either(half.dot(to_eye), eta);
+            let direction = if THROUGH { refracted_at(half, to_eye, eta) } else { mirrored_at(half, to_eye) };
+            let useless = if THROUGH { normal } else { -normal };
+            let choose = |own: f32, useless: f32| if is_mirrored == THROUGH { useless } else { own };
+            let chosen = Vec3::new(
+                choose(direction.x, useless.x),
+                choose(direction.y, useless.y),
+                choose(direction.z, useless.z),
+            );
+            set_lane(&mut directions, i, chosen);
+        }
+        directions
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobes(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn has_narrow_lobe(&self, _: usize) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn narrow_lobe(&self, i: usize) -> Option<NarrowLobe> {
+        let (normal, to_eye, alpha) = (lane(&self.normal, i), lane(&self.to_eye, i), self.alpha[i]);
+        let (eta, cosine) = (self.far[i] / self.near[i], normal.dot(to_eye));
+        let reflectance = dielectric_either(cosine, eta);
+        if !THROUGH {
+            return Some(NarrowLobe::of_microfacets(normal, to_eye, alpha, reflectance, 0.0));
+        }
+        // A facet that turns by an angle turns what it refracts at normal incidence by 1 − 1/η of that, where a mirror has 2.
+        let turn = 0.5 * (1.0 - 1.0 / eta).abs() * alpha;
+        let axis = refracted_at(normal, to_eye, eta);
+        let lobe = NarrowLobe { axis, ..NarrowLobe::of_microfacets(normal, to_eye, turn, 1.0, 0.0) };
+        (reflectance < 1.0).then_some(lobe)
+    }
+
+    #[inline(always)]
+    fn narrower_than(&self, _: u32, _: f32) -> u32 {
+        0
+    }
+
+    #[inline(always)]
+    fn even(&self, _: usize) -> Option<Vec3> {
+        None
+    }
+
+    #[inline(always)]
+    fn f_at(&self, i: usize, direction: Vec3) -> Vec3 {
+        Vec3::splat(self.lobe(i, direction) * self.shown[i] + self.unit[i])
+    }
+}

@@ -1,0 +1,219 @@
+//! Lobes of rough glass against the formulas in `f64`, their samples against the pdf, and their albedos against quadrature.
+
+use super::*;
+use crate::materials::bsdf::{LobeSet, RoughRow};
+use crate::materials::fresnel::dielectric;
+use crate::materials::lobe_tests::{
+    ALPHAS, COSINES, Light, Subject, check_neighbours, check_neighbours_lit, direction, reference,
+};
+use crate::math::DVec3;
+use crate::math::random::unit as random;
+
+use std::f64::consts::{PI, TAU};
+
+/// Indices of refraction on the viewer's side and on the other.
+const INDICES: [[f32; 2]; 5] = [[1.0, 1.5], [1.5, 1.0], [1.0, 1.33], [2.4, 1.0], [1.5, 1.33]];
+
+fn glass([near, far]: [f32; 2], alpha: f32) -> GlassPoint {
+    GlassPoint { near, far, alpha }
+}
+
+/// Both parts of a surface, seen from a direction.
+fn parts(point: &GlassPoint, to_eye: DVec3) -> (Subject<GlassRow<false>>, Subject<GlassRow<true>>) {
+    let (alphas, eta) = ([point.alpha; 2], f64::from(point.far) / f64::from(point.near));
+    let reflection = Subject::new(point, alphas, to_eye);
+    (reflection, Subject::lit(point, alphas, to_eye, Light::Refracted(eta)))
+}
+
+/// f of basic radiance that comes through, as Walter et al. write it (equations 16, 20, 21 and 33, with this G).
+fn transmission(point: &GlassPoint, o: DVec3, i: DVec3) -> f64 {
+    let [near, far, alpha] = [point.near, point.far, point.alpha].map(f64::from);
+    let half = -(i * far + o * near).normalize();
+    let half = half * half.z.signum();
+    let (cos_o, cos_i) = (o.dot(half), i.dot(half));
+    if cos_o * o.z <= 0.0 || cos_i * i.z <= 0.0 {
+        return 0.0;
+    }
+    let tangent2 = (half.x * half.x + half.y * half.y) / (half.z * half.z);
+    let distribution = alpha.powi(2) / (PI * half.z.powi(4) * (alpha.powi(2) + tangent2).powi(2));
+    let lambda = |d: DVec3| {
+        let tangent2 = (1.0 - d.z * d.z) / (d.z * d.z);
+        0.5 * ((1.0 + alpha * alpha * tangent2).sqrt() - 1.0)
+    };
+    let shadowing = 1.0 / (1.0 + lambda(o) + lambda(i));
+    let fresnel = exact_reflectance(cos_o.abs(), far / near);
+    let jacobian = far * far / (far * cos_i + near * cos_o).powi(2);
+    (cos_o * cos_i / (o.z * i.z)).abs() * (1.0 - fresnel) * shadowing * distribution * jacobian
+}
+
+/// Fresnel's reflectance in `f64`.
+fn exact_reflectance(cosine: f64, eta: f64) -> f64 {
+    let squared = eta * eta - 1.0 + cosine * cosine;
+    if squared <= 0.0 {
+        return 1.0;
+    }
+    let root = squared.sqrt();
+    let parallel = (eta * eta * cosine - root) / (eta * eta * cosine + root);
+    let perpendicular = (cosine - root) / (cosine + root);
+    0.5 * (parallel * parallel + perpendicular * perpendicular)
+}
+
+/// A pair of directions about the peak of the lobe, or anywhere.
+fn ways(next: &mut impl FnMut() -> f32, point: &GlassPoint, is_near: bool) -> (DVec3, Option<DVec3>) {
+    let to_eye = direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3();
+    let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
+    if is_near {
+        let eta = f64::from(point.far) / f64::from(point.near);
+        let there = Subject::<GlassRow<true>>::lit(point, [point.alpha; 2], to_eye, Light::Refracted(eta));
+        (to_eye, there.at_half_vector(y, turn).map(|(way, _)| way.as_vec3().as_dvec3()))
+    } else {
+        let way = direction(f64::from(0.05 + 0.95 * next()), turn);
+        (to_eye, Some(DVec3::new(way.x, way.y, -way.z).as_vec3().as_dvec3()))
+    }
+}
+
+#[test]
+fn what_comes_through_is_what_the_formulas_say_and_reciprocal() {
+    let mut next = random(9);
+    for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
+        let point = glass(indices, alpha);
+        let back = glass([indices[1], indices[0]], alpha);
+        // A half vector of indices that are close has less digits.
+        let least = f64::from((1.5 - 1.0_f32).min((indices[0] - indices[1]).abs()));
+        let (reciprocity, error) = if alpha >= 0.05 { (1e-5, 3e-5) } else { (1e-3, 4e-3) };
+        for trial in 0..400 {
+            let (to_eye, Some(light)) = ways(&mut next, &point, trial % 2 == 0) else { continue };
+            if light.z > -0.02 {
+                continue;
+            }
+            let eta = f64::from(indices[1]) / f64::from(indices[0]);
+            let subject = |point: &GlassPoint, eye: DVec3, eta: f64| {
+                Subject::<GlassRow<true>>::lit(point, [alpha; 2], eye, Light::Refracted(eta))
+            };
+            let value = |point: &GlassPoint, eye: DVec3, light: DVec3, eta: f64| {
+                subject(point, eye, eta).values(LobeSet::All, &[light])[0].0.x
+            };
+            let there = value(&point, to_eye, light, eta);
+            // Turn both, so that the other side is above.
+            let [eye, light_back] = [light, to_eye].map(|one| DVec3::new(one.x, one.y, -one.z));
+            let again = value(&back, eye, light_back, 1.0 / eta);
+            let [near, far] = indices.map(f64::from);
+            let (one, other) = (there / (far * far), again / (near * near));
+            let what = format!("α {alpha}, {indices:?}, from {light} to {to_eye}");
+            assert!((one - other).abs() <= reciprocity * one.max(other), "{what}: {one} there, {other} back");
+            let exact = transmission(&point, to_eye.normalize(), light.normalize());
+            assert!(
+                (there - exact).abs() <= error * (0.5 / least) * exact + 1e-9,
+                "{what}: {there} is not {exact}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_is_reflected_is_what_the_formulas_say_and_reciprocal() {
+    let mut next = random(10);
+    for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
+        let point = glass(indices, alpha);
+        let (reciprocity, error) = if alpha >= 0.05 { (1e-5, 3e-5) } else { (1e-3, 5e-3) };
+        for _ in 0..200 {
+            let place = |next: &mut dyn FnMut() -> f32| {
+                direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3().as_dvec3()
+            };
+            let to_eye = place(&mut next);
+            let subject = Subject::<GlassRow<false>>::new(&point, [alpha; 2], to_eye);
+            let (y, turn) = (f64::from(0.98 * next()), f64::from(next()) * TAU);
+            let near = subject.at_half_vector(y, turn).map(|(way, _)| way.as_vec3().as_dvec3());
+            for light in [Some(place(&mut next)), near].into_iter().flatten().filter(|one| one.z > 0.02) {
+                let there = subject.values(LobeSet::All, &[light])[0].0.x;
+                let back = Subject::<GlassRow<false>>::new(&point, [alpha; 2], light);
+                let back = back.values(LobeSet::All, &[to_eye])[0].0.x;
+                let what = format!("α {alpha}, {indices:?}, from {light} to {to_eye}");
+                assert!((there - back).abs() <= reciprocity * there, "{what}: {there} there, {back} back");
+                let (o, i) = (to_eye.normalize(), light.normalize());
+                let eta = f64::from(point.far) / f64::from(point.near);
+                let fresnel = exact_reflectance((o + i).length() * 0.5, eta);
+                let exact = fresnel * reference(o, i, [f64::from(alpha); 2]);
+                // Just before total reflection, the reflectance rises without bound.
+                let room = if fresnel > 0.5 && fresnel < 1.0 { 20.0 } else { 1.0 };
+                assert!(
+                    (there - exact).abs() <= room * error * exact + 1e-12,
+                    "{what}: {there} is not {exact}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn samples_of_both_sides_are_drawn_by_their_density() {
+    // Three boundaries, seven lobes, five directions, both sides: 210 pairs.
+    for (indices, alpha) in INDICES[..3].iter().flat_map(|one| ALPHAS.map(|alpha| (*one, alpha))) {
+        for cosine in COSINES {
+            let (reflection, transmission) = parts(&glass(indices, alpha), direction(cosine, 0.7));
+            let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}");
+            reflection.check_samples(&format!("reflection, {what}"), LobeSet::All);
+            transmission.check_samples(&format!("transmission, {what}"), LobeSet::All);
+        }
+    }
+}
+
+#[test]
+fn reflection_and_transmission_are_what_quadrature_of_f_has_and_never_more_than_all() {
+    for (indices, alpha) in INDICES.into_iter().flat_map(|one| ALPHAS.map(|alpha| (one, alpha))) {
+        for cosine in COSINES {
+            let (reflection, transmission) = parts(&glass(indices, alpha), direction(cosine, 0.3));
+            let sampled = [reflection.albedo_by_choices(128).x, transmission.albedo_by_choices(128).x];
+            // Total reflection begins at a ring.
+            let exact = [reflection.albedo_by_rings(1000).x, transmission.albedo_by_rings(1000).x];
+            let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}: {sampled:?}, {exact:?}");
+            let (sum, sum_exact) = (sampled[0] + sampled[1], exact[0] + exact[1]);
+            assert!((sum - sum_exact).abs() < 1e-3, "{what}: {sum} is not {sum_exact}");
+            assert!(sum < 1.0 + 1e-5, "{what}: {sum}");
+            for (sampled, exact) in sampled.into_iter().zip(exact) {
+                assert!((sampled - exact).abs() < 1e-3, "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn narrow_lobes_reflect_as_smooth_glass_does() {
+    for indices in INDICES {
+        for cosine in [0.3, 0.7, 1.0] {
+            let (reflection, transmission) = parts(&glass(indices, 0.001), direction(cosine, 0.2));
+            let smooth = f64::from(dielectric(cosine as f32, indices[1] / indices[0]).0);
+            let (reflected, through) = (reflection.sampled_albedo(128).x, transmission.sampled_albedo(128).x);
+            assert!((reflected - smooth).abs() < 1e-3, "{indices:?}, {cosine}: {reflected} is not {smooth}");
+            assert!(
+                (through + smooth - 1.0).abs() < 1e-3,
+                "{indices:?}, {cosine}: {through} beside {smooth}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_path_goes_on_at_exactly_one_side() {
+    for indices in INDICES {
+        let (reflection, transmission) = parts(&glass(indices, 0.4), direction(0.5, 0.3));
+        let (up, down) = (reflection.samples(LobeSet::All, 32), transmission.samples(LobeSet::All, 32));
+        let mut reflected = 0;
+        for (up, down) in up.into_iter().zip(down) {
+            // The same numbers choose at both; the other one gets the direction into the surface.
+            let goes_on = [up != DVec3::NEG_Z, down != DVec3::Z];
+            assert!(goes_on[0] != goes_on[1], "{up} {down}");
+            reflected += u32::from(goes_on[0]);
+        }
+        assert!(reflected > 0 && reflected < 1024, "{indices:?}: {reflected}");
+    }
+}
+
+#[test]
+fn a_surface_gets_the_bits_that_it_gets_alone() {
+    let points: Vec<GlassPoint> =
+        INDICES.into_iter().flat_map(|one| [0.001, 0.2, 1.0].map(|alpha| glass(one, alpha))).collect();
+    check_neighbours::<GlassRow<false>>(&points);
+    check_neighbours_lit::<GlassRow<true>>(&points, Light::Through);
+    assert!(GlassRow::<true>::SENDS_RAYS);
+}

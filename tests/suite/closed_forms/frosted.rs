@@ -1,0 +1,312 @@
+//! Light that comes through rough surfaces: rough glass, and principled materials that transmit.
+
+use glimt::integrators::View;
+use glimt::math::{DVec3, Vec3};
+use glimt::scene::description::{
+    EmissionSource, Falloff, Integrator, Material, MaterialKind, NumberSource, Shadows, Shape,
+};
+
+use super::global::by_paths;
+use super::photons::{assert_same_light, both};
+use super::scenes::{Build, emitter, frosted, glass, matte, metal, mirror, plastic, scene, translucent};
+use super::{assert_close, mean_and_error, v};
+
+/// Half a world of a material below y = 0, or a sheet there, seen from a side: above or below it, towards the middle.
+fn boundary(material: Material, side: f64) -> Build {
+    let plane = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
+    let build = scene().shape(plane, material);
+    build.seen(v(-0.1, 0.1 * side, 0.02), DVec3::ZERO)
+}
+
+fn sheet(material: Material) -> Build {
+    let quad = scene().quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), material);
+    quad.seen(v(-0.1, 0.1, 0.02), DVec3::ZERO)
+}
+
+/// Boundaries seen from above and from below, with their lamps on the other side: where refraction leads to, and so large.
+fn boundaries() -> Vec<(String, Build, DVec3)> {
+    let mut all = Vec::new();
+    for roughness in [0.1, 0.3, 0.6, 1.0] {
+        let glass = frosted(1.5, roughness);
+        // sin 45°/1.5, and from inside a steeper way that is not reflected totally.
+        all.push((
+            format!("glass {roughness} from outside"),
+            boundary(glass.clone(), 1.0),
+            v(0.53, -1.0, -0.1),
+        ));
+        let steep = boundary(glass, 1.0).seen(v(-0.05, -0.1, 0.02), DVec3::ZERO);
+        all.push((format!("glass {roughness} from inside"), steep, v(0.9, 1.0, -0.3)));
+        let sheet = sheet(translucent(0.8, roughness, 0.7));
+        all.push((format!("sheet {roughness}"), sheet, v(1.0, -1.0, -0.2)));
+    }
+    all
+}
+
+#[test]
+fn every_technique_finds_the_same_light_that_comes_through() {
+    for (what, build, at) in boundaries() {
+        let lit = build.clone().sphere(at, 0.5, emitter(2.0));
+        let path = mean_and_error(&by_paths(lit.clone(), 1).values(1024, 16));
+        let whitted = lit.clone().depth(1);
+        let sampled = whitted.clone().shadows(Shadows::Off, 1);
+        // Light samples do not find a lamp behind a boundary without refraction: samples of lobes do.
+        let inside = what.contains("from outside");
+        let shell = glass(if inside { 1.5 } else { 1.0 });
+        let hidden = by_paths(lit.clone().sphere(at, 0.55, shell), 2);
+        for (technique, build, samples) in
+            [("whitted", &whitted, 1024), ("light samples", &sampled, 4096), ("lobes", &hidden, 4096)]
+        {
+            let (mean, error) = mean_and_error(&build.values(samples, 16));
+            let both = error.hypot(path.1);
+            let told = format!("{what}: {technique} {mean}, path {path:?}, ± {both}");
+            let is_narrow = technique == "light samples" && what.contains("0.1");
+            assert!(is_narrow || both < 0.03 * path.0, "{told}");
+            assert!((mean - path.0).abs() < 5.0 * both + 1e-5 * mean, "{told}");
+        }
+    }
+}
+
+#[test]
+fn lamps_of_every_kind_shine_through() {
+    // Light samples and samples of lobes, weighed, against lobes alone; many lamps, of which vertices pick some.
+    for (what, build, at) in boundaries().into_iter().skip(3).take(3) {
+        let lamps = |build: Build| {
+            (0..12_u32).fold(build, |build, number| {
+                let turn = f64::from(number) * 0.7;
+                let by = v(turn.cos(), 0.2, turn.sin()) * 0.5;
+                build.sphere(at + by, 0.08, emitter(f64::from(1 + number) as f32))
+            })
+        };
+        let point = |build: Build| build.point_light(at, 1.0, Falloff::Square);
+        for (lit, build) in [("twelve", lamps(build.clone())), ("a point", point(build.clone()))] {
+            let path = mean_and_error(&by_paths(build.clone(), 1).values(2048, 16));
+            let whitted = mean_and_error(&build.depth(1).values(2048, 16));
+            let error = path.1.hypot(whitted.1);
+            assert!(error < 0.03 * path.0, "{what}, {lit}: ± {error} of {path:?}");
+            assert!(
+                (path.0 - whitted.0).abs() < 5.0 * error + 1e-5 * path.0,
+                "{what}, {lit}: {path:?} {whitted:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn whitted_follows_rough_glass_as_paths_do() {
+    // A slab with lamps on both sides: all lobes are those of microfacets.
+    for roughness in [0.1, 0.4, 0.8] {
+        let build = scene()
+            .cuboid(DVec3::ZERO, v(4.0, 0.3, 4.0), DVec3::ZERO, frosted(1.5, roughness))
+            .sphere(v(0.5, -1.5, 0.0), 0.5, emitter(2.0))
+            .sphere(v(0.8, 1.2, 0.3), 0.4, emitter(1.0))
+            .environment(0.3)
+            .seen(v(-1.0, 1.0, 0.2), v(0.0, 0.15, 0.0));
+        for depth in [1, 2, 4] {
+            let whitted = mean_and_error(&build.clone().depth(depth).values(1024, 16));
+            let path = mean_and_error(&by_paths(build.clone(), depth).values(1024, 16));
+            let error = whitted.1.hypot(path.1);
+            let what = format!("roughness {roughness}, depth {depth}: {whitted:?}, by paths {path:?}");
+            assert!(error < 0.02 * path.0, "{what}");
+            assert!((whitted.0 - path.0).abs() < 5.0 * error, "{what}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_brighter_for_rough_glass_under_an_even_sky() {
+    // Microfacets lose what they would scatter twice, and the narrowest hardly any.
+    for (roughness, least) in [(0.01, 0.999), (0.2, 0.97), (0.5, 0.6), (1.0, 0.2)] {
+        for (what, material) in [
+            ("glass", frosted(1.5, roughness)),
+            ("a bubble in it", frosted(0.7, roughness)),
+            ("a sheet", translucent(1.0, roughness, 1.0)),
+        ] {
+            let build = scene()
+                .environment(1.0)
+                .sphere(v(0.0, 0.0, -5.0), 1.0, material)
+                .seen(DVec3::ZERO, v(0.3, 0.1, -4.0));
+            for (integrator, build) in [("whitted", build.clone().depth(64)), ("path", by_paths(build, 64))] {
+                let (mean, error) = mean_and_error(&build.values(512, 16));
+                let told = format!("{what} of {roughness}, {integrator}: {mean} ± {error}");
+                assert!(mean < 1.0 + 4.0 * error + 1e-3, "{told}");
+                // A sheet is no whole sphere of light: it has a clear coat, and loses light at each side.
+                assert!(what == "a sheet" || mean > least, "{told}");
+            }
+        }
+    }
+}
+
+#[test]
+fn rough_glass_that_does_not_refract_is_no_boundary() {
+    let build = scene()
+        .background(0.7)
+        .sphere(v(0.0, 0.0, -5.0), 1.0, frosted(1.0, 0.5))
+        .seen(DVec3::ZERO, v(0.3, 0.0, -5.0));
+    assert_close("alone", build.value(), 0.7);
+    assert_close("by paths", by_paths(build, 4).value(), 0.7);
+}
+
+#[test]
+fn of_touching_glasses_the_later_one_is_rough_or_smooth() {
+    // The background is seen by smooth glass alone. A frosted box in a smooth one, which is larger and comes later: all of it is
+    // smooth glass. The other way round, its outside is rough.
+    let smooth = |build: Build| build.cuboid(v(0.0, 0.0, -5.0), v(2.0, 2.0, 2.0), DVec3::ZERO, glass(1.5));
+    let frost = |build: Build, size: f64| {
+        build.cuboid(v(0.0, 0.0, -5.0), DVec3::splat(size), DVec3::ZERO, frosted(1.5, 0.5))
+    };
+    let seen = |build: Build| build.background(1.0).seen(DVec3::ZERO, v(0.1, 0.05, -5.0)).depth(16);
+    let reference = seen(smooth(scene())).value();
+    for size in [1.0, 2.0] {
+        assert_close(&format!("inside, {size}"), seen(smooth(frost(scene(), size))).value(), reference);
+    }
+    let (rough, _) = mean_and_error(&seen(frost(smooth(scene()), 2.0)).values(64, 16));
+    assert_eq!(rough, 0.0, "a rough surface shows no background");
+    let half = seen(frost(smooth(scene()), 1.0)).value();
+    assert_close("a frosted core of the same index", half, reference);
+    // Water on frosted glass: the surface between them is that of the water.
+    let slab = |build: Build, material: Material, low: f64, high: f64| {
+        build.cuboid(v(0.0, 0.5 * (low + high), 0.0), v(8.0, high - low, 8.0), DVec3::ZERO, material)
+    };
+    let seen = |build: Build| build.background(1.0).seen(v(0.3, 5.0, 0.1), v(0.0, 2.0, 0.0)).depth(16);
+    let wet =
+        slab(slab(slab(scene(), glass(1.5), 0.0, 1.0), frosted(1.5, 0.5), 0.5, 1.5), glass(1.33), 1.5, 2.0);
+    // The frosted glass has no rough boundary but that to the water, which comes later: everything is smooth.
+    let smooth = slab(slab(scene(), glass(1.5), 0.0, 1.5), glass(1.33), 1.5, 2.0);
+    let (wet, smooth) = (seen(wet), seen(smooth));
+    let means = [wet, smooth].map(|build| mean_and_error(&build.values(256, 16)));
+    let error = means[0].1.hypot(means[1].1);
+    assert!((means[0].0 - means[1].0).abs() <= 5.0 * error + 1e-4, "{means:?}");
+    assert!(means[1].0 > 0.9, "{means:?}");
+}
+
+/// A box of walls with a lamp behind frosted glass, beside a mirror ball and one of smooth glass, which throw caustics.
+fn room() -> Build {
+    scene()
+        .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), matte(0.6))
+        .quad(v(-1.0, 0.0, -1.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), matte(0.7))
+        .quad(v(1.0, 0.0, 1.0), v(0.0, 0.0, -2.0), v(0.0, 2.0, 0.0), plastic(0.6, 0.4))
+        .cuboid(v(-0.3, 0.25, 0.1), v(0.5, 0.5, 0.5), v(0.0, 30.0, 0.0), frosted(1.5, 0.6))
+        .sphere(v(0.4, 0.35, 0.0), 0.35, mirror(0.9))
+        .sphere(v(-0.5, 0.75, 0.1), 0.25, glass(1.5))
+        .quad(v(-0.9, 0.0, -0.5), v(0.4, 0.0, -0.3), v(0.0, 0.8, 0.0), translucent(0.8, 0.5, 0.6))
+        .quad(v(-0.5, 1.9, -0.5), v(1.0, 0.0, 0.0), v(0.0, 0.0, 1.0), emitter(4.0))
+        .pictured(v(0.0, 1.0, 3.5), v(0.0, 0.6, -0.4), 30.0, 12, 12)
+}
+
+#[test]
+fn photons_and_paths_see_the_same_light_through_rough_glass() {
+    for depth in [1, 2, 3, 5] {
+        let means = both(&room().depth(depth), depth, [256, 16], (20_000, 0.05));
+        assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
+    }
+}
+
+#[test]
+fn photons_scatter_at_rough_glass_to_both_sides() {
+    // All light comes from a lamp in a shell without refraction: photons bring it to a frosted plane and a sheet, which throw it on.
+    let at = v(0.0, 1.2, 0.0);
+    let room = |depth: u32| {
+        scene()
+            .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), matte(0.8))
+            .cuboid(v(-0.4, 0.3, 0.0), v(0.6, 0.2, 0.6), DVec3::ZERO, frosted(1.5, 0.9))
+            .quad(v(0.1, 0.4, 0.4), v(0.6, 0.0, 0.0), v(0.0, 0.0, -0.8), translucent(0.9, 0.9, 0.8))
+            .sphere(at, 0.2, emitter(8.0))
+            .sphere(at, 0.25, glass(1.0))
+            .pictured(v(0.0, 1.5, 3.5), v(0.0, 0.2, 0.0), 26.0, 12, 12)
+            .depth(depth)
+    };
+    for depth in [2, 3, 4, 6] {
+        let means = both(&room(depth), depth, [512, 32], (20_000, 0.03));
+        assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
+    }
+}
+
+#[test]
+fn the_parts_of_pictures_of_frosted_glass_add_up() {
+    let build = room()
+        .sphere(v(0.3, 0.9, 0.3), 0.2, metal(0.9, 0.3, 0.0))
+        .environment(0.2)
+        .background(0.3)
+        .point_light(v(0.5, 1.5, 0.8), 1.0, Falloff::Square)
+        .pictured(v(0.0, 1.0, 3.5), v(0.0, 0.6, -0.4), 40.0, 24, 16);
+    for integrator in [Integrator::Whitted, Integrator::Path] {
+        let build = build.clone().with(|scene| scene.render.integrator = integrator);
+        let picture = |view: View| build.clone().viewed(view).picture(8, 3);
+        let parts = [View::Ambient, View::Diffuse, View::Specular, View::Emission].map(picture);
+        for (pixel, beauty) in picture(View::Beauty).into_iter().enumerate() {
+            let sum: DVec3 = parts.iter().map(|part| part[pixel]).sum();
+            let off = (sum - beauty).abs().max_element();
+            assert!(off <= 2e-5 * beauty.max_element().max(1.0), "{integrator:?}, {pixel}: {sum} {beauty}");
+        }
+    }
+}
+
+#[test]
+fn a_share_of_light_arrives_at_rough_glass_as_at_other_surfaces() {
+    // The lamp is in sight of every point of the box's top.
+    let build = scene()
+        .cuboid(DVec3::ZERO, v(2.0, 0.2, 2.0), DVec3::ZERO, frosted(1.5, 0.5))
+        .sphere(v(0.0, 2.0, 0.0), 0.3, emitter(2.0))
+        .seen(v(0.3, 1.0, 0.2), v(0.1, 0.1, 0.0))
+        .viewed(View::Shadow);
+    assert_close("in sight", build.value(), 1.0);
+}
+
+#[test]
+fn a_clear_coat_weakens_what_shines_below_it() {
+    // By 1 − c·E(μ), where a smooth enough coat has E = F0 + (1 − F0)(1 − μ)⁵ with F0 = .04, and c = ½.
+    let left = |cosine: f64| 1.0 - 0.5 * (0.04 + 0.96 * (1.0 - cosine).powi(5));
+    let coated = |radiance: f32| {
+        let mut lamp = translucent(0.0, 0.5, 0.0);
+        if let MaterialKind::Principled { clearcoat_roughness, specular, .. } = &mut lamp.kind {
+            (*clearcoat_roughness, *specular) = (NumberSource::Constant(0.02), NumberSource::Constant(0.0));
+        }
+        lamp.emission = EmissionSource::constant(Vec3::splat(radiance));
+        lamp
+    };
+    for cosine in [1.0_f64, 0.6, 0.3] {
+        let from = v((1.0 - cosine * cosine).sqrt(), cosine, 0.0) * 3.0;
+        let lamp = scene().quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), coated(3.0));
+        let seen = lamp.seen(from, DVec3::ZERO);
+        for build in [seen.clone(), by_paths(seen, 2)] {
+            let value = build.value();
+            assert!((value / (3.0 * left(cosine)) - 1.0).abs() < 4e-3, "{cosine}: {value}");
+        }
+    }
+    // What it throws on a floor: light samples, samples of lobes, and photons behind glass without refraction.
+    let shapes = [
+        Shape::Quad { corner: v(-0.5, 1.0, -0.5), u: v(1.0, 0.0, 0.0), v: v(0.0, 0.0, 1.0) },
+        Shape::Sphere { center: v(0.0, 1.0, 0.0), radius: 0.4 },
+        Shape::Box { center: v(0.0, 1.0, 0.0), size: DVec3::splat(0.5), rotate: v(10.0, 30.0, 0.0) },
+        Shape::Torus { center: v(0.0, 1.0, 0.0), axis: DVec3::Y, radius: 0.4, tube: 0.15 },
+    ];
+    let floor = || {
+        let corner = v(-2.0, 0.0, 2.0);
+        let floor = scene().quad(corner, v(4.0, 0.0, 0.0), v(0.0, 0.0, -4.0), matte(0.7));
+        floor.pictured(v(0.0, 0.5, 3.0), v(1.2, 0.0, 0.0), 20.0, 8, 8).depth(1)
+    };
+    for shape in shapes {
+        let lit = floor().shape(shape.clone(), coated(2.0));
+        let means = |build: &Build, samples: u32| {
+            let means = |seed| {
+                let picture = build.picture(samples, seed);
+                picture.iter().map(|color| color.x).sum::<f64>() / picture.len() as f64
+            };
+            mean_and_error(&(0..16).map(means).collect::<Vec<_>>())
+        };
+        let samples = means(&lit, 64);
+        let path = means(&by_paths(lit.clone(), 1), 64);
+        // Light samples do not find a lamp in a shell of glass.
+        let hidden = lit.clone().sphere(v(0.0, 1.0, 0.0), 0.75, glass(1.0));
+        let lobes = means(&by_paths(hidden.clone(), 3), 512);
+        let photons = means(&hidden.depth(3).photons(20_000, 0.05), 16);
+        for (technique, found) in [("path", path), ("lobes", lobes), ("photons", photons)] {
+            let error = found.1.hypot(samples.1);
+            let told = format!("{shape:?}, {technique}: {found:?}, light samples {samples:?}");
+            assert!(error < 6e-3 * samples.0, "{told}");
+            assert!((found.0 - samples.0).abs() < 4.0 * error + 3e-3 * samples.0, "{told}");
+        }
+        let bare = means(&floor().shape(shape.clone(), emitter(2.0)), 64);
+        assert!(samples.0 < 0.985 * bare.0, "{shape:?}: {samples:?} under the coat, {bare:?} without");
+    }
+}
