@@ -175,8 +175,7 @@ impl World {
     /// on, or rows are not filled with the BSDF.
     pub fn plain_rough(&self, material: usize) -> Option<(&Material, &Rough)> {
         let material = &self.materials[material];
-        if material.normal_map.is_some() || material.emission.texture.is_some() || material.opacity.is_some()
-        {
+        if material.relief.is_some() || material.emission.texture.is_some() || material.opacity.is_some() {
             return None;
         }
         match &material.bsdf {
