@@ -14,7 +14,7 @@
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
 //! | [`accel`] | a bounding volume hierarchy over any shapes, where a closure tests each; over triangles, one by vector instructions, and a k-d tree |
 //! | [`sampling`] | sample streams, warps, distributions |
-//! | [`materials`] | rough BSDFs in rows (phong, metal, plastic, principled), smooth coats, mirror, glass, panes; opacity; texture lookup, normal maps, Fresnel |
+//! | [`materials`] | rough BSDFs in rows (phong, metal, plastic, principled), smooth coats, mirror, glass, panes; opacity; texture lookup, normal maps, heights, Fresnel |
 //! | [`lights`] | lights without extent (`delta`), from beyond the scene (`infinite`), and shapes that emit (`area`); a tree over many lights; photon emission |
 //! | [`scene`] | the scene file: parsing, validation, diagnostics, the lowered description |
 //! | [`assets`] | bytes → meshes, textures, orbiter cameras |

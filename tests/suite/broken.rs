@@ -202,7 +202,10 @@ const BROKEN: &[(&str, &[Said])] = &[
             (25, 24, r#"there is no texture "brikcs"; did you mean "bricks"?"#),
             (25, 42, "`scale` must be at least 0; found -1"),
             (25, 46, "unknown key `sclae` in `emission`; did you mean `scale`?"),
-            (28, 13, "unknown key `textur` in `diffuse`; did you mean `texture`?"),
+            (26, 8, r#"`bump` must be the name of a texture, or { texture = "name" }; found a number"#),
+            (27, 14, "`bump_scale` must be a number; found a text"),
+            (30, 13, "unknown key `textur` in `diffuse`; did you mean `texture`?"),
+            (31, 40, r#"`channel` cannot be "height""#),
         ],
     ),
     (

@@ -5,7 +5,7 @@
 //! | --- | --- | --- |
 //! | [`geometry`] | rays, boxes, one file a shape; hits with bounds on their errors | no other room of this crate |
 //! | [`accel`] | trees over boxes, whose closures test what is in them; trees over triangles, with all vector instructions | `geometry`; of the shapes, triangles alone |
-//! | [`materials`] | one file a BSDF; textures and their footprints, normal maps | no other room: directions are in a local frame |
+//! | [`materials`] | one file a BSDF; textures and their footprints, normal maps, heights | no other room: directions are in a local frame |
 //! | [`lights`] | one file a light, in `area`, `delta` and `infinite`; picks among many; photon emission | `geometry` and textures, but neither BSDFs nor trees over shapes |
 //!
 //! Begin to read at [`geometry::Shape`] (what a shape tells), at the page of [`lights`] (what a light tells), at

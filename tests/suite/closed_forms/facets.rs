@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec2, Vec3};
-use glimt::scene::description::{Falloff, NormalMap, Shadows, TextureFilter, Wrap};
+use glimt::scene::description::{Bump, Falloff, NormalMap, Shadows, TextureFilter, Wrap};
 
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, scene};
 use super::{Random, v};
@@ -166,6 +166,9 @@ fn closed(number: u32, random: &mut Random) -> Build {
             wall.normals = wall.positions.iter().map(any).collect();
         }
         let mut material = matte(0.8);
+        // Any numbers serve as normals and as heights.
+        let as_heights = bumps.filter(|_| number % 8 == 3);
+        material.bump = as_heights.map(|texture| Bump { texture, channel: None, scale: 0.3 });
         material.normal_map = bumps.map(|texture| NormalMap { texture, strength: 2.0 });
         build = build.mesh(wall, placed, material);
         if is_smooth {

@@ -1,6 +1,7 @@
 //! The tracer against closed forms: each comment derives the right answer.
 
 mod bodies;
+mod bumps;
 mod camera;
 mod caustics;
 mod direct;

@@ -305,6 +305,7 @@ pub fn plain(kind: MaterialKind) -> Material {
         kind,
         emission: EmissionSource::NONE,
         normal_map: None,
+        bump: None,
         opacity: OpacitySource::FULL,
     }
 }

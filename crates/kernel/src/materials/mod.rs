@@ -21,6 +21,7 @@ pub mod pane;
 pub mod phong;
 pub mod plastic;
 pub mod principled;
+pub mod relief;
 pub mod rough;
 pub mod texels;
 pub mod texture;
@@ -40,6 +41,7 @@ pub use pane::Pane;
 pub use phong::Phong;
 pub use plastic::Plastic;
 pub use principled::{EmissionCoat, Principled, PrincipledInputs};
+pub use relief::{Bump, Relief};
 pub use rough::{BsdfRow, Rough, RoughBsdf, RoughKind};
 
 use crate::math::Vec3;
@@ -51,8 +53,8 @@ pub struct Material {
     pub bsdf: Bsdf,
     /// Radiance that it emits, the same in every direction.
     pub emission: Emission,
-    /// Normal map, which bends the shading normals.
-    pub normal_map: Option<NormalMap>,
+    /// What bends the shading normals.
+    pub relief: Option<Relief>,
     /// The chance that it is there. `None` if it is there everywhere.
     pub opacity: Option<Opacity>,
 }
@@ -68,7 +70,7 @@ impl Material {
             Bsdf::Pane(_) => false,
         };
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
-        in_bsdf || self.normal_map.is_some() || self.emission.texture.is_some() || of_opacity.is_some()
+        in_bsdf || self.relief.is_some() || self.emission.texture.is_some() || of_opacity.is_some()
     }
 
     /// Whether light may pass it straight on.
@@ -104,9 +106,9 @@ impl Material {
             Bsdf::Pane(_) => false,
         };
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
-        let of_normals = self.normal_map.as_ref().map(|map| &map.texture);
-        let others = [self.emission.texture.as_ref(), of_normals, of_opacity];
-        in_bsdf || others.into_iter().flatten().any(|texture| texture.mipmaps.is_some())
+        let of_relief = self.relief.iter().flat_map(Relief::textures);
+        let mut others = [self.emission.texture.as_ref(), of_opacity].into_iter().flatten().chain(of_relief);
+        in_bsdf || others.any(|texture| texture.mipmaps.is_some())
     }
 }
 

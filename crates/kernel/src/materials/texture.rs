@@ -6,7 +6,7 @@ use super::footprint::{Footprint, TexturePoint};
 use super::mipmaps::Mipmaps;
 use super::texels::Texels;
 use crate::choice;
-use crate::math::elementary::log2;
+use crate::math::elementary::{exp2, log2};
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::math::transform::sin_cos_degrees;
 use crate::math::{DVec2, Vec2, Vec3};
@@ -140,14 +140,46 @@ impl Color {
 impl Texture {
     /// The linear value at texture coordinates, v = 0 at the bottom row; coordinates that are not finite count as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
-        let tiles = at.uv * self.repeat.as_dvec2();
-        let tiles = self.moved.as_ref().map_or(tiles, |moved| moved.point(tiles));
+        let tiles = self.tiles(at.uv);
+        self.in_tiles(tiles, || self.level(&at.footprint))
+    }
+
+    /// The value at coordinates of the tiles, at this level if the filter has levels.
+    #[inline]
+    fn in_tiles(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
         let folded = [tiles.x, tiles.y].map(|x| self.wrap.fold(finite(x)) as f32);
         match self.filter {
             TextureFilter::Nearest => self.nearest(folded),
             TextureFilter::Bilinear => self.bilinear(&self.texels, folded),
-            TextureFilter::Mipmap => self.trilinear(self.level(&at.footprint), folded),
+            TextureFilter::Mipmap => self.trilinear(level(), folded),
         }
+    }
+
+    /// Coordinates that are repeated and moved: 1 is the width of the image.
+    #[inline]
+    fn tiles(&self, uv: DVec2) -> DVec2 {
+        let tiles = uv * self.repeat.as_dvec2();
+        self.moved.as_ref().map_or(tiles, |moved| moved.point(tiles))
+    }
+
+    /// Changes of the red channel with u and v, by central differences: over a texel, or over one of the level that the footprint
+    /// chooses.
+    pub fn slopes(&self, at: &TexturePoint) -> Vec2 {
+        let tiles = self.tiles(at.uv);
+        let level = match (self.filter, &self.mipmaps) {
+            (TextureFilter::Mipmap, Some(mipmaps)) => self.level(&at.footprint).min(mipmaps.count() as f32),
+            (TextureFilter::Mipmap | TextureFilter::Nearest | TextureFilter::Bilinear, _) => 0.0,
+        };
+        // Look up on both sides, along the axes of the image.
+        let steps = size(&self.texels).as_dvec2().recip() * f64::from(exp2(level));
+        let beside = |by: DVec2| self.in_tiles(tiles + by, || level).x;
+        let change = |half: DVec2| beside(half) - beside(-half);
+        let changes =
+            Vec2::new(change(DVec2::new(steps.x * 0.5, 0.0)), change(DVec2::new(0.0, steps.y * 0.5)));
+        // Turn the gradient back from the image's coordinates to those of the surface.
+        let slopes = changes.as_dvec2() / steps;
+        let slopes = self.moved.as_ref().map_or(slopes, |moved| moved.vector_before(slopes));
+        slopes.as_vec2() * self.repeat
     }
 
     /// Number of texels in a unit of u and v.
@@ -409,6 +441,24 @@ mod tests {
         assert_eq!(Moved::new(0.0, DVec2::ZERO), None);
         let (sin, cos) = Moved::new(-270.0, DVec2::ZERO).expect("it turns").turn;
         assert_eq!((sin, cos), (1.0, 0.0));
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_moved_image() {
+        // Around the middle the numbers rise by 1 a texel across and by 2 a texel up: by 2 and 4 of the image's size.
+        let mut texture = numbered(TextureFilter::Bilinear, Wrap::Repeat);
+        let at = |texture: &Texture, u: f64, v: f64| texture.slopes(&TexturePoint::sharp(DVec2::new(u, v)));
+        assert_eq!(at(&texture, 0.5, 0.5), Vec2::new(2.0, 4.0));
+        texture.repeat = Vec2::new(2.0, -3.0);
+        assert_eq!(at(&texture, 0.25, -0.5), Vec2::new(4.0, -12.0));
+        // (u, v) becomes (−v, 2u): the change with u is that up the image.
+        (texture.repeat, texture.moved) =
+            (Vec2::new(2.0, 1.0), Moved::new(90.0, DVec2::new(1.0, 0.0)).map(Box::new));
+        assert_eq!(at(&texture, 0.25, 0.5), Vec2::new(8.0, -2.0));
+        // Nothing is found beyond a border that goes on, and nothing in what is not finite.
+        let clamped = numbered(TextureFilter::Bilinear, Wrap::Clamp);
+        assert_eq!(at(&clamped, -1.0, 0.5), Vec2::new(0.0, 4.0));
+        assert_eq!(at(&clamped, f64::NAN, f64::INFINITY), Vec2::ZERO);
     }
 
     #[test]

@@ -9,8 +9,8 @@ use crate::assets::FileMaterial;
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Color, Moved, Texture, TextureFilter, Wrap};
 use crate::materials::{
-    Bsdf, Coated, Emission, EmissionCoat, Glass, Material, Metal, MetalFresnel, Mirror, NormalMap, Number,
-    Opacity, Pane, Phong, Plastic, Principled, PrincipledInputs, Rough,
+    Bsdf, Bump, Coated, Emission, EmissionCoat, Glass, Material, Metal, MetalFresnel, Mirror, NormalMap,
+    Number, Opacity, Pane, Phong, Plastic, Principled, PrincipledInputs, Relief, Rough,
 };
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{
@@ -67,7 +67,12 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
         texture: declared_texture(scene, images, map.texture, TextureUse::Normal),
         strength: map.strength,
     });
-    Material { bsdf, emission, normal_map, opacity: opacity(scene, images, &material.opacity) }
+    let bump = material.bump.map(|bump| Bump {
+        texture: declared_texture(scene, images, bump.texture, TextureUse::Number(bump.number())),
+        scale: bump.scale,
+    });
+    let relief = Relief::new(normal_map, bump);
+    Material { bsdf, emission, relief, opacity: opacity(scene, images, &material.opacity) }
 }
 
 /// Opacity of a material of the scene file. `None` if the material is there everywhere.
@@ -168,7 +173,7 @@ pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
         (FileKind::Glass, Some((ior, tint))) => Bsdf::Glass(Glass::new(ior, tint)),
         (FileKind::Phong | FileKind::Glass, _) => return file_phong(images, own),
     };
-    Material { bsdf, emission: Emission::NONE, normal_map: None, opacity: None }
+    Material { bsdf, emission: Emission::NONE, relief: None, opacity: None }
 }
 
 fn file_phong(images: &Images, own: &FileMaterial) -> Material {
@@ -190,7 +195,7 @@ fn file_phong(images: &Images, own: &FileMaterial) -> Material {
     Material {
         bsdf: Bsdf::Rough(Rough::Phong(phong)),
         emission: file_emission(images, own),
-        normal_map,
+        relief: Relief::new(normal_map, None),
         opacity: None,
     }
 }
@@ -203,12 +208,7 @@ pub fn fallback_material() -> Material {
         shininess: 1.0,
         ambient: None,
     };
-    Material {
-        bsdf: Bsdf::Rough(Rough::Phong(phong)),
-        emission: Emission::NONE,
-        normal_map: None,
-        opacity: None,
-    }
+    Material { bsdf: Bsdf::Rough(Rough::Phong(phong)), emission: Emission::NONE, relief: None, opacity: None }
 }
 
 fn declared_color(scene: &Scene, images: &Images, source: &ColorSource) -> Color {

@@ -179,7 +179,7 @@ impl World {
         let material = &self.materials[material];
         let emission = &material.emission;
         let is_even = emission.texture.is_none() && emission.coat.is_none();
-        if material.normal_map.is_some() || !is_even || material.opacity.is_some() {
+        if material.relief.is_some() || !is_even || material.opacity.is_some() {
             return None;
         }
         match &material.bsdf {

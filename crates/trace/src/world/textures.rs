@@ -61,9 +61,9 @@ pub struct Lookups {
     pub ambient: bool,
     /// Emission textures, and the map of the environment.
     pub lights: bool,
-    /// Normal maps.
+    /// Normal maps and heights.
     pub normals: bool,
-    /// Normal maps of mirrors and glass, by which other surfaces are seen.
+    /// Those of mirrors and glass, by which other surfaces are seen.
     pub delta_normals: bool,
 }
 
@@ -95,7 +95,7 @@ impl Lookups {
             TextureRole::Facets | TextureRole::Roughness(_) => self.diffuse || self.specular,
             TextureRole::Ambient => self.ambient,
             TextureRole::Emission | TextureRole::EmissionCoat(_) => self.lights,
-            TextureRole::NormalMap => self.normals || self.delta_normals && is_delta,
+            TextureRole::NormalMap | TextureRole::Bump(_) => self.normals || self.delta_normals && is_delta,
             TextureRole::Opacity(_) => true,
         }
     }

@@ -75,6 +75,24 @@ fn opacity_and_vertex_colours_redo_only_what_reads_them() {
 }
 
 #[test]
+fn heights_redo_the_picture_alone() {
+    let mut bench = Bench::new(&format!("{SCENE}[textures.bumps]\nfile = \"bumps.ppm\"\n"));
+    bench.write("bumps.ppm", "P6\n2 1\n255\nabcxyz");
+    assert_statuses(&bench.done().0, "dddddsdd");
+    let mut expect = |from: &str, to: &str, statuses: &str| {
+        bench.edit(from, to);
+        let (report, unchanged) = bench.done();
+        assert_statuses(&report, statuses);
+        assert!(!unchanged, "{to}");
+    };
+    let diffuse = "diffuse = [0.5, 0.5, 0.5]";
+    let bump = format!("{diffuse}\nbump = \"bumps\"\nbump_scale = 0.1");
+    expect(diffuse, &bump, "drdrrsdd");
+    expect("bump_scale = 0.1", "bump_scale = 0.2", "drrrrsdd");
+    expect("bump = \"bumps\"", "bump = { texture = \"bumps\", channel = \"b\" }", "drdrrsdd");
+}
+
+#[test]
 fn files_that_a_mesh_names_are_part_of_it() {
     let mut bench = Bench::new(SCENE);
     bench.write("one.mtl", "newmtl a\nKd 1 0 0\n");

@@ -150,6 +150,8 @@ pub struct Material {
     pub emission: EmissionSource,
     /// The map that bends the shading normals.
     pub normal_map: Option<NormalMap>,
+    /// The heights that bend them further.
+    pub bump: Option<Bump>,
     /// The chance that it is there.
     pub opacity: OpacitySource,
 }
@@ -221,6 +223,24 @@ pub struct NormalMap {
     pub strength: f32,
 }
 
+/// A texture of heights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bump {
+    /// Index into [`Scene::textures`](super::Scene::textures).
+    pub texture: usize,
+    /// The channel that holds the heights. `None` for luminance.
+    pub channel: Option<Channel>,
+    /// Length of a height of 1; below 0, what stood out is sunk.
+    pub scale: f32,
+}
+
+impl Bump {
+    /// The number of a pixel that is its height.
+    pub fn number(&self) -> PixelNumber {
+        self.channel.map_or(PixelNumber::Luminance, PixelNumber::Channel)
+    }
+}
+
 /// Purpose of a texture's look-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TextureUse {
@@ -249,6 +269,8 @@ pub enum TextureRole {
     Emission,
     /// Map that bends its normals.
     NormalMap,
+    /// Heights that bend its normals.
+    Bump(PixelNumber),
     /// The chance that it is there.
     Opacity(PixelNumber),
     /// Clear coat over what emits.
@@ -262,9 +284,11 @@ impl TextureRole {
             Self::Diffuse | Self::Specular | Self::Ambient | Self::Facets | Self::Emission => {
                 TextureUse::Color
             }
-            Self::Roughness(number) => TextureUse::Number(number),
+            Self::Roughness(number)
+            | Self::Bump(number)
+            | Self::Opacity(number)
+            | Self::EmissionCoat(number) => TextureUse::Number(number),
             Self::NormalMap => TextureUse::Normal,
-            Self::Opacity(number) | Self::EmissionCoat(number) => TextureUse::Number(number),
         }
     }
 }
@@ -430,17 +454,18 @@ impl Material {
     /// The textures that it looks up, as indices into [`Scene::textures`](super::Scene::textures), each with its role; one may
     /// have several.
     pub fn textures(&self) -> Vec<(usize, TextureRole)> {
-        let Self { name: _, kind, emission, normal_map, opacity } = self;
+        let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
         let colors = kind.colors().into_iter().filter_map(|(color, role)| Some((color.texture()?, role)));
         let numbers = kind.numbers().into_iter().filter_map(|number| number.texture(PixelNumber::Luminance));
         let numbers = numbers.map(|(texture, number)| (texture, TextureRole::Roughness(number)));
         let shown = emission.texture.filter(|_| self.emits()).map(|index| (index, TextureRole::Emission));
         let normals = normal_map.map(|map| (map.texture, TextureRole::NormalMap));
+        let heights = bump.map(|bump| (bump.texture, TextureRole::Bump(bump.number())));
         let opacity = opacity.texture().map(|(texture, number)| (texture, TextureRole::Opacity(number)));
         let coat = self.emission_coat().into_iter().flatten();
         let coat = coat.filter_map(|number| number.texture(PixelNumber::Luminance));
         let coat = coat.map(|(texture, number)| (texture, TextureRole::EmissionCoat(number)));
-        colors.chain(numbers).chain(shown).chain(normals).chain(opacity).chain(coat).collect()
+        colors.chain(numbers).chain(shown).chain(normals).chain(heights).chain(opacity).chain(coat).collect()
     }
 }
 
@@ -520,6 +545,13 @@ impl Fingerprinted for NormalMap {
     }
 }
 
+impl Fingerprinted for Bump {
+    fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
+        let Self { texture, channel, scale } = *self;
+        key.f32(scale).add(&NumberSource::Texture { texture, channel }, of);
+    }
+}
+
 impl Fingerprinted for MaterialKind {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
         match self {
@@ -562,7 +594,7 @@ impl Fingerprinted for MaterialKind {
 
 impl Fingerprinted for Material {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
-        let Self { name: _, kind, emission, normal_map, opacity } = self;
-        key.add(kind, of).add(emission, of).add(normal_map, of).add(opacity, of);
+        let Self { name: _, kind, emission, normal_map, bump, opacity } = self;
+        key.add(kind, of).add(emission, of).add(normal_map, of).add(bump, of).add(opacity, of);
     }
 }

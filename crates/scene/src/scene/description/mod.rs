@@ -16,9 +16,9 @@ use std::path::PathBuf;
 pub use camera::{Camera, CameraChange, Pose, Viewpoint, is_same_distance};
 pub use light::{DirectionalLight, Environment, Falloff, Light, PointLight, SpotLight};
 pub use material::{
-    Channel, ColorSource, EmissionSides, EmissionSource, Encoding, FresnelSource, Material, MaterialKind,
-    NormalMap, NumberSource, OpacitySource, PixelNumber, Texture, TextureFilter, TextureRole, TextureUse,
-    Wrap,
+    Bump, Channel, ColorSource, EmissionSides, EmissionSource, Encoding, FresnelSource, Material,
+    MaterialKind, NormalMap, NumberSource, OpacitySource, PixelNumber, Texture, TextureFilter, TextureRole,
+    TextureUse, Wrap,
 };
 pub use method::{Integrator, Method};
 pub use render::{

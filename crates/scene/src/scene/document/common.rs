@@ -1,6 +1,6 @@
 //! The keys that all materials have.
 
-use super::super::description::{EmissionSource, NormalMap, NumberSource, OpacitySource};
+use super::super::description::{Bump, EmissionSource, NormalMap, NumberSource, OpacitySource};
 use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
@@ -17,6 +17,13 @@ pub(super) fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMa
     let texture = table.optional("normal_map").name_in(textures);
     let strength = table.optional("normal_strength").number32(Limits::AtLeast(0.0)).unwrap_or(1.0);
     texture.map(|texture| NormalMap { texture, strength })
+}
+
+/// `bump` and `bump_scale`.
+pub(super) fn bump(table: &Table<'_>, textures: &Names) -> Option<Bump> {
+    let texture = table.optional("bump").texture_of_numbers(textures);
+    let scale = table.optional("bump_scale").number32(Limits::Any).unwrap_or(0.01);
+    texture.map(|(texture, channel)| Bump { texture, channel, scale })
 }
 
 /// `opacity` and `opacity_cutoff`.

@@ -211,7 +211,11 @@ impl<'a> Key<'a> {
 
     /// The index of a thing that is named elsewhere in the file.
     pub(super) fn name_in(&self, names: &Names) -> Option<usize> {
-        let text = self.text_or(|| format!("the name of a {}", names.kind))?;
+        self.find(names, self.text_or(|| format!("the name of a {}", names.kind))?)
+    }
+
+    /// The index of a thing of this name, which is the value.
+    fn find(&self, names: &Names, text: &str) -> Option<usize> {
         let index = names.find(text);
         if index.is_none() {
             let message = format!("there is no {} \"{}\"", names.kind, shortened(text, 40));

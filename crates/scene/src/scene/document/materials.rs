@@ -71,6 +71,7 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
         Kind::Principled => Some(principled(table, textures)),
     };
     let (emission, normal_map) = (common::emission(table, textures), common::normal_map(table, textures));
+    let bump = common::bump(table, textures);
     let opacity = if kind.as_ref().is_some_and(MaterialKind::is_glass) {
         common::refuse_opacity(table);
         OpacitySource::FULL
@@ -78,7 +79,7 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
         common::opacity(table, textures)
     };
     table.finish();
-    Some(Material { name, kind: kind?, emission, normal_map, opacity })
+    Some(Material { name, kind: kind?, emission, normal_map, bump, opacity })
 }
 
 fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {

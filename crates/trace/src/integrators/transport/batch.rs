@@ -42,7 +42,7 @@ pub struct VertexBatch {
     pub after_gloss: u32,
     /// Normals for the cosines.
     pub normal: Lanes3,
-    /// Normals before a normal map bent them, and the cosine between both; [`UNBENT`] without a normal map.
+    /// Normals before a relief bent them, and the cosine between both; [`UNBENT`] without a relief.
     pub smooth_normal: Lanes3,
     pub bend: Lanes,
     /// BSDFs, all of one kind.

@@ -152,12 +152,12 @@ impl<'a> Vertex<'a> {
         Self { normal: -self.normal, side: -self.side, sides: self.sides.map(turned), ..*self }
     }
 
-    /// The interpolated normal, bent by a normal map, on the front side.
+    /// The interpolated normal, bent by the relief, on the front side.
     pub fn front_shading_normal(&self, counters: &mut RayCounters) -> Vec3 {
         let surface = &self.surface;
-        let Some(map) = &self.material.normal_map else { return surface.shading_normal };
-        counters.texture_lookups += 1;
-        map.bend(&self.texture_point, surface.shading_normal, surface.dpdu, surface.dpdv)
+        let Some(relief) = &self.material.relief else { return surface.shading_normal };
+        let (normal, tangents) = (surface.shading_normal, [surface.dpdu, surface.dpdv]);
+        relief.bend(&self.texture_point, normal, tangents, &mut counters.texture_lookups)
     }
 
     /// The shading normals.
@@ -276,7 +276,7 @@ impl Shading {
 
 /// Shading normals on the viewer's side.
 pub struct Shading {
-    /// The interpolated normal, bent by a normal map.
+    /// The interpolated normal, bent by a relief.
     pub normal: Vec3,
     /// The interpolated normal.
     pub smooth_normal: Vec3,

@@ -1,6 +1,6 @@
 //! Numbers or textures.
 
-use super::super::super::description::NumberSource;
+use super::super::super::description::{Channel, NumberSource};
 use super::super::context::Issue;
 use super::super::limits::Limits;
 use super::super::names::Names;
@@ -8,6 +8,7 @@ use super::super::value::{Item, limited};
 use super::Key;
 
 const NUMBER_OR_TEXTURE: &str = "a number, or { texture = \"name\" }";
+const NAME_OR_TEXTURE: &str = "the name of a texture, or { texture = \"name\" }";
 
 impl Key<'_> {
     /// A number or a texture of numbers, perhaps with the channel that holds them.
@@ -17,12 +18,8 @@ impl Key<'_> {
         limits: Limits,
     ) -> Option<NumberSource> {
         if self.is_table() {
-            let table = self.inline_table()?;
-            let texture = table.required("texture", "\"name\"").name_in(textures);
-            let key = table.optional("channel");
-            let channel = if key.is_given() { key.choice().map(Some) } else { Some(None) };
-            table.finish();
-            return Some(NumberSource::Texture { texture: texture?, channel: channel? });
+            let (texture, channel) = self.texture_with_channel(textures)?;
+            return Some(NumberSource::Texture { texture, channel });
         }
         let value = self.value?;
         if let Item::String(text) = value.item()
@@ -36,5 +33,24 @@ impl Key<'_> {
         }
         let number = limited(self.context, self.name, value, limits, NUMBER_OR_TEXTURE);
         number.map(|number| NumberSource::Constant(number as f32))
+    }
+
+    /// The name of a texture of numbers, or `{ texture = "name", channel = "r" }`.
+    pub(in super::super) fn texture_of_numbers(&self, textures: &Names) -> Option<(usize, Option<Channel>)> {
+        if self.is_table() {
+            return self.texture_with_channel(textures);
+        }
+        let name = self.text_or(|| NAME_OR_TEXTURE.to_owned())?;
+        Some((self.find(textures, name)?, None))
+    }
+
+    /// The texture and the channel of `{ texture = "name", channel = "r" }`.
+    fn texture_with_channel(&self, textures: &Names) -> Option<(usize, Option<Channel>)> {
+        let table = self.inline_table()?;
+        let texture = table.required("texture", "\"name\"").name_in(textures);
+        let key = table.optional("channel");
+        let channel = if key.is_given() { key.choice().map(Some) } else { Some(None) };
+        table.finish();
+        Some((texture?, channel?))
     }
 }

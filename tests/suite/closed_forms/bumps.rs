@@ -1,0 +1,241 @@
+//! Textures of heights: a ramp is a tilted plane, and waves have the normals of their derivatives.
+
+use std::f64::consts::{PI, TAU};
+
+use glimt::geometry::mesh::TriangleMesh;
+use glimt::integrators::View;
+use glimt::math::{DVec2, DVec3, Vec2, Vec3};
+use glimt::scene::description::{
+    Bump, Falloff, Integrator, Material, NormalMap, Shadows, TextureFilter, Wrap,
+};
+
+use super::scenes::{
+    AS_IT_IS, Build, glass, lat_long_sphere, matte, metal, mirror, phong, plastic, principled, scene,
+};
+use super::v;
+
+/// A texture of heights by their place in the image, from (0, 0) at the bottom left to (1, 1).
+fn heights(build: &mut Build, size: usize, height: impl Fn(DVec2) -> f64) -> usize {
+    let place = |i: usize| (i as f64 + 0.5) / size as f64;
+    let row =
+        |y: usize| (0..size).map(|x| Vec3::splat(height(DVec2::new(place(x), place(y))) as f32)).collect();
+    let rows: Vec<Vec<Vec3>> = (0..size).rev().map(row).collect();
+    let rows: Vec<&[Vec3]> = rows.iter().map(Vec::as_slice).collect();
+    build.texture(&rows, TextureFilter::Bilinear, Wrap::Repeat, Vec2::ONE)
+}
+
+fn bumped(texture: usize, scale: f64, material: Material) -> Material {
+    Material { bump: Some(Bump { texture, channel: None, scale: scale as f32 }), ..material }
+}
+
+/// Materials of every kind that shows its normals.
+fn materials() -> Vec<(&'static str, Material)> {
+    vec![
+        ("phong", phong(0.3, 0.5, 20.0, 0.0)),
+        ("metal", metal(0.9, 0.3, 0.0)),
+        ("plastic", plastic(0.7, 0.2)),
+        ("smooth plastic", plastic(0.7, 0.0)),
+        ("principled", principled(0.6, 0.3, 0.4)),
+        ("mirror", mirror(0.9)),
+        ("glass", glass(1.5)),
+    ]
+}
+
+#[test]
+fn a_ramp_is_shaded_as_a_tilted_plane() {
+    // Heights of 0.3·u over edges of 2 are slopes of 0.15; the tilted plane goes through the point that is seen. The light is
+    // where the bent normal faces it less than the surface does: nothing fades.
+    let slope = 0.15;
+    let up = v(-slope, 1.0, 0.0).normalize();
+    let eye = v(1.0, 1.5, 0.4);
+    let lit = scene()
+        .point_light(v(2.0, 4.0, 1.0), 30.0, Falloff::Square)
+        .shadows(Shadows::Off, 1)
+        .seen(eye, DVec3::ZERO)
+        .environment(0.25);
+    for (name, material) in materials().into_iter().filter(|(name, _)| *name != "glass") {
+        let mut relief = lit.clone();
+        let texture = heights(&mut relief, 8, |at| at.x);
+        let (u, w) = (v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0));
+        let relief = relief.quad(-(u + w) / 2.0, u, w, bumped(texture, 0.3, material.clone()));
+        let along = v(1.0, slope, 0.0) * 2.0;
+        let tilted = lit.clone().quad(-(along + w) / 2.0, along, w, material);
+        assert!(up.dot(along).abs() < 1e-12);
+        let [relief, tilted] = [relief, tilted].map(|build| build.depth(1).value());
+        assert!((relief - tilted).abs() < 2e-5 * tilted && tilted > 0.0, "{name}: {relief} is not {tilted}");
+    }
+}
+
+#[test]
+fn a_ramp_is_a_normal_map_of_one_slope() {
+    // On a cube of edges of 1 the slopes are those of the map. Only around the middle of the faces is the ramp one.
+    let slope = 0.25;
+    for (name, material) in materials() {
+        for integrator in [Integrator::Whitted, Integrator::Path] {
+            let lit = scene()
+                .sky(2, [0.1, 0.9, 0.6, 0.3].map(Vec3::splat).to_vec(), 0.0)
+                .with(|scene| scene.render.integrator = integrator)
+                .point_light(v(2.0, 4.0, 3.0), 10.0, Falloff::Square)
+                .depth(3)
+                .pictured(v(0.0, 0.0, 4.0), DVec3::ZERO, 8.0, 3, 3);
+            let cube = |build: Build, material| build.cuboid(DVec3::ZERO, DVec3::ONE, DVec3::ZERO, material);
+            let (mut relief, mut mapped) = (lit.clone(), lit);
+            let texture = heights(&mut relief, 8, |at| at.x);
+            let relief = cube(relief, bumped(texture, slope, material.clone()));
+            let normal = v(-slope, 0.0, 1.0).normalize().as_vec3() * 0.5 + 0.5;
+            let texture = mapped.texture(&[&[normal]], TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
+            let normal_map = Some(NormalMap { texture, strength: 1.0 });
+            let mapped = cube(mapped, Material { normal_map, ..material.clone() });
+            for (relief, mapped) in relief.picture(4, 1).into_iter().zip(mapped.picture(4, 1)) {
+                let off = (relief - mapped).abs().max_element();
+                assert!(
+                    off < 2e-4 * mapped.max_element(),
+                    "{name} by {integrator:?}: {relief} is not {mapped}"
+                );
+            }
+        }
+    }
+}
+
+/// The shading normal that is seen.
+fn normal(build: &Build) -> DVec3 {
+    build.clone().viewed(View::Normal).color() * 2.0 - 1.0
+}
+
+/// Height of the waves over an image, and its gradient.
+fn waves(at: DVec2) -> (f64, DVec2) {
+    let phase = TAU * at;
+    let slopes = DVec2::new(phase.x.cos() * phase.y.cos(), -phase.x.sin() * phase.y.sin());
+    (phase.x.sin() * phase.y.cos(), slopes * TAU)
+}
+
+/// Columns of the image of waves: the slope over a texel of it, of what is interpolated between texels, is less by 2·10⁻⁴ of
+/// the steepest.
+const COLUMNS: usize = 256;
+
+#[test]
+fn waves_on_a_parallelogram_have_their_normals_however_they_are_tiled() {
+    // The image's coordinates are s = R(r·(u, v)) + o, so that ∇h by (u, v) is r·Rᵀ∇h by s.
+    let (u, w) = (v(2.0, 0.0, 0.0), v(0.5, 0.0, -1.5));
+    for (repeat, degrees, offset) in [
+        (DVec2::ONE, 0.0_f64, DVec2::ZERO),
+        (DVec2::new(2.0, -1.0), 0.0, DVec2::new(0.3, 0.1)),
+        (DVec2::new(1.0, 2.0), 30.0, DVec2::new(-0.2, 0.7)),
+    ] {
+        let mut build = scene();
+        let texture = heights(&mut build, COLUMNS, |at| waves(at).0);
+        let tiled = &mut build.scene.textures[texture];
+        (tiled.repeat, tiled.rotate, tiled.offset) = (repeat.as_vec2(), degrees, offset.as_vec2());
+        let build = build.quad(DVec3::ZERO, u, w, bumped(texture, 0.05, matte(0.5)));
+        for at in [DVec2::new(0.21, 0.34), DVec2::new(0.7, 0.55), DVec2::new(0.43, 0.9)] {
+            let turn = DVec2::from_angle(degrees.to_radians());
+            let slopes = repeat
+                * DVec2::from_angle(-degrees.to_radians()).rotate(waves(turn.rotate(repeat * at) + offset).1)
+                * 0.05;
+            // The graph's own tangents are u and w, raised by the slopes.
+            let expected = (u + DVec3::Y * slopes.x).cross(w + DVec3::Y * slopes.y).normalize();
+            let point = u * at.x + w * at.y;
+            let found = normal(&build.clone().seen(point + v(0.3, 2.0, 0.2), point));
+            assert!(
+                (found - expected).length() < 5e-4,
+                "{at} of {repeat}, {degrees}°: {found}, not {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn waves_on_a_sphere_and_on_its_mesh_have_the_normals_of_the_displaced_sphere() {
+    // The point is (R + h)·n; its derivatives by longitude and latitude span the tangent plane, to first order in h/R.
+    let (radius, scale) = (2.0, 1e-2);
+    let direction = |uv: DVec2| {
+        let (longitude, latitude) = ((uv.x - 0.5) * TAU, (uv.y - 0.5) * PI);
+        v(latitude.cos() * longitude.cos(), latitude.sin(), latitude.cos() * longitude.sin())
+    };
+    let mut build = scene();
+    let texture = heights(&mut build, COLUMNS, |at| waves(at).0);
+    build.scene.textures[texture].repeat = Vec2::new(4.0, 2.0);
+    let ball = build.sphere(DVec3::ZERO, radius, bumped(texture, scale, matte(0.5)));
+    for uv in [DVec2::new(0.3, 0.4), DVec2::new(0.61, 0.77), DVec2::new(0.93, 0.15)] {
+        let repeat = DVec2::new(4.0, 2.0);
+        let slopes = repeat * waves(uv * repeat).1 * scale;
+        let (n, step) = (direction(uv), 1e-5);
+        let tangent = |by: DVec2, slope: f64| {
+            (direction(uv + by * step) - direction(uv - by * step)) * (radius / (2.0 * step)) + n * slope
+        };
+        let across = tangent(DVec2::X, slopes.x).cross(tangent(DVec2::Y, slopes.y)).normalize();
+        let expected = across * across.dot(n).signum();
+        let found = normal(&ball.clone().seen(n * 5.0, DVec3::ZERO));
+        assert!((found - expected).length() < 5e-4, "{uv}: {found}, not {expected}");
+    }
+}
+
+#[test]
+fn waves_on_a_mesh_follow_its_coordinates_and_its_placement() {
+    // Its corners have the coordinates 2·(x, z) + (0.1, 0.2) in the file; the instance is three times as large, and mirrored.
+    // Heights are lengths of the scene: they do not grow with the instance.
+    let corners = [v(0.0, 0.0, 0.0), v(1.0, 0.0, 0.0), v(1.0, 0.0, 1.0), v(0.0, 0.0, 1.0)];
+    let coordinates = |at: DVec3| DVec2::new(at.x, at.z) * 2.0 + DVec2::new(0.1, 0.2);
+    for mirrored in [1.0, -1.0] {
+        let mesh = TriangleMesh {
+            positions: corners.map(|corner| corner.as_vec3()).to_vec(),
+            uvs: corners.map(|corner| coordinates(corner).as_vec2()).to_vec(),
+            triangles: vec![[0, 2, 1], [0, 3, 2]],
+            ..TriangleMesh::default()
+        };
+        let mut build = scene();
+        let texture = heights(&mut build, COLUMNS, |at| waves(at).0);
+        let placed = [v(3.0 * mirrored, 3.0, 3.0), DVec3::ZERO, v(0.0, 0.5, 0.0)];
+        let build = build.mesh(mesh, placed, bumped(texture, 0.05, matte(0.5)));
+        for at in [v(0.2, 0.0, 0.1), v(0.3, 0.0, 0.8), v(0.77, 0.0, 0.5)] {
+            let slopes = waves(coordinates(at)).1 * 2.0 * 0.05 / 3.0;
+            let expected = v(-slopes.x * mirrored, 1.0, -slopes.y).normalize();
+            let point = v(3.0 * mirrored * at.x, 0.5, 3.0 * at.z);
+            let found = normal(&build.clone().seen(point + v(0.3, 2.0, 0.2), point));
+            assert!((found - expected).length() < 5e-4, "{at}, mirrored {mirrored}: {found}, not {expected}");
+        }
+    }
+}
+
+#[test]
+fn far_waves_with_levels_are_flat() {
+    // A pixel of 1° from 400 units is 7 units wide, and a wave one.
+    let mut build = scene();
+    let texture = heights(&mut build, 32, |at| waves(at).0);
+    build.scene.textures[texture].repeat = Vec2::splat(200.0);
+    let (u, w) = (v(200.0, 0.0, 0.0), v(0.0, 0.0, -200.0));
+    let seen = |filter, distance: f64| {
+        let mut build = build.clone();
+        build.scene.textures[texture].filter = filter;
+        let build = build.quad(-(u + w) / 2.0, u, w, bumped(texture, 0.2, matte(0.5)));
+        let at = v(0.03, 0.0, 0.01);
+        normal(&build.pictured(at + DVec3::Y * distance, at, 1.0, 1, 1)).y
+    };
+    assert!(seen(TextureFilter::Bilinear, 400.0) < 0.98);
+    assert!(seen(TextureFilter::Mipmap, 400.0) > 0.999);
+    let near = [TextureFilter::Bilinear, TextureFilter::Mipmap].map(|filter| seen(filter, 1.0));
+    assert!((near[0] - near[1]).abs() < 0.02 && near[0] < 0.98, "{near:?}");
+}
+
+#[test]
+fn bumpy_balls_have_no_black_edge() {
+    // Where normals turn away from the viewer, what is reflected is still that of the sky. The waves go from pole to pole.
+    let mut darkest = Vec::new();
+    for (name, material) in materials().into_iter().filter(|(name, _)| *name != "glass") {
+        let mut build = scene().environment(1.0);
+        let texture = heights(&mut build, 16, |at| (TAU * at.y).cos());
+        build.scene.textures[texture].repeat = Vec2::new(1.0, 4.0);
+        let ball = lat_long_sphere(12, 16, 1.0, DVec3::ZERO);
+        let uvs = |p: &Vec3| Vec2::new(0.5 + p.z.atan2(p.x) / TAU as f32, 0.5 + p.y.asin() / PI as f32);
+        let mesh = TriangleMesh { uvs: ball.positions.iter().map(uvs).collect(), ..ball };
+        let material = bumped(texture, 0.02, material);
+        let build = build
+            .mesh(mesh, AS_IT_IS, material.clone())
+            .smooth()
+            .sphere(v(2.5, 0.0, 0.0), 1.0, material)
+            .pictured(v(1.25, 0.0, 5.0), v(1.25, 0.0, 0.0), 42.0, 48, 24);
+        let least = build.depth(1).picture(32, 0).iter().map(|color| color.x).fold(f64::MAX, f64::min);
+        darkest.push((name, least));
+    }
+    assert!(darkest.iter().all(|(_, least)| *least > 0.2), "{darkest:?}");
+}
