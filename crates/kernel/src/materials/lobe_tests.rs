@@ -143,7 +143,7 @@ impl<R: RoughRow> Subject<R> {
 
     /// The albedo of all lobes by their samples: the mean of f·cos/pdf.
     pub fn sampled_albedo(&self, side: u32) -> DVec3 {
-        self.mean_of(self.samples(LobeSet::All, side))
+        self.mean_of(&self.samples(LobeSet::All, side))
     }
 
     /// [`Subject::sampled_albedo`] with sixteen choices for each place of the grid.
@@ -158,12 +158,12 @@ impl<R: RoughRow> Subject<R> {
             let directions = self.row.sample(LobeSet::All, &self.normals(), &choices, &u);
             samples.extend((0..LANES).map(|i| lane(&directions, i).as_dvec3()));
         }
-        self.mean_of(samples)
+        self.mean_of(&samples)
     }
 
     /// The mean of f·cos/pdf.
-    fn mean_of(&self, samples: Vec<DVec3>) -> DVec3 {
-        let values = self.values(LobeSet::All, &samples);
+    fn mean_of(&self, samples: &[DVec3]) -> DVec3 {
+        let values = self.values(LobeSet::All, samples);
         let sum: DVec3 = samples
             .iter()
             .zip(values)

@@ -356,7 +356,7 @@ kinds! {
     /// A diffuse base under a coat of microfacets.
     Plastic(Plastic, PlasticRow, kept: Box<PlasticRow>),
     /// The inputs of glTF.
-    Principled(Principled, PrincipledRow<false>, kept: Box<PrincipledRow<false>>),
+    Principled(Box<Principled>, PrincipledRow<false>, kept: Box<PrincipledRow<false>>),
     }
     parts {
     /// The reflection of rough glass.

@@ -46,7 +46,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             transmission,
             clearcoat,
             clearcoat_roughness,
-        } => Bsdf::Rough(Rough::Principled(Principled::new(PrincipledInputs {
+        } => Bsdf::Rough(Rough::Principled(Box::new(Principled::new(PrincipledInputs {
             color: color(base),
             metallic: number(metallic),
             roughness: number(roughness),
@@ -56,7 +56,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             transmission: number(transmission),
             clearcoat: number(clearcoat),
             clearcoat_roughness: number(clearcoat_roughness),
-        }))),
+        })))),
         MaterialKind::Glass { ior, tint, roughness } => {
             Bsdf::Glass(Glass::new(*ior, *tint).with_roughness(number(roughness)))
         }

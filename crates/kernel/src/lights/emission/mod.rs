@@ -247,10 +247,10 @@ impl PhotonSource {
                     self.directed(place.from, &Sends::Front(place.normal), targets, u, by_cosine);
                 let start = Start::Surface { point: place.point, error: place.error, normal };
                 // A clear coat weakens what leaves in this direction.
-                let left = |texture: &Box<EmissionTexture>| {
+                let left = |texture: &EmissionTexture| {
                     texture.left_by_coat(place.point, place.primitive, -direction)
                 };
-                let flux = place.flux * light.texture.as_ref().map_or(1.0, left);
+                let flux = place.flux * light.texture.as_deref().map_or(1.0, left);
                 Some(Made { start, direction, flux, ratio })
             }
         }
