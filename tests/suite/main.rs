@@ -17,6 +17,7 @@ mod inputs;
 mod json;
 mod keeping;
 mod kernel;
+mod models;
 mod mutation;
 #[cfg(target_os = "linux")]
 mod niceness;

@@ -253,7 +253,7 @@ fn scene_of(file: &str) -> String {
     let ball = "[[sphere]]\ncenter = [0, 1, 0]\nradius = 0.5\nmaterial = \"m\"\n";
     match file.rsplit_once('.').map_or("", |(_, ending)| ending) {
         "txt" => format!("[camera]\norbiter = \"{file}\"\n[materials.m]\ntype = \"phong\"\n{ball}"),
-        "obj" | "off" | "ply" => format!(
+        "obj" | "off" | "ply" | "stl" => format!(
             "{camera}[[mesh]]\nfile = \"{file}\"\nmaterial = \"m\"\n[materials.m]\ntype = \"phong\"\n"
         ),
         "mtl" => format!("{camera}[[mesh]]\nfile = \"case.obj\"\n"),

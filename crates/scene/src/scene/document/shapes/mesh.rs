@@ -12,10 +12,10 @@ use crate::math::DVec3;
 use crate::math::limits::{SHORTEST, is_too_short, length};
 
 /// Endings of mesh files that can be read.
-pub(super) const MESHES: [&str; 3] = ["obj", "off", "ply"];
+pub(super) const MESHES: [&str; 4] = ["obj", "off", "ply", "stl"];
 
 /// Endings that other versions read.
-pub(super) const UNAVAILABLE: [&str; 3] = ["stl", "gltf", "glb"];
+pub(super) const UNAVAILABLE: [&str; 2] = ["gltf", "glb"];
 
 /// The mesh files named so far, each once, however it is written.
 #[derive(Default)]

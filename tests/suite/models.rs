@@ -1,0 +1,80 @@
+//! Models in files of every format, with their own materials.
+
+use super::desk::Desk;
+
+const CAMERA: &str = "[render]\nwidth = 24\nheight = 18\nsamples = 4\n[camera]\nposition = [0.3, 0.4, 3]\nlook_at = [0.5, 0.4, 0]\n\
+                      [[light]]\nposition = [1, 2, 3]\nintensity = [9, 9, 9]\n[environment]\ncolor = [0.3, 0.4, 0.5]\n";
+
+/// The linear values of a scene's picture.
+fn picture(desk: &Desk, scene: &str) -> Vec<f32> {
+    desk.write("scene.toml", format!("{CAMERA}{scene}"));
+    desk.expect("scene.toml --once -o scene.exr", 0);
+    image::open(desk.path("scene.exr")).expect("a picture").to_rgb32f().into_raw()
+}
+
+#[test]
+fn one_tetrahedron_is_one_picture_in_every_format() {
+    let desk = Desk::new();
+    let corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]];
+    let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let words = |[a, b, c]: [i32; 3]| format!("{a} {b} {c}\n");
+    let vertices = corners.map(words).concat();
+    let numbered = faces.map(|face| format!("3 {}", words(face.map(|corner: usize| corner as i32)))).concat();
+    desk.write("a.off", format!("OFF\n4 4 0\n{vertices}{numbered}"));
+    let properties = ["x", "y", "z"].map(|name| format!("property float {name}\n")).concat();
+    desk.write(
+        "a.ply",
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 4\n{properties}element face 4\nproperty list uchar int \
+             vertex_indices\nend_header\n{vertices}{numbered}"
+        ),
+    );
+    let obj = corners.map(|corner| format!("v {}", words(corner))).concat()
+        + &faces.map(|face| format!("f {}", words(face.map(|corner| corner as i32 + 1)))).concat();
+    desk.write("a.obj", obj);
+    let places = faces.map(|face| face.map(|corner| corners[corner]));
+    let facet = |places: [[i32; 3]; 3]| {
+        let vertices = places.map(|place| format!("vertex {}", words(place))).concat();
+        format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
+    };
+    desk.write("a.stl", format!("solid a\n{}endsolid a\n", places.map(facet).concat()));
+    let mut bytes = [&b"solid is how many begin"[..], &[0; 57], &4_u32.to_le_bytes()].concat();
+    for place in places {
+        bytes.extend([0; 12]);
+        bytes.extend(place.as_flattened().iter().flat_map(|number| (*number as f32).to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    desk.write("b.STL", bytes);
+    for smooth in [false, true] {
+        let of = |file: &str| {
+            let mesh =
+                format!("[[mesh]]\nfile = \"{file}\"\nmaterial = \"m\"\nsmooth = {smooth}\n[materials.m]\n");
+            picture(&desk, &mesh)
+        };
+        let expected = of("a.off");
+        assert!(expected.iter().any(|value| (value - expected[0]).abs() > 0.1), "it is seen");
+        for file in ["a.ply", "a.obj", "a.stl", "b.STL"] {
+            assert!(of(file) == expected, "{file}, smooth = {smooth}");
+        }
+    }
+}
+
+#[test]
+fn a_direction_that_a_mesh_has_not_is_a_warning() {
+    let desk = Desk::new();
+    desk.write("a.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n");
+    let scene = |anisotropy: &str| {
+        format!(
+            "{CAMERA}[[mesh]]\nfile = \"a.stl\"\nmaterial = \"m\"\n[materials.m]\ntype = \"metal\"\ncolor = 0.9\nanisotropy = {anisotropy}\n"
+        )
+    };
+    desk.write("brushed.toml", scene("0.5"));
+    let stderr = desk.expect("brushed.toml --once -o a.exr", 0);
+    let message = "a.stl has no texture coordinates: the `anisotropy` of \"m\" has no direction there";
+    assert!(
+        stderr.contains("warning") && stderr.contains(message) && stderr.contains("brushed.toml:"),
+        "{stderr}"
+    );
+    desk.write("plain.toml", scene("0.0"));
+    assert!(!desk.expect("plain.toml --once -o b.exr", 0).contains("anisotropy"));
+}
