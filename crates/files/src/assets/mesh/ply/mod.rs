@@ -51,15 +51,15 @@ fn read(source: &Source<'_>, header: &Header, mut numbers: impl Numbers) -> Resu
     if vertices > u64::from(u32::MAX) || header.elements.iter().filter(|e| e.name == "vertex").count() > 1 {
         return Err(source.wrong(format!("{vertices} vertices are too many, or in more than one element")));
     }
-    if count_of("tristrips") > 0 && count_of("face") == 0 {
-        return Err(source.wrong("triangle strips are not read; write the mesh with faces"));
-    }
+    // Strips repeat what faces say, if there are faces.
+    let has_faces = count_of("face") > 0;
     let mut parsed = Parsed::default();
     for element in &header.elements {
         plausible(source, element, header.encoding, numbers.at())?;
         match element.name.as_str() {
             "vertex" => read_vertices(&place, element, &mut numbers, &mut parsed)?,
             "face" => read_faces(&place, element, &mut numbers, vertices, &mut parsed)?,
+            "tristrips" if !has_faces => read_strips(&place, element, &mut numbers, vertices, &mut parsed)?,
             _ if element.properties.is_empty() => {}
             _ => each(&place, element, &mut numbers, |numbers| {
                 element.properties.iter().try_for_each(|property| skip(numbers, property.kind))
@@ -197,18 +197,78 @@ fn read_faces(
     vertices: u64,
     parsed: &mut Parsed,
 ) -> Result<(), AssetError> {
-    let corners = element
-        .properties
-        .iter()
-        .position(|property| ["vertex_indices", "vertex_index"].contains(&property.name.as_str()))
-        .filter(
-            |&place| matches!(element.properties[place].kind, Kind::List { item, .. } if item.is_whole()),
-        );
-    let Some(corners) = corners else {
+    let Some(corners) = corners_of(element) else {
         return Err(place.source.wrong("the faces have no list of whole numbers `vertex_indices`"));
     };
     let faces = &mut parsed.faces;
     faces.reserve(element.count as usize);
+    each_list(place, element, corners, numbers, |numbers, item, length| {
+        for _ in 0..length {
+            faces.corner(corner(numbers.integer(item)?, vertices)?);
+        }
+        faces.close(length);
+        Ok(())
+    })
+}
+
+/// Reads triangle strips: each vertex makes a triangle with the two before it, every second one turned around. −1 ends a strip
+/// within a list; a vertex that is repeated joins strips and makes no triangle.
+fn read_strips(
+    place: &Place<'_>,
+    element: &Element,
+    numbers: &mut impl Numbers,
+    vertices: u64,
+    parsed: &mut Parsed,
+) -> Result<(), AssetError> {
+    let Some(corners) = corners_of(element) else {
+        return Err(place.source.wrong("the strips have no list of whole numbers `vertex_indices`"));
+    };
+    let faces = &mut parsed.faces;
+    each_list(place, element, corners, numbers, |numbers, item, length| {
+        let (mut before, mut count) = ([0; 2], 0_usize);
+        for _ in 0..length {
+            let vertex = numbers.integer(item)?;
+            if vertex == -1 {
+                count = 0;
+                continue;
+            }
+            let next = corner(vertex, vertices)?;
+            let [first, second] = before;
+            if count >= 2 && first != second && second != next && next != first {
+                let triangle = if count % 2 == 0 { [first, second, next] } else { [second, first, next] };
+                triangle.into_iter().for_each(|vertex| faces.corner(vertex));
+                faces.close(3);
+            }
+            (before, count) = ([second, next], count + 1);
+        }
+        Ok(())
+    })
+}
+
+/// The property that lists the vertices of a face or a strip.
+fn corners_of(element: &Element) -> Option<usize> {
+    let is_named = |name: &str| ["vertex_indices", "vertex_index"].contains(&name);
+    let corners = element.properties.iter().position(|property| is_named(&property.name));
+    corners
+        .filter(|&place| matches!(element.properties[place].kind, Kind::List { item, .. } if item.is_whole()))
+}
+
+/// The vertex of this number.
+fn corner(vertex: i64, vertices: u64) -> Result<u32, String> {
+    match u32::try_from(vertex) {
+        Ok(fits) if u64::from(fits) < vertices => Ok(fits),
+        Ok(_) | Err(_) => Err(format!("vertex {vertex} is out of range: there are {vertices}, from 0")),
+    }
+}
+
+/// Reads all items of an element; `read` takes their lists at `corners`, by the type and number of their items.
+fn each_list<N: Numbers>(
+    place: &Place<'_>,
+    element: &Element,
+    corners: usize,
+    numbers: &mut N,
+    mut read: impl FnMut(&mut N, Scalar, usize) -> Result<(), String>,
+) -> Result<(), AssetError> {
     each(place, element, numbers, |numbers| {
         for (index, property) in element.properties.iter().enumerate() {
             let Kind::List { count, item } = property.kind else {
@@ -220,14 +280,7 @@ fn read_faces(
                 numbers.skip(item, length)?;
                 continue;
             }
-            for _ in 0..length {
-                let vertex = numbers.integer(item)?;
-                if !(0..vertices as i64).contains(&vertex) {
-                    return Err(format!("vertex {vertex} is out of range: there are {vertices}, from 0"));
-                }
-                faces.corner(vertex as u32);
-            }
-            faces.close(length);
+            read(numbers, item, length)?;
         }
         Ok(())
     })

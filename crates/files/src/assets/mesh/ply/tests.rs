@@ -191,3 +191,30 @@ fn vertices_have_colours() {
     assert_eq!(with(floats, ["1 0 0.2", "2 -1 nan", "0 0 0", "1 1 1"])[..2], [[255, 0, 51], [255, 0, 0]]);
     assert_eq!(with("property uchar red\n", ["1", "2", "3", "4"]), [[0; 3]; 0]);
 }
+
+#[test]
+fn strips_are_triangles_that_turn_in_turns() {
+    let file = |strips: &str, elements: &str| {
+        let header = format!("ply\nformat ascii 1.0\n{VERTEX}{elements}end_header\n");
+        format!("{header}{SQUARE}{strips}").into_bytes()
+    };
+    let strips = "element tristrips 1\nproperty list int int vertex_indices\n";
+    let read = |list: &str| read_bytes(&file(list, strips)).expect("whole");
+    // Across the square and back: both triangles face the same side.
+    assert_eq!(read("4 0 1 3 2\n").mesh.triangles, [[0, 1, 3], [3, 1, 2]]);
+    // −1 begins anew.
+    assert_eq!(read("7 0 1 3 -1 0 1 2\n").mesh.triangles, [[0, 1, 3], [0, 1, 2]]);
+    // A vertex that is repeated joins strips, and no face is missing.
+    let joined = read("8 0 1 3 3 3 1 2 0\n");
+    assert_eq!(joined.mesh.triangles, [[0, 1, 3], [3, 1, 2], [2, 1, 0]]);
+    assert_eq!(joined.dropped, crate::assets::Dropped::default());
+    assert!(says(&file("3 0 1 4\n", strips)).contains("vertex 4 is out of range: there are 4, from 0"));
+    assert!(says(&file("3 0 1 -2\n", strips)).contains("vertex -2 is out of range"));
+    assert!(says(&file("900 0 1 2\n", strips)).contains("more than the file can hold"));
+    assert!(
+        says(&file("", "element tristrips 0\nproperty float vertex_indices\n")).contains("no list of whole")
+    );
+    // Beside faces they are left aside.
+    let both = format!("{strips}element face 1\nproperty list uchar int vertex_indices\n");
+    assert_eq!(read_bytes(&file("4 0 1 3 2\n3 0 1 2\n", &both)).expect("whole").mesh.triangles, [[0, 1, 2]]);
+}
