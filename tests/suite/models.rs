@@ -60,6 +60,45 @@ fn one_tetrahedron_is_one_picture_in_every_format() {
 }
 
 #[test]
+fn the_physical_extension_of_mtl_is_the_principled_material() {
+    let desk = Desk::new();
+    desk.write("dull.ppm", "P3 2 2 255 20 20 20 90 90 90 160 160 160 230 230 230\n");
+    desk.write("skin.ppm", "P3 2 1 255 250 120 60 40 90 230\n");
+    desk.write(
+        "a.obj",
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n",
+    );
+    for (mtl, keys) in [
+        ("Kd 0.8 0.4 0.2\nPr 0.3\n", "color = [0.8, 0.4, 0.2]\nroughness = 0.3\n"),
+        (
+            "Kd 0.8 0.4 0.2\nillum 3\nKs 1 1 1\nNs 90\nPm 1\nNi 1\n",
+            "color = [0.8, 0.4, 0.2]\nmetallic = 1.0\n",
+        ),
+        (
+            "Kd 0.8 0.4 0.2\nNi 1.8\nPc 0.5\nPcr 0.25\nPs 0.1\naniso 0.2\n",
+            "color = [0.8, 0.4, 0.2]\nior = 1.8\nclearcoat = 0.5\nclearcoat_roughness = 0.25\n",
+        ),
+        (
+            "Kd 0.8 0.4 0.2\nPr 0.3\nKe 2 1 0.5\n",
+            "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nemission = [2, 1, 0.5]\n",
+        ),
+        (
+            "map_Kd skin.ppm\nmap_Pr dull.ppm\nmap_Pm dull.ppm\n",
+            "color = { texture = \"skin\" }\nroughness = { texture = \"dull\" }\nmetallic = { texture = \"dull\" }\n",
+        ),
+    ] {
+        desk.write("a.mtl", format!("newmtl m\n{mtl}"));
+        let textures = "[textures.skin]\nfile = \"skin.ppm\"\n[textures.dull]\nfile = \"dull.ppm\"\n";
+        let declared = format!("[materials.m]\ntype = \"principled\"\n{keys}{textures}");
+        let own = picture(&desk, "[[mesh]]\nfile = \"a.obj\"\n");
+        let expected = picture(&desk, &format!("[[mesh]]\nfile = \"a.obj\"\nmaterial = \"m\"\n{declared}"));
+        assert!(own == expected, "{mtl}");
+        desk.write("a.mtl", "newmtl m\nKd 0.8 0.4 0.2\n");
+        assert!(picture(&desk, "[[mesh]]\nfile = \"a.obj\"\n") != expected, "{mtl}: it matters");
+    }
+}
+
+#[test]
 fn a_direction_that_a_mesh_has_not_is_a_warning() {
     let desk = Desk::new();
     desk.write("a.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n");

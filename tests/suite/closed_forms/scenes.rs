@@ -402,6 +402,8 @@ pub fn file_material(illumination_model: u8, ior: f32) -> FileMaterial {
         specular_texture: None,
         emission_texture: None,
         normal_texture: None,
+        normal_strength: 1.0,
+        physical: None,
     }
 }
 

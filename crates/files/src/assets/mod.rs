@@ -116,6 +116,27 @@ pub struct FileMaterial {
     pub emission_texture: Option<PathBuf>,
     /// Normal map, `norm` or `map_Bump`.
     pub normal_texture: Option<PathBuf>,
+    /// Factor on its slopes, ≥ 0: the option `-bm`, or 1.
+    pub normal_strength: f32,
+    /// What the extension for physically based rendering says. `None` without any of its statements.
+    pub physical: Option<PhysicalMaterial>,
+}
+
+/// The extension of MTL for physically based rendering. Numbers are in [0, 1].
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhysicalMaterial {
+    /// Roughness, `Pr`.
+    pub roughness: f32,
+    /// Weight of the metal, `Pm`.
+    pub metallic: f32,
+    /// Weight of a clear coat, `Pc`.
+    pub clearcoat: f32,
+    /// Roughness of the clear coat, `Pcr`.
+    pub clearcoat_roughness: f32,
+    /// Texture of the roughness, `map_Pr`.
+    pub roughness_texture: Option<PathBuf>,
+    /// Texture of the metal's weight, `map_Pm`.
+    pub metallic_texture: Option<PathBuf>,
 }
 
 /// A gKit orbiter camera: the scene's centre seen from outside.

@@ -1,11 +1,11 @@
 //! From the description's materials and those of mesh files to materials that are ready for look-ups.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::textures::{TextureSource, declared_source, file_source};
+use super::textures::{FILE_NUMBER, TextureSource, declared_source, file_source};
 use super::{Image, Images};
-use crate::assets::FileMaterial;
+use crate::assets::{FileMaterial, PhysicalMaterial};
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Color, Moved, Texture, TextureFilter, Wrap};
 use crate::materials::{
@@ -120,14 +120,18 @@ pub fn emission(scene: &Scene, images: &Images, material: &description::Material
     Emission { scale: emission.scale, texture, sides: emission.sides, coat }
 }
 
-/// Kind of a material of a mesh file. Models 3, 5 and 8 of the MTL format with a highlight are mirrors, 4, 6, 7 and 9 glass.
-enum FileKind {
+/// Kind of a material of a mesh file. What the extension for physically based rendering describes is principled; else models 3, 5 and 8 of the MTL format with a highlight are mirrors, 4, 6, 7 and 9 glass.
+enum FileKind<'a> {
     Phong,
+    Principled(&'a PhysicalMaterial),
     Mirror,
     Glass,
 }
 
-fn kind(own: &FileMaterial) -> FileKind {
+fn kind(own: &FileMaterial) -> FileKind<'_> {
+    if let Some(physical) = &own.physical {
+        return FileKind::Principled(physical);
+    }
     match own.illumination_model {
         Some(3 | 5 | 8) if own.specular.max_element() > 0.0 => FileKind::Mirror,
         Some(4 | 6 | 7 | 9) => FileKind::Glass,
@@ -138,7 +142,7 @@ fn kind(own: &FileMaterial) -> FileKind {
 /// Whether a mesh file's material emits.
 pub fn file_emits(own: &FileMaterial) -> bool {
     match kind(own) {
-        FileKind::Phong => own.emission != Vec3::ZERO,
+        FileKind::Phong | FileKind::Principled(_) => own.emission != Vec3::ZERO,
         FileKind::Mirror | FileKind::Glass => false,
     }
 }
@@ -147,7 +151,7 @@ pub fn file_emits(own: &FileMaterial) -> bool {
 pub fn file_is_glass(own: &FileMaterial) -> bool {
     match kind(own) {
         FileKind::Glass => true,
-        FileKind::Phong | FileKind::Mirror => false,
+        FileKind::Phong | FileKind::Principled(_) | FileKind::Mirror => false,
     }
 }
 
@@ -171,33 +175,62 @@ pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (kind(own), file_glass(own)) {
         (FileKind::Mirror, _) => Bsdf::Mirror(Mirror::Even(own.specular.min(Vec3::ONE))),
         (FileKind::Glass, Some((ior, tint))) => Bsdf::Glass(Glass::new(ior, tint)),
-        (FileKind::Phong | FileKind::Glass, _) => return file_phong(images, own),
+        (FileKind::Principled(physical), _) => {
+            return file_surface(images, own, file_principled(images, own, physical));
+        }
+        (FileKind::Phong | FileKind::Glass, _) => return file_surface(images, own, file_phong(images, own)),
     };
     Material { bsdf, emission: Emission::NONE, relief: None, opacity: None }
 }
 
-fn file_phong(images: &Images, own: &FileMaterial) -> Material {
-    let texture = |path: &Path, used| file_texture(images, &file_source(path, used));
-    let color = |path: &Option<PathBuf>, constant: Vec3| match path {
-        Some(path) => Color::Texture(texture(path, TextureUse::Color)),
-        None => Color::Constant(constant),
+/// A rough material of a mesh file, with its emission and its normal map.
+fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
+    let normals = |path: &PathBuf| NormalMap {
+        texture: file_texture(images, &file_source(path, TextureUse::Normal)),
+        strength: own.normal_strength,
     };
-    let phong = Phong {
-        diffuse: color(&own.diffuse_texture, own.diffuse),
-        specular: color(&own.specular_texture, own.specular * (2.0 / (own.shininess + 2.0))),
-        shininess: own.shininess,
-        ambient: None,
-    };
-    let normal_map = own
-        .normal_texture
-        .as_ref()
-        .map(|path| NormalMap { texture: texture(path, TextureUse::Normal), strength: 1.0 });
     Material {
-        bsdf: Bsdf::Rough(Rough::Phong(phong)),
+        bsdf: Bsdf::Rough(rough),
         emission: file_emission(images, own),
-        relief: Relief::new(normal_map, None),
+        relief: Relief::new(own.normal_texture.as_ref().map(normals), None),
         opacity: None,
     }
+}
+
+fn file_color(images: &Images, path: &Option<PathBuf>, constant: Vec3) -> Color {
+    match path {
+        Some(path) => Color::Texture(file_texture(images, &file_source(path, TextureUse::Color))),
+        None => Color::Constant(constant),
+    }
+}
+
+fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
+    let strength = own.specular * (2.0 / (own.shininess + 2.0));
+    Rough::Phong(Phong {
+        diffuse: file_color(images, &own.diffuse_texture, own.diffuse),
+        specular: file_color(images, &own.specular_texture, strength),
+        shininess: own.shininess,
+        ambient: None,
+    })
+}
+
+/// A principled material of a mesh file. An index of refraction of 1 or less says nothing.
+fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> Rough {
+    let number = |path: &Option<PathBuf>, constant: f32| match path {
+        Some(path) => Number::Texture(file_texture(images, &file_source(path, FILE_NUMBER))),
+        None => Number::Constant(constant),
+    };
+    Rough::Principled(Box::new(Principled::new(PrincipledInputs {
+        color: file_color(images, &own.diffuse_texture, own.diffuse.min(Vec3::ONE)),
+        metallic: number(&physical.metallic_texture, physical.metallic),
+        roughness: number(&physical.roughness_texture, physical.roughness),
+        ior: if own.ior > 1.0 { own.ior.min(10.0) } else { 1.5 },
+        specular: Number::Constant(1.0),
+        specular_color: Color::Constant(Vec3::ONE),
+        transmission: Number::Constant(0.0),
+        clearcoat: Number::Constant(physical.clearcoat),
+        clearcoat_roughness: Number::Constant(physical.clearcoat_roughness),
+    })))
 }
 
 /// The material of triangles of a mesh file that name none.

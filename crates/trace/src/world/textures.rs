@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::assets::image::ImageEncoding;
 use crate::assets::{FileMaterial, LoadedMesh};
 use crate::math::Vec3;
-use crate::scene::description::{Encoding, Scene, TextureFilter, TextureRole, TextureUse};
+use crate::scene::description::{Encoding, PixelNumber, Scene, TextureFilter, TextureRole, TextureUse};
 
 /// An image file, and the encoding of its numbers.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -210,14 +210,26 @@ pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
     TextureSource { path: path.to_owned(), encoding }
 }
 
+/// Use of textures of mesh files as numbers.
+pub const FILE_NUMBER: TextureUse = TextureUse::Number(PixelNumber::Luminance);
+
 fn file_textures(material: &FileMaterial, lookups: Lookups) -> impl Iterator<Item = (&Path, TextureUse)> {
-    let all = [
-        (&material.diffuse_texture, TextureRole::Diffuse),
+    let shared = [
         (&material.diffuse_texture, TextureRole::Ambient),
-        (&material.specular_texture, TextureRole::Specular),
         (&material.emission_texture, TextureRole::Emission),
         (&material.normal_texture, TextureRole::NormalMap),
     ];
-    let looked_up = all.into_iter().filter(move |(_, role)| lookups.has(*role, false));
+    let own = match &material.physical {
+        None => vec![
+            (&material.diffuse_texture, TextureRole::Diffuse),
+            (&material.specular_texture, TextureRole::Specular),
+        ],
+        Some(physical) => vec![
+            (&material.diffuse_texture, TextureRole::Facets),
+            (&physical.roughness_texture, TextureRole::Roughness(PixelNumber::Luminance)),
+            (&physical.metallic_texture, TextureRole::Roughness(PixelNumber::Luminance)),
+        ],
+    };
+    let looked_up = own.into_iter().chain(shared).filter(move |(_, role)| lookups.has(*role, false));
     looked_up.filter_map(|(path, role)| Some((path.as_deref()?, role.texture_use())))
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::text::{with_line_feeds, without_mark};
 use crate::assets::read::{self, Watch};
-use crate::assets::{AssetError, FileMaterial};
+use crate::assets::{AssetError, FileMaterial, PhysicalMaterial};
 use crate::math::{DVec3, Vec3};
 
 /// Most bytes of a material file.
@@ -35,7 +35,7 @@ pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>,
 fn without_comment(line: &str) -> &str {
     let is_numeric = matches!(
         line.split_whitespace().next(),
-        Some("Ka" | "Kd" | "Ks" | "Ke" | "Ns" | "Ni" | "d" | "illum")
+        Some("Ka" | "Kd" | "Ks" | "Ke" | "Ns" | "Ni" | "d" | "illum" | "Pr" | "Pm" | "Pc" | "Pcr" | "Ps")
     );
     if is_numeric { line.split('#').next().unwrap_or(line) } else { line }
 }
@@ -53,7 +53,7 @@ fn check(line: &str) -> Result<(), String> {
     let Some(keyword) = words.next() else { return Ok(()) };
     let wanted = match keyword {
         "Ka" | "Kd" | "Ks" | "Ke" => 3,
-        "Ns" | "Ni" | "d" => 1,
+        "Ns" | "Ni" | "d" | "Pr" | "Pm" | "Pc" | "Pcr" | "Ps" => 1,
         _ => return check_words(keyword, words.next()),
     };
     let numbers = words.take(wanted).filter(|word| word.parse().is_ok_and(f32::is_finite)).count();
@@ -88,6 +88,7 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
     let plain = if diffuse_texture.is_some() { 1.0 } else { 0.6 };
     let emission_texture = file(extra("map_Ke"));
     let shining = if emission_texture.is_some() { 1.0 } else { 0.0 };
+    let normals = extra("norm").or(extra("map_Kn")).or(found.normal_texture.as_deref());
     FileMaterial {
         name: found.name.clone(),
         diffuse: color(found.diffuse, plain),
@@ -99,8 +100,36 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
         diffuse_texture,
         specular_texture: file(found.specular_texture.as_deref()),
         emission_texture,
-        normal_texture: file(extra("norm").or(extra("map_Kn")).or(found.normal_texture.as_deref())),
+        normal_texture: file(normals),
+        normal_strength: normals.map_or(1.0, multiplier),
+        physical: physical(found, file),
     }
+}
+
+/// Statements of the extension for physically based rendering that make a material physical; `Ps` and `aniso` have no other effect.
+const PHYSICAL: [&str; 8] = ["Pr", "Pm", "Pc", "Pcr", "Ps", "aniso", "map_Pr", "map_Pm"];
+
+/// The extension for physically based rendering; `file` finds the file of a statement.
+fn physical(
+    found: &tobj::Material,
+    file: impl Fn(Option<&str>) -> Option<PathBuf>,
+) -> Option<PhysicalMaterial> {
+    let extra = |key: &str| found.unknown_param.get(key).map(String::as_str);
+    PHYSICAL.iter().any(|key| extra(key).is_some()).then(|| {
+        let number = |key, otherwise: f32| {
+            let word = extra(key).and_then(|text| text.split_whitespace().next());
+            word.and_then(|word| word.parse().ok()).map_or(otherwise, |number: f32| number.clamp(0.0, 1.0))
+        };
+        let [roughness_texture, metallic_texture] = ["map_Pr", "map_Pm"].map(|key| file(extra(key)));
+        PhysicalMaterial {
+            roughness: number("Pr", 0.5),
+            metallic: number("Pm", 0.0),
+            clearcoat: number("Pc", 0.0),
+            clearcoat_roughness: number("Pcr", 0.0),
+            roughness_texture,
+            metallic_texture,
+        }
+    })
 }
 
 /// Files of all maps of a material, also of unused maps.
@@ -133,6 +162,13 @@ pub(super) fn pictures(found: &tobj::Material, folder: &Path) -> Vec<PathBuf> {
 /// The colour, with 0 for negative components.
 fn color(found: Option<[f64; 3]>, otherwise: f32) -> Vec3 {
     found.map_or(Vec3::splat(otherwise), |numbers| DVec3::from_array(numbers).as_vec3().max(Vec3::ZERO))
+}
+
+/// The number of the option `-bm` of a map; 1 without it, or if it is below 0 or no number.
+fn multiplier(statement: &str) -> f32 {
+    let mut words = statement.split_whitespace().skip_while(|word| *word != "-bm").skip(1);
+    let number = words.next().and_then(|word| word.parse().ok());
+    number.filter(|number: &f32| number.is_finite() && *number >= 0.0).unwrap_or(1.0)
 }
 
 /// The file of a map, behind its options (`-bm 1.0 -s 2 2 2 a name.png`), with either slash.
@@ -194,10 +230,61 @@ mod tests {
             specular_texture: file("sub/shine.png"),
             emission_texture: file("glow.png"),
             normal_texture: file("bumps.png"),
+            normal_strength: 1.0,
+            physical: None,
         };
         assert_eq!(materials[0], expected);
         assert_eq!((materials[1].diffuse, materials[1].emission), (Vec3::splat(0.6), Vec3::ZERO));
         assert_eq!(materials[2].emission, Vec3::ONE);
+    }
+
+    #[test]
+    fn a_bump_multiplier_is_the_strength_of_the_normal_map() {
+        for (statement, strength) in [
+            ("map_Bump -bm 0.5 n.png", 0.5),
+            ("bump -clamp on -bm 2 -s 1 1 1 n.png", 2.0),
+            ("norm -bm 0 n.png", 0.0),
+            ("norm n.png", 1.0),
+            ("norm -bm -3 n.png", 1.0),
+            ("norm -bm nan n.png", 1.0),
+        ] {
+            let found = read(&format!("newmtl a\n{statement}\n")).expect("whole");
+            assert_eq!(found[0].normal_strength, strength, "{statement}");
+            assert_eq!(found[0].normal_texture, Some(PathBuf::from("models/n.png")), "{statement}");
+        }
+    }
+
+    #[test]
+    fn the_statements_of_the_extension_find_their_fields() {
+        let physical = |text: &str| read(&format!("newmtl a\n{text}")).expect("whole")[0].physical.clone();
+        assert_eq!(physical("Kd 1 0 0\n"), None);
+        let plain = PhysicalMaterial {
+            roughness: 0.5,
+            metallic: 0.0,
+            clearcoat: 0.0,
+            clearcoat_roughness: 0.0,
+            roughness_texture: None,
+            metallic_texture: None,
+        };
+        assert_eq!(physical("Ps 0.25\n"), Some(plain.clone()));
+        assert_eq!(physical("aniso 0.5\n"), Some(plain.clone()));
+        let all = "Pr 0.3 # dull\nPm 1.5\nPc -1\nPcr 0.1\nmap_Pr -s 1 1 1 dull.png\nmap_Pm metal.png\n";
+        let file = |name: &str| Some(Path::new("models").join(name));
+        let expected = PhysicalMaterial {
+            roughness: 0.3,
+            metallic: 1.0,
+            clearcoat: 0.0,
+            clearcoat_roughness: 0.1,
+            roughness_texture: file("dull.png"),
+            metallic_texture: file("metal.png"),
+        };
+        assert_eq!(physical(all), Some(expected));
+        assert_eq!(
+            physical("map_Pm metal.png\n"),
+            Some(PhysicalMaterial { metallic_texture: file("metal.png"), ..plain })
+        );
+        let error = read("newmtl a\nPr rough\n").expect_err("refused").to_string();
+        assert!(error.ends_with("a.mtl:2: `Pr` is followed by a finite number"), "{error}");
     }
 
     #[test]
