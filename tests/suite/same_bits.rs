@@ -143,6 +143,98 @@ fn known_pictures_have_their_bits_by_every_instruction_set() {
     assert!(wrong.is_empty(), "other bits:\n{}", wrong.join("\n"));
 }
 
+/// Materials of microfacets, bump and normal maps, opacity, panes.
+const MATERIALS: &str = r#"
+[render]
+width = 40
+height = 30
+samples = 4
+integrator = "INTEGRATOR"
+background = [0.2, 0.3, 0.5]
+[camera]
+position = [0, 1.6, 5]
+look_at = [0, 0.7, 0]
+fov = 50
+[textures.waves]
+file = "waves.ppm"
+repeat = [3, 2]
+rotate = 25
+filter = "mipmap"
+[materials]
+floor = { type = "plastic", diffuse = 0.5, roughness = 0.3, bump = "waves", bump_scale = 0.05 }
+gold = { type = "metal", element = "gold", roughness = 0.3, anisotropy = 0.5 }
+steel = { type = "metal", color = 0.8, roughness = { texture = "waves" }, bump = "waves", bump_scale = 0.1 }
+enamel = { type = "plastic", diffuse = [0.7, 0.1, 0.1], roughness = 0, opacity = 0.7 }
+leaf = { type = "principled", color = [0.2, 0.6, 0.2], opacity = { texture = "waves", channel = "r" }, opacity_cutoff = 0.4 }
+lacquer = { type = "principled", metallic = 0.5, clearcoat = 0.8, clearcoat_roughness = 0.1, normal_map = "waves" }
+glass = { type = "glass", bump = "waves", bump_scale = 0.03 }
+pane = { type = "glass", thin = true, tint = [0.8, 0.9, 0.9] }
+lamp = { diffuse = 0, emission = [6, 5, 4], emission_sides = "both" }
+[[plane]]
+material = "floor"
+[[sphere]]
+center = [-1.6, 0.5, 0]
+radius = 0.5
+material = "gold"
+[[sphere]]
+center = [-0.5, 0.5, 0]
+radius = 0.5
+material = "steel"
+[[sphere]]
+center = [0.6, 0.5, 0]
+radius = 0.5
+material = "enamel"
+[[sphere]]
+center = [1.7, 0.5, 0]
+radius = 0.5
+material = "lacquer"
+[[sphere]]
+center = [0, 0.4, 1.2]
+radius = 0.4
+material = "glass"
+[[quad]]
+corner = [-2, 0, -1]
+u = [2, 0, 0]
+v = [0, 2, 0]
+material = "leaf"
+[[quad]]
+corner = [0, 0, -1]
+u = [2, 0, 0]
+v = [0, 2, 0]
+material = "pane"
+[[disk]]
+center = [0, 2.5, -2]
+normal = [0, 0, 1]
+radius = 0.6
+material = "lamp"
+[[light]]
+position = [1, 4, 3]
+intensity = [9, 9, 9]
+"#;
+
+#[test]
+fn materials_have_the_same_bits_by_every_instruction_set() {
+    let desk = Desk::new();
+    desk.write(
+        "waves.ppm",
+        "P3 3 3 255 0 20 90 250 100 30 90 10 200 80 90 100 30 20 10 200 210 220 9 100 80 140 50 60 70 200 3",
+    );
+    for integrator in ["whitted", "path"] {
+        desk.write("materials.toml", MATERIALS.replace("INTEGRATOR", integrator));
+        let sets = [Instructions::Portable, Instructions::Avx2, Instructions::Avx512];
+        let names = ["portable", "avx2", "avx512"];
+        let pictures =
+            sets.into_iter().zip(names).filter(|(set, _)| set.available() == *set).map(|(_, name)| {
+                let mut process = desk.glimt("materials.toml --once -o materials.exr");
+                let output = process.env("GLIMT_SIMD", name).output().expect("it runs");
+                assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+                (name, hash(&desk, "materials.exr"))
+            });
+        let pictures: Vec<(&str, u64)> = pictures.collect();
+        assert!(pictures.iter().all(|(_, bits)| *bits == pictures[0].1), "{integrator}: {pictures:x?}");
+    }
+}
+
 /// A grid over a square at y = 0, with its middles a little higher, in so many steps.
 fn uneven_floor(steps: u32) -> String {
     let mut text = String::new();

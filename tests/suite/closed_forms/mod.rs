@@ -6,6 +6,7 @@ mod camera;
 mod caustics;
 mod direct;
 mod distant;
+mod everywhere;
 mod facets;
 mod far;
 mod film;
