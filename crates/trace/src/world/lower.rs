@@ -120,7 +120,8 @@ pub fn emission(scene: &Scene, images: &Images, material: &description::Material
     Emission { scale: emission.scale, texture, sides: emission.sides, coat }
 }
 
-/// Kind of a material of a mesh file. What the extension for physically based rendering describes is principled; else models 3, 5 and 8 of the MTL format with a highlight are mirrors, 4, 6, 7 and 9 glass.
+/// Kind of a material of a mesh file. Models 4, 6, 7 and 9 of the MTL format are glass; what the extension for physically based
+/// rendering describes is principled; else models 3, 5 and 8 with a highlight are mirrors.
 enum FileKind<'a> {
     Phong,
     Principled(&'a PhysicalMaterial),
@@ -129,13 +130,11 @@ enum FileKind<'a> {
 }
 
 fn kind(own: &FileMaterial) -> FileKind<'_> {
-    if let Some(physical) = &own.physical {
-        return FileKind::Principled(physical);
-    }
-    match own.illumination_model {
-        Some(3 | 5 | 8) if own.specular.max_element() > 0.0 => FileKind::Mirror,
-        Some(4 | 6 | 7 | 9) => FileKind::Glass,
-        _ => FileKind::Phong,
+    match (own.illumination_model, &own.physical) {
+        (Some(4 | 6 | 7 | 9), _) => FileKind::Glass,
+        (_, Some(physical)) => FileKind::Principled(physical),
+        (Some(3 | 5 | 8), None) if own.specular.max_element() > 0.0 => FileKind::Mirror,
+        (_, None) => FileKind::Phong,
     }
 }
 
@@ -174,7 +173,10 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (kind(own), file_glass(own)) {
         (FileKind::Mirror, _) => Bsdf::Mirror(Mirror::Even(own.specular.min(Vec3::ONE))),
-        (FileKind::Glass, Some((ior, tint))) => Bsdf::Glass(Glass::new(ior, tint)),
+        (FileKind::Glass, Some((ior, tint))) => {
+            let roughness = own.physical.as_ref().map_or(0.0, |physical| physical.roughness);
+            Bsdf::Glass(Glass::new(ior, tint).with_roughness(Number::Constant(roughness)))
+        }
         (FileKind::Principled(physical), _) => {
             return file_surface(images, own, file_principled(images, own, physical));
         }
