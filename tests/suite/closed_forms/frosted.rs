@@ -216,7 +216,7 @@ fn photons_scatter_at_rough_glass_to_both_sides() {
             .depth(depth)
     };
     for depth in [2, 3, 4, 6] {
-        let means = both(&room(depth), depth, [512, 32], (20_000, 0.03));
+        let means = both(&room(depth), depth, [512, 64], (20_000, 0.03));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }
@@ -299,7 +299,7 @@ fn a_clear_coat_weakens_what_shines_below_it() {
         // Light samples do not find a lamp in a shell of glass.
         let hidden = lit.clone().sphere(v(0.0, 1.0, 0.0), 0.75, glass(1.0));
         let lobes = means(&by_paths(hidden.clone(), 3), 512);
-        let photons = means(&hidden.depth(3).photons(20_000, 0.05), 16);
+        let photons = means(&hidden.depth(3).photons(20_000, 0.05), 32);
         for (technique, found) in [("path", path), ("lobes", lobes), ("photons", photons)] {
             let error = found.1.hypot(samples.1);
             let told = format!("{shape:?}, {technique}: {found:?}, light samples {samples:?}");
