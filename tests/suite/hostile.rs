@@ -135,7 +135,7 @@ fn an_asset_with_the_wrong_content() {
         ("obj", "the file is empty", "bad.obj:1: this is a binary file of another kind"),
         ("off", "the file is empty", "bad.off:1: "),
         ("ply", "the file is empty", "bad.ply:1: "),
-        ("stl", "the file is empty", "bad.stl: "),
+        ("stl", "the file is empty", "bad.stl:"),
         ("png", "the file is empty", "no image that can be read"),
         ("jpg", "the file is empty", "no image that can be read"),
         ("hdr", "the file is empty", "no image that can be read"),

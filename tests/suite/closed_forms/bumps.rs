@@ -51,9 +51,10 @@ fn a_ramp_is_shaded_as_a_tilted_plane() {
     let lit = scene()
         .point_light(v(2.0, 4.0, 1.0), 30.0, Falloff::Square)
         .shadows(Shadows::Off, 1)
-        .seen(eye, DVec3::ZERO)
-        .environment(0.25);
+        .seen(eye, DVec3::ZERO);
     for (name, material) in materials().into_iter().filter(|(name, _)| *name != "glass") {
+        // A mirror shows no point light, but what is around.
+        let lit = lit.clone().background(if name == "mirror" { 0.25 } else { 0.0 });
         let mut relief = lit.clone();
         let texture = heights(&mut relief, 8, |at| at.x);
         let (u, w) = (v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0));
@@ -68,7 +69,7 @@ fn a_ramp_is_shaded_as_a_tilted_plane() {
 
 #[test]
 fn a_ramp_is_a_normal_map_of_one_slope() {
-    // On a cube of edges of 1 the slopes are those of the map. Only around the middle of the faces is the ramp one.
+    // On a cube of edges of 1 the slopes are those of the map. Its faces show the middle half of the image, a ramp everywhere.
     let slope = 0.25;
     for (name, material) in materials() {
         for integrator in [Integrator::Whitted, Integrator::Path] {
@@ -80,7 +81,9 @@ fn a_ramp_is_a_normal_map_of_one_slope() {
                 .pictured(v(0.0, 0.0, 4.0), DVec3::ZERO, 8.0, 3, 3);
             let cube = |build: Build, material| build.cuboid(DVec3::ZERO, DVec3::ONE, DVec3::ZERO, material);
             let (mut relief, mut mapped) = (lit.clone(), lit);
-            let texture = heights(&mut relief, 8, |at| at.x);
+            let texture = heights(&mut relief, 8, |at| 2.0 * at.x);
+            let shown = &mut relief.scene.textures[texture];
+            (shown.repeat, shown.offset) = (Vec2::splat(0.5), Vec2::splat(0.25));
             let relief = cube(relief, bumped(texture, slope, material.clone()));
             let normal = v(-slope, 0.0, 1.0).normalize().as_vec3() * 0.5 + 0.5;
             let texture = mapped.texture(&[&[normal]], TextureFilter::Nearest, Wrap::Repeat, Vec2::ONE);
@@ -234,7 +237,7 @@ fn bumpy_balls_have_no_black_edge() {
             .smooth()
             .sphere(v(2.5, 0.0, 0.0), 1.0, material)
             .pictured(v(1.25, 0.0, 5.0), v(1.25, 0.0, 0.0), 42.0, 48, 24);
-        let least = build.depth(1).picture(32, 0).iter().map(|color| color.x).fold(f64::MAX, f64::min);
+        let least = build.depth(8).picture(32, 0).iter().map(|color| color.x).fold(f64::MAX, f64::min);
         darkest.push((name, least));
     }
     assert!(darkest.iter().all(|(_, least)| *least > 0.2), "{darkest:?}");

@@ -298,7 +298,7 @@ fn a_clear_coat_weakens_what_shines_below_it() {
         let path = means(&by_paths(lit.clone(), 1), 64);
         // Light samples do not find a lamp in a shell of glass.
         let hidden = lit.clone().sphere(v(0.0, 1.0, 0.0), 0.75, glass(1.0));
-        let lobes = means(&by_paths(hidden.clone(), 3), 512);
+        let lobes = means(&by_paths(hidden.clone(), 3), 768);
         let photons = means(&hidden.depth(3).photons(20_000, 0.05), 32);
         for (technique, found) in [("path", path), ("lobes", lobes), ("photons", photons)] {
             let error = found.1.hypot(samples.1);

@@ -111,7 +111,7 @@ fn a_furnace_with_a_glowing_ball_in_glass_is_even() {
         .pictured(v(0.1, 0.2, 0.6), v(0.3, -1.0, 0.4), 20.0, 8, 8)
         .depth(400);
     for build in [furnace.clone().photons(10_000, 0.03), by_paths(furnace, 400)] {
-        let means: Vec<f64> = (0..16).map(|seed| mean(&build.picture(8, seed))).collect();
+        let means: Vec<f64> = (0..16).map(|seed| mean(&build.picture(10, seed))).collect();
         let (mean, error) = mean_and_error(&means);
         assert!(error < 1e-2, "{mean} ± {error}");
         assert!((mean - 1.0).abs() < 4.0 * error + 2e-3, "{mean} ± {error}");

@@ -49,7 +49,7 @@ fn tables() -> Vec<Table> {
         .filter(|(name, _)| name == "Every material")
         .flat_map(|(_, rows)| rows.clone())
         .collect();
-    assert_eq!(materials.len(), 6);
+    assert_eq!(materials.len(), 8);
     let is_opacity = |row: &[String]| row[0].starts_with("`opacity");
     let solid: Vec<_> = materials.iter().filter(|row| !is_opacity(row)).cloned().collect();
     let key = |row: &Vec<String>| {

@@ -54,6 +54,11 @@ pub(crate) fn lettered(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<
     bytes_if(path, limit, watch, |start| !start[..start.len().min(3)].contains(&0))
 }
 
+/// Reads a file that does not begin with zeros alone.
+pub(crate) fn not_blank(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
+    bytes_if(path, limit, watch, |start| start.is_empty() || start.iter().any(|byte| *byte != 0))
+}
+
 /// Reads a regular file.
 pub(crate) fn bytes(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
     bytes_if(path, limit, watch, |_| true)

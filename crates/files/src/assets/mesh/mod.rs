@@ -42,7 +42,7 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
         "obj" => (obj::parse, read::text),
         "off" => (off::parse, read::lettered),
         "ply" => (ply::parse, read::lettered),
-        "stl" => (stl::parse, read::bytes),
+        "stl" => (stl::parse, read::not_blank),
         _ => return Err(AssetError::unreadable(path, "meshes end in .obj, .off, .ply or .stl")),
     };
     let watch = Watch { progress, token };

@@ -471,6 +471,27 @@ fn warnings_are_said_before_anything_is_rendered() {
     assert_eq!((early, early.len()), (warnings, 1));
 }
 
+#[test]
+fn a_mesh_without_coordinates_says_that_its_anisotropy_has_no_direction() {
+    let brushed = SCENE.replace(
+        "type = \"phong\"\ndiffuse = [0.5, 0.5, 0.5]",
+        "type = \"metal\"\ncolor = [0.5, 0.5, 0.5]\nanisotropy = 0.5",
+    );
+    let said = |scene: &str, mesh: &str| {
+        let mut bench = Bench::new(scene);
+        bench.write("one.obj", mesh);
+        let (_, warnings) = bench.done_with_warnings();
+        warnings.into_iter().map(|one| one.message).collect::<Vec<_>>()
+    };
+    let warnings = said(&brushed, OBJ);
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    let expected = "one.obj has no texture coordinates: the `anisotropy` of \"wall\" has no direction there";
+    assert!(warnings[0].ends_with(expected), "{warnings:?}");
+    let with_coordinates = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+    assert_eq!(said(&brushed, with_coordinates), [""; 0]);
+    assert_eq!(said(&brushed.replace("anisotropy = 0.5", "anisotropy = 0"), OBJ), [""; 0]);
+}
+
 /// A kernel as the real one, but a little slower.
 fn leisurely(
     photons: Option<&PhotonMaps>,
