@@ -376,7 +376,7 @@ fn signals_end_it_with_their_code_and_leave_the_picture() {
             .spawn()
             .expect("it runs");
         // Without a sample there is nothing to keep.
-        wait_for_line(&mut child, |line| line.contains("\"progress\"") && !line.contains("\"samples\":0,"));
+        wait_for(&mut child, |line| line.contains("\"progress\"") && !line.contains("\"samples\":0,"));
         let killed = Process::new("kill").arg(format!("-{name}")).arg(child.id().to_string()).status();
         assert!(killed.expect("kill runs").success());
         assert_eq!(child.wait().expect("it ends").code(), Some(code), "{name}");
@@ -439,13 +439,8 @@ fn new_writes_to_stdout_where_the_file_is_a_dash() {
     assert_eq!(desk.bytes("-"), glimt::scene::starter().as_bytes());
 }
 
-/// Waits until the process prints this to stderr; later output is read and dropped.
-fn wait_for(child: &mut std::process::Child, word: &str) {
-    let word = word.to_owned();
-    wait_for_line(child, move |line| line.contains(&word));
-}
-
-fn wait_for_line(child: &mut std::process::Child, is_it: impl Fn(&str) -> bool + Send + 'static) {
+/// Waits until the process prints such a line to stderr; later output is read and dropped.
+fn wait_for(child: &mut std::process::Child, is_it: impl Fn(&str) -> bool + Send + 'static) {
     use std::io::{BufRead, BufReader};
     let stderr = BufReader::new(child.stderr.take().expect("piped"));
     let (sender, said) = std::sync::mpsc::channel();
