@@ -3,7 +3,7 @@
 
     python3 .ci/injected_errors.py [PROFILE [WORD]]      (default: dev)
 
-A copy of the sources under target/injected gets all faults at once, each behind its name; it is built once, and the test of
+A copy of the sources under target/injected gets all faults at once, each behind its number; it is built once, and the test of
 each fault is run with that fault alone, after all of them without any. The sources themselves know nothing of it. WORD: only faults
 with it in their file or test.
 """
@@ -19,11 +19,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 COPY = ROOT / "target" / "injected"
 SWITCH = """
-/// Whether a fault is asked for.
-pub fn injected(fault: &str) -> bool {
-    static ASKED: std::sync::LazyLock<String> =
-        std::sync::LazyLock::new(|| std::env::var("GLIMT_FAULT").unwrap_or_default());
-    *ASKED == fault
+/// Whether a fault is asked for, by its number in the table.
+#[inline]
+pub fn injected(fault: u32) -> bool {
+    static ASKED: std::sync::LazyLock<Option<u32>> =
+        std::sync::LazyLock::new(|| std::env::var("GLIMT_FAULT").ok().and_then(|asked| asked.parse().ok()));
+    *ASKED == Some(fault)
 }
 """
 GLOBAL = "closed_forms::global::"
@@ -243,16 +244,16 @@ def copy_with_faults(faults_asked):
             (COPY / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(ROOT / name, COPY / name)
     places = {}
-    for fault, file, place, wrong, _ in faults_asked:
-        places.setdefault((file, place), []).append((fault, wrong))
+    for number, (fault, file, place, wrong, _) in enumerate(faults_asked):
+        places.setdefault((file, place), []).append((fault, number, wrong))
     for (file, place), faults in places.items():
         path = source(file)
         head, right, tail = re.split("[⟦⟧]", place)
         if path.read_text().count(head + right + tail) != 1:
             sys.exit(f"{faults[0][0]}: {file} does not hold `{place}` once")
         chosen = right
-        for fault, wrong in faults:
-            chosen = f'if crate::injected("{fault}") {{ {wrong} }} else {{ {chosen} }}'
+        for _, number, wrong in faults:
+            chosen = f'if crate::injected({number}) {{ {wrong} }} else {{ {chosen} }}'
         path.write_text(path.read_text().replace(head + right + tail, f"{head}({chosen}){tail}"))
     for lib in {crate_of(file.split("/")[0]) / "src" / "lib.rs" for _, file, *_ in faults_asked}:
         lib.write_text(lib.read_text() + SWITCH)
@@ -268,10 +269,10 @@ def executables(profile):
     return {m["target"]["name"]: m["executable"] for m in messages if m.get("executable") and m["profile"]["test"]}
 
 
-def passes(programs, test, fault=""):
+def passes(programs, test, fault=None):
     room = test.split("::")[0]
     program = programs["suite" if room == "closed_forms" else "glimt_" + crate_of(room).name]
-    env = {**os.environ, "GLIMT_FAULT": fault}
+    env = {**os.environ, "GLIMT_FAULT": "" if fault is None else str(fault)}
     run = subprocess.run([program, "--exact", test], cwd=COPY, env=env, capture_output=True, text=True)
     if "1 passed" not in run.stdout and "1 failed" not in run.stdout:
         sys.exit(f"there is no test {test}\n{run.stdout}{run.stderr}")
@@ -287,8 +288,8 @@ def main():
         if not passes(programs, test):
             sys.exit(f"{test} fails without any fault")
     missed = 0
-    for fault, _, _, _, test in asked:
-        found = not passes(programs, test, fault)
+    for number, (fault, _, _, _, test) in enumerate(asked):
+        found = not passes(programs, test, number)
         missed += not found
         print(f"{'found ' if found else 'MISSED'}  {fault:45} {test}", flush=True)
     sys.exit(f"{missed} faults are not found" if missed else 0)

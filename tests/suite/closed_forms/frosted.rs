@@ -282,7 +282,7 @@ fn a_clear_coat_weakens_what_shines_below_it() {
     let floor = || {
         let corner = v(-2.0, 0.0, 2.0);
         let floor = scene().quad(corner, v(4.0, 0.0, 0.0), v(0.0, 0.0, -4.0), matte(0.7));
-        floor.pictured(v(0.0, 0.5, 3.0), v(1.2, 0.0, 0.0), 20.0, 8, 8).depth(1)
+        floor.pictured(v(0.0, 0.6, 3.0), v(1.0, -0.5, 0.0), 36.0, 8, 8).depth(1)
     };
     for shape in shapes {
         let lit = floor().shape(shape.clone(), coated(2.0));
@@ -298,7 +298,7 @@ fn a_clear_coat_weakens_what_shines_below_it() {
         // Light samples do not find a lamp in a shell of glass.
         let hidden = lit.clone().sphere(v(0.0, 1.0, 0.0), 0.75, glass(1.0));
         let lobes = means(&by_paths(hidden.clone(), 3), 768);
-        let photons = means(&hidden.depth(3).photons(20_000, 0.05), 48);
+        let photons = means(&hidden.depth(3).photons(20_000, 0.05), 32);
         for (technique, found) in [("path", path), ("lobes", lobes), ("photons", photons)] {
             let error = found.1.hypot(samples.1);
             let told = format!("{shape:?}, {technique}: {found:?}, light samples {samples:?}");
