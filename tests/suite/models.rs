@@ -83,6 +83,16 @@ fn the_physical_extension_of_mtl_is_the_principled_material() {
             "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nemission = [2, 1, 0.5]\n",
         ),
         (
+            "Kd 0.8 0.4 0.2\nPr 0.3\nKe 2 1 0.5\nd 0.25\n",
+            "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nemission = [2, 1, 0.5]\nopacity = 0.25\n",
+        ),
+        ("Kd 0.8 0.4 0.2\nPr 0.3\nTr 0.25\n", "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nopacity = 0.75\n"),
+        // A mask makes no glass.
+        (
+            "Kd 0.8 0.4 0.2\nPr 0.3\nKe 2 1 0.5\nillum 9\nd 0.5\nmap_d dull.ppm\n",
+            "color = [0.8, 0.4, 0.2]\nroughness = 0.3\nemission = [2, 1, 0.5]\nopacity = { texture = \"dull\" }\n",
+        ),
+        (
             "map_Kd skin.ppm\nmap_Pr dull.ppm\nmap_Pm dull.ppm\n",
             "color = { texture = \"skin\" }\nroughness = { texture = \"dull\" }\nmetallic = { texture = \"dull\" }\n",
         ),

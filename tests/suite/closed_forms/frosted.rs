@@ -209,6 +209,8 @@ fn photons_scatter_at_rough_glass_to_both_sides() {
         scene()
             .quad(v(-1.0, 0.0, 1.0), v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0), matte(0.8))
             .cuboid(v(-0.4, 0.3, 0.0), v(0.6, 0.2, 0.6), DVec3::ZERO, frosted(1.5, 0.9))
+            // In the glass, where light is brighter by the square of its index.
+            .cuboid(v(-0.4, 0.25, 0.0), v(0.55, 0.08, 0.55), DVec3::ZERO, matte(0.9))
             .quad(v(0.1, 0.4, 0.4), v(0.6, 0.0, 0.0), v(0.0, 0.0, -0.8), translucent(0.9, 0.9, 0.8))
             .sphere(at, 0.2, emitter(8.0))
             .sphere(at, 0.25, glass(1.0))
@@ -284,7 +286,7 @@ fn a_clear_coat_weakens_what_shines_below_it() {
         let floor = scene().quad(corner, v(4.0, 0.0, 0.0), v(0.0, 0.0, -4.0), matte(0.7));
         floor.pictured(v(0.0, 0.6, 3.0), v(1.0, -0.5, 0.0), 36.0, 8, 8).depth(1)
     };
-    for shape in shapes {
+    for (number, shape) in shapes.into_iter().enumerate() {
         let lit = floor().shape(shape.clone(), coated(2.0));
         let means = |build: &Build, samples: u32| {
             let means = |seed| {
@@ -294,15 +296,18 @@ fn a_clear_coat_weakens_what_shines_below_it() {
             mean_and_error(&(0..16).map(means).collect::<Vec<_>>())
         };
         let samples = means(&lit, 64);
-        let path = means(&by_paths(lit.clone(), 1), 64);
         // Light samples do not find a lamp in a shell of glass.
         let hidden = lit.clone().sphere(v(0.0, 1.0, 0.0), 0.75, glass(1.0));
-        let lobes = means(&by_paths(hidden.clone(), 3), 768);
-        let photons = means(&hidden.depth(3).photons(20_000, 0.05), 32);
-        for (technique, found) in [("path", path), ("lobes", lobes), ("photons", photons)] {
+        let photons = hidden.clone().depth(3).photons(8_000, 0.2);
+        let mut found = vec![("path", means(&by_paths(lit, 1), 64)), ("photons", means(&photons, 16))];
+        // Samples of lobes alone, the dearest, meet one of the shapes.
+        if number == 0 {
+            found.push(("lobes", means(&by_paths(hidden, 3), 768)));
+        }
+        for (technique, found) in found {
             let error = found.1.hypot(samples.1);
             let told = format!("{shape:?}, {technique}: {found:?}, light samples {samples:?}");
-            assert!(error < 6e-3 * samples.0, "{told}");
+            assert!(error < 5e-3 * samples.0, "{told}");
             assert!((found.0 - samples.0).abs() < 4.0 * error + 3e-3 * samples.0, "{told}");
         }
         let bare = means(&floor().shape(shape.clone(), emitter(2.0)), 64);

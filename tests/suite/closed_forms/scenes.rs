@@ -398,6 +398,8 @@ pub fn file_material(illumination_model: u8, ior: f32) -> FileMaterial {
         emission: Vec3::ZERO,
         ior,
         illumination_model: Some(illumination_model),
+        opacity: 1.0,
+        opacity_texture: None,
         diffuse_texture: None,
         specular_texture: None,
         emission_texture: None,

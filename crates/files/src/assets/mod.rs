@@ -108,6 +108,10 @@ pub struct FileMaterial {
     pub ior: f32,
     /// Illumination model, `illum`.
     pub illumination_model: Option<u8>,
+    /// Opacity in [0, 1], `d` or else 1 − `Tr`.
+    pub opacity: f32,
+    /// Texture of the opacity, `map_d`, in its place.
+    pub opacity_texture: Option<PathBuf>,
     /// Diffuse texture, `map_Kd`, relative to the MTL's folder.
     pub diffuse_texture: Option<PathBuf>,
     /// Specular texture, `map_Ks`.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::lower::{emission, file_emission, opacity};
+use super::lower::{emission, file_emission, file_opacity, opacity};
 use super::{Geometry, Images, MeshInstance, Object};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
@@ -181,7 +181,8 @@ fn mesh_lights(
     let all: Vec<(Option<u32>, Shining)> = match shining {
         Some(shining) => vec![(None, shining.clone())],
         None => {
-            let of_file = |material| Shining::new(lit(file_emission(images, material)), None);
+            let of_file =
+                |material| Shining::new(lit(file_emission(images, material)), file_opacity(images, material));
             (0..).zip(&loaded.materials).map(|(own, material)| (Some(own), of_file(material))).collect()
         }
     };

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::textures::{FILE_NUMBER, TextureSource, declared_source, file_source};
+use super::textures::{FILE_NUMBER, FILE_OPACITY, TextureSource, declared_source, file_source};
 use super::{Image, Images};
 use crate::assets::{FileMaterial, PhysicalMaterial};
 use crate::materials::texels::{TexelData, Texels};
@@ -120,7 +120,7 @@ pub fn emission(scene: &Scene, images: &Images, material: &description::Material
     Emission { scale: emission.scale, texture, sides: emission.sides, coat }
 }
 
-/// Kind of a material of a mesh file. Models 4, 6, 7 and 9 of the MTL format are glass; what the extension for physically based
+/// Kind of a material of a mesh file. Models 4, 6, 7 and 9 of the MTL format are glass, unless a texture masks them; what the extension for physically based
 /// rendering describes is principled; else models 3, 5 and 8 with a highlight are mirrors.
 enum FileKind<'a> {
     Phong,
@@ -131,7 +131,7 @@ enum FileKind<'a> {
 
 fn kind(own: &FileMaterial) -> FileKind<'_> {
     match (own.illumination_model, &own.physical) {
-        (Some(4 | 6 | 7 | 9), _) => FileKind::Glass,
+        (Some(4 | 6 | 7 | 9), _) if own.opacity_texture.is_none() => FileKind::Glass,
         (_, Some(physical)) => FileKind::Principled(physical),
         (Some(3 | 5 | 8), None) if own.specular.max_element() > 0.0 => FileKind::Mirror,
         (_, None) => FileKind::Phong,
@@ -169,6 +169,19 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     Emission { texture, ..Emission::constant(own.emission) }
 }
 
+/// Opacity of a mesh file's material. `None` if the material is there everywhere; glass is.
+pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
+    if file_is_glass(own) {
+        return None;
+    }
+    let value = match &own.opacity_texture {
+        Some(path) => Number::Texture(file_texture(images, &file_source(path, FILE_OPACITY))),
+        None if own.opacity < 1.0 => Number::Constant(own.opacity),
+        None => return None,
+    };
+    Some(Opacity { value, cutoff: 0.0 })
+}
+
 /// A material of a mesh file. The highlight's strength k becomes ks = 2k/(α + 2).
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (kind(own), file_glass(own)) {
@@ -182,7 +195,7 @@ pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
         }
         (FileKind::Phong | FileKind::Glass, _) => return file_surface(images, own, file_phong(images, own)),
     };
-    Material { bsdf, emission: Emission::NONE, relief: None, opacity: None }
+    Material { bsdf, emission: Emission::NONE, relief: None, opacity: file_opacity(images, own) }
 }
 
 /// A rough material of a mesh file, with its emission and its normal map.
@@ -195,7 +208,7 @@ fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
         bsdf: Bsdf::Rough(rough),
         emission: file_emission(images, own),
         relief: Relief::new(own.normal_texture.as_ref().map(normals), None),
-        opacity: None,
+        opacity: file_opacity(images, own),
     }
 }
 

@@ -212,12 +212,15 @@ pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
 
 /// Use of textures of mesh files as numbers.
 pub const FILE_NUMBER: TextureUse = TextureUse::Number(PixelNumber::Luminance);
+/// Use of textures of mesh files as opacity.
+pub const FILE_OPACITY: TextureUse = TextureUse::Number(PixelNumber::Opacity);
 
 fn file_textures(material: &FileMaterial, lookups: Lookups) -> impl Iterator<Item = (&Path, TextureUse)> {
     let shared = [
         (&material.diffuse_texture, TextureRole::Ambient),
         (&material.emission_texture, TextureRole::Emission),
         (&material.normal_texture, TextureRole::NormalMap),
+        (&material.opacity_texture, TextureRole::Opacity(PixelNumber::Opacity)),
     ];
     let own = match &material.physical {
         None => vec![

@@ -35,7 +35,21 @@ pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>,
 fn without_comment(line: &str) -> &str {
     let is_numeric = matches!(
         line.split_whitespace().next(),
-        Some("Ka" | "Kd" | "Ks" | "Ke" | "Ns" | "Ni" | "d" | "illum" | "Pr" | "Pm" | "Pc" | "Pcr" | "Ps")
+        Some(
+            "Ka" | "Kd"
+                | "Ks"
+                | "Ke"
+                | "Ns"
+                | "Ni"
+                | "d"
+                | "Tr"
+                | "illum"
+                | "Pr"
+                | "Pm"
+                | "Pc"
+                | "Pcr"
+                | "Ps"
+        )
     );
     if is_numeric { line.split('#').next().unwrap_or(line) } else { line }
 }
@@ -53,7 +67,7 @@ fn check(line: &str) -> Result<(), String> {
     let Some(keyword) = words.next() else { return Ok(()) };
     let wanted = match keyword {
         "Ka" | "Kd" | "Ks" | "Ke" => 3,
-        "Ns" | "Ni" | "d" | "Pr" | "Pm" | "Pc" | "Pcr" | "Ps" => 1,
+        "Ns" | "Ni" | "d" | "Tr" | "Pr" | "Pm" | "Pc" | "Pcr" | "Ps" => 1,
         _ => return check_words(keyword, words.next()),
     };
     let numbers = words.take(wanted).filter(|word| word.parse().is_ok_and(f32::is_finite)).count();
@@ -97,6 +111,8 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
         emission: color(found.emissive, shining),
         ior: found.optical_density.unwrap_or(1.0) as f32,
         illumination_model: found.illumination_model,
+        opacity: opacity(found),
+        opacity_texture: file(found.dissolve_texture.as_deref()),
         diffuse_texture,
         specular_texture: file(found.specular_texture.as_deref()),
         emission_texture,
@@ -104,6 +120,13 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
         normal_strength: normals.map_or(1.0, multiplier),
         physical: physical(found, file),
     }
+}
+
+/// The opacity: `d`, or else 1 − `Tr`.
+fn opacity(found: &tobj::Material) -> f32 {
+    let transparency = || found.unknown_param.get("Tr")?.split_whitespace().next()?.parse().ok();
+    let opacity = found.dissolve.or_else(|| transparency().map(|part: f64| 1.0 - part));
+    opacity.unwrap_or(1.0).clamp(0.0, 1.0) as f32
 }
 
 /// Statements of the extension for physically based rendering that make a material physical; `Ps` and `aniso` have no other effect.
@@ -226,6 +249,8 @@ mod tests {
             emission: Vec3::new(4.0, 5.0, 6.0),
             ior: 1.5,
             illumination_model: Some(7),
+            opacity: 1.0,
+            opacity_texture: None,
             diffuse_texture: file("wall one.png"),
             specular_texture: file("sub/shine.png"),
             emission_texture: file("glow.png"),
@@ -252,6 +277,25 @@ mod tests {
             assert_eq!(found[0].normal_strength, strength, "{statement}");
             assert_eq!(found[0].normal_texture, Some(PathBuf::from("models/n.png")), "{statement}");
         }
+    }
+
+    #[test]
+    fn opacity_is_what_is_said_first_of_all_by_d() {
+        for (statements, opacity) in [
+            ("d 0.25 # of glass\n", 0.25),
+            ("Tr 0.25\n", 0.75),
+            ("Tr 1\nd 1\n", 1.0),
+            ("d -1\n", 0.0),
+            ("Tr -0.5\n", 1.0),
+            ("Kd 1 1 1\n", 1.0),
+        ] {
+            let found = read(&format!("newmtl a\n{statements}")).expect("whole");
+            assert_eq!((found[0].opacity, &found[0].opacity_texture), (opacity, &None), "{statements}");
+        }
+        let found = read("newmtl a\nd 1\nmap_d -mm 0 1 mask.png\n").expect("whole");
+        assert_eq!(found[0].opacity_texture, Some(PathBuf::from("models/mask.png")));
+        let error = read("newmtl a\nTr x\n").expect_err("refused").to_string();
+        assert!(error.ends_with("a.mtl:2: `Tr` is followed by a finite number"), "{error}");
     }
 
     #[test]

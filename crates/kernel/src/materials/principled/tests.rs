@@ -35,7 +35,8 @@ const RED: Vec3 = Vec3::new(0.7, 0.1, 0.05);
 
 fn subjects() -> impl Iterator<Item = (f32, f32, [f32; 2])> {
     ALPHAS.into_iter().flat_map(|alpha| {
-        [(0.0, [0.0, 0.0]), (0.4, [0.6, alpha]), (1.0, [0.0, 0.0])]
+        // A coat of another roughness, so that samples of one lobe do not pass for those of the other.
+        [(0.0, [0.0, 0.0]), (0.4, [0.6, 0.7 * alpha]), (1.0, [0.0, 0.0])]
             .map(|(metallic, coat)| (alpha, metallic, coat))
     })
 }
