@@ -56,7 +56,7 @@ macro_rules! kinds {
             }
 
             /// [`RoughMaterial::at`].
-            #[inline]
+            #[inline(always)]
             pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> RoughBsdf {
                 match self { $(Self::$kind(own) => RoughBsdf::$kind(own.at(at, lookups))),+ }
             }

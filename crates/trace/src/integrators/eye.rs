@@ -311,16 +311,16 @@ impl Wavefront<'_, '_> {
             let Some(hit) = packet.hit(lane) else { continue };
             let index = tile.world.material_index(&hit);
             if known.is_none_or(|(own, _)| own != index) {
-                known = tile.plain_rough(index).map(|plain| (index, plain));
+                known = tile.plain(index).map(|plain| (index, plain));
             }
-            let Some((_, (material, rough))) = known else { continue };
+            let Some((_, (material, _))) = known else { continue };
             let slot = first + lane as u32;
             if packet.shining & 1 << lane != 0 {
-                self.accumulator.add(slot, Part::Emitted, material.emission.scale);
+                self.accumulator.add(slot, Part::Emitted, material.emission);
             }
             if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
-                let Some(bsdf) = rough.constant() else { continue };
-                self.accumulator.add(slot, Part::Ambient, render.ambient * bsdf.ambient());
+                let Some(ambient) = material.ambient else { continue };
+                self.accumulator.add(slot, Part::Ambient, render.ambient * ambient);
             }
         }
         // Add the background and the lights beyond the scene.
@@ -335,14 +335,14 @@ impl Wavefront<'_, '_> {
     /// Adds the emission and ambient light of a plain surface.
     fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let index = self.tile.world.material_index(hit);
-        let Some((material, rough)) = self.tile.plain_rough(index) else { return };
+        let Some((material, _)) = self.tile.plain(index) else { return };
         if is_shining {
-            self.add_emitted(path, material.emission.scale, self.tile.lamp_weight(path, hit));
+            self.add_emitted(path, material.emission, self.tile.lamp_weight(path, hit));
         }
         let render = &self.tile.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
-            let Some(bsdf) = rough.constant() else { return };
-            self.accumulator.add_ambient(path, path.throughput * render.ambient * bsdf.ambient());
+            let Some(ambient) = material.ambient else { return };
+            self.accumulator.add_ambient(path, path.throughput * render.ambient * ambient);
         }
     }
 
@@ -422,11 +422,11 @@ impl Wavefront<'_, '_> {
         if bsdf.is_black() {
             return;
         }
-        self.light_rough(path, vertex, bsdf, path.medium);
+        self.light_rough(path, vertex, &bsdf, path.medium);
     }
 
     /// Queues the vertices of a rough surface for direct light, with the medium behind it.
-    fn light_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: RoughBsdf, far: Medium) {
+    fn light_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: Medium) {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
@@ -435,13 +435,13 @@ impl Wavefront<'_, '_> {
         // Light that comes through has a vertex of its own; a share of the light that arrives is that of the viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| measure != Measure::ArrivingShare) {
             let (path, vertex) = (&PathRay { medium: far, ..*path }, &vertex.behind());
-            self.direct.push(tile, &ShadingVertex { path, place, vertex, shading, bsdf }, measure);
+            self.direct.push(tile, &ShadingVertex { path, place, vertex, shading, bsdf: &bsdf }, measure);
         }
     }
 
     fn shade_rough_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: GlassPoint, far: Medium) {
         if self.accumulator.takes_reflected() {
-            self.light_rough(path, vertex, RoughBsdf::GlassReflection(rough), far);
+            self.light_rough(path, vertex, &RoughBsdf::GlassReflection(rough), far);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::plain::PlainMaterial;
 use super::straight::Passable;
 use super::{Bodies, Camera, Geometry, ObjectMaterial, Parts, World, lower};
 use crate::assets::LoadedMesh;
@@ -23,6 +24,8 @@ impl World {
         let world = Self {
             camera,
             geometry,
+            plain: materials.iter().map(PlainMaterial::of).collect(),
+            textured: materials.iter().map(Material::is_textured).collect(),
             materials,
             object_materials,
             lights,

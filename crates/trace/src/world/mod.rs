@@ -18,6 +18,7 @@ pub mod mesh_tree;
 mod object;
 mod origin;
 mod packet;
+mod plain;
 mod straight;
 pub mod textures;
 mod triangle_tree;
@@ -37,6 +38,7 @@ pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;
 pub use object::Object;
 pub use origin::origin;
+pub use plain::PlainMaterial;
 pub use straight::{MOST_STRAIGHT, Weakened};
 pub use textures::{
     Lookups, NeededTexture, TextureSource, declared_source, environment_source, textures_needed,
@@ -46,7 +48,7 @@ use crate::assets::OrbiterCamera;
 use crate::geometry::rows::lanes;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
-use crate::materials::{Bsdf, Material, Mipmaps, Rough};
+use crate::materials::{Material, Mipmaps};
 use crate::math::Vec3;
 use crate::scene::description;
 
@@ -86,6 +88,10 @@ pub struct World {
     pub geometry: Arc<Geometry>,
     /// Materials; objects refer to them by index.
     pub materials: Vec<Material>,
+    /// What rows need to know of each material that is plain.
+    plain: Box<[Option<PlainMaterial>]>,
+    /// [`Material::is_textured`] of each material.
+    textured: Box<[bool]>,
     /// Material of each object, or the range of a mesh file's own materials.
     object_materials: Vec<ObjectMaterial>,
     /// Lights of every kind.
@@ -167,25 +173,16 @@ impl World {
         }
     }
 
+    /// [`Material::is_textured`] of a material.
+    #[inline(always)]
+    pub fn is_textured(&self, material: usize) -> bool {
+        self.textured[material]
+    }
+
     /// Whether vertex colours count at an object.
     #[inline]
     pub fn is_colored(&self, object: u32) -> bool {
         self.colored.as_ref().is_some_and(|colored| colored[object as usize])
-    }
-
-    /// A material and its rough BSDF. `None` if anything bends its normals, its emission is not the same everywhere, light may
-    /// pass it straight on, or rows are not filled with the BSDF.
-    pub fn plain_rough(&self, material: usize) -> Option<(&Material, &Rough)> {
-        let material = &self.materials[material];
-        let emission = &material.emission;
-        let is_even = emission.texture.is_none() && emission.coat.is_none();
-        if material.relief.is_some() || !is_even || material.opacity.is_some() {
-            return None;
-        }
-        match &material.bsdf {
-            Bsdf::Rough(rough) => rough.fills_rows().then_some((material, rough)),
-            Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Pane(_) | Bsdf::Coated(_) => None,
-        }
     }
 
     /// The vertex colour at a hit, by which the material's colour is multiplied. `None` if it does not count.

@@ -80,8 +80,9 @@ impl World {
 
     /// The part of the light that passes the surface at a hit straight on, and the ray beyond it.
     pub fn beyond(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
-        let material = &self.materials[self.material_index(hit)];
-        let asked = Asked { uv: material.is_textured(), shadow_point: false };
+        let index = self.material_index(hit);
+        let material = &self.materials[index];
+        let asked = Asked { uv: self.is_textured(index), shadow_point: false };
         let surface = self.geometry.asked_surface(ray, hit, asked);
         let cosine = surface.shading_normal.dot(ray.direction.normalize_or_zero());
         let color = self.vertex_color(hit).unwrap_or(Vec3::ONE);

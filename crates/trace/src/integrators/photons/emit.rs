@@ -338,7 +338,7 @@ impl PhotonWavefront<'_> {
             self.open.bsdf.prepare(bsdf.kind());
         }
         let i = self.open.used.trailing_ones() as usize;
-        let lit = ShadingVertex { path, place: 0, vertex, shading, bsdf };
+        let lit = ShadingVertex { path, place: 0, vertex, shading, bsdf: &bsdf };
         self.open.put(i, tile, &lit, Measure::ALL, medium);
         let counts = self.open.landed(i, vertex.to_eye) * by_chance;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
@@ -351,7 +351,7 @@ impl PhotonWavefront<'_> {
             self.open_behind.bsdf.prepare(bsdf.kind());
         }
         let i = self.open_behind.used.trailing_ones() as usize;
-        let lit = ShadingVertex { path, place: 0, vertex: &vertex.behind(), shading, bsdf };
+        let lit = ShadingVertex { path, place: 0, vertex: &vertex.behind(), shading, bsdf: &bsdf };
         self.open_behind.put(i, tile, &lit, Measure::ALL, medium);
         set_lane(&mut self.open_behind.throughput, i, path.throughput * (counts / (eta * eta)));
     }

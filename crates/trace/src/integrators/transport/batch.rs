@@ -238,6 +238,10 @@ impl VertexBatch {
     /// [`Ray::start`] of rays from the vertices in these directions: none of a ray that goes behind its facet.
     #[inline(always)]
     pub fn starts(&self, directions: &Lanes3) -> [u32; LANES] {
+        // Vertices of shapes have none.
+        if self.start.iter().fold(!0, |all, start| all & start) == Ray::NO_TRIANGLE {
+            return self.start;
+        }
         let apart = truths(self.has_facet);
         let mut starts = self.start;
         for i in 0..LANES {

@@ -13,13 +13,13 @@ use crate::geometry::rows::{self, HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::view::Measure;
+use crate::materials::Rough;
 use crate::materials::bsdf::ShownLobes;
-use crate::materials::{Material, Rough};
 use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, lane, set_lane, take, take_u32, truths};
 use crate::math::{DVec2, Vec3};
 use crate::sampling::CAMERA_PATH;
 use crate::scene::description::Shadows;
-use crate::world::{Hit, Loops, Object, PACKET};
+use crate::world::{Hit, Loops, Object, PACKET, PlainMaterial};
 
 /// Source of the rays of a packet.
 #[derive(Clone, Copy)]
@@ -158,16 +158,16 @@ impl TileContext<'_> {
     #[inline(always)]
     fn is_held_by_rows(&self, material: usize) -> bool {
         // Beams need tangents and curvatures.
-        self.pixel_spread == 0.0 && !self.world.materials[material].is_textured()
+        self.pixel_spread == 0.0 && !self.world.is_textured(material)
     }
 
-    /// A material and its rough BSDF. `None` if its surfaces are not plain.
+    /// A material whose surfaces are plain, with its rough BSDF.
     #[inline(always)]
-    pub fn plain_rough(&self, material: usize) -> Option<(&Material, &Rough)> {
-        let (material, rough) = self.world.plain_rough(material)?;
+    pub fn plain(&self, material: usize) -> Option<(&PlainMaterial, &Rough)> {
+        let (plain, rough) = self.world.plain(material)?;
         // Ambient light needs look-ups for each surface by itself.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
-        (!has_ambient || rough.constant().is_some()).then_some((material, rough))
+        (!has_ambient || plain.ambient.is_some()).then_some((plain, rough))
     }
 }
 
@@ -287,22 +287,23 @@ impl PacketIntersection<'_> {
             // Leave out materials that are not plain. The first plain one decides the kind of all BSDFs.
             let materials = tile.world.row_of_materials(id, of_object, &hits.primitive);
             let (mut of, mut has_uv) = (0, false);
-            let mut groups = ArrayVec::<(&Rough, u32), PACKET>::new();
+            let mut groups = ArrayVec::<(&Rough, bool, u32), PACKET>::new();
             let mut waiting = of_object;
             while waiting != 0 {
                 let (material, alike) = first_alike(&materials, waiting, folds);
                 waiting &= !alike;
-                let Some((material, rough)) = tile.plain_rough(material as usize) else { continue };
+                let Some((material, rough)) = tile.plain(material as usize) else { continue };
                 if plain.all | of == 0 {
-                    row.bsdf.prepare(rough.kind());
-                } else if row.bsdf.kind() != rough.kind() {
+                    row.bsdf.prepare(material.kind);
+                } else if row.bsdf.kind() != material.kind {
                     continue;
                 }
                 of |= alike;
-                has_uv |= rough.row_texture().is_some() && *are_lit && measure.is_colored();
-                plain.shining |= if material.emission.shines() { alike } else { 0 };
-                plain.two_sided |= if material.emission.is_two_sided() { alike } else { 0 };
-                groups.push((rough, alike));
+                let is_textured = material.has_row_texture && *are_lit && measure.is_colored();
+                has_uv |= is_textured;
+                plain.shining |= if material.shines() { alike } else { 0 };
+                plain.two_sided |= if material.is_two_sided { alike } else { 0 };
+                groups.push((rough, is_textured, alike));
             }
             if of == 0 {
                 continue;
@@ -326,8 +327,7 @@ impl PacketIntersection<'_> {
             }
             plain.all |= of;
             // Look the materials up. Beyond the vertices that the camera sees, all lobes count.
-            for (rough, of) in groups {
-                let has_uv = has_uv && rough.row_texture().is_some();
+            for (rough, has_uv, of) in groups {
                 plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
                 let shown = [(of, measure.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
                 let shown = if *measure == Measure::ALL { &shown[..1] } else { &shown };

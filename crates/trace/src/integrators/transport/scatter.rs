@@ -76,6 +76,10 @@ pub struct Scattered {
     alive: u32,
     /// Unit directions.
     directions: Lanes3,
+    /// [`Ray::start`] of the rays.
+    starts: [u32; LANES],
+    /// A bit for each vertex with a narrow lobe.
+    narrow: u32,
     /// Their pdfs in sr⁻¹.
     densities: Lanes,
     /// Factors on the throughput.
@@ -91,13 +95,12 @@ impl BsdfSampling<'_> {
         // Scatter the vertices side by side.
         let row = self.row;
         let scattered = self.tile.world.geometry.instructions().run(self);
-        let starts = row.starts(&scattered.directions);
-        let narrow = row.bsdf.narrow_lobes();
         let of_lobe = |density: f32| move |cone: &Cone| cone.scattered(density);
         // Make a path of each that goes on.
         next.extend(lanes(scattered.alive).map(|i| {
             let mut path = PathRay {
-                ray: Ray::new(lane(&row.from, i), lane(&scattered.directions, i)).leaving(starts[i]),
+                ray: Ray::new(lane(&row.from, i), lane(&scattered.directions, i))
+                    .leaving(scattered.starts[i]),
                 throughput: lane(&row.throughput, i) * lane(&scattered.factors, i),
                 slot: row.slot[i],
                 path: row.path[i],
@@ -108,7 +111,7 @@ impl BsdfSampling<'_> {
                     roulette_throughput: scattered.roulette_throughput[i],
                     only_specular_before: false,
                     one_diffuse_before: row.only_specular_before & 1 << i != 0,
-                    is_after_gloss: narrow & 1 << i != 0,
+                    is_after_gloss: scattered.narrow & 1 << i != 0,
                 },
                 cone: cones
                     .get(row.place[i] as usize)
@@ -167,6 +170,8 @@ impl Loops for BsdfSampling<'_> {
                 roulette_throughput[i] /= chance;
             }
         }
-        Scattered { alive, directions, densities, factors, roulette_throughput }
+        let starts = row.starts(&directions);
+        let narrow = row.bsdf.narrow_lobes();
+        Scattered { alive, directions, starts, narrow, densities, factors, roulette_throughput }
     }
 }

@@ -72,9 +72,10 @@ impl<'a> Vertex<'a> {
     }
 
     fn shaded(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
-        let material = &tile.world.materials[tile.world.material_index(hit)];
+        let index = tile.world.material_index(hit);
+        let material = &tile.world.materials[index];
         let is_lit = material.bsdf.is_lit();
-        let asked = Asked { uv: material.is_textured(), shadow_point: is_lit };
+        let asked = Asked { uv: tile.world.is_textured(index), shadow_point: is_lit };
         let surface = tile.world.geometry.asked_surface(by, hit, asked);
         Self::at_surface(tile, path, (material, surface), hit, distance)
     }
@@ -295,5 +296,5 @@ pub struct ShadingVertex<'a> {
     /// Its shading normals.
     pub shading: Shading,
     /// Its BSDF.
-    pub bsdf: RoughBsdf,
+    pub bsdf: &'a RoughBsdf,
 }
