@@ -126,7 +126,7 @@ macro_rules! kinds {
             }
 
             /// [`RoughPoint::is_black`].
-            #[inline]
+            #[inline(always)]
             pub fn is_black(&self) -> bool {
                 match self {
                     $(Self::$kind(own) => own.is_black(),)+
@@ -135,7 +135,7 @@ macro_rules! kinds {
             }
 
             /// [`RoughPoint::ambient`].
-            #[inline]
+            #[inline(always)]
             pub fn ambient(&self) -> Vec3 {
                 match self {
                     $(Self::$kind(own) => own.ambient(),)+
@@ -370,7 +370,7 @@ kinds! {
 
 impl RoughBsdf {
     /// The BSDF for light that comes through the surface, which is of another kind. `None` if none comes.
-    #[inline]
+    #[inline(always)]
     pub fn behind(&self) -> Option<Self> {
         match self {
             Self::GlassReflection(glass) => Some(Self::GlassTransmission(*glass)),

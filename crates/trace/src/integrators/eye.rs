@@ -411,11 +411,11 @@ impl Wavefront<'_, '_> {
             }
             return;
         }
-        let bsdf = if self.accumulator.measure.is_colored() {
-            vertex.tinted_bsdf(rough.at(at, lookups))
-        } else {
-            rough.bleached()
-        };
+        let is_colored = self.accumulator.measure.is_colored();
+        let mut bsdf = if is_colored { rough.at(at, lookups) } else { rough.bleached() };
+        if is_colored {
+            vertex.tint(&mut bsdf);
+        }
         if takes_ambient {
             self.accumulator.add_ambient(path, path.throughput * ambient * bsdf.ambient());
         }
@@ -426,6 +426,7 @@ impl Wavefront<'_, '_> {
     }
 
     /// Queues the vertices of a rough surface for direct light, with the medium behind it.
+    #[inline(always)]
     fn light_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: Medium) {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);

@@ -25,6 +25,7 @@ impl World {
             camera,
             geometry,
             plain: materials.iter().map(PlainMaterial::of).collect(),
+            has_directions: materials.iter().any(|material| material.bsdf.has_direction()),
             textured: materials.iter().map(Material::is_textured).collect(),
             materials,
             object_materials,

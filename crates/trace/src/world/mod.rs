@@ -90,6 +90,8 @@ pub struct World {
     pub materials: Vec<Material>,
     /// What rows need to know of each material that is plain.
     plain: Box<[Option<PlainMaterial>]>,
+    /// Whether the lobes of any material depend on the direction of texture coordinates.
+    has_directions: bool,
     /// [`Material::is_textured`] of each material.
     textured: Box<[bool]>,
     /// Material of each object, or the range of a mesh file's own materials.
@@ -191,8 +193,12 @@ impl World {
         self.is_colored(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
     }
 
-    /// Whether an object has texture coordinates of its own, in place of barycentric ones.
+    /// Whether an object has texture coordinates of its own, in place of barycentric ones, or no material asks for their direction.
+    #[inline]
     pub fn has_coordinates(&self, object: u32) -> bool {
+        if !self.has_directions {
+            return true;
+        }
         let mesh = self.geometry.objects()[object as usize].mesh();
         mesh.is_none_or(|mesh| !mesh.tree.loaded().mesh.uvs.is_empty())
     }

@@ -126,6 +126,7 @@ impl DirectLightQueue {
     }
 
     /// Adds a vertex.
+    #[inline(always)]
     pub fn push(&mut self, tile: &TileContext<'_>, lit: &ShadingVertex<'_>, measure: Measure) {
         self.note_cone(lit.place, lit.vertex.cone);
         let medium = self.media.number(lit.path.medium);

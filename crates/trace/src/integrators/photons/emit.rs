@@ -306,8 +306,8 @@ impl PhotonWavefront<'_> {
     /// Stores a photon at a rough surface. If there is a factor on its flux, and it came by mirrors and glass alone, it is scattered with
     /// that factor.
     fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, scattered: Option<f32>) {
-        let bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
-        let bsdf = vertex.tinted_bsdf(bsdf);
+        let mut bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
+        vertex.tint(&mut bsdf);
         if !bsdf.is_black() {
             self.leave_photon(path, vertex, bsdf, (path.medium, scattered));
         }

@@ -80,6 +80,7 @@ impl Accumulator<'_> {
     }
 
     /// Adds ambient light that a path meets.
+    #[inline]
     pub fn add_ambient(&mut self, path: &PathRay, radiance: Vec3) {
         if path.state.only_specular_before {
             self.add(path.slot, Part::Ambient, radiance);

@@ -106,7 +106,7 @@ impl<'a> Vertex<'a> {
             color: tile.world.vertex_color(hit),
             curvature,
             material,
-            has_coordinates: !material.bsdf.has_direction() || tile.world.has_coordinates(hit.object),
+            has_coordinates: tile.world.has_coordinates(hit.object),
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
             to_eye,
             normal: surface.normal * side,
@@ -136,10 +136,12 @@ impl<'a> Vertex<'a> {
         self.color.map_or(color, |own| color * own)
     }
 
-    /// The BSDF, multiplied by the vertex colour.
-    #[inline]
-    pub fn tinted_bsdf(&self, bsdf: RoughBsdf) -> RoughBsdf {
-        self.color.map_or(bsdf, |color| bsdf.tinted(color))
+    /// Multiplies a BSDF by the vertex colour.
+    #[inline(always)]
+    pub fn tint(&self, bsdf: &mut RoughBsdf) {
+        if let Some(color) = self.color {
+            *bsdf = bsdf.tinted(color);
+        }
     }
 
     /// Sets the starts of rays that leave.
