@@ -32,6 +32,13 @@ impl TriangleMesh {
         self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
     }
 
+    /// Least and greatest coordinates, in the file's. `None` without vertices.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let first = *self.positions.first()?;
+        let grow = |[least, greatest]: [Vec3; 2], at: &Vec3| [least.min(*at), greatest.max(*at)];
+        Some(self.positions.iter().fold([first; 2], grow).map(|at| at.as_dvec3() + self.origin))
+    }
+
     /// Bytes that the mesh takes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.positions.as_slice())
