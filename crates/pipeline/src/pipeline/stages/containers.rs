@@ -1,0 +1,81 @@
+//! glTF files that a request has open: each is read once, however many parts and images the scene names.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::assets::gltf::{Container, ImageBytes, is_gltf};
+use crate::assets::mesh::load;
+use crate::assets::{AssetError, LoadedMesh};
+use crate::control::{CancelToken, Progress, unwatched};
+
+/// The slot of a file, which is filled by whoever needs it first.
+type Slot = Arc<Mutex<Option<Arc<Container>>>>;
+
+/// Open glTF files.
+#[derive(Debug, Default)]
+pub(in crate::pipeline) struct Containers(Mutex<HashMap<PathBuf, Slot>>);
+
+impl Containers {
+    /// The open file of a path.
+    ///
+    /// # Errors
+    /// As for [`Container::open`]; the next call tries again.
+    pub(in crate::pipeline) fn open(
+        &self,
+        path: &Path,
+        progress: Progress<'_>,
+        token: &CancelToken,
+    ) -> Result<Arc<Container>, AssetError> {
+        let slot = {
+            let mut files = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::clone(files.entry(path.to_owned()).or_default())
+        };
+        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(container) = &*slot {
+            return Ok(Arc::clone(container));
+        }
+        let container = Arc::new(Container::open(path, progress, token)?);
+        *slot = Some(Arc::clone(&container));
+        Ok(container)
+    }
+
+    /// A mesh file, or a part of a glTF file. The whole of a glTF file is its scene as one mesh.
+    pub(in crate::pipeline) fn mesh(
+        &self,
+        (path, part): (&Path, Option<u32>),
+        progress: Progress<'_>,
+        token: &CancelToken,
+    ) -> Result<LoadedMesh, AssetError> {
+        if !is_gltf(path) {
+            return load(path, progress, token);
+        }
+        let container = self.open(path, progress, token)?;
+        match part {
+            Some(part) => container.part(part as usize, &unwatched, token),
+            None => container.whole(token),
+        }
+    }
+
+    /// The bytes of an image of a glTF file, or the file that holds them.
+    pub(in crate::pipeline) fn image(
+        &self,
+        (path, number): (&Path, u32),
+        token: &CancelToken,
+    ) -> Result<ImageInput, AssetError> {
+        let container = self.open(path, &unwatched, token)?;
+        Ok(match container.image(number as usize)? {
+            ImageBytes::Inside(bytes) => ImageInput::Bytes(bytes.into()),
+            ImageBytes::File(path) => ImageInput::File(path),
+        })
+    }
+}
+
+/// Where an image is read from.
+#[derive(Debug)]
+pub(in crate::pipeline) enum ImageInput {
+    /// An image file.
+    File(PathBuf),
+    /// Bytes of another file.
+    Bytes(Arc<[u8]>),
+}
