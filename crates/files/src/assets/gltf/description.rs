@@ -1,8 +1,8 @@
-//! What a glTF file shows, in the terms of scenes.
+//! The content of a glTF file, in the terms of scenes.
 
 use crate::math::{DMat3, DVec3, Vec2};
 
-/// What a file shows.
+/// The content of a file that is seen.
 #[derive(Debug, Default)]
 pub struct ModelScene {
     /// Placed parts, in the order of the nodes.
@@ -135,7 +135,7 @@ pub struct ModelMaterial {
     pub name: String,
     /// Base colour.
     pub color: Slot,
-    /// How far it is a metal: the blue of its texture.
+    /// Weight of the metal: the blue of its texture.
     pub metallic: Slot,
     /// Roughness: the green of its texture.
     pub roughness: Slot,
@@ -229,7 +229,7 @@ pub struct ModelCamera {
     pub position: DVec3,
     /// The way that it looks, a unit vector.
     pub direction: DVec3,
-    /// What is up in the picture.
+    /// The direction that is up in the picture.
     pub up: DVec3,
     /// Vertical angle in degrees.
     pub fov: f64,

@@ -16,7 +16,7 @@ use crate::math::{DMat3, DVec3};
 const MOST_INSTANCES: usize = 1 << 20;
 
 impl Container {
-    /// What the file's scene shows: the one that it names, else the first, else all nodes.
+    /// Returns what the file's scene shows: the one that it names, else the first, else all nodes.
     ///
     /// # Errors
     /// [`AssetError::Malformed`] with the place in the JSON.
@@ -306,7 +306,7 @@ impl Walk<'_> {
 struct Worlds {
     /// Nodes in the order of the walk.
     order: Vec<(usize, Placed)>,
-    /// Of each node that the scene has.
+    /// Placement of each node; `None` for those that the scene does not have.
     of_node: Vec<Option<Placed>>,
 }
 

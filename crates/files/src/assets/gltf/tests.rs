@@ -39,7 +39,7 @@ fn scene(container: &Container) -> Result<ModelScene, AssetError> {
     container.scene(&CancelToken::new())
 }
 
-/// What is said of a file, when it is opened, its scene is read, or its first part.
+/// Message of the error of opening a file, or of reading its scene or its first part.
 fn says(json: &Value) -> String {
     let all = || {
         let container = open_json(json)?;
@@ -365,7 +365,7 @@ fn a_glb_that_is_cut_or_foreign_is_an_error() {
         let opened = desk.open("a.glb", &whole[..length]);
         assert!(opened.is_err(), "{length}");
     }
-    let mut old = whole.clone();
+    let mut old = whole;
     old[4] = 1;
     assert!(desk.open("a.glb", &old).expect_err("refused").to_string().contains("GLB of version 1"));
     assert!(

@@ -1,6 +1,7 @@
 //! A whole glTF file as one mesh: its scene, each part in its place, with what materials of mesh files can say.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use super::description::{ModelMaterial, Placed};
 use super::{Container, ModelScene, Wrong};
@@ -30,15 +31,17 @@ impl Container {
         whole.warnings = scene.notes;
         whole.materials = scene.materials.iter().map(file_material).collect();
         // Normals, coordinates and colours are all vertices' or nobody's.
-        let mut parts: HashMap<usize, LoadedMesh> = HashMap::new();
+        let mut parts: HashMap<usize, TriangleMesh> = HashMap::new();
         for instance in &scene.instances {
-            if !parts.contains_key(&instance.part) {
-                let part = self.part(instance.part, &unwatched, token)?;
-                whole.dropped.degenerate += part.dropped.degenerate;
-                whole.dropped.non_finite += part.dropped.non_finite;
-                parts.insert(instance.part, part);
-            }
-            let part = &parts[&instance.part].mesh;
+            let part = match parts.entry(instance.part) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => {
+                    let LoadedMesh { mesh, dropped, .. } = self.part(instance.part, &unwatched, token)?;
+                    whole.dropped.degenerate += dropped.degenerate;
+                    whole.dropped.non_finite += dropped.non_finite;
+                    new.insert(mesh)
+                }
+            };
             if whole.mesh.triangles.len() + part.triangles.len() > MOST_TRIANGLES {
                 return Err(self.wrong(Wrong::new(format!(
                     "more than {MOST_TRIANGLES} triangles with all instances; `glimt import` makes a scene of instances"
@@ -90,7 +93,7 @@ fn fill<T: Copy>(all: &mut Vec<T>, first: u32, more: &[T], count: usize, missing
     all.resize(first as usize + count, missing);
 }
 
-/// What a mesh file can say of a material.
+/// The parts of a material that a mesh file can state.
 fn file_material(material: &ModelMaterial) -> FileMaterial {
     let number = |slot: &super::Slot| slot.factor.x as f32;
     FileMaterial {

@@ -17,7 +17,7 @@ use crate::pipeline::settings::Side;
 use crate::pipeline::stages::containers::Containers;
 use crate::scene::quoted;
 
-/// Where the text finds parts and images.
+/// The files in which the text finds parts and images.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::pipeline) enum Naming {
     /// In the glTF file and the files that it names.
@@ -31,11 +31,11 @@ pub(in crate::pipeline) enum Naming {
 pub(in crate::pipeline) struct Asset {
     /// Its name, relative to the text.
     pub(in crate::pipeline) name: String,
-    /// What it holds.
+    /// Its content.
     pub(in crate::pipeline) content: Content,
 }
 
-/// What a file holds.
+/// The content of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(in crate::pipeline) enum Content {
     /// A part as PLY.

@@ -15,9 +15,9 @@ use crate::pipeline::stages::containers::Containers;
 pub struct Imported {
     /// Its text. Files that it names are relative to it.
     pub text: String,
-    /// Those files, each with its path relative to the text.
+    /// The files that the text names, each with its path relative to the text.
     pub files: Vec<(PathBuf, Vec<u8>)>,
-    /// What has no equal and what stands for it, with the place in the file.
+    /// Approximations, each with its place in the file.
     pub notes: Vec<String>,
 }
 

@@ -27,7 +27,7 @@ pub(super) struct TextureFile {
     pub(super) image: Option<usize>,
 }
 
-/// How the numbers of a texture are read: those of one table are all read alike.
+/// Use of a texture's numbers, which is one for each table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Reading {
     Colors,
@@ -38,7 +38,7 @@ enum Reading {
 /// Keys of a table with their values.
 type Keys = Vec<(&'static str, String)>;
 
-/// What makes two textures the same.
+/// Identity of a texture: image, use, and the other keys of its table.
 type Identity = (usize, Reading, String);
 
 /// Materials and their textures.
@@ -99,7 +99,7 @@ impl<F: Files> Materials<'_, F> {
         }
     }
 
-    /// What every material has.
+    /// Adds the keys that every material may have.
     fn surface(&mut self, keys: &mut Keys, material: &ModelMaterial) {
         let emission = &material.emission;
         if emission.factor != DVec3::ZERO {

@@ -22,7 +22,7 @@ use crate::control::CancelToken;
 use crate::math::DVec3;
 use crate::scene::fingerprint::Fingerprint;
 
-/// How a model is shown.
+/// Way of showing a model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::pipeline) struct Show {
     /// The side from which it is seen. `None` for the file's own camera, else [`Side::Iso`].
@@ -35,7 +35,7 @@ pub(in crate::pipeline) struct Show {
 const SIZE: [f64; 2] = [640.0, 480.0];
 
 impl Show {
-    /// How a call wants it.
+    /// The way that a call asks for.
     pub(in crate::pipeline) fn of(overrides: &Overrides) -> Self {
         let aspect = match (overrides.width, overrides.height) {
             (None, None) => None,
@@ -101,8 +101,6 @@ fn render(toml: &mut Toml, size: Option<[u32; 2]>) {
     toml.key("samples", "256");
     toml.key("error", "0.05");
     toml.key("integrator", "\"path\"");
-    // A soft key light on glossy surfaces makes bright dots of few paths.
-    toml.key("clamp", "10");
 }
 
 /// The camera that frames the model.

@@ -65,6 +65,7 @@ pub(super) fn text(
         toml.key("vertex_colors", "true");
     }
     ground(&mut toml, &mut names, bounds, &eye);
-    let (companions, notes, assets) = (loaded.companions, Vec::new(), Vec::new());
+    let (companions, notes, assets) = (loaded.companions.clone(), Vec::new(), Vec::new());
+    containers.keep(path, loaded);
     Ok(ModelText { text: toml.finish(), companions, notes, assets })
 }

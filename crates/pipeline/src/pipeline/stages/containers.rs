@@ -12,9 +12,13 @@ use crate::control::{CancelToken, Progress, unwatched};
 /// The slot of a file, which is filled by whoever needs it first.
 type Slot = Arc<Mutex<Option<Arc<Container>>>>;
 
-/// Open glTF files.
+/// Open glTF files, and meshes that were read ahead.
 #[derive(Debug, Default)]
-pub(in crate::pipeline) struct Containers(Mutex<HashMap<PathBuf, Slot>>);
+pub(in crate::pipeline) struct Containers {
+    gltf: Mutex<HashMap<PathBuf, Slot>>,
+    /// Meshes that were read before the stage that needs them, each for one who asks.
+    ahead: Mutex<HashMap<PathBuf, LoadedMesh>>,
+}
 
 impl Containers {
     /// The open file of a path.
@@ -28,7 +32,7 @@ impl Containers {
         token: &CancelToken,
     ) -> Result<Arc<Container>, AssetError> {
         let slot = {
-            let mut files = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut files = self.gltf.lock().unwrap_or_else(PoisonError::into_inner);
             Arc::clone(files.entry(path.to_owned()).or_default())
         };
         let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
@@ -48,13 +52,19 @@ impl Containers {
         token: &CancelToken,
     ) -> Result<LoadedMesh, AssetError> {
         if !is_gltf(path) {
-            return load(path, progress, token);
+            let ahead = self.ahead.lock().unwrap_or_else(PoisonError::into_inner).remove(&canonical(path));
+            return ahead.map_or_else(|| load(path, progress, token), Ok);
         }
         let container = self.open(path, progress, token)?;
         match part {
             Some(part) => container.part(part as usize, &unwatched, token),
             None => container.whole(token),
         }
+    }
+
+    /// Keeps a mesh that [`Containers::mesh`] has given for whoever asks for it next.
+    pub(in crate::pipeline) fn keep(&self, path: &Path, mesh: LoadedMesh) {
+        self.ahead.lock().unwrap_or_else(PoisonError::into_inner).insert(canonical(path), mesh);
     }
 
     /// The bytes of an image of a glTF file, or the file that holds them.
@@ -71,11 +81,16 @@ impl Containers {
     }
 }
 
-/// Where an image is read from.
+/// Source of an image's bytes.
 #[derive(Debug)]
 pub(in crate::pipeline) enum ImageInput {
     /// An image file.
     File(PathBuf),
     /// Bytes of another file.
     Bytes(Arc<[u8]>),
+}
+
+/// One file by whatever name; a name that leads nowhere stands for itself.
+pub(super) fn canonical(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::super::cache::Pool;
 use super::super::watch::content::{Content, FileRead, may_have_changed};
+use super::containers::canonical;
 use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::{AssetError, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
@@ -222,11 +223,6 @@ fn file_key(file: &MeshFile, content: Content) -> Key {
     key.finish()
 }
 
-/// One file by whatever name; a name that leads nowhere stands for itself.
-pub(super) fn canonical(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| path.to_owned())
-}
-
 /// Whether an object shows the file's own materials, for each mesh file.
 fn with_own_materials(scene: &Scene) -> Vec<bool> {
     let mut shown = vec![false; scene.mesh_files.len()];
@@ -419,6 +415,7 @@ mod tests {
     fn a_material_that_changes_after_it_was_read_is_not_taken_for_the_new_one() {
         let desk = Desk::new();
         let path = desk.folder.path().join("a.obj");
+        let file = MeshFile { value: path, span: 0..0, part: None };
         let snapshot = desk.snapshot();
         let token = CancelToken::new();
         let reading = Reading {
@@ -430,13 +427,13 @@ mod tests {
         };
         let loads = std::sync::atomic::AtomicUsize::new(0);
         let load_and_change = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
-            let mesh = load(path, progress, token);
+            let mesh = crate::assets::mesh::load(path, progress, token);
             if loads.fetch_add(1, std::sync::atomic::Ordering::SeqCst) == 0 {
                 desk.write("a.mtl", "newmtl m\nKd 0 1 0\n");
             }
             mesh
         };
-        let asset = one(&path, desk.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
+        let asset = one(&file, desk.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
         let mesh = asset.result.expect("a mesh").0;
         assert_eq!(asset.files[1].content, desk.hash("a.mtl"));
         assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0, "the mesh has what the file is said to hold");

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use super::super::cache::{Pool, Spare};
 use super::super::watch::content::{Content, FileRead};
-use super::containers::ImageInput;
-use super::meshes::{Meshes, canonical};
+use super::containers::{ImageInput, canonical};
+use super::meshes::Meshes;
 use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::AssetError;
 use crate::assets::image::{
