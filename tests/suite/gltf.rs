@@ -39,6 +39,17 @@ impl Glb {
         self.accessors.len() - 1
     }
 
+    /// The file as JSON, with the buffer as zeros of its length in a data URI.
+    pub(crate) fn finish_text(self, mut json: Value) -> String {
+        let Self { bytes, views, accessors } = self;
+        json["asset"] = json!({"version": "2.0"});
+        let zeros = format!("data:;base64,{}", "AAAA".repeat(bytes.len().div_ceil(3)));
+        json["buffers"] = json!([{"byteLength": bytes.len(), "uri": zeros}]);
+        json["bufferViews"] = json!(views);
+        json["accessors"] = json!(accessors);
+        json.to_string()
+    }
+
     /// The file with this JSON, to which the buffer is added.
     pub(crate) fn finish(self, mut json: Value) -> Vec<u8> {
         let Self { mut bytes, views, accessors } = self;
@@ -99,5 +110,20 @@ pub(crate) fn cubes(image: &[u8]) -> Vec<u8> {
             {"baseColorTexture": {"index": 0}, "baseColorFactor": [1, 0.5, 0.5, 1], "metallicFactor": 0}}],
         "textures": [{"source": 0}],
         "images": [{"bufferView": view, "mimeType": "image/png", "name": "checks"}]
+    }))
+}
+
+/// A sparse point of four corners, as JSON.
+pub(crate) fn sparse() -> String {
+    let mut glb = Glb::default();
+    let position = glb.vectors(&[[0.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);
+    let (indices, values) = (glb.view(&[0; 4]), glb.view(&[0; 12]));
+    glb.accessors[position]["sparse"] = json!({
+        "count": 1, "indices": {"bufferView": indices, "componentType": 5125}, "values": {"bufferView": values}
+    });
+    glb.finish_text(json!({
+        "nodes": [{"mesh": 0, "skin": 0, "children": [1]}, {"matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1], "mesh": 0}],
+        "skins": [{"joints": [1]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": position}, "mode": 5}]}]
     }))
 }

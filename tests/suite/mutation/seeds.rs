@@ -101,8 +101,8 @@ fn meshes() -> Vec<Seed> {
         ply("binary_big_endian", &big),
         text("case.stl", stl),
         Seed { file: "case.stl".to_owned(), bytes: binary_stl },
-        Seed { file: "case.glb".to_owned(), bytes: model.clone() },
-        Seed { file: "case.gltf".to_owned(), bytes: model },
+        Seed { file: "case.glb".to_owned(), bytes: model },
+        text("case.gltf", &crate::gltf::sparse()),
         text("case.txt", "c 0 1 0\np 0 0\nr 18 16\ns 2.5 3.5\nf 45 1024 640\n"),
     ]
 }

@@ -19,6 +19,8 @@ pub struct ModelScene {
     pub notes: Vec<String>,
     /// Least and greatest coordinates of all instances. `None` without one.
     pub bounds: Option<[DVec3; 2]>,
+    /// Points of the instances, some of them far out in every direction.
+    pub outline: Vec<DVec3>,
 }
 
 /// An affine map.

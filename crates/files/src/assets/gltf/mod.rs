@@ -279,7 +279,11 @@ fn buffers(
                 let silent = Watch { progress: &unwatched, token: watch.token };
                 let bytes = read::bytes(&file, FILE_LIMIT - total, silent).map_err(|error| match error {
                     AssetError::Unreadable { path: missing, reason } => {
-                        wrong(Wrong::new(format!("cannot read {}: {reason}", missing.display())))
+                        let name = path.file_name().unwrap_or_default().to_string_lossy();
+                        AssetError::unreadable(
+                            &missing,
+                            format!("{reason}; buffers[{number}] of {name} is in it"),
+                        )
                     }
                     other => other,
                 })?;

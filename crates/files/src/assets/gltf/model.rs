@@ -1,6 +1,7 @@
 //! The scene of a glTF file: a walk through its nodes.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use super::description::{
     ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelScene, Notes, Placed,
@@ -10,8 +11,11 @@ use super::materials::material;
 use super::{Container, Wrong};
 use crate::assets::AssetError;
 use crate::control::{CancelToken, unwatched};
+use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DMat3, DVec3};
 
+/// Most vertices, those of instances counted, that are all measured.
+const MOST_MEASURED: usize = 20_000_000;
 /// Most placed parts of a file.
 const MOST_INSTANCES: usize = 1 << 20;
 
@@ -31,43 +35,41 @@ impl Container {
         let Walk { mut scene, notes, .. } = walk;
         scene.notes = notes.0;
         scene.images = self.root.images.iter().map(|image| image.name.clone()).collect();
-        scene.bounds = self.bounds(&scene.instances, token)?;
+        self.measure(&mut scene, token)?;
         Ok(scene)
     }
 
-    /// Bounds of placed parts, by the corners of each part's box. Parts that are wrong are left to whoever loads them.
-    fn bounds(
-        &self,
-        instances: &[ModelInstance],
-        token: &CancelToken,
-    ) -> Result<Option<[DVec3; 2]>, AssetError> {
-        let mut boxes: HashMap<usize, Option<[DVec3; 2]>> = HashMap::new();
-        let mut all: Option<[DVec3; 2]> = None;
-        for instance in instances {
-            let known = boxes.get(&instance.part).copied();
-            let of_part = match known {
-                Some(known) => known,
-                None => {
-                    let loaded = self.part(instance.part, &unwatched, token);
-                    if let Err(AssetError::Cancelled(cancelled)) = loaded {
-                        return Err(cancelled.into());
+    /// Finds bounds and outline of the instances. Parts that are wrong are left to whoever loads them.
+    fn measure(&self, scene: &mut ModelScene, token: &CancelToken) -> Result<(), AssetError> {
+        let mut parts: HashMap<usize, (TriangleMesh, Vec<DVec3>)> = HashMap::new();
+        let mut vertices = 0;
+        for instance in &scene.instances {
+            let (mesh, extremes) = match parts.entry(instance.part) {
+                Entry::Occupied(known) => &*known.into_mut(),
+                Entry::Vacant(new) => match self.part(instance.part, &unwatched, token) {
+                    Err(AssetError::Cancelled(cancelled)) => return Err(cancelled.into()),
+                    loaded => {
+                        let mesh = loaded.map(|loaded| loaded.mesh).unwrap_or_default();
+                        let extremes = mesh.extremes();
+                        new.insert((mesh, extremes))
                     }
-                    let found = loaded.ok().and_then(|loaded| loaded.mesh.bounds());
-                    boxes.insert(instance.part, found);
-                    found
-                }
+                },
             };
-            let Some([least, greatest]) = of_part else { continue };
-            for corner in 0..8 {
-                let pick = |bit: usize, axis: usize| {
-                    if corner >> bit & 1 == 0 { least[axis] } else { greatest[axis] }
-                };
-                let at = instance.placed.point(DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2)));
-                let [min, max] = all.unwrap_or([at; 2]);
-                all = Some([min.min(at), max.max(at)]);
+            let placed = &instance.placed;
+            scene.outline.extend(extremes.iter().map(|at| placed.point(*at)));
+            // All vertices count as long as they are not too many.
+            vertices += mesh.positions.len();
+            let all = mesh.positions.iter().map(|at| at.as_dvec3() + mesh.origin);
+            let few = extremes.iter().copied();
+            let places: &mut dyn Iterator<Item = DVec3> =
+                if vertices <= MOST_MEASURED { &mut { all } } else { &mut { few } };
+            for at in places.map(|at| placed.point(at)) {
+                let [least, greatest] = scene.bounds.unwrap_or([at; 2]);
+                scene.bounds = Some([least.min(at), greatest.max(at)]);
             }
+            token.check()?;
         }
-        Ok(all)
+        Ok(())
     }
 }
 

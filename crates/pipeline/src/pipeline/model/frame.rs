@@ -6,7 +6,7 @@ use crate::pipeline::settings::Side;
 
 /// Vertical angle in degrees.
 pub(super) const FOV: f64 = 30.0;
-/// Part of the picture's half height and half width that the model's box may fill.
+/// Part of the picture's half height and half width that the model's points may fill.
 const FILLED: f64 = 0.88;
 
 /// A camera.
@@ -32,19 +32,18 @@ impl Side {
     }
 }
 
-/// The eye that sees a box as large as a picture of this width over height allows.
-pub(super) fn framed([least, greatest]: [DVec3; 2], from: Side, aspect: f64) -> Eye {
+/// The eye that sees a box, of which only these points are to be seen, as large as a picture of this width over height allows.
+pub(super) fn framed([least, greatest]: [DVec3; 2], points: &[DVec3], from: Side, aspect: f64) -> Eye {
     let (back, up) = from.axes();
     let middle = (least + greatest) * 0.5;
     let right = up.cross(back).normalize_or(DVec3::X);
     let above = back.cross(right);
     let tangent = libm::tan((FOV * 0.5).to_radians()) * FILLED;
-    // Every corner of the box lies inside the frame.
+    // Every point lies inside the frame.
     let half = (greatest - least) * 0.5;
     let mut distance = 0.0_f64;
-    for corner in 0..8 {
-        let sign = |bit: usize| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
-        let at = half * DVec3::new(sign(0), sign(1), sign(2));
+    for point in points {
+        let at = *point - middle;
         let (across, upwards, near) = (at.dot(right).abs(), at.dot(above).abs(), at.dot(back));
         distance = distance.max(near + (across / (tangent * aspect)).max(upwards / tangent));
     }
@@ -103,7 +102,10 @@ mod tests {
         let bounds = [DVec3::new(-1.0, 2.0, -3.0), DVec3::new(4.0, 3.0, 0.5)];
         for from in [Side::Front, Side::Back, Side::Left, Side::Right, Side::Top, Side::Bottom, Side::Iso] {
             for aspect in [0.5, 1.0, 4.0 / 3.0, 3.0] {
-                let eye = framed(bounds, from, aspect);
+                let corners: Vec<DVec3> = (0..8)
+                    .map(|corner| DVec3::from([0, 1, 2].map(|axis: usize| bounds[corner >> axis & 1][axis])))
+                    .collect();
+                let eye = framed(bounds, &corners, from, aspect);
                 let back = (eye.position - eye.look_at).normalize();
                 let right = eye.up.cross(back).normalize();
                 let above = back.cross(right);
@@ -131,7 +133,7 @@ mod tests {
     /// A plane under the sky and the key light alone has the sky's radiance.
     #[test]
     fn the_ground_is_as_bright_as_the_sky() {
-        let eye = framed([DVec3::ZERO, DVec3::ONE], Side::Iso, 1.0);
+        let eye = framed([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], Side::Iso, 1.0);
         let direction = key_direction(&eye).normalize();
         let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
         let radiance = ground_reflectance() * irradiance / std::f64::consts::PI;

@@ -106,7 +106,12 @@ impl Writer<'_> {
                 eye
             }
             None => {
-                let eye = framed(bounds, show.from.unwrap_or(Side::Iso), aspect.unwrap_or(SIZE[0] / SIZE[1]));
+                let eye = framed(
+                    bounds,
+                    &scene.outline,
+                    show.from.unwrap_or(Side::Iso),
+                    aspect.unwrap_or(SIZE[0] / SIZE[1]),
+                );
                 camera(&mut self.toml, &eye, FOV);
                 eye
             }

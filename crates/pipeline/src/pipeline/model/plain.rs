@@ -32,12 +32,13 @@ pub(super) fn text(
             reason: "no usable face".to_owned(),
         });
     };
-    let bounds = match is_z_up(path) {
-        // The rotation that makes z point upwards takes (x, y, z) to (x, z, −y).
-        true => [DVec3::new(least.x, least.z, -greatest.y), DVec3::new(greatest.x, greatest.z, -least.y)],
-        false => [least, greatest],
-    };
-    let eye = framed(bounds, show.from.unwrap_or(Side::Iso), show.aspect.unwrap_or(SIZE[0] / SIZE[1]));
+    // The rotation that makes z point upwards takes (x, y, z) to (x, z, −y).
+    let upright = |at: DVec3| if is_z_up(path) { DVec3::new(at.x, at.z, -at.y) } else { at };
+    let (a, b) = (upright(least), upright(greatest));
+    let bounds = [a.min(b), a.max(b)];
+    let points: Vec<DVec3> = loaded.mesh.extremes().into_iter().map(upright).collect();
+    let eye =
+        framed(bounds, &points, show.from.unwrap_or(Side::Iso), show.aspect.unwrap_or(SIZE[0] / SIZE[1]));
     let (mut toml, mut names) = (Toml::default(), Unique::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
     render(&mut toml, None);

@@ -45,14 +45,20 @@ pub(in crate::pipeline) struct Origin<'a> {
 /// The scene of a model, and the other files that it is made of.
 fn model_scene(
     Origin { path, sets, show }: Origin<'_>,
-    containers: &Containers,
+    (contents, containers): (&Snapshot, &Containers),
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<(scene::Loaded, Vec<PathBuf>), Stop> {
     let made = model::text(path, show, containers, token).map_err(|error| match error {
         AssetError::Cancelled(_) => Stop::Cancelled,
         AssetError::OutOfMemory { .. } => Stop::work(error),
-        AssetError::Unreadable { path, reason } => broken(&path, format!("cannot read it: {reason}")),
+        AssetError::Unreadable { path, reason } => {
+            // A file that is missing is watched, so that its coming is noticed.
+            if let Ok(content) = contents.read(&path, token) {
+                findings.read(FileRead { path: path.clone(), content });
+            }
+            broken(&path, format!("cannot read it: {reason}"))
+        }
         AssetError::Malformed { path, line, reason } => {
             let line = line.map_or(String::new(), |line| format!("line {line}: "));
             broken(&path, format!("{line}{reason}"))
@@ -114,7 +120,7 @@ pub(in crate::pipeline) fn parse(
     let (loaded, companions) = match &known {
         Some(parsed) => (parsed.loaded.clone(), parsed.companions.clone()),
         None if is_model => {
-            let (loaded, companions) = model_scene(origin, containers, findings, token)?;
+            let (loaded, companions) = model_scene(origin, (contents, containers), findings, token)?;
             let read = |path: PathBuf| Ok(FileRead { content: contents.read(&path, token)?, path });
             (Arc::new(loaded), companions.into_iter().map(read).collect::<Result<_, Cancelled>>()?)
         }
