@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-use super::description::{ModelMaterial, Placed};
+use super::description::{Alpha, ModelMaterial, Placed};
 use super::{Container, ModelScene, Wrong};
 use crate::assets::{AssetError, FileMaterial, LoadedMesh, PhysicalMaterial};
 use crate::control::{CancelToken, unwatched};
@@ -104,6 +104,13 @@ fn file_material(material: &ModelMaterial) -> FileMaterial {
         emission: material.emission.factor.as_vec3(),
         ior: material.ior as f32,
         illumination_model: material.glass.map(|_| 7),
+        opacity: match &material.alpha {
+            Alpha::Opaque => 1.0,
+            Alpha::Blend(value) => number(value),
+            Alpha::Mask { value, cutoff } if value.factor.x < *cutoff => 0.0,
+            Alpha::Mask { .. } => 1.0,
+        },
+        opacity_texture: None,
         diffuse_texture: None,
         specular_texture: None,
         emission_texture: None,
