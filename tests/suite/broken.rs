@@ -104,7 +104,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (3, 10, "`output`: .webp files are not available in this version"),
             (10, 8, "`file`: unknown file ending .gif"),
             (13, 8, "`file` needs a file ending that says its format"),
-            (20, 8, "`file`: .gltf files are not available in this version"),
+            (20, 8, "`file`: unknown file ending .fbx"),
             (24, 8, "`file`: unknown file ending .obi; did you mean .obj?"),
         ],
     ),

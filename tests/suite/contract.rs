@@ -75,6 +75,7 @@ const TABLES: &[(&str, &[Key])] = &[
             ("repeat", "[1, 1]", Default),
             ("rotate", "0.0", Default),
             ("offset", "[0, 0]", Default),
+            ("factor", "1", Default),
             ("uv", "0", Default),
             ("encoding", "\"auto\"", Default),
         ],

@@ -13,8 +13,8 @@ use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
     Accel, Camera, ColorSource, EmissionSource, Encoding, Environment, Falloff, FresnelSource, Integrator,
-    Light, Located, Material, MaterialKind, Mesh, NumberSource, Object, OpacitySource, Photons, PixelFilter,
-    Placement, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
+    Light, Located, Material, MaterialKind, Mesh, MeshFile, NumberSource, Object, OpacitySource, Photons,
+    PixelFilter, Placement, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
 };
 use glimt::world::{Geometry, Image, Lookups, MeshTree, Parts, World, lights, origin, sky, textures_needed};
 
@@ -155,7 +155,7 @@ impl Build {
         let tree = MeshTree::build(Arc::new(loaded), self.scene.render.accel, &CancelToken::new())
             .expect("nobody cancels");
         self.parts.meshes.push(Arc::new(tree));
-        self.scene.mesh_files.push(Located { value: PathBuf::new(), span: 0..0 });
+        self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
         let [scale, rotate, translate] = placed;
         let file = self.parts.meshes.len() - 1;
         let placed = Placement::Steps { scale, rotate, translate };
@@ -200,6 +200,8 @@ impl Build {
             rotate: 0.0,
             offset: Vec2::ZERO,
             encoding: Encoding::Linear,
+            image: None,
+            factor: Vec3::ONE,
         });
         number
     }

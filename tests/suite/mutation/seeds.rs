@@ -81,6 +81,8 @@ fn meshes() -> Vec<Seed> {
     let off = "COFF\n# small\n4 2 5\n0 0 0 255 0 0 255\n1 0 0 0 0 0 0\n1 1 0 0 0 0 0\n0 1 0 0 0 0 0\n3 0 1 2 0.5\n4 0 1 2 3\n";
     let wild = "STCN4OFF 3 1 0\n0 0 0 1 0 0 1 1 1 1 1 0 0\n1 0 0 1 0 0 1 1 1 1 1 0 1\n0 1 0 1 0 0 1 1 1 1 1 1 0\n3 0 1 2\n";
     let stl = "solid small\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e0 0\nendloop\nendfacet\nendsolid\n";
+    // A model with materials, and a texture that is a cut image.
+    let model = crate::gltf::cubes(b"\x89PNG\r\n\x1a\n");
     let mut binary_stl = vec![b' '; 80];
     binary_stl.extend(1_u32.to_le_bytes());
     for number in [0.0_f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0] {
@@ -99,6 +101,8 @@ fn meshes() -> Vec<Seed> {
         ply("binary_big_endian", &big),
         text("case.stl", stl),
         Seed { file: "case.stl".to_owned(), bytes: binary_stl },
+        Seed { file: "case.glb".to_owned(), bytes: model },
+        text("case.gltf", &crate::gltf::sparse()),
         text("case.txt", "c 0 1 0\np 0 0\nr 18 16\ns 2.5 3.5\nf 45 1024 640\n"),
     ]
 }

@@ -232,6 +232,11 @@ impl Desk {
     pub(super) fn lay(&self, case: Case, made: &Seed) -> PathBuf {
         let folder = self.0.path().join("scenes");
         let scene = folder.join("case.toml");
+        if ["case.glb", "case.gltf"].contains(&made.file.as_str()) {
+            // A model is shown alone, which reads more of it than a scene does.
+            std::fs::write(folder.join(&made.file), &made.bytes).expect("written");
+            return folder.join(&made.file);
+        }
         std::fs::write(folder.join(&made.file), &made.bytes).expect("written");
         if case.kind == Kind::Asset {
             if made.file != "case.mtl" {

@@ -12,6 +12,7 @@ mod input;
 mod keys;
 mod leafing;
 mod long;
+mod model;
 mod outputs;
 #[cfg(target_os = "linux")]
 mod polite;

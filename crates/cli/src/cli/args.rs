@@ -15,7 +15,7 @@ pub use self::parts::{Engine, FarmArgs, MergeArgs};
 use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
-use crate::pipeline::settings::{Checkpoints, Overrides, Resume, View};
+use crate::pipeline::settings::{Checkpoints, Overrides, Resume, Side, View};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
@@ -26,6 +26,8 @@ Examples:
   glimt ball.toml --once -o a.png -o a.exr
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
+  glimt helmet.glb                        a model alone: obj, off, ply, stl, glb, gltf
+  glimt import helmet.glb -o helmet.toml  a scene of it, to edit
   glimt compare a.exr reference.exr       the error of one picture against another
   glimt bench ball.toml --plot plot.svg   measure the error of each method against its seconds
   glimt ball.toml --once -o 1.part --shard 1/2    render the first half, as another machine the second
@@ -65,6 +67,7 @@ impl Args {
             Some(Subcommand::Compare(compare)) => compare.color,
             Some(Subcommand::Merge(merge)) => merge.color,
             Some(Subcommand::Farm(farm)) => farm.color,
+            Some(Subcommand::Import(import)) => import.color,
             Some(Subcommand::New { .. }) | None => self.render.color,
         }
     }
@@ -89,6 +92,9 @@ pub enum Subcommand {
         /// The file to write; - is stdout
         file: PathBuf,
     },
+    /// Make a scene of a glTF file, with its meshes as PLY files and its images beside it; refuses to overwrite
+    #[command(after_help = IMPORT_HELP)]
+    Import(ImportArgs),
     /// Measure the error of a picture against a reference
     #[command(after_help = COMPARE_HELP)]
     Compare(CompareArgs),
@@ -101,6 +107,30 @@ pub enum Subcommand {
     /// Print the job script that renders a picture in parts on several machines
     #[command(after_help = parts::FARM_HELP)]
     Farm(Box<FarmArgs>),
+}
+
+const IMPORT_HELP: &str = "\
+The scene is what `glimt FILE` shows, as a text to edit. Its meshes and images are in a folder beside it that has its
+name. Where the file has something that glimt lacks, a comment names it and what stands for it, and so does a message.
+Lights: 1 cd counts as 1 W/sr, 1 lx as 1 W/m2.
+
+Exit codes: 0 written; 1 it could not be written, or --strict and something has no equal; 2 the file is wrong, or
+there is a file of that name.";
+
+/// A file of another program, and the scene to write.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ImportArgs {
+    /// The file to read: gltf, glb
+    pub file: PathBuf,
+    /// The scene to write [FILE with .toml, in the working directory]
+    #[arg(short, long, value_name = "SCENE")]
+    pub output: Option<PathBuf>,
+    /// Exit with 1, and write nothing, if something has no equal
+    #[arg(long)]
+    pub strict: bool,
+    /// Colours of the messages
+    #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
+    pub color: ColorChoice,
 }
 
 const COMPARE_HELP: &str = "\
@@ -149,7 +179,7 @@ pub struct CompareArgs {
 /// A render's options; each overrides the scene for this run.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RenderArgs {
-    /// The scene file (TOML)
+    /// The scene file (TOML), or a model: obj, off, ply, stl, glb, gltf
     #[arg(required = true, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
     /// Render once without the terminal UI, write the picture, exit
@@ -212,6 +242,9 @@ pub struct RenderArgs {
     /// The view to render: the beauty picture or an AOV
     #[arg(long, value_parser = one_of::<View>(), value_name = "NAME", help_heading = "Picture")]
     pub view: Option<View>,
+    /// The side from which a model is seen, in place of its own camera
+    #[arg(long, value_parser = one_of::<Side>(), value_name = "SIDE", help_heading = "Picture")]
+    pub from: Option<Side>,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("seed"), help_heading = "Picture")]
     pub seed: Option<u32>,
@@ -270,6 +303,7 @@ impl RenderArgs {
             photons: self.photons.map(bool::from),
             dof: self.dof.map(bool::from),
             view: self.view,
+            from: self.from,
             crop: self.crop,
             threads: self.threads,
             bit_depth: self.bit_depth,

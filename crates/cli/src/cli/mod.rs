@@ -9,6 +9,7 @@ mod compare;
 mod console;
 mod exit;
 mod farm;
+mod import;
 mod live;
 mod lower;
 mod merge;
@@ -43,6 +44,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     let exit = match args.command {
         Some(Subcommand::Check { scene, sets, .. }) => check::run(&scene, &sets, &console),
         Some(Subcommand::New { file }) => new::run(&file, &console),
+        Some(Subcommand::Import(args)) => import::run(&args, &console),
         Some(Subcommand::Compare(args)) => compare::run(&args, &console),
         Some(Subcommand::Bench(args)) => bench::run(&args, &console),
         Some(Subcommand::Merge(args)) => merge::run(&args, &console),

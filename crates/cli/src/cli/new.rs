@@ -1,12 +1,11 @@
 //! `glimt new`: a scene to start from, as a file or on stdout.
 
-use std::fs::OpenOptions;
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::Path;
 
 use super::console::Console;
 use super::exit::Exit;
-use crate::output::{self, FileIdentity, Format, OutputError};
+use crate::output::{self, Format, OutputError, write};
 use crate::scene::{is_mesh, starter};
 
 pub(super) fn run(file: &Path, console: &Console) -> Exit {
@@ -18,7 +17,7 @@ pub(super) fn run(file: &Path, console: &Console) -> Exit {
         return console.fail(Exit::WRONG, &message);
     }
     let name = file.display();
-    match create(file, starter().as_bytes()) {
+    match write::new_file(file, starter().as_bytes()) {
         Ok(()) => {
             console.say(&format!("wrote {name}"));
             console.say(&format!(
@@ -74,17 +73,6 @@ fn is_picture(file: &Path) -> bool {
         Ok(_) | Err(OutputError::NotAvailable { .. }) => true,
         Err(_) => false,
     }
-}
-
-/// Makes the file, never in place of another one; leaves no part of it on failure.
-fn create(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
-    let written = file.write_all(bytes).and_then(|()| file.sync_all());
-    if written.is_err() && FileIdentity::of(path).is_some_and(|there| there.is_of(&file)) {
-        // The file is still ours; the caller reports the error in any case.
-        let _ = std::fs::remove_file(path);
-    }
-    written
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Assets: from bytes to meshes, textures and cameras. Every error names the file and, if the file has lines, the line.
 
 pub mod contain;
+pub mod gltf;
 pub mod image;
 pub mod mesh;
 pub mod orbiter;

@@ -15,7 +15,7 @@ use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use super::attributes::{Attributes, Carried};
 use super::place::{self, Place, Target};
 use super::temporary::{self, Temporary};
-use super::{Losses, OutputError, stoppable};
+use super::{FileIdentity, Losses, OutputError, stoppable};
 use crate::control::CancelToken;
 
 /// Standard output. It is already open: opening it by this name would fail for a socket.
@@ -33,6 +33,20 @@ pub const STDOUT: &str = "/dev/stdout";
 pub fn atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let guard = Guard { is_kept: &|_| false, may_replace: &|_| Ok(()), losses: Losses::Told(&|_| ()) };
     atomic_until(path, bytes, &guard, &CancelToken::new())
+}
+
+/// Makes a new file, never in place of another one; leaves no part of it on failure.
+///
+/// # Errors
+/// The system's, [`ErrorKind::AlreadyExists`] among them.
+pub fn new_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = OpenOptions::new().write(true).create_new(true).open(path)?;
+    let written = file.write_all(bytes).and_then(|()| file.sync_all());
+    if written.is_err() && FileIdentity::of(path).is_some_and(|there| there.is_of(&file)) {
+        // The file is still ours; the caller reports the error in any case.
+        let _ = fs::remove_file(path);
+    }
+    written
 }
 
 /// Files that a write must not touch. Both functions are called at the last moment, with the real path, links followed.

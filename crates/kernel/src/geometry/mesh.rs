@@ -32,6 +32,30 @@ impl TriangleMesh {
         self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
     }
 
+    /// Least and greatest coordinates, in the file's. `None` without vertices.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let first = *self.positions.first()?;
+        let grow = |[least, greatest]: [Vec3; 2], at: &Vec3| [least.min(*at), greatest.max(*at)];
+        Some(self.positions.iter().fold([first; 2], grow).map(|at| at.as_dvec3() + self.origin))
+    }
+
+    /// Vertices that lie farthest in each of 26 directions, in the file's coordinates: along the axes, and the diagonals of two and
+    /// of three of them.
+    pub fn extremes(&self) -> Vec<DVec3> {
+        let Some(first) = self.positions.first() else { return Vec::new() };
+        let steps = [-1.0_f32, 0.0, 1.0];
+        let directions =
+            (0..27).map(|index| Vec3::new(steps[index % 3], steps[index / 3 % 3], steps[index / 9]));
+        let farthest = |direction: Vec3| {
+            let farther = |(far, at): (f32, Vec3), next: &Vec3| {
+                let reach = direction.dot(*next);
+                if reach > far { (reach, *next) } else { (far, at) }
+            };
+            self.positions.iter().fold((direction.dot(*first), *first), farther).1.as_dvec3() + self.origin
+        };
+        directions.filter(|direction| *direction != Vec3::ZERO).map(farthest).collect()
+    }
+
     /// Bytes that the mesh takes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.positions.as_slice())

@@ -65,6 +65,7 @@ mod tests {
             repeat: Vec2::ONE,
             mipmaps: None,
             moved: None,
+            factor: None,
         };
         NormalMap { texture: Arc::new(texture), strength: 1.0 }
     }

@@ -84,7 +84,15 @@ mod tests {
         let data = TexelData::Float(numbers.to_vec());
         let texels = Arc::new(Texels { width: numbers.len() as u32, height: 1, data, unusable: 0 });
         let (filter, wrap) = (TextureFilter::Bilinear, Wrap::Repeat);
-        Arc::new(Texture { texels, filter, wrap, repeat: Vec2::ONE, mipmaps: None, moved: None })
+        Arc::new(Texture {
+            texels,
+            filter,
+            wrap,
+            repeat: Vec2::ONE,
+            mipmaps: None,
+            moved: None,
+            factor: None,
+        })
     }
 
     /// Heights that rise by 1 in a unit of u around the middle.

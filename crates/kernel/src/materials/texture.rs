@@ -50,6 +50,8 @@ pub struct Texture {
     pub repeat: Vec2,
     /// Motion of the repeated coordinates. `None` if they stay.
     pub moved: Option<Box<Moved>>,
+    /// Factor on what is looked up. `None` for 1; heights and their slopes have none.
+    pub factor: Option<Vec3>,
 }
 
 /// Motion of texture coordinates: a rotation, then a translation.
@@ -141,7 +143,8 @@ impl Texture {
     /// The linear value at texture coordinates, v = 0 at the bottom row; coordinates that are not finite count as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tiles = self.tiles(at.uv);
-        self.in_tiles(tiles, || self.level(&at.footprint))
+        let value = self.in_tiles(tiles, || self.level(&at.footprint));
+        self.factor.map_or(value, |factor| value * factor)
     }
 
     /// The value at coordinates of the tiles, at this level if the filter has levels.
@@ -193,10 +196,16 @@ impl Texture {
     /// [`Texture::lookup`] side by side, for a texture without mip levels.
     #[inline(always)]
     pub fn lookup_row(&self, uv: &[[f64; LANES]; 2]) -> Lanes3 {
-        match &self.moved {
+        let mut row = match &self.moved {
             None => self.repeated_row(uv, self.repeat.as_dvec2()),
             Some(moved) => self.moved_row(moved, uv),
+        };
+        if let Some(factor) = self.factor {
+            for (lanes, factor) in row.iter_mut().zip(factor.to_array()) {
+                lanes.iter_mut().for_each(|lane| *lane *= factor);
+            }
         }
+        row
     }
 
     /// [`Texture::lookup_row`] of a texture whose coordinates are moved.
@@ -250,7 +259,8 @@ impl Texture {
     /// Mean of its image, which is the mean of the texture if a whole number of tiles fits into u and v.
     pub fn mean(&self) -> Vec3 {
         let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));
-        last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0))
+        let mean = last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0));
+        self.factor.map_or(mean, |factor| mean * factor)
     }
 
     /// The level at which the footprint is one texel, from 0 on; with a fraction between two levels.
@@ -396,7 +406,7 @@ mod tests {
     fn numbered(filter: TextureFilter, wrap: Wrap) -> Texture {
         let data = [2.0, 3.0, 0.0, 1.0].map(Vec3::splat).to_vec();
         let texels = Arc::new(Texels { width: 2, height: 2, data: TexelData::Float(data), unusable: 0 });
-        Texture { texels, mipmaps: None, filter, wrap, repeat: Vec2::ONE, moved: None }
+        Texture { texels, mipmaps: None, filter, wrap, repeat: Vec2::ONE, moved: None, factor: None }
     }
 
     fn bilinear(wrap: Wrap, u: f32, v: f32) -> f32 {
@@ -441,6 +451,19 @@ mod tests {
         assert_eq!(Moved::new(0.0, DVec2::ZERO), None);
         let (sin, cos) = Moved::new(-270.0, DVec2::ZERO).expect("it turns").turn;
         assert_eq!((sin, cos), (1.0, 0.0));
+    }
+
+    #[test]
+    fn a_factor_multiplies_values_and_their_mean_but_no_slopes() {
+        let plain = numbered(TextureFilter::Bilinear, Wrap::Repeat);
+        let factor = Vec3::new(0.5, 2.0, 3.0);
+        let texture = Texture { factor: Some(factor), ..plain.clone() };
+        let at = TexturePoint::sharp(DVec2::new(0.3, 0.6));
+        assert_eq!(texture.lookup(&at), plain.lookup(&at) * factor);
+        assert_eq!((texture.mean(), texture.slopes(&at)), (plain.mean() * factor, plain.slopes(&at)));
+        let uv = [[0.3; LANES], [0.6; LANES]];
+        let [row, before] = [&texture, &plain].map(|one| lane(&one.lookup_row(&uv), 3));
+        assert_eq!(row, before * factor);
     }
 
     #[test]
@@ -505,7 +528,8 @@ mod tests {
                         let texels = Arc::clone(&texels);
                         let moved = Moved::new(degrees, DVec2::new(degrees, 0.25)).filter(|_| degrees != 0.0);
                         let moved = moved.map(Box::new);
-                        let texture = Texture { texels, mipmaps: None, filter, wrap, repeat, moved };
+                        let texture =
+                            Texture { texels, mipmaps: None, filter, wrap, repeat, moved, factor: None };
                         for first in 0..60 {
                             let u = std::array::from_fn(|i| number(first + i));
                             let v = std::array::from_fn(|i| number(first + 5 * i));

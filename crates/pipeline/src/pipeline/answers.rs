@@ -107,6 +107,8 @@ pub struct Kept {
     pub is_new: bool,
     /// Whether the file gives this camera, with what the call sets.
     pub is_own: bool,
+    /// Whether it is a new scene beside a model, which stays the file that is shown.
+    pub of_model: bool,
 }
 
 #[cfg(test)]

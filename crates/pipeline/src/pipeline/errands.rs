@@ -13,7 +13,7 @@ use crate::film::Quantity;
 use crate::integrators::RenderSettings;
 use crate::math::DVec2;
 use crate::output::{Losses, OutputError, write};
-use crate::scene::{Loaded, text_now};
+use crate::scene::{Loaded, is_model, text_now};
 use crate::system::{file, in_words};
 use crate::world::World;
 
@@ -101,6 +101,9 @@ impl AtHand {
     fn keep_camera(&self, camera: &Viewpoint, inputs: &Inputs) -> Result<Kept, String> {
         let loaded = &self.parsed.loaded;
         let path = loaded.path.clone();
+        if is_model(&path) {
+            return write_scene_of_model(loaded, camera);
+        }
         let is_as_read = || text_now(&path).is_ok_and(|now| *now == *loaded.source.text());
         let changed =
             || "the scene file has changed since it was read: the camera is not written into it".to_owned();
@@ -126,6 +129,18 @@ impl AtHand {
                 .map_err(|error| error.to_string())?;
         }
         let is_own = Loaded::camera_of(&text, &self.sets).is_some_and(|own| own.is_nearly(camera));
-        Ok(Kept { path, is_new, is_own })
+        Ok(Kept { path, is_new, is_own, of_model: false })
     }
+}
+
+/// Writes the scene of a model, with this camera, beside the model; never over a file.
+fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<Kept, String> {
+    let path = loaded.path.with_extension("toml");
+    let shown = path.display();
+    if path.symlink_metadata().is_ok() {
+        return Err(format!("{shown} exists already, and is left as it is"));
+    }
+    let text = loaded.text_with_camera(camera)?;
+    write::new_file(&path, text.as_bytes()).map_err(|error| format!("{shown}: {}", in_words(&error)))?;
+    Ok(Kept { path, is_new: true, is_own: false, of_model: true })
 }

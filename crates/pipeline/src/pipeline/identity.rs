@@ -86,7 +86,7 @@ impl Depends<'_> {
         let eye = Eye::new(&scene, self.parsed.orbiter, self.camera);
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
         let meshes: Vec<Key> =
-            scene.mesh_files.iter().map(|file| key(&self.content_of(&file.value))).collect();
+            scene.mesh_files.iter().map(|file| key(&self.content_of(&file.value), file.part)).collect();
         let of = keys::referents(&scene, &meshes, orbiter.as_deref());
         let world = keys::world(&keys::surfaces(&scene, &of, &[]), &eye.camera, &of);
         keys::render(world, &self.plan.settings, self.plan.crop)
@@ -113,8 +113,13 @@ impl Depends<'_> {
     }
 }
 
-fn key(content: &str) -> Key {
-    Fingerprint::new("content").text(content).finish()
+fn key(content: &str, part: Option<u32>) -> Key {
+    let mut key = Fingerprint::new("content");
+    key.text(content);
+    if let Some(part) = part {
+        key.index(part as usize);
+    }
+    key.finish()
 }
 
 /// Name of a file as seen from the scene's folder, or alone.

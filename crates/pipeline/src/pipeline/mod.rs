@@ -16,6 +16,7 @@ mod identity;
 mod inputs;
 mod keys;
 mod memory;
+mod model;
 mod pace;
 mod plan;
 pub mod protocol;
@@ -36,5 +37,6 @@ mod worker;
 mod tests;
 
 pub use check::{Checked, check};
+pub use model::import::{Imported, import};
 pub use watch::content::{Content, FileRead};
 pub use worker::{Handle, Remote, start};

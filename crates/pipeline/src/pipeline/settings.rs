@@ -32,6 +32,8 @@ macro_rules! overrides {
             pub dof: Option<bool>,
             /// The view: beauty or an AOV.
             pub view: Option<View>,
+            /// The side from which a model is seen, in place of its own camera.
+            pub from: Option<Side>,
             /// The camera.
             pub camera: CameraChange,
             /// Render these pixels only; the rest of the picture stays black.
@@ -59,6 +61,26 @@ macro_rules! overrides {
 }
 
 render_keys!(overrides, changed);
+
+choice! {
+    /// Sides from which a model is seen.
+    pub enum Side {
+        /// The front: +z, of an STL file −y.
+        Front = "front",
+        /// The back.
+        Back = "back",
+        /// Its left side in the picture of the front.
+        Left = "left",
+        /// Its right side in the picture of the front.
+        Right = "right",
+        /// Above.
+        Top = "top",
+        /// Below, without the ground.
+        Bottom = "bottom",
+        /// Before it, from above and to its right.
+        Iso = "iso",
+    }
+}
 
 /// Checkpoints of a render, beside its output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -25,7 +25,7 @@ pub use changes::changes;
 use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
 pub use facing::MeshBounds;
-pub use source::Source;
+pub use source::{Source, quoted};
 
 /// Scene files over this size, in bytes, are refused.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
@@ -149,6 +149,14 @@ pub struct Outcome {
 /// of at most [`MAX_FILE_BYTES`] bytes of UTF-8 text is refused without blocking.
 pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     let text = read::text(path).map_err(|problem| vec![*problem])?;
+    load_text(text, path, sets)
+}
+
+/// Validates a text as the scene of a file, which is not read: that of a model. Otherwise as [`load`].
+///
+/// # Errors
+/// As for [`load`].
+pub fn load_text(text: Arc<str>, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     let source = Source::with_sets(text, sets)?;
     let Outcome { scene, diagnostics, settings } = document::lower(&source, path);
     match scene {
@@ -165,6 +173,11 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
 /// searched for beside `path`, which names the scene in diagnostics and is not read.
 pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
     document::lower(&Source::file(text), path)
+}
+
+/// Whether a file shows a model of its own: it is a mesh by its name, and holds no scene all the same.
+pub fn is_model(path: &Path) -> bool {
+    read::is_model(path)
 }
 
 /// Whether a file is a mesh by its name.

@@ -14,10 +14,10 @@ use crate::system::in_words;
 
 /// The text. The error is one diagnostic that names the file.
 pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
-    let bytes = bytes(path).map_err(|(message, help)| problem(path, message, help, None))?;
-    if is_mesh(path) && !holds_scene(&bytes) {
+    if is_model(path) {
         return Err(mesh(path));
     }
+    let bytes = bytes(path).map_err(|(message, help)| problem(path, message, help, None))?;
     if bytes.contains(&0) || bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(problem(
             path,
@@ -42,9 +42,16 @@ fn mesh(path: &Path) -> Box<Diagnostic> {
     problem(path, "this is a mesh, not a scene".to_owned(), Some(help), None)
 }
 
-/// Whether a file that is named like a mesh is a scene all the same.
-fn holds_scene(bytes: &[u8]) -> bool {
-    memchr::memmem::find(bytes, b"[camera]").is_some()
+/// Whether a file is named like a mesh and is no scene all the same, as its start shows. What cannot be read is none.
+pub(super) fn is_model(path: &Path) -> bool {
+    const START: u64 = 1 << 16;
+    let start = || {
+        let (file, _) = file::open(path).ok()?.ok()?;
+        let mut bytes = Vec::new();
+        file.take(START).read_to_end(&mut bytes).ok()?;
+        Some(bytes)
+    };
+    is_mesh(path) && start().is_some_and(|bytes| memchr::memmem::find(&bytes, b"[camera]").is_none())
 }
 
 fn problem(path: &Path, message: String, help: Option<String>, place: Option<Place>) -> Box<Diagnostic> {

@@ -8,7 +8,7 @@ use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
 use crate::geometry::{Asked, Ray};
 use crate::math::{DVec3, Vec3};
-use crate::scene::description::{Accel, Located, Mesh, Object, Placement, Scene, Shape};
+use crate::scene::description::{Accel, Mesh, MeshFile, Object, Placement, Scene, Shape};
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
@@ -51,7 +51,7 @@ impl Build {
         let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
         let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
         self.meshes.push(Arc::new(tree));
-        self.scene.mesh_files.push(Located { value: PathBuf::new(), span: 0..0 });
+        self.scene.mesh_files.push(MeshFile { value: PathBuf::new(), span: 0..0, part: None });
         let file = self.meshes.len() - 1;
         let placed = Placement::Steps { scale, rotate, translate };
         self.shape(Shape::Mesh(Mesh { file, placed, smooth: false, vertex_colors: false }), material)

@@ -281,20 +281,24 @@ fn declared_number(scene: &Scene, images: &Images, source: &NumberSource, usual:
 
 fn declared_texture(scene: &Scene, images: &Images, index: usize, used: TextureUse) -> Arc<Texture> {
     let declared = &scene.textures[index];
-    let &description::Texture { filter, wrap, repeat, rotate, offset, .. } = declared;
+    let &description::Texture { filter, wrap, repeat, rotate, offset, factor, .. } = declared;
     let Image { texels, mipmaps } = image(images, &declared_source(scene, index, used));
     let mipmaps = match filter {
         TextureFilter::Nearest | TextureFilter::Bilinear => None,
         TextureFilter::Mipmap => mipmaps,
     };
     let moved = Moved::new(rotate, offset.as_dvec2()).map(Box::new);
-    Arc::new(Texture { texels, mipmaps, filter, wrap, repeat, moved })
+    let factor = match used {
+        TextureUse::Color | TextureUse::Number(_) => Some(factor).filter(|factor| *factor != Vec3::ONE),
+        TextureUse::Normal => None,
+    };
+    Arc::new(Texture { texels, mipmaps, filter, wrap, repeat, moved, factor })
 }
 
 fn file_texture(images: &Images, source: &TextureSource) -> Arc<Texture> {
     let (filter, wrap, repeat) = (TextureFilter::Bilinear, Wrap::Repeat, Vec2::ONE);
     let Image { texels, .. } = image(images, source);
-    Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat, moved: None })
+    Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat, moved: None, factor: None })
 }
 
 /// The loaded image. A material that no object has may name textures that were not loaded: they are never looked up.

@@ -15,6 +15,8 @@ use crate::scene::description::{Encoding, PixelNumber, Scene, TextureFilter, Tex
 pub struct TextureSource {
     /// The file.
     pub path: PathBuf,
+    /// Number of the image in a glTF file. `None` if the file is an image.
+    pub image: Option<u32>,
     /// Encoding of its numbers.
     pub encoding: ImageEncoding,
 }
@@ -165,7 +167,7 @@ fn environment_file(scene: &Scene) -> Option<&Path> {
 }
 
 fn environment_map(file: &Path) -> TextureSource {
-    TextureSource { path: file.to_owned(), encoding: ImageEncoding::Color }
+    TextureSource { path: file.to_owned(), image: None, encoding: ImageEncoding::Color }
 }
 
 /// Whether each material of the scene belongs to an object, and whether each mesh file's own materials belong to an
@@ -197,7 +199,7 @@ pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> Textu
             ImageEncoding::Number { of, is_srgb: false }
         }
     };
-    TextureSource { path: texture.file.value.clone(), encoding }
+    TextureSource { path: texture.file.value.clone(), image: texture.image, encoding }
 }
 
 /// Source of a texture of a mesh file for this use.
@@ -207,7 +209,7 @@ pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
         TextureUse::Normal => ImageEncoding::Linear,
         TextureUse::Number(of) => ImageEncoding::Number { of, is_srgb: false },
     };
-    TextureSource { path: path.to_owned(), encoding }
+    TextureSource { path: path.to_owned(), image: None, encoding }
 }
 
 /// Use of textures of mesh files as numbers.

@@ -10,7 +10,11 @@ use crate::control::{CancelToken, unwatched};
 /// neither can occur (ITU-T T.81, B.1.1.5).
 pub(super) fn check_whole(path: &Path, limit: u64, token: &CancelToken) -> Result<(), String> {
     let bytes = read::bytes(path, limit, Watch { progress: &unwatched, token });
-    let bytes = bytes.map_err(|error: AssetError| error.to_string())?;
+    check_bytes(&bytes.map_err(|error: AssetError| error.to_string())?)
+}
+
+/// [`check_whole`] of bytes in memory.
+pub(super) fn check_bytes(bytes: &[u8]) -> Result<(), String> {
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     match (last([0xff, 0xda]), last([0xff, 0xd9])) {
         (Some(scan), Some(end)) if scan < end => Ok(()),

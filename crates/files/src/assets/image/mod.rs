@@ -9,8 +9,9 @@ mod jpeg;
 mod png;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Seek};
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use ::image::error::LimitErrorKind;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
@@ -102,8 +103,10 @@ pub fn load(
     progress: Progress<'_>,
     token: &CancelToken,
 ) -> Result<Texels, AssetError> {
-    let watch = Watch { progress, token };
-    let file = Source::open(path, limits, token)?;
+    load_source(Source::open(path, limits, token)?, encoding, Watch { progress, token })
+}
+
+fn load_source(file: Source, encoding: ImageEncoding, watch: Watch<'_>) -> Result<Texels, AssetError> {
     let length = file.length as usize;
     watch.tick(0, length)?;
     let texels =
@@ -117,13 +120,50 @@ pub fn load(
 /// # Errors
 /// As for [`load`], as far as the start of the file shows them.
 pub fn size(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<(u32, u32, u64), AssetError> {
-    let watch = Watch { progress: &unwatched, token };
-    let file = Source::open(path, limits, token)?;
+    size_of_source(Source::open(path, limits, token)?, Watch { progress: &unwatched, token })
+}
+
+fn size_of_source(file: Source, watch: Watch<'_>) -> Result<(u32, u32, u64), AssetError> {
     file.read_apart(watch, |file, report| {
         let (decoder, bytes) = file.decoder(report)?;
         let (width, height) = decoder.dimensions();
         Ok((width, height, bytes))
     })
+}
+
+/// An image inside another file.
+#[derive(Clone, Debug)]
+pub struct ImageWithin<'a> {
+    /// The file.
+    pub path: &'a Path,
+    /// The bytes of the image.
+    pub bytes: Arc<[u8]>,
+}
+
+/// [`load`] of an image inside another file.
+///
+/// # Errors
+/// As for [`load`].
+pub fn load_within(
+    image: ImageWithin<'_>,
+    encoding: ImageEncoding,
+    limits: ImageLimits,
+    progress: Progress<'_>,
+    token: &CancelToken,
+) -> Result<Texels, AssetError> {
+    load_source(Source::within(image, limits, token)?, encoding, Watch { progress, token })
+}
+
+/// [`size`] of an image inside another file.
+///
+/// # Errors
+/// As for [`size`].
+pub fn size_within(
+    image: ImageWithin<'_>,
+    limits: ImageLimits,
+    token: &CancelToken,
+) -> Result<(u32, u32, u64), AssetError> {
+    size_of_source(Source::within(image, limits, token)?, Watch { progress: &unwatched, token })
 }
 
 /// The mip levels of an image.
@@ -142,10 +182,34 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
     })
 }
 
-/// An open image file with the settings for reading it.
+/// The bytes of an image: a file, or bytes of another one.
+enum Bytes {
+    File(File),
+    Within(Cursor<Arc<[u8]>>),
+}
+
+impl Read for Bytes {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.read(buffer),
+            Self::Within(bytes) => bytes.read(buffer),
+        }
+    }
+}
+
+impl Seek for Bytes {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match self {
+            Self::File(file) => file.seek(to),
+            Self::Within(bytes) => bytes.seek(to),
+        }
+    }
+}
+
+/// An open image with the settings for reading it.
 struct Source {
     path: PathBuf,
-    file: File,
+    file: Bytes,
     length: u64,
     limits: ImageLimits,
     token: CancelToken,
@@ -157,7 +221,16 @@ impl Source {
         if length == 0 {
             return Err(AssetError::malformed(path, None, "the file is empty"));
         }
-        Ok(Self { path: path.to_owned(), file, length, limits, token: token.clone() })
+        Ok(Self { path: path.to_owned(), file: Bytes::File(file), length, limits, token: token.clone() })
+    }
+
+    fn within(image: ImageWithin<'_>, limits: ImageLimits, token: &CancelToken) -> Result<Self, AssetError> {
+        let (path, length) = (image.path.to_owned(), image.bytes.len() as u64);
+        if length == 0 {
+            return Err(AssetError::malformed(&path, None, "an image in it is empty"));
+        }
+        let file = Bytes::Within(Cursor::new(image.bytes));
+        Ok(Self { path, file, length, limits, token: token.clone() })
     }
 
     /// Runs a foreign decoder on it.
@@ -187,7 +260,10 @@ impl Source {
 
     /// A decoder of an image within the limits, and the bytes that its texels will take.
     fn decoder(self, report: Reporter) -> Result<(Box<dyn ImageDecoder>, u64), String> {
-        let header = self.file.try_clone().map_err(|error| in_words(&error))?;
+        let (header, within) = match &self.file {
+            Bytes::File(file) => (Some(file.try_clone().map_err(|error| in_words(&error))?), None),
+            Bytes::Within(bytes) => (None, Some(Arc::clone(bytes.get_ref()))),
+        };
         let reader = BufReader::new(Counting::new(self.file, self.length, report));
         let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|error| in_words(&error))?;
         if reader.format().is_none() {
@@ -197,10 +273,15 @@ impl Source {
         }
         let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
         if is_jpeg {
-            jpeg::check_whole(&self.path, self.limits.memory_bytes, &self.token)?;
+            match within {
+                Some(bytes) => jpeg::check_bytes(&bytes)?,
+                None => jpeg::check_whole(&self.path, self.limits.memory_bytes, &self.token)?,
+            }
         }
-        if reader.format() == Some(ImageFormat::Hdr) {
-            hdr::check_header(&header, &self.token)?;
+        if reader.format() == Some(ImageFormat::Hdr)
+            && let Some(header) = &header
+        {
+            hdr::check_header(header, &self.token)?;
         }
         let decoder = choose(reader, self.limits.memory_bytes).map_err(|error| reason(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };

@@ -19,7 +19,7 @@ const BATCH: usize = 1 << 14;
 
 /// Polygons over vertices: corners of all, one after the other.
 #[derive(Debug, Default)]
-pub(super) struct Faces {
+pub(in crate::assets) struct Faces {
     corners: Vec<u32>,
     /// Corners of each face; empty as long as all are triangles.
     arities: Vec<u32>,
@@ -27,12 +27,12 @@ pub(super) struct Faces {
 
 impl Faces {
     /// Adds a corner to the face that [`Faces::close`] will end.
-    pub(super) fn corner(&mut self, vertex: u32) {
+    pub(in crate::assets) fn corner(&mut self, vertex: u32) {
         self.corners.push(vertex);
     }
 
     /// Ends a face of this many corners.
-    pub(super) fn close(&mut self, arity: usize) {
+    pub(in crate::assets) fn close(&mut self, arity: usize) {
         if self.arities.is_empty() && arity == 3 {
             return;
         }
@@ -43,7 +43,7 @@ impl Faces {
         self.arities.push(arity as u32);
     }
 
-    pub(super) fn reserve(&mut self, triangles: usize) {
+    pub(in crate::assets) fn reserve(&mut self, triangles: usize) {
         self.corners.reserve(3 * triangles);
     }
 
@@ -58,10 +58,10 @@ impl Faces {
     }
 
     /// Most corners that vertices of 32 bits can number.
-    pub(super) const MOST_CORNERS: usize = u32::MAX as usize;
+    pub(in crate::assets) const MOST_CORNERS: usize = u32::MAX as usize;
 
     /// Number of faces.
-    pub(super) fn len(&self) -> usize {
+    pub(in crate::assets) fn len(&self) -> usize {
         if self.arities.is_empty() { self.corners.len() / 3 } else { self.arities.len() }
     }
 }
@@ -69,30 +69,30 @@ impl Faces {
 /// A mesh file's numbers. `normals`, `uvs` and `colors` are empty or one for each position; a normal of zero is missing.
 /// `face_materials` is empty or one for each face.
 #[derive(Debug, Default)]
-pub(super) struct Parsed {
-    pub(super) positions: Vec<DVec3>,
-    pub(super) normals: Vec<Vec3>,
-    pub(super) uvs: Vec<Vec2>,
+pub(in crate::assets) struct Parsed {
+    pub(in crate::assets) positions: Vec<DVec3>,
+    pub(in crate::assets) normals: Vec<Vec3>,
+    pub(in crate::assets) uvs: Vec<Vec2>,
     /// In sRGB.
-    pub(super) colors: Vec<[u8; 3]>,
-    pub(super) faces: Faces,
+    pub(in crate::assets) colors: Vec<[u8; 3]>,
+    pub(in crate::assets) faces: Faces,
     /// Whether each face has vertices of its own, of which those at one place become one.
-    pub(super) has_corners_apart: bool,
-    pub(super) face_materials: Vec<u32>,
-    pub(super) materials: Vec<FileMaterial>,
-    pub(super) warnings: Vec<String>,
-    pub(super) material_warnings: Vec<String>,
-    pub(super) companions: Vec<PathBuf>,
-    pub(super) pictures: Vec<PathBuf>,
+    pub(in crate::assets) has_corners_apart: bool,
+    pub(in crate::assets) face_materials: Vec<u32>,
+    pub(in crate::assets) materials: Vec<FileMaterial>,
+    pub(in crate::assets) warnings: Vec<String>,
+    pub(in crate::assets) material_warnings: Vec<String>,
+    pub(in crate::assets) companions: Vec<PathBuf>,
+    pub(in crate::assets) pictures: Vec<PathBuf>,
 }
 
 /// A vertex colour of parts from 0 to 1 in sRGB, in bytes; what is not a number is 0.
-pub(super) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
+pub(in crate::assets) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
     parts.map(|part| (part.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 
 /// Assembles a mesh: cuts polygons, drops bad faces, compacts the vertices, completes the normals.
-pub(super) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
+pub(in crate::assets) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
     let Parsed {
         positions,
         normals,

@@ -1,13 +1,13 @@
 //! Mesh files: OBJ with MTL, OFF, PLY, STL. Each parser gives the numbers as the file has them; `assemble` makes a mesh of
 //! them that keeps the invariants of [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
 
-mod assemble;
+pub(in crate::assets) mod assemble;
 mod mtl;
 mod normals;
 mod obj;
 mod off;
 mod places;
-mod ply;
+pub mod ply;
 mod polygon;
 mod stl;
 mod text;
@@ -61,10 +61,10 @@ type Reader = fn(&Path, u64, Watch<'_>) -> Result<Vec<u8>, AssetError>;
 
 /// A file in memory, with the watch on its parsing.
 #[derive(Clone, Copy)]
-struct Source<'a> {
-    path: &'a Path,
-    bytes: &'a [u8],
-    watch: Watch<'a>,
+pub(in crate::assets) struct Source<'a> {
+    pub(in crate::assets) path: &'a Path,
+    pub(in crate::assets) bytes: &'a [u8],
+    pub(in crate::assets) watch: Watch<'a>,
 }
 
 impl Source<'_> {

@@ -12,7 +12,7 @@ mod unfinished;
 use std::cell::{Cell, RefCell};
 use std::collections::HashSet;
 use std::fmt::Display;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -29,6 +29,7 @@ use super::identity::Depends;
 use super::inputs::Inputs;
 use super::keys;
 use super::memory::Foretold;
+use super::model::Show;
 use super::pace::Stopwatch;
 use super::plan::{NamedBy, Plan, cores, plan};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing};
@@ -43,10 +44,11 @@ use super::report::finish::{Finished, report};
 use super::settings::{Checkpoints, Overrides, Resume};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
+use super::stages::containers::Containers;
 use super::stages::glass::glass;
 use super::stages::lights::{SkyMemo, lights};
-use super::stages::meshes::{KeptMesh, Meshes, meshes};
-use super::stages::parse::{Parsed, parse};
+use super::stages::meshes::{KeptMesh, MeshName, Meshes, meshes};
+use super::stages::parse::{Origin, Parsed, parse};
 use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::render::render;
 use super::stages::textures::{Needed, TextureCache, Textures, add_declared, needed, textures};
@@ -90,7 +92,7 @@ pub(super) struct Engine {
     means: Means,
     contents: Arc<Contents>,
     parsed: Memo<Arc<Parsed>>,
-    meshes: Pool<PathBuf, KeptMesh>,
+    meshes: Pool<MeshName, KeptMesh>,
     bodies: Memo<Arc<Bodies>>,
     textures: TextureCache,
     accel: AccelCache,
@@ -337,8 +339,11 @@ impl Engine {
         (contents, token): (&Snapshot, &CancelToken),
         findings: &mut Findings,
     ) -> Result<Ready, Stop> {
+        let containers = Containers::default();
+        let show = Show::of(&request.overrides);
         let parsed = table.run(Stage::Parse, || {
-            parse(&request.scene, &request.overrides.sets, contents, &mut self.parsed, findings, token)
+            let origin = Origin { path: &request.scene, sets: &request.overrides.sets, show };
+            parse(origin, (contents, &containers), &mut self.parsed, findings, token)
         })?;
         let before = self.good.as_ref().map(|good| good.parsed.loaded.source.text());
         let edit = before.and_then(|before| changes(before, parsed.loaded.source.text()));
@@ -366,7 +371,7 @@ impl Engine {
             check_targets(request.write, &plan, table.sink)?;
         }
         let pool = self.pool(plan.threads)?;
-        let reading = Reading { sink: table.sink, token, contents, pool: &pool };
+        let reading = Reading { sink: table.sink, token, contents, pool: &pool, containers: &containers };
         let lookups = plan.settings.lookups();
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
         Foretold::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).check(&plan)?;
@@ -586,9 +591,12 @@ impl Engine {
         let mut findings = Findings::default();
         let mut all = || {
             let contents = &Snapshot::of(Arc::clone(&self.contents));
-            let parsed = parse(path, sets, contents, &mut self.parsed, &mut findings, &token)?.value;
+            let containers = Containers::default();
+            let origin = Origin { path, sets, show: Show::default() };
+            let parsed =
+                parse(origin, (contents, &containers), &mut self.parsed, &mut findings, &token)?.value;
             let pool = self.pool(cores())?;
-            let reading = Reading { sink, token: &token, contents, pool: &pool };
+            let reading = Reading { sink, token: &token, contents, pool: &pool, containers: &containers };
             let loaded = &parsed.loaded;
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
             let mut wanted = needed(loaded, &found, Lookups::ALL, &self.textures);

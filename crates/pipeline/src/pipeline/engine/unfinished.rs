@@ -6,6 +6,7 @@ use super::{Engine, Meanwhile};
 use crate::pipeline::plan::plan;
 use crate::pipeline::protocol::Request;
 use crate::pipeline::sink::Sink;
+use crate::pipeline::stages::containers::Containers;
 use crate::pipeline::stages::meshes::Meshes;
 use crate::pipeline::stages::parse::Parsed;
 use crate::pipeline::stages::textures::{Needed, Textures, needed, textures};
@@ -50,7 +51,9 @@ impl Engine {
         // Load what another view needs, if the files still hold it.
         let pool = self.pool(plan.threads)?;
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
-        let reading = Reading { sink, token: meanwhile.token, contents: &snapshot, pool: &pool };
+        let containers = Containers::default();
+        let token = meanwhile.token;
+        let reading = Reading { sink, token, contents: &snapshot, pool: &pool, containers: &containers };
         let good = self.with_textures(good, plan.settings.lookups(), &reading)?;
         // Make it ready: all that did not change is kept from before.
         let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: true };

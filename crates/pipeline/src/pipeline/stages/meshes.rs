@@ -8,12 +8,11 @@ use rayon::prelude::*;
 
 use super::super::cache::Pool;
 use super::super::watch::content::{Content, FileRead, may_have_changed};
+use super::containers::canonical;
 use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
-use crate::assets::mesh::load;
 use crate::assets::{AssetError, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
-use crate::math::Vec3;
-use crate::scene::description::{Located, Scene};
+use crate::scene::description::{MeshFile, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::{Loaded, MeshBounds};
 
@@ -34,12 +33,7 @@ impl KeptMesh {
     }
 
     fn bounds(&self) -> MeshBounds {
-        *self.bounds.get_or_init(|| {
-            let mesh = &self.mesh.mesh;
-            let first = *mesh.positions.first()?;
-            let grow = |[least, greatest]: [Vec3; 2], at: &Vec3| [least.min(*at), greatest.max(*at)];
-            Some(mesh.positions.iter().fold([first; 2], grow).map(|at| at.as_dvec3() + mesh.origin))
-        })
+        *self.bounds.get_or_init(|| self.mesh.mesh.bounds())
     }
 }
 
@@ -52,7 +46,7 @@ pub(in crate::pipeline) type Meshes = Vec<Arc<KeptMesh>>;
 /// Cancelled.
 pub(in crate::pipeline) fn meshes(
     loaded: &Loaded,
-    cache: &mut Pool<PathBuf, KeptMesh>,
+    cache: &mut Pool<MeshName, KeptMesh>,
     findings: &mut Findings,
     reading: &Reading<'_>,
 ) -> Result<Staged<Meshes>, Stop> {
@@ -63,20 +57,25 @@ pub(in crate::pipeline) fn meshes(
     let before: Vec<(Content, Option<Arc<KeptMesh>>)> = files
         .iter()
         .map(|file| {
-            let name = canonical(&file.value);
+            let name = name(file);
             let content = reading.contents.read(&file.value, reading.token)?;
             if let Some(last) = cache.latest(&name) {
                 // What it named last time it most likely names again: hashed before it is read.
                 companions(&last.companions, reading)?;
             }
-            Ok((content, cache.get(&name, file_key(&file.value, content))))
+            Ok((content, cache.get(&name, file_key(file, content))))
         })
         .collect::<Result<_, Cancelled>>()?;
     let assets: Vec<Asset<KeptMesh>> = reading.pool.install(|| {
         files
             .par_iter()
             .zip(before)
-            .map(|(file, (content, kept))| one(&file.value, content, kept, reading, load))
+            .map(|(file, (content, kept))| {
+                let load = |_: &Path, progress: Progress<'_>, token: &CancelToken| {
+                    reading.containers.mesh((&file.value, file.part), progress, token)
+                };
+                one(file, content, kept, reading, load)
+            })
             .collect::<Result<_, _>>()
     })?;
     let mut meshes = Vec::new();
@@ -93,7 +92,7 @@ pub(in crate::pipeline) fn meshes(
                 let said = warnings_of(&mesh.mesh, uses_own);
                 warnings.extend(said.map(|said| (file, format!("{}: {said}", file.value.display()))));
                 let bytes = mesh.mesh.mesh.memory_bytes();
-                cache.insert(canonical(&file.value), file_key(&file.value, content), (mesh.clone(), bytes));
+                cache.insert(name(file), file_key(file, content), (mesh.clone(), bytes));
                 mesh
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
@@ -101,7 +100,7 @@ pub(in crate::pipeline) fn meshes(
             Err(error) => {
                 counts.failed += 1;
                 findings.asset_error(loaded, file.span.clone(), &error);
-                let key = file_key(&file.value, content);
+                let key = file_key(file, content);
                 Arc::new(KeptMesh::new(Arc::default(), key, Vec::new()))
             }
         };
@@ -146,14 +145,22 @@ pub(in crate::pipeline) fn meshes(
     Ok(loaded_and_kept(meshes, counts))
 }
 
+/// A mesh file and the number of its part, however the scene spells it.
+pub(in crate::pipeline) type MeshName = (PathBuf, Option<u32>);
+
+fn name(file: &MeshFile) -> MeshName {
+    (canonical(&file.value), file.part)
+}
+
 /// One file of this content: from before if it and all that it names are as they were.
 fn one(
-    path: &Path,
+    file: &MeshFile,
     content: Content,
     kept: Option<Arc<KeptMesh>>,
     reading: &Reading<'_>,
     load: impl Fn(&Path, Progress<'_>, &CancelToken) -> Result<LoadedMesh, AssetError>,
 ) -> Result<Asset<KeptMesh>, Cancelled> {
+    let path = &file.value;
     let mut files = vec![FileRead { path: path.to_owned(), content }];
     if let Some(mesh) = kept
         && mesh.companions == companions(&mesh.companions, reading)?
@@ -177,7 +184,7 @@ fn one(
             let companions = contents_of(mesh.companions.iter(), reading)?;
             files.extend(companions.iter().cloned());
             let mut key = Fingerprint::new("mesh");
-            key.key(&file_key(path, content));
+            key.key(&file_key(file, content));
             for file in &companions {
                 file.content.add_to(key.path(&file.path));
             }
@@ -210,15 +217,10 @@ fn contents_of<'a>(
         .collect()
 }
 
-fn file_key(path: &Path, content: Content) -> Key {
+fn file_key(file: &MeshFile, content: Content) -> Key {
     let mut key = Fingerprint::new("file");
-    content.add_to(key.path(path));
+    content.add_to(key.path(&file.value).index(file.part.map_or(0, |part| part as usize + 1)));
     key.finish()
-}
-
-/// One file by whatever name; a name that leads nowhere stands for itself.
-pub(super) fn canonical(path: &Path) -> PathBuf {
-    path.canonicalize().unwrap_or_else(|_| path.to_owned())
 }
 
 /// Whether an object shows the file's own materials, for each mesh file.
@@ -238,7 +240,7 @@ fn warnings_of(mesh: &LoadedMesh, uses_own: bool) -> impl Iterator<Item = String
 /// Most warnings of all mesh files.
 const MOST_WARNINGS: usize = 100;
 
-fn warn(loaded: &Loaded, warnings: Vec<(&Located<PathBuf>, String)>, findings: &mut Findings) {
+fn warn(loaded: &Loaded, warnings: Vec<(&MeshFile, String)>, findings: &mut Findings) {
     let unsaid = warnings.len().saturating_sub(MOST_WARNINGS);
     let last = warnings.last().map(|(file, _)| file.span.clone());
     for (file, message) in warnings.into_iter().take(MOST_WARNINGS) {
@@ -265,6 +267,7 @@ fn dropped(faces: &Dropped) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::containers::Containers;
     use super::*;
     use crate::pipeline::sink::Sink;
     use crate::pipeline::watch::content::{Contents, Snapshot};
@@ -276,7 +279,7 @@ mod tests {
         folder: tempfile::TempDir,
         sink: Sink,
         pool: rayon::ThreadPool,
-        cache: Pool<PathBuf, KeptMesh>,
+        cache: Pool<MeshName, KeptMesh>,
         contents: Arc<Contents>,
     }
 
@@ -318,7 +321,13 @@ mod tests {
             self.write("scene.toml", &format!("{tables}{camera}"));
             let loaded = crate::scene::load(&self.folder.path().join("scene.toml"), &[]).expect("a scene");
             let token = CancelToken::new();
-            let reading = Reading { sink: &self.sink, token: &token, contents, pool: &self.pool };
+            let reading = Reading {
+                sink: &self.sink,
+                token: &token,
+                contents,
+                pool: &self.pool,
+                containers: &Containers::default(),
+            };
             let mut findings = Findings::default();
             let meshes = meshes(&loaded, &mut self.cache, &mut findings, &reading).expect("not cancelled");
             (meshes.value, findings)
@@ -406,18 +415,25 @@ mod tests {
     fn a_material_that_changes_after_it_was_read_is_not_taken_for_the_new_one() {
         let desk = Desk::new();
         let path = desk.folder.path().join("a.obj");
+        let file = MeshFile { value: path, span: 0..0, part: None };
         let snapshot = desk.snapshot();
         let token = CancelToken::new();
-        let reading = Reading { sink: &desk.sink, token: &token, contents: &snapshot, pool: &desk.pool };
+        let reading = Reading {
+            sink: &desk.sink,
+            token: &token,
+            contents: &snapshot,
+            pool: &desk.pool,
+            containers: &Containers::default(),
+        };
         let loads = std::sync::atomic::AtomicUsize::new(0);
         let load_and_change = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
-            let mesh = load(path, progress, token);
+            let mesh = crate::assets::mesh::load(path, progress, token);
             if loads.fetch_add(1, std::sync::atomic::Ordering::SeqCst) == 0 {
                 desk.write("a.mtl", "newmtl m\nKd 0 1 0\n");
             }
             mesh
         };
-        let asset = one(&path, desk.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
+        let asset = one(&file, desk.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
         let mesh = asset.result.expect("a mesh").0;
         assert_eq!(asset.files[1].content, desk.hash("a.mtl"));
         assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0, "the mesh has what the file is said to hold");

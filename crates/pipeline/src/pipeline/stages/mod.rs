@@ -1,6 +1,7 @@
 //! The stages, one file each: a function of its inputs and of what is kept from before.
 
 pub(super) mod accel;
+pub(super) mod containers;
 pub(super) mod glass;
 pub(super) mod lights;
 pub(super) mod meshes;
@@ -18,6 +19,7 @@ use std::time::Instant;
 
 use rayon::ThreadPool;
 
+use self::containers::Containers;
 use super::protocol::{Failure, Status};
 use super::sink::Sink;
 use super::watch::content::{Contents, FileRead, Snapshot};
@@ -81,6 +83,7 @@ pub(super) struct Reading<'a> {
     pub(super) token: &'a CancelToken,
     pub(super) contents: &'a Snapshot,
     pub(super) pool: &'a ThreadPool,
+    pub(super) containers: &'a Containers,
 }
 
 /// Findings of a request about files, errors and warnings.

@@ -4,16 +4,20 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::cache::Memo;
+use super::super::model::{self, Show};
 use super::super::protocol::Failure;
 use super::super::watch::content::{Content, FileRead, Snapshot};
+use super::containers::Containers;
 use super::{Findings, Staged, Stop};
-use crate::assets::OrbiterCamera;
 use crate::assets::mesh::load as load_mesh;
 use crate::assets::orbiter::load as load_orbiter;
-use crate::control::CancelToken;
+use crate::assets::{AssetError, OrbiterCamera};
+use crate::control::{CancelToken, Cancelled};
 use crate::scene;
 use crate::scene::description::Camera;
+use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Fingerprint;
+use crate::scene::is_model;
 
 /// A scene that was understood.
 #[derive(Debug)]
@@ -22,7 +26,57 @@ pub(in crate::pipeline) struct Parsed {
     pub(in crate::pipeline) orbiter: Option<OrbiterCamera>,
     /// Files that the scene file names, and those that these name, where the call sets anything.
     pub(in crate::pipeline) named: Vec<PathBuf>,
+    /// Files that a model's scene was made of, beside the model.
+    companions: Vec<FileRead>,
     orbiter_content: Option<Content>,
+}
+
+/// What the call asks for.
+#[derive(Clone, Copy)]
+pub(in crate::pipeline) struct Origin<'a> {
+    /// The scene file, or a model.
+    pub(in crate::pipeline) path: &'a Path,
+    /// Values in place of the scene's.
+    pub(in crate::pipeline) sets: &'a [String],
+    /// How a model is shown.
+    pub(in crate::pipeline) show: Show,
+}
+
+/// The scene of a model, and the other files that it is made of.
+fn model_scene(
+    Origin { path, sets, show }: Origin<'_>,
+    (contents, containers): (&Snapshot, &Containers),
+    findings: &mut Findings,
+    token: &CancelToken,
+) -> Result<(scene::Loaded, Vec<PathBuf>), Stop> {
+    let made = model::text(path, show, containers, token).map_err(|error| match error {
+        AssetError::Cancelled(_) => Stop::Cancelled,
+        AssetError::OutOfMemory { .. } => Stop::work(error),
+        AssetError::Unreadable { path, reason } => {
+            // A file that is missing is watched, so that its coming is noticed.
+            if let Ok(content) = contents.read(&path, token) {
+                findings.read(FileRead { path: path.clone(), content });
+            }
+            broken(&path, format!("cannot read it: {reason}"))
+        }
+        AssetError::Malformed { path, line, reason } => {
+            let line = line.map_or(String::new(), |line| format!("line {line}: "));
+            broken(&path, format!("{line}{reason}"))
+        }
+    })?;
+    let notes = made.notes.into_iter().map(|note| of_file(path, Severity::Warning, note));
+    findings.warnings.extend(notes);
+    let loaded = scene::load_text(made.text.into(), path, sets);
+    Ok((loaded.map_err(|errors| Stop::Failed(Failure::Scene(errors)))?, made.companions))
+}
+
+fn broken(path: &Path, message: String) -> Stop {
+    Stop::Failed(Failure::Scene(vec![of_file(path, Severity::Error, message)]))
+}
+
+/// A diagnostic about a whole file.
+fn of_file(path: &Path, severity: Severity, message: String) -> Diagnostic {
+    Diagnostic { severity, message, path: path.to_owned(), place: None, help: None }
 }
 
 /// Read and validate the scene, with what the call sets in it.
@@ -30,33 +84,59 @@ pub(in crate::pipeline) struct Parsed {
 /// # Errors
 /// All errors of the scene file.
 pub(in crate::pipeline) fn parse(
-    path: &Path,
-    sets: &[String],
-    contents: &Snapshot,
+    origin: Origin<'_>,
+    (contents, containers): (&Snapshot, &Containers),
     memo: &mut Memo<Arc<Parsed>>,
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<Staged<Arc<Parsed>>, Stop> {
+    let Origin { path, sets, show } = origin;
     let content = contents.read(path, token)?;
     findings.read(FileRead { path: path.to_owned(), content });
+    let is_model = is_model(path);
     let mut key = Fingerprint::new("parse");
     content.add_to(key.path(path));
     sets.iter().for_each(|set| {
         key.text(set);
     });
+    if is_model {
+        show.add_to(&mut key);
+    } else if show.from.is_some() {
+        let message = "--from is for models: a scene has its own camera";
+        return Err(Stop::Failed(Failure::Scene(vec![of_file(
+            Path::new(""),
+            Severity::Error,
+            message.to_owned(),
+        )])));
+    }
     let key = key.finish();
-    let known = memo.get(key).cloned();
-    let loaded = match &known {
-        Some(parsed) => parsed.loaded.clone(),
-        None => Arc::new(scene::load(path, sets).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?),
+    // A model is made of more than one file: each of them must be as it was.
+    let is_same = |parsed: &&Arc<Parsed>| {
+        let now =
+            |file: &FileRead| contents.read(&file.path, token).is_ok_and(|content| content == file.content);
+        parsed.companions.iter().all(now)
     };
+    let known = memo.get(key).filter(is_same).cloned();
+    let (loaded, companions) = match &known {
+        Some(parsed) => (parsed.loaded.clone(), parsed.companions.clone()),
+        None if is_model => {
+            let (loaded, companions) = model_scene(origin, (contents, containers), findings, token)?;
+            let read = |path: PathBuf| Ok(FileRead { content: contents.read(&path, token)?, path });
+            (Arc::new(loaded), companions.into_iter().map(read).collect::<Result<_, Cancelled>>()?)
+        }
+        None => {
+            let loaded = scene::load(path, sets).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?;
+            (Arc::new(loaded), Vec::new())
+        }
+    };
+    companions.iter().for_each(|file| findings.read(file.clone()));
     let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
     findings.warnings.extend(loaded.warnings.iter().cloned());
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
         return Ok(Staged::reused(parsed, "the file did not change"));
     }
     let named = named(&loaded);
-    let parsed = Arc::new(Parsed { loaded, orbiter, named, orbiter_content });
+    let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, orbiter_content });
     // A camera that could not be read is tried again by the next request.
     if parsed.orbiter.is_some() == orbiter_content.is_some() {
         memo.set(key, parsed.clone());

@@ -9,10 +9,13 @@ use rayon::prelude::*;
 
 use super::super::cache::{Pool, Spare};
 use super::super::watch::content::{Content, FileRead};
-use super::meshes::{Meshes, canonical};
+use super::containers::{ImageInput, canonical};
+use super::meshes::Meshes;
 use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::AssetError;
-use crate::assets::image::{ImageEncoding, ImageLimits, load, mipmaps, size};
+use crate::assets::image::{
+    ImageEncoding, ImageLimits, ImageWithin, load, load_within, mipmaps, size, size_within,
+};
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
 use crate::materials::texels::Texels;
@@ -27,7 +30,11 @@ use crate::world::{
 const MOST_BYTES: u64 = 2 << 30;
 
 /// A file and the reading of its numbers, however the scene spells it.
-type Name = (PathBuf, ImageEncoding);
+type Name = (PathBuf, Option<u32>, ImageEncoding);
+
+fn name(source: &TextureSource) -> Name {
+    (canonical(&source.path), source.image, source.encoding)
+}
 
 /// The cache of textures: one entry for each file and reading of its numbers, and one for its mipmap levels if a material uses
 /// them.
@@ -40,8 +47,7 @@ pub(in crate::pipeline) struct TextureCache {
 impl TextureCache {
     /// Whether all of these were loaded before, whatever their files hold now.
     fn has_all(&self, needed: &[NeededTexture]) -> bool {
-        let name = |one: &NeededTexture| (canonical(&one.source.path), one.source.encoding);
-        needed.iter().all(|one| self.texels.latest(&name(one)).is_some())
+        needed.iter().all(|one| self.texels.latest(&name(&one.source)).is_some())
     }
 
     pub(in crate::pipeline) fn end(&mut self, success: bool, request: u64) {
@@ -61,7 +67,7 @@ impl TextureCache {
     /// The texels of a file that were read last.
     #[cfg(test)]
     pub(in crate::pipeline) fn latest(&self, path: &Path) -> Option<&Arc<Texels>> {
-        self.texels.latest(&(canonical(path), ImageEncoding::Color))
+        self.texels.latest(&(canonical(path), None, ImageEncoding::Color))
     }
 }
 
@@ -226,9 +232,10 @@ impl Wanted<'_> {
     }
 
     fn key(&self) -> Key {
-        let (path, encoding) = &self.name;
+        let (path, image, encoding) = &self.name;
         let mut key = Fingerprint::new("texture");
-        self.content.add_to(key.path(path).index(encoding.index()));
+        key.path(path).index(encoding.index()).index(image.map_or(0, |image| image as usize + 1));
+        self.content.add_to(&mut key);
         key.finish()
     }
 }
@@ -242,7 +249,7 @@ fn images<'a>(
     let mut images: Vec<Wanted<'a>> = Vec::new();
     let mut known = HashMap::new();
     for one in needed {
-        let name = (canonical(&one.source.path), one.source.encoding);
+        let name = name(&one.source);
         let index = *known.entry(name.clone()).or_insert(images.len());
         if let Some(image) = images.get_mut(index) {
             image.asked_by.push(one);
@@ -272,7 +279,7 @@ fn load_all(
         let (width, height, bytes) = match &image.kept.texels {
             Some(texels) => (texels.width, texels.height, texels.memory_bytes() as u64),
             // One that cannot be read says so when it is loaded.
-            None => size(image.path(), ImageLimits::default(), reading.token).unwrap_or_default(),
+            None => size_of(&image.asked_by[0].source, reading).unwrap_or_default(),
         };
         bytes + if image.has_mipmaps() { Mipmaps::memory_bytes_of(width, height) } else { 0 }
     };
@@ -314,7 +321,14 @@ fn load_one(image: &Wanted<'_>, reading: &Reading<'_>) -> Result<(Image, bool), 
             was_kept = false;
             let (one, limits) = (image.asked_by[0], ImageLimits::default());
             let encoding = one.source.encoding;
-            let load = |progress: Progress<'_>| load(image.path(), encoding, limits, progress, reading.token);
+            let input = input(&one.source, reading)?;
+            let load = |progress: Progress<'_>| match input {
+                ImageInput::File(path) => load(&path, encoding, limits, progress, reading.token),
+                ImageInput::Bytes(bytes) => {
+                    let within = ImageWithin { path: image.path(), bytes };
+                    load_within(within, encoding, limits, progress, reading.token)
+                }
+            };
             Arc::new(reading.sink.asset(&one.name, load)?)
         }
     };
@@ -328,11 +342,31 @@ fn load_one(image: &Wanted<'_>, reading: &Reading<'_>) -> Result<(Image, bool), 
     Ok((Image { texels, mipmaps }, was_kept))
 }
 
+/// Where an image is read from.
+fn input(source: &TextureSource, reading: &Reading<'_>) -> Result<ImageInput, AssetError> {
+    match source.image {
+        None => Ok(ImageInput::File(source.path.clone())),
+        Some(image) => reading.containers.image((&source.path, image), reading.token),
+    }
+}
+
+/// Columns, rows and bytes of an image.
+fn size_of(source: &TextureSource, reading: &Reading<'_>) -> Result<(u32, u32, u64), AssetError> {
+    let limits = ImageLimits::default();
+    match input(source, reading)? {
+        ImageInput::File(path) => size(&path, limits, reading.token),
+        ImageInput::Bytes(bytes) => {
+            size_within(ImageWithin { path: &source.path, bytes }, limits, reading.token)
+        }
+    }
+}
+
 /// For `check`: also the textures of the scene file that no visible material names, and the map of a black environment.
 pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<NeededTexture>) {
-    let mut known: HashSet<PathBuf> = wanted.iter().map(|one| one.source.path.clone()).collect();
+    let name = |path: &Path, image: Option<u32>| (path.to_owned(), image);
+    let mut known: HashSet<_> = wanted.iter().map(|one| name(&one.source.path, one.source.image)).collect();
     for (index, texture) in loaded.scene.textures.iter().enumerate() {
-        if !known.insert(texture.file.value.clone()) {
+        if !known.insert(name(&texture.file.value, texture.image)) {
             continue;
         }
         let encoding = match texture.encoding {
@@ -340,7 +374,7 @@ pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<Needed
             Encoding::Srgb => ImageEncoding::Srgb,
             Encoding::Linear => ImageEncoding::Linear,
         };
-        let source = TextureSource { path: texture.file.value.clone(), encoding };
+        let source = TextureSource { path: texture.file.value.clone(), image: texture.image, encoding };
         wanted.push(NeededTexture {
             source,
             name: texture.name.clone(),
@@ -351,7 +385,7 @@ pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<Needed
         });
     }
     let environment = loaded.scene.environment.as_ref().and_then(|environment| environment.file.as_ref());
-    if let Some(file) = environment.filter(|file| known.insert(file.value.clone())) {
+    if let Some(file) = environment.filter(|file| known.insert(name(&file.value, None))) {
         wanted.push(NeededTexture::of_environment(&file.value));
     }
 }

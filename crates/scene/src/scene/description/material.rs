@@ -16,6 +16,8 @@ pub struct Texture {
     pub name: String,
     /// Its file, resolved against the scene's folder.
     pub file: Located<PathBuf>,
+    /// Number of the image in a glTF file. `None` if the file is an image.
+    pub image: Option<u32>,
     /// Interpolation.
     pub filter: TextureFilter,
     /// Outside [0, 1].
@@ -28,6 +30,8 @@ pub struct Texture {
     pub offset: Vec2,
     /// Meaning of its numbers.
     pub encoding: Encoding,
+    /// Factor on the linear colours and numbers that are looked up, not on normals and heights.
+    pub factor: Vec3,
 }
 
 choice! {
@@ -472,9 +476,10 @@ impl Material {
 /// Key of the look-up; the texels have keys of their own.
 impl Fingerprinted for Texture {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
-        let Self { name: _, file, filter, wrap, repeat, rotate, offset, encoding } = self;
+        let Self { name: _, file, image, filter, wrap, repeat, rotate, offset, encoding, factor } = self;
         key.path(&file.value).choice(*filter).choice(*wrap).choice(*encoding).f32(repeat.x).f32(repeat.y);
-        key.f64(*rotate).f32(offset.x).f32(offset.y);
+        key.f64(*rotate).f32(offset.x).f32(offset.y).vec3(*factor);
+        key.index(image.map_or(0, |image| image as usize + 1));
     }
 }
 

@@ -41,8 +41,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// `[materials.*]`, in the order of the file.
     pub materials: Vec<Material>,
-    /// The mesh files that `[[mesh]]` tables name, each once.
-    pub mesh_files: Vec<Located<PathBuf>>,
+    /// The mesh files that `[[mesh]]` tables name, and parts of them, each once.
+    pub mesh_files: Vec<MeshFile>,
     /// Every shape, in the order of the file within its kind.
     pub objects: Vec<Object>,
     /// `[[light]]`, in the order of the file.
@@ -58,6 +58,17 @@ pub struct Located<T> {
     pub value: T,
     /// Bytes of the scene file.
     pub span: Range<usize>,
+}
+
+/// A mesh file, or one part of a glTF file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MeshFile {
+    /// The file.
+    pub value: PathBuf,
+    /// Bytes of the scene file that name it.
+    pub span: Range<usize>,
+    /// Number of the part. `None` for the whole file.
+    pub part: Option<u32>,
 }
 
 /// Photon maps: read and validated, used by the integrators that have them.

@@ -1,7 +1,9 @@
 //! `[textures.*]`.
 
+use std::path::PathBuf;
+
 use super::super::description::{
-    Channel, Encoding, Material, PixelNumber, Texture, TextureFilter, TextureUse, Wrap,
+    Channel, Encoding, Located, Material, PixelNumber, Texture, TextureFilter, TextureUse, Wrap,
 };
 use super::super::sanitize::shortened;
 use super::context::{Context, Issue};
@@ -9,11 +11,14 @@ use super::key::Key;
 use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
-use crate::math::Vec2;
+use crate::math::{Vec2, Vec3};
 
 /// Endings of pictures that can be read.
 pub(super) const PICTURES: [&str; 12] =
     ["png", "jpg", "jpeg", "ppm", "pgm", "pbm", "pnm", "tga", "bmp", "hdr", "exr", "webp"];
+
+/// Endings of files that hold numbered images.
+pub(super) const GLTF: [&str; 2] = ["glb", "gltf"];
 
 /// The textures of a file.
 pub(super) struct Textures {
@@ -32,7 +37,7 @@ pub(super) fn read(root: &Table<'_>) -> Textures {
 }
 
 fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
-    let file = table.required("file", "\"picture.png\"").file(&PICTURES, &[]);
+    let (file, image) = image(table);
     let filter = table.optional("filter").choice().unwrap_or(TextureFilter::Bilinear);
     let wrap = table.optional("wrap").choice().unwrap_or(Wrap::Repeat);
     let repeat = table.optional("repeat").pair(Limits::NotZero).unwrap_or(Vec2::ONE);
@@ -40,8 +45,20 @@ fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
     let offset = table.optional("offset").pair(Limits::Any).unwrap_or(Vec2::ZERO);
     let encoding = table.optional("encoding").choice().unwrap_or(Encoding::Auto);
     first_coordinates(&table.optional("uv"));
+    let factor = table.optional("factor");
+    let factor = if factor.is_given() { factor.color() } else { Some(Vec3::ONE) };
     table.finish();
-    Some(Texture { name, file: file?, filter, wrap, repeat, rotate, offset, encoding })
+    let (file, image, factor) = (file?, image?, factor?);
+    Some(Texture { name, file, image, filter, wrap, repeat, rotate, offset, encoding, factor })
+}
+
+/// The file, and the number of the image if it is one of glTF.
+fn image(table: &Table<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
+    let (key, number) = (table.required("file", "\"picture.png\""), table.optional("image"));
+    if !number.is_given() {
+        return (key.file(&PICTURES, &[]), Some(None));
+    }
+    (key.file(&GLTF, &[]), number.whole(0..=i128::from(u32::MAX)).map(Some))
 }
 
 /// Reports a set of texture coordinates other than the first: no mesh file has more.

@@ -135,7 +135,7 @@ fn a_click_after_f_focuses_there() {
 }
 
 fn kept(desk: &mut Desk, is_new: bool, is_own: bool) -> Vec<Effect> {
-    let outcome = Ok(Kept { path: "scenes/cornell.toml".into(), is_new, is_own });
+    let outcome = Ok(Kept { path: "scenes/cornell.toml".into(), is_new, is_own, of_model: false });
     desk.worker(protocol::Event::CameraKept { generation: 0, outcome })
 }
 

@@ -6,6 +6,7 @@ use super::say::{notify, say};
 use crate::pipeline::protocol::{Command, Kept};
 use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
+use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::tui::camera::{dollied, orbited, zoomed};
 use crate::tui::event::Effect;
@@ -111,7 +112,8 @@ fn forget_own(state: &mut State) {
 pub(super) fn keep(state: &mut State) -> Vec<Effect> {
     let Some(view) = state.request.viewpoint() else { return unknown(state) };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
-    if !state.request.toggles.camera.is_any() && !is_set {
+    // The scene of a model is worth writing with its own camera, too.
+    if !state.request.toggles.camera.is_any() && !is_set && !is_mesh(&state.request.scene) {
         return notify(state, "the camera is where the scene has it: there is nothing to write");
     }
     vec![Effect::Send(Command::KeepCamera(view))]
@@ -119,7 +121,7 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
 
 /// Tells the outcome of keeping the camera. A camera that the file has now does not count as moved by keys.
 pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effect> {
-    let Kept { path, is_new, is_own } = match outcome {
+    let Kept { path, is_new, is_own, of_model } = match outcome {
         Ok(kept) => kept,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
@@ -128,6 +130,7 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
     };
     let name = visible(&path.to_string_lossy()).into_owned();
     let words = match (is_new, is_own) {
+        _ if of_model => format!("wrote {name}, a scene of this model with this camera"),
         (true, true) => format!("the camera is in {name} now"),
         (true, false) => format!("the camera is in {name}; in this call --set comes first"),
         (false, _) => format!("{name} has this camera already"),

@@ -10,6 +10,7 @@ use crate::choice::Choice;
 use crate::pipeline::protocol::Command;
 use crate::pipeline::settings::View;
 use crate::scene::description::{Integrator, Method, Shadows};
+use crate::scene::is_mesh;
 use crate::tui::ExitStatus;
 use crate::tui::action::Action;
 use crate::tui::event::{Effect, KeyPress};
@@ -65,6 +66,9 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::CloseUp => close_up(state),
         Action::RectangleFirst => rectangle::press(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
+        Action::Edit if is_mesh(&state.request.scene) => {
+            notify(state, "a model is no text; c writes a scene of it")
+        }
         Action::Edit => vec![Effect::Edit(places::to_edit(state))],
         Action::BeforeAfter => history::before_and_after(state),
         Action::OlderPicture => history::browse(state, 1),

@@ -3,6 +3,7 @@
 
 mod body;
 mod header;
+pub mod write;
 
 use super::assemble::{Parsed, assemble, color_bytes};
 use super::text::Cursor;

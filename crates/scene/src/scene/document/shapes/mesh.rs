@@ -3,47 +3,60 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use super::super::super::description::{Located, Mesh, Placement, Shape};
+use super::super::super::description::{Located, Mesh, MeshFile, Placement, Shape};
 use super::super::context::Issue;
 use super::super::key::Key;
 use super::super::limits::Limits;
 use super::super::table::Table;
+use super::super::textures::GLTF;
 use crate::math::DVec3;
 use crate::math::limits::{SHORTEST, is_too_short, length};
 
 /// Endings of mesh files that can be read.
-pub(super) const MESHES: [&str; 4] = ["obj", "off", "ply", "stl"];
-
-/// Endings that other versions read.
-pub(super) const UNAVAILABLE: [&str; 2] = ["gltf", "glb"];
+pub(super) const MESHES: [&str; 6] = ["obj", "off", "ply", "stl", "glb", "gltf"];
 
 /// The mesh files named so far, each once, however it is written.
 #[derive(Default)]
 pub(super) struct MeshFiles {
-    list: Vec<Located<PathBuf>>,
-    indices: HashMap<PathBuf, usize>,
+    list: Vec<MeshFile>,
+    indices: HashMap<(PathBuf, Option<u32>), usize>,
 }
 
 impl MeshFiles {
-    fn index(&mut self, file: Located<PathBuf>) -> usize {
+    fn index(&mut self, file: Located<PathBuf>, part: Option<u32>) -> usize {
         let identity = file.value.canonicalize().unwrap_or_else(|_| file.value.clone());
-        *self.indices.entry(identity).or_insert_with(|| {
-            self.list.push(file);
+        *self.indices.entry((identity, part)).or_insert_with(|| {
+            let Located { value, span } = file;
+            self.list.push(MeshFile { value, span, part });
             self.list.len() - 1
         })
     }
 
-    pub(super) fn into_list(self) -> Vec<Located<PathBuf>> {
+    pub(super) fn into_list(self) -> Vec<MeshFile> {
         self.list
     }
 }
 
 pub(super) fn read(table: &Table<'_>, files: &mut MeshFiles) -> Option<Shape> {
-    let file = table.required("file", "\"mesh.obj\"").file(&MESHES, &UNAVAILABLE);
+    let file = table.required("file", "\"mesh.obj\"").file(&MESHES, &[]);
+    let part = part(table, file.as_ref());
     let placed = placement(table);
     let smooth = table.optional("smooth").flag().unwrap_or(true);
     let vertex_colors = table.optional("vertex_colors").flag().unwrap_or(false);
-    Some(Shape::Mesh(Mesh { file: files.index(file?), placed: placed?, smooth, vertex_colors }))
+    Some(Shape::Mesh(Mesh { file: files.index(file?, part?), placed: placed?, smooth, vertex_colors }))
+}
+
+/// The number of a part, which glTF files have.
+fn part(table: &Table<'_>, file: Option<&Located<PathBuf>>) -> Option<Option<u32>> {
+    let key = table.optional("part");
+    let Some(span) = key.span() else { return Some(None) };
+    let number = key.whole(0..=i128::from(u32::MAX)).map(Some);
+    let ending = file.and_then(|file| file.value.extension()).unwrap_or_default().to_ascii_lowercase();
+    if file.is_some() && !GLTF.iter().any(|known| ending == *known) {
+        key.context.report(Issue::error(span, "`part` is for .glb and .gltf files: others have no parts"));
+        return None;
+    }
+    number
 }
 
 /// `matrix`, or `scale`, `rotate` and `translate`.

@@ -11,9 +11,9 @@ mod sphere;
 mod torus;
 mod triangle;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::super::description::{Located, Object, Shape};
+use super::super::description::{MeshFile, Object, Shape};
 use super::context::Issue;
 use super::limits::Limits;
 use super::materials::Materials;
@@ -44,7 +44,7 @@ pub(super) fn is_kind(name: &str) -> bool {
 }
 
 /// Every shape of the file, and the mesh files they name; no shapes if one of them is wrong.
-pub(super) fn read(root: &Table<'_>, materials: &Materials) -> (Option<Vec<Object>>, Vec<Located<PathBuf>>) {
+pub(super) fn read(root: &Table<'_>, materials: &Materials) -> (Option<Vec<Object>>, Vec<MeshFile>) {
     let mut files = MeshFiles::default();
     let mut objects = Vec::new();
     let mut is_right = true;
@@ -145,5 +145,5 @@ fn span_area(u: DVec3, v: DVec3) -> bool {
 /// Whether a file is a mesh by its name, of any version of glimt.
 pub(in crate::scene) fn is_mesh(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    mesh::MESHES.iter().chain(&mesh::UNAVAILABLE).any(|known| *known == ending)
+    mesh::MESHES.iter().any(|known| *known == ending)
 }

@@ -1,0 +1,342 @@
+//! glTF 2.0 (Khronos, *glTF 2.0 Specification*): files as JSON or GLB, their parts as meshes, their images, and what they show.
+//!
+//! A part is a primitive; parts are counted over all meshes from 0. The types of the crate `gltf` are not used: without its
+//! validation it gives up at an index out of range, and with it, at every extension that it does not know; its errors have no place.
+
+mod accessor;
+mod base64;
+mod description;
+mod json;
+mod materials;
+mod model;
+mod part;
+mod whole;
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+pub use self::description::{
+    Alpha, Glass, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelScene, Placed,
+    Slot, TextureRef, TextureWrap,
+};
+use self::json::{Root, Uri};
+use super::AssetError;
+use super::read::{self, Watch};
+use crate::control::{CancelToken, Progress, unwatched};
+
+/// Most bytes of a file, and of all buffers together.
+const FILE_LIMIT: u64 = 4 << 30;
+/// Most bytes of JSON, data URIs included.
+const JSON_LIMIT: usize = 512 << 20;
+
+/// Whether a file is glTF by its name.
+pub fn is_gltf(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default();
+    ending.eq_ignore_ascii_case("glb") || ending.eq_ignore_ascii_case("gltf")
+}
+
+/// A fault of a file: a place in the JSON, and the reason.
+#[derive(Debug)]
+struct Wrong(String);
+
+impl Wrong {
+    fn new(reason: impl Into<String>) -> Self {
+        Self(reason.into())
+    }
+
+    /// An index that leads nowhere.
+    fn index(list: &str, index: usize, length: usize) -> Self {
+        Self(format!("{list}[{index}] does not exist: there are {length}"))
+    }
+
+    /// The same with the place that it was met in.
+    fn inside(self, place: impl Into<String>) -> Self {
+        Self(format!("{}: {}", place.into(), self.0))
+    }
+}
+
+/// A text of a file in a message.
+fn shown(text: &str) -> String {
+    text.chars().take(60).collect()
+}
+
+/// An open glTF file with its buffers.
+#[derive(Debug)]
+pub struct Container {
+    path: PathBuf,
+    root: Root,
+    buffers: Vec<Vec<u8>>,
+    /// Files that hold its buffers, read.
+    companions: Vec<PathBuf>,
+}
+
+/// The bytes of an image.
+#[derive(Debug, PartialEq)]
+pub enum ImageBytes<'a> {
+    /// Inside the file.
+    Inside(&'a [u8]),
+    /// A file of its own.
+    File(PathBuf),
+}
+
+impl Container {
+    /// Opens a file and reads its buffers.
+    ///
+    /// # Errors
+    /// [`AssetError`], with the place in the JSON.
+    pub fn open(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<Self, AssetError> {
+        let watch = Watch { progress, token };
+        let bytes = read::not_blank(path, FILE_LIMIT, watch)?;
+        let length = bytes.len();
+        let wrong = |wrong: Wrong| AssetError::malformed(path, None, wrong.0);
+        let (json, binary) =
+            if bytes.starts_with(b"glTF") { chunks(&bytes).map_err(wrong)? } else { (0..length, None) };
+        // Parse the JSON.
+        let text = &bytes[json];
+        if text.len() > JSON_LIMIT {
+            let (has, most) = (text.len().div_ceil(1 << 20), JSON_LIMIT >> 20);
+            return Err(wrong(Wrong::new(format!(
+                "{has} MiB of JSON, more than the {most} that are read; keep the buffers in .glb or .bin files"
+            ))));
+        }
+        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+        let mut root: Root = serde_json::from_slice(text).map_err(|error| {
+            let what = error.to_string();
+            let what = what.split(" at line ").next().unwrap_or_default();
+            AssetError::malformed(
+                path,
+                Some(error.line()),
+                format!("column {}: {}", error.column(), shown_long(what)),
+            )
+        })?;
+        check_version(&root).map_err(wrong)?;
+        check_required(&root).map_err(wrong)?;
+        // Keep the binary chunk, then read what the buffers name.
+        let binary = binary.map(|range| {
+            let mut bytes = bytes;
+            bytes.truncate(range.end);
+            bytes.drain(..range.start);
+            bytes
+        });
+        let (buffers, companions) = buffers(path, &mut root, binary, watch)?;
+        let container = Self { path: path.to_owned(), root, buffers, companions };
+        container.check_corners().map_err(wrong)?;
+        watch.tick(2 * length, 2 * length)?;
+        Ok(container)
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Files that hold its buffers.
+    pub fn companions(&self) -> &[PathBuf] {
+        &self.companions
+    }
+
+    /// The bytes of an image, or the file that holds them.
+    ///
+    /// # Errors
+    /// An image that does not exist, or bytes that are not there.
+    pub fn image(&self, number: usize) -> Result<ImageBytes<'_>, AssetError> {
+        self.image_bytes(number).map_err(|wrong| self.wrong(wrong.inside(format!("images[{number}]"))))
+    }
+
+    /// The bytes of an image, read from its file if it has one.
+    ///
+    /// # Errors
+    /// As for [`Container::image`], and a file that cannot be read.
+    pub fn image_content(&self, number: usize, token: &CancelToken) -> Result<Vec<u8>, AssetError> {
+        match self.image(number)? {
+            ImageBytes::Inside(bytes) => Ok(bytes.to_vec()),
+            ImageBytes::File(file) => read::bytes(&file, FILE_LIMIT, Watch { progress: &unwatched, token }),
+        }
+    }
+
+    fn image_bytes(&self, number: usize) -> Result<ImageBytes<'_>, Wrong> {
+        let images = &self.root.images;
+        let image = images.get(number).ok_or_else(|| Wrong::index("images", number, images.len()))?;
+        match (&image.uri, image.buffer_view) {
+            (Some(Uri::Data(bytes)), _) => Ok(ImageBytes::Inside(bytes)),
+            (Some(Uri::File(uri)), _) => Ok(ImageBytes::File(beside(&self.path, uri)?)),
+            (None, Some(view)) => {
+                let views = &self.root.buffer_views;
+                let json = views.get(view).ok_or_else(|| Wrong::index("bufferViews", view, views.len()))?;
+                accessor::view_bytes(self, json).map(ImageBytes::Inside)
+            }
+            (None, None) => Err(Wrong::new("it has neither a URI nor a buffer view")),
+        }
+    }
+
+    fn wrong(&self, wrong: Wrong) -> AssetError {
+        AssetError::malformed(&self.path, None, wrong.0)
+    }
+
+    /// Refuses files whose primitives share bytes so often that the meshes would take many times the file's size.
+    fn check_corners(&self) -> Result<(), Wrong> {
+        let mut known = HashSet::new();
+        let mut corners = 0;
+        for primitive in self.root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+            let list = primitive.indices.or_else(|| primitive.attributes.get("POSITION").copied());
+            if known.insert((list, &primitive.attributes)) {
+                let accessor = list.and_then(|list| self.root.accessors.get(list));
+                corners += accessor.map_or(0, |accessor| accessor.count.min(u64::from(u32::MAX)));
+            }
+        }
+        let bytes: u64 = self.buffers.iter().map(|buffer| buffer.len() as u64).sum();
+        let most = bytes + (1 << 20);
+        if corners > most {
+            return Err(Wrong::new(format!(
+                "its primitives claim {corners} corners, more than its {bytes} bytes can hold"
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// A longer text of a parser in a message.
+fn shown_long(text: &str) -> String {
+    text.chars().take(200).collect()
+}
+
+type Range = std::ops::Range<usize>;
+
+/// The JSON and the binary chunk of a GLB file (4.4).
+fn chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), Wrong> {
+    const JSON: u32 = 0x4e4f_534a;
+    const BINARY: u32 = 0x004e_4942;
+    let word = |at: usize| bytes.get(at..at + 4)?.first_chunk().copied().map(u32::from_le_bytes);
+    match word(4) {
+        Some(2) => {}
+        Some(version) => {
+            return Err(Wrong::new(format!("it is GLB of version {version}; version 2 is read")));
+        }
+        None => return Err(Wrong::new("the file ends in its header")),
+    }
+    let (mut json, mut binary, mut at) = (None, None, 12);
+    while let (Some(length), Some(kind)) = (word(at), word(at + 4)) {
+        let start = at + 8;
+        let end = start.checked_add(length as usize).filter(|end| *end <= bytes.len());
+        let Some(end) = end else {
+            let has = bytes.len() - start;
+            return Err(Wrong::new(format!(
+                "the chunk at byte {at} claims {length} bytes, and the file has {has} more"
+            )));
+        };
+        match kind {
+            JSON if json.is_none() => json = Some(start..end),
+            BINARY if binary.is_none() => binary = Some(start..end),
+            _ => {}
+        }
+        at = end.next_multiple_of(4);
+    }
+    Ok((json.ok_or_else(|| Wrong::new("it has no JSON"))?, binary))
+}
+
+fn check_version(root: &Root) -> Result<(), Wrong> {
+    match root.asset.version.as_str() {
+        version if version.starts_with("2.") => Ok(()),
+        "" => Err(Wrong::new("it is no glTF: asset.version is missing")),
+        version => Err(Wrong::new(format!("it is glTF {}; version 2 is read", shown(version)))),
+    }
+}
+
+/// Extensions without which a file has no meshes or no pictures, and the way out.
+const MISSING: [(&str, &str); 5] = [
+    ("KHR_draco_mesh_compression", "export it without Draco compression"),
+    ("EXT_meshopt_compression", "export it without meshopt compression"),
+    ("KHR_meshopt_compression", "export it without meshopt compression"),
+    ("KHR_texture_basisu", "export it with PNG or JPEG textures in place of Basis ones"),
+    ("EXT_mesh_gpu_instancing", "export it with a node for each instance"),
+];
+
+/// Refuses files that cannot be read without what glimt does not have.
+fn check_required(root: &Root) -> Result<(), Wrong> {
+    for name in &root.extensions_required {
+        if let Some((_, help)) = MISSING.iter().find(|(known, _)| known == name) {
+            return Err(Wrong::new(format!("it needs {name}, which this version does not read; {help}")));
+        }
+    }
+    Ok(())
+}
+
+/// The bytes of all buffers, and the files that held them.
+fn buffers(
+    path: &Path,
+    root: &mut Root,
+    mut binary: Option<Vec<u8>>,
+    watch: Watch<'_>,
+) -> Result<(Vec<Vec<u8>>, Vec<PathBuf>), AssetError> {
+    let (mut all, mut files, mut total) = (Vec::new(), Vec::new(), 0);
+    for (number, buffer) in root.buffers.iter_mut().enumerate() {
+        let wrong =
+            |wrong: Wrong| AssetError::malformed(path, None, wrong.inside(format!("buffers[{number}]")).0);
+        let bytes = match buffer.uri.take() {
+            Some(Uri::Data(bytes)) => bytes,
+            Some(Uri::File(uri)) => {
+                let file = beside(path, &uri).map_err(wrong)?;
+                let silent = Watch { progress: &unwatched, token: watch.token };
+                let bytes = read::bytes(&file, FILE_LIMIT - total, silent).map_err(|error| match error {
+                    AssetError::Unreadable { path: missing, reason } => {
+                        let name = path.file_name().unwrap_or_default().to_string_lossy();
+                        AssetError::unreadable(
+                            &missing,
+                            format!("{reason}; buffers[{number}] of {name} is in it"),
+                        )
+                    }
+                    other => other,
+                })?;
+                files.push(file);
+                bytes
+            }
+            None if number == 0 => {
+                binary.take().ok_or_else(|| wrong(Wrong::new("it has neither a URI nor a binary chunk")))?
+            }
+            None => return Err(wrong(Wrong::new("it has no URI"))),
+        };
+        if (bytes.len() as u64) < buffer.byte_length {
+            let (has, claimed) = (bytes.len(), buffer.byte_length);
+            return Err(wrong(Wrong::new(format!("it claims {claimed} bytes, and there are {has}"))));
+        }
+        total += bytes.len() as u64;
+        if total > FILE_LIMIT {
+            return Err(wrong(Wrong::new(format!("the buffers have more than {} MiB", FILE_LIMIT >> 20))));
+        }
+        all.push(bytes);
+    }
+    Ok((all, files))
+}
+
+/// The file that a relative URI names (RFC 3986), seen from a file.
+fn beside(path: &Path, uri: &str) -> Result<PathBuf, Wrong> {
+    let has_scheme = uri.split(['/', '?', '#']).next().is_some_and(|first| first.contains(':'));
+    if has_scheme || uri.starts_with('/') || uri.is_empty() {
+        return Err(Wrong::new(format!("{:?} is no file beside it", shown(uri))));
+    }
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let [first, behind @ ..] = rest {
+        let digits =
+            behind.get(..2).and_then(|digits| u8::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok());
+        match (first, digits) {
+            (b'%', Some(byte)) => {
+                bytes.push(byte);
+                rest = &behind[2..];
+            }
+            _ => {
+                bytes.push(*first);
+                rest = behind;
+            }
+        }
+    }
+    let name =
+        String::from_utf8(bytes).map_err(|_| Wrong::new(format!("{:?} is no name of a file", shown(uri))))?;
+    if name.contains('\0') {
+        return Err(Wrong::new("a name with a byte 0"));
+    }
+    Ok(path.parent().unwrap_or(Path::new("")).join(name))
+}
+
+#[cfg(test)]
+mod tests;

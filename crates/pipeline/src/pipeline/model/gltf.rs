@@ -1,0 +1,301 @@
+//! Scenes of glTF files.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use super::frame::{framed, tidied};
+use super::materials::{Materials, TextureFile};
+use super::toml::{Toml, color, list, number, vector};
+use super::{Eye, FOV, ModelText, SIZE, Show, Unique, camera, file_name, ground, light, render};
+use crate::assets::AssetError;
+use crate::assets::gltf::{
+    Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelScene,
+};
+use crate::control::{CancelToken, unwatched};
+use crate::math::{DMat3, DVec3};
+use crate::pipeline::settings::Side;
+use crate::pipeline::stages::containers::Containers;
+use crate::scene::quoted;
+
+/// The files in which the text finds parts and images.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::pipeline) enum Naming {
+    /// In the glTF file and the files that it names.
+    Inside,
+    /// In a folder of files of their own, beside the text.
+    Folder(String),
+}
+
+/// A file that the text names.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::pipeline) struct Asset {
+    /// Its name, relative to the text.
+    pub(in crate::pipeline) name: String,
+    /// Its content.
+    pub(in crate::pipeline) content: Content,
+}
+
+/// The content of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(in crate::pipeline) enum Content {
+    /// A part as PLY.
+    Part(usize),
+    /// An image as it is.
+    Image(usize),
+}
+
+/// The scene of a glTF file.
+pub(super) fn text(
+    path: &Path,
+    (show, naming): (Show, &Naming),
+    containers: &Containers,
+    token: &CancelToken,
+) -> Result<ModelText, AssetError> {
+    let container = containers.open(path, &unwatched, token)?;
+    let scene = container.scene(token)?;
+    let Some(bounds) = scene.bounds else {
+        let reason = "its scene shows no faces".to_owned();
+        return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
+    };
+    let mut writer = Writer {
+        container: &container,
+        path,
+        naming,
+        toml: Toml::default(),
+        files: Unique::default(),
+        assets: Vec::new(),
+        names: HashMap::new(),
+        image_names: scene.images.clone(),
+    };
+    writer.write(&scene, bounds, show);
+    let Writer { toml, assets, .. } = writer;
+    let ModelScene { notes, .. } = scene;
+    Ok(ModelText { text: toml.finish(), companions: container.companions().to_vec(), notes, assets })
+}
+
+struct Writer<'a> {
+    container: &'a Container,
+    path: &'a Path,
+    naming: &'a Naming,
+    toml: Toml,
+    /// Names of files in the folder.
+    files: Unique,
+    assets: Vec<Asset>,
+    names: HashMap<Content, String>,
+    image_names: Vec<String>,
+}
+
+impl Writer<'_> {
+    fn write(&mut self, scene: &ModelScene, bounds: [DVec3; 2], show: Show) {
+        // Say what this is, and what it is not.
+        self.toml.comment(&format!("{}, as glimt shows it.", file_name(self.path)));
+        for note in &scene.notes {
+            self.toml.comment(note);
+        }
+        // The picture, its camera and its light.
+        let own = scene.cameras.first().filter(|_| show.from.is_none());
+        let aspect = show.aspect.or(own.and_then(|camera| camera.aspect));
+        let size = own
+            .and_then(|camera| camera.aspect)
+            .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
+        render(&mut self.toml, size);
+        let eye = match own {
+            Some(own) => {
+                let eye = eye_of(own, bounds);
+                camera(&mut self.toml, &eye, own.fov);
+                eye
+            }
+            None => {
+                let eye = framed(
+                    bounds,
+                    &scene.outline,
+                    show.from.unwrap_or(Side::Iso),
+                    aspect.unwrap_or(SIZE[0] / SIZE[1]),
+                );
+                camera(&mut self.toml, &eye, FOV);
+                eye
+            }
+        };
+        light(&mut self.toml, &eye, !scene.lights.is_empty());
+        if !scene.lights.is_empty() {
+            self.toml.section("1 cd of the file counts as 1 W/sr, 1 lx as 1 W/m².");
+        }
+        scene.lights.iter().for_each(|light| self.light(light));
+        // Materials, then what has them.
+        let mut names = Unique::default();
+        let materials = Materials::write(scene, &mut names, self);
+        let mut shapes = Unique::default();
+        for instance in &scene.instances {
+            self.mesh(instance, &materials[instance.material], &mut shapes);
+        }
+        ground(&mut self.toml, &mut names, bounds, &eye);
+    }
+
+    fn light(&mut self, light: &ModelLight) {
+        let toml = &mut self.toml;
+        toml.table("[[light]]");
+        if !light.name.is_empty() {
+            toml.comment(&light.name);
+        }
+        match light.kind {
+            ModelLightKind::Point => {}
+            ModelLightKind::Spot { .. } => toml.key("type", "\"spot\""),
+            ModelLightKind::Directional => toml.key("type", "\"directional\""),
+        }
+        match light.kind {
+            ModelLightKind::Directional => {
+                toml.key("direction", vector(light.direction));
+                toml.key("irradiance", color(light.intensity));
+            }
+            ModelLightKind::Point | ModelLightKind::Spot { .. } => {
+                toml.key("position", vector(light.position));
+                toml.key("intensity", color(light.intensity));
+            }
+        }
+        if let ModelLightKind::Spot { angle, blend } = light.kind {
+            toml.key("look_at", vector(light.position + light.direction));
+            toml.key("angle", number(angle.min(359.0)));
+            toml.key("blend", number(blend));
+        }
+    }
+
+    fn mesh(&mut self, instance: &ModelInstance, material: &str, shapes: &mut Unique) {
+        self.toml.table("[[mesh]]");
+        if !instance.name.is_empty() {
+            self.toml.key("name", quoted(&shapes.name(&instance.name, "mesh")));
+        }
+        let base = if instance.name.is_empty() { "part" } else { &instance.name };
+        match self.naming {
+            Naming::Inside => {
+                self.toml.key("file", quoted(&file_name(self.path)));
+                self.toml.key("part", instance.part.to_string());
+            }
+            Naming::Folder(_) => {
+                let name = self.asset(Content::Part(instance.part), base, "ply");
+                self.toml.key("file", quoted(&name));
+            }
+        }
+        self.toml.key("material", quoted(material));
+        self.placement(&instance.placed.linear, instance.placed.translate);
+        if !instance.has_normals {
+            self.toml.key("smooth", "false");
+        }
+        if instance.has_colors {
+            self.toml.key("vertex_colors", "true");
+        }
+    }
+
+    /// `scale` and `translate` where these are enough, else `matrix`.
+    fn placement(&mut self, linear: &DMat3, translate: DVec3) {
+        let scale = DVec3::new(linear.x_axis.x, linear.y_axis.y, linear.z_axis.z);
+        if *linear == DMat3::from_diagonal(scale) {
+            if scale != DVec3::ONE {
+                self.toml.key("scale", color(scale));
+            }
+            if translate != DVec3::ZERO {
+                self.toml.key("translate", vector(translate));
+            }
+            return;
+        }
+        let rows = linear.transpose();
+        let row = |axis: DVec3, last: f64| {
+            let row = list(&[axis.x, axis.y, axis.z, last].map(tidy));
+            row[1..row.len() - 1].to_owned()
+        };
+        let matrix = [(rows.x_axis, translate.x), (rows.y_axis, translate.y), (rows.z_axis, translate.z)];
+        let matrix = matrix.map(|(axis, last)| row(axis, last)).join(",  ");
+        self.toml.key("matrix", format!("[{matrix},  0, 0, 0, 1]"));
+    }
+
+    /// Name of a file in the folder, which is made if the content is new.
+    fn asset(&mut self, content: Content, wanted: &str, ending: &str) -> String {
+        if let Some(known) = self.names.get(&content) {
+            return known.clone();
+        }
+        let folder = match self.naming {
+            Naming::Inside => String::new(),
+            Naming::Folder(folder) => format!("{folder}/"),
+        };
+        let plain: String =
+            wanted.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
+        let plain = plain.trim_matches('.').chars().take(60).collect::<String>().to_lowercase();
+        let name = format!("{folder}{}.{ending}", self.files.name(&plain, "part"));
+        self.assets.push(Asset { name: name.clone(), content });
+        self.names.insert(content, name.clone());
+        name
+    }
+}
+
+impl super::materials::Files for Writer<'_> {
+    fn toml(&mut self) -> &mut Toml {
+        &mut self.toml
+    }
+
+    fn image_name(&self, image: usize) -> String {
+        let name = self.image_names.get(image).filter(|name| !name.is_empty()).cloned();
+        let of_file = || match self.container.image(image) {
+            Ok(ImageBytes::File(path)) => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()),
+            Ok(ImageBytes::Inside(_)) | Err(_) => None,
+        };
+        name.or_else(of_file).unwrap_or_else(|| format!("image_{image}"))
+    }
+
+    fn image(&mut self, image: usize) -> TextureFile {
+        let bytes = self.container.image(image);
+        match (self.naming, bytes) {
+            (Naming::Inside, Ok(ImageBytes::File(file))) => {
+                let folder = self.path.parent().unwrap_or(Path::new(""));
+                let name = file.strip_prefix(folder).unwrap_or(&file);
+                TextureFile { file: name.to_string_lossy().into_owned(), image: None }
+            }
+            (Naming::Inside, Ok(ImageBytes::Inside(_)) | Err(_)) => {
+                TextureFile { file: file_name(self.path), image: Some(image) }
+            }
+            (Naming::Folder(_), bytes) => {
+                let ending = match &bytes {
+                    Ok(ImageBytes::Inside(bytes)) => ending(bytes).to_owned(),
+                    Ok(ImageBytes::File(path)) => {
+                        path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+                    }
+                    Err(_) => "png".to_owned(),
+                };
+                let wanted = self.image_name(image);
+                let name = self.asset(Content::Image(image), &wanted, &ending);
+                TextureFile { file: name, image: None }
+            }
+        }
+    }
+}
+
+/// The ending of an image by its first bytes.
+fn ending(bytes: &[u8]) -> &'static str {
+    if bytes.starts_with(b"\xff\xd8") {
+        "jpg"
+    } else if bytes.starts_with(b"RIFF") {
+        "webp"
+    } else {
+        "png"
+    }
+}
+
+/// A number without the rest that a rotation by a right angle leaves.
+fn tidy(value: f64) -> f64 {
+    if value.abs() < 1e-12 { 0.0 } else { value }
+}
+
+/// The eye of a file's camera. It looks at the depth of the model's middle.
+fn eye_of(camera: &ModelCamera, [least, greatest]: [DVec3; 2]) -> Eye {
+    let size = (greatest - least).length().max(1e-12);
+    let depth = ((least + greatest) * 0.5 - camera.position).dot(camera.direction).max(size * 0.05);
+    let look_at = camera.position + camera.direction * depth;
+    let step = size.min(depth) * 1e-6;
+    let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| tidied(part, step)));
+    let up = if (camera.up - DVec3::Y).length() < 1e-6 || is_level(camera) { DVec3::Y } else { camera.up };
+    Eye { position: tidy(camera.position), look_at: tidy(look_at), up }
+}
+
+/// Whether a camera looks the same with y upwards.
+fn is_level(camera: &ModelCamera) -> bool {
+    let side = camera.direction.cross(DVec3::Y);
+    side.length() > 1e-3 && camera.up.dot(side.normalize()).abs() < 1e-6 && camera.up.y > 0.0
+}

@@ -1,0 +1,49 @@
+//! Scenes of glTF files as files of their own.
+
+use std::path::{Path, PathBuf};
+
+use super::gltf::{Content, Naming};
+use super::{ModelText, Show};
+use crate::assets::AssetError;
+use crate::assets::gltf::is_gltf;
+use crate::assets::mesh::ply::write;
+use crate::control::{CancelToken, unwatched};
+use crate::pipeline::stages::containers::Containers;
+
+/// A scene that can be written.
+#[derive(Debug)]
+pub struct Imported {
+    /// Its text. Files that it names are relative to it.
+    pub text: String,
+    /// The files that the text names, each with its path relative to the text.
+    pub files: Vec<(PathBuf, Vec<u8>)>,
+    /// Approximations, each with its place in the file.
+    pub notes: Vec<String>,
+}
+
+/// Reads a file of another program as a scene whose other files are in a folder of this name.
+///
+/// # Errors
+/// What is wrong with the file, in words.
+pub fn import(path: &Path, folder: &str) -> Result<Imported, String> {
+    if !is_gltf(path) {
+        return Err(format!("{} is no file that can be imported: .gltf or .glb", path.display()));
+    }
+    let (containers, token) = (Containers::default(), CancelToken::new());
+    let naming = Naming::Folder(folder.to_owned());
+    let read = || {
+        let ModelText { text, notes, assets, .. } =
+            super::gltf::text(path, (Show::default(), &naming), &containers, &token)?;
+        let container = containers.open(path, &unwatched, &token)?;
+        let mut files = Vec::new();
+        for asset in assets {
+            let bytes = match asset.content {
+                Content::Part(part) => write::bytes(&container.part(part, &unwatched, &token)?.mesh),
+                Content::Image(image) => container.image_content(image, &token)?,
+            };
+            files.push((PathBuf::from(asset.name), bytes));
+        }
+        Ok(Imported { text, files, notes })
+    };
+    read().map_err(|error: AssetError| error.to_string())
+}

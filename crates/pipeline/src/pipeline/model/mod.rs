@@ -1,0 +1,166 @@
+//! Scenes of models: the text of a scene that shows a mesh or a glTF file. `glimt MODEL` reads this text as it reads that of a
+//! scene file, `glimt import` writes it; so both show the same.
+
+mod frame;
+mod gltf;
+pub(super) mod import;
+mod materials;
+mod plain;
+mod toml;
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+use self::frame::{Eye, FOV, KEY, SKY, ground_reflectance, key_direction};
+use self::gltf::{Asset, Naming};
+use self::toml::{Toml, number, vector};
+use super::settings::{Overrides, Side};
+use super::stages::containers::Containers;
+use crate::assets::AssetError;
+use crate::assets::gltf::is_gltf;
+use crate::control::CancelToken;
+use crate::math::DVec3;
+use crate::scene::fingerprint::Fingerprint;
+
+/// Way of showing a model.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(in crate::pipeline) struct Show {
+    /// The side from which it is seen. `None` for the file's own camera, else [`Side::Iso`].
+    pub(in crate::pipeline) from: Option<Side>,
+    /// Width over height of the picture. `None` if the call leaves one of them open.
+    pub(in crate::pipeline) aspect: Option<f64>,
+}
+
+/// Width and height of a picture where nobody says another.
+const SIZE: [f64; 2] = [640.0, 480.0];
+
+impl Show {
+    /// The way that a call asks for.
+    pub(in crate::pipeline) fn of(overrides: &Overrides) -> Self {
+        let aspect = match (overrides.width, overrides.height) {
+            (None, None) => None,
+            (width, height) => {
+                let or = |given: Option<u32>, usual: f64| given.map_or(usual, f64::from);
+                Some(or(width, SIZE[0]) / or(height, SIZE[1]))
+            }
+        };
+        Self { from: overrides.from, aspect }
+    }
+
+    /// Adds what the scene of a model depends on.
+    pub(in crate::pipeline) fn add_to(self, key: &mut Fingerprint) {
+        key.flag(self.from.is_some());
+        if let Some(from) = self.from {
+            key.choice(from);
+        }
+        key.f64(self.aspect.unwrap_or_default());
+    }
+}
+
+/// The scene of a model.
+#[derive(Debug)]
+pub(in crate::pipeline) struct ModelText {
+    /// The text of the scene.
+    pub(in crate::pipeline) text: String,
+    /// Other files that it was made of.
+    pub(in crate::pipeline) companions: Vec<PathBuf>,
+    /// Approximations, a line each.
+    pub(in crate::pipeline) notes: Vec<String>,
+    /// Files that the text names beside itself and that are not there yet.
+    pub(in crate::pipeline) assets: Vec<Asset>,
+}
+
+/// The scene that shows a model, with paths relative to the model's folder.
+///
+/// # Errors
+/// What is wrong with the file.
+pub(in crate::pipeline) fn text(
+    path: &Path,
+    show: Show,
+    containers: &Containers,
+    token: &CancelToken,
+) -> Result<ModelText, AssetError> {
+    if is_gltf(path) {
+        return gltf::text(path, (show, &Naming::Inside), containers, token);
+    }
+    plain::text(path, show, containers, token)
+}
+
+/// Name of a file in its folder.
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Tables that are the same for every model: the picture, then what is around it.
+fn render(toml: &mut Toml, size: Option<[u32; 2]>) {
+    toml.table("[render]");
+    if let Some([width, height]) = size {
+        toml.key("width", width.to_string());
+        toml.key("height", height.to_string());
+    }
+    toml.key("samples", "256");
+    toml.key("error", "0.05");
+    toml.key("integrator", "\"path\"");
+}
+
+/// The camera that frames the model.
+fn camera(toml: &mut Toml, eye: &Eye, fov: f64) {
+    toml.table("[camera]");
+    toml.key("position", vector(eye.position));
+    toml.key("look_at", vector(eye.look_at));
+    if eye.up != DVec3::Y {
+        toml.key("up", vector(eye.up));
+    }
+    if fov != 40.0 {
+        toml.key("fov", number(fov));
+    }
+}
+
+/// A sky, and a key light where the model has no lights of its own.
+fn light(toml: &mut Toml, eye: &Eye, has_own: bool) {
+    toml.table("[environment]");
+    toml.key("color", number(SKY));
+    if !has_own {
+        toml.table("[[light]]");
+        toml.key("type", "\"directional\"");
+        toml.key("direction", vector(key_direction(eye)));
+        toml.key("irradiance", number(KEY));
+        toml.key("angle", "6");
+    }
+}
+
+/// A ground below the model, unless the eye is below it.
+fn ground(toml: &mut Toml, names: &mut Unique, [least, greatest]: [DVec3; 2], eye: &Eye) {
+    let size = (greatest - least).length();
+    let height = least.y - size * 1e-4;
+    if eye.position.y <= height {
+        return;
+    }
+    let name = names.name("ground", "ground");
+    toml.table(&format!("[materials.{name}]"));
+    toml.key("diffuse", number(ground_reflectance()));
+    toml.table("[[plane]]");
+    toml.key("point", vector(DVec3::new(0.0, frame::tidied(height, size * 1e-5), 0.0)));
+    toml.key("material", format!("\"{name}\""));
+}
+
+/// Names in use.
+#[derive(Debug, Default)]
+struct Unique(HashSet<String>);
+
+impl Unique {
+    /// A name that is not in use yet: this one, or with a number. One without letters becomes `usual` with a number.
+    fn name(&mut self, wanted: &str, usual: &str) -> String {
+        let plain: String = wanted.chars().filter(|c| !c.is_control()).take(100).collect();
+        let plain = plain.trim();
+        let is_name = plain.parse::<f64>().is_err() && !plain.is_empty();
+        let plain = if is_name { plain } else { usual };
+        let mut name = plain.to_owned();
+        let mut next = 2;
+        while !self.0.insert(name.clone()) {
+            name = format!("{plain}_{next}");
+            next += 1;
+        }
+        name
+    }
+}

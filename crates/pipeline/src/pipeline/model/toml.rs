@@ -1,0 +1,143 @@
+//! The text of a scene as a person would write it: short numbers, bare keys, nothing that is the default.
+
+use crate::math::{DVec3, Vec2};
+use crate::scene::quoted;
+
+/// A growing text.
+#[derive(Debug, Default)]
+pub(super) struct Toml(String);
+
+impl Toml {
+    /// A comment of its own lines.
+    pub(super) fn comment(&mut self, text: &str) {
+        const WIDTH: usize = 110;
+        let mut line = String::from("#");
+        for word in text.split_whitespace() {
+            if line.len() + 1 + word.len() > WIDTH {
+                self.line(&line);
+                line = String::from("#");
+            }
+            // A control character would end the comment.
+            line.extend(std::iter::once(' ').chain(word.chars().filter(|c| !c.is_control())));
+        }
+        self.line(&line);
+    }
+
+    /// An empty line, then a header such as `[camera]`.
+    pub(super) fn table(&mut self, header: &str) {
+        if !self.0.is_empty() && !self.0.ends_with("\n\n") {
+            self.0.push('\n');
+        }
+        self.line(header);
+    }
+
+    /// An empty line, then a comment.
+    pub(super) fn section(&mut self, text: &str) {
+        if !self.0.is_empty() && !self.0.ends_with("\n\n") {
+            self.0.push('\n');
+        }
+        self.comment(text);
+    }
+
+    /// A key with a value that is TOML.
+    pub(super) fn key(&mut self, key: &str, value: impl AsRef<str>) {
+        self.line(&format!("{key} = {}", value.as_ref()));
+    }
+
+    fn line(&mut self, line: &str) {
+        self.0.push_str(line);
+        self.0.push('\n');
+    }
+
+    pub(super) fn finish(self) -> String {
+        self.0
+    }
+}
+
+/// A number with as many digits as a 32-bit float holds; lengths far from 0 keep all of theirs.
+pub(super) fn number(value: f64) -> String {
+    const FAR: f64 = 1e4;
+    let magnitude = value.abs();
+    let text = if magnitude >= 1e15 || magnitude > 0.0 && magnitude < 1e-5 {
+        format!("{:e}", value as f32)
+    } else if magnitude >= FAR {
+        format!("{value}")
+    } else {
+        format!("{}", value as f32)
+    };
+    if text == "-0" { "0".to_owned() } else { text }
+}
+
+/// A number with some significant digits.
+pub(super) fn rounded(value: f64, digits: i32) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    let unit = libm::pow(10.0, f64::from(digits - 1) - libm::floor(libm::log10(value.abs())));
+    (value * unit).round() / unit
+}
+
+/// Numbers in brackets.
+pub(super) fn list(values: &[f64]) -> String {
+    format!("[{}]", values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
+}
+
+/// A point or a direction.
+pub(super) fn vector(value: DVec3) -> String {
+    list(&value.to_array())
+}
+
+/// Two numbers.
+pub(super) fn pair(value: Vec2) -> String {
+    list(&[f64::from(value.x), f64::from(value.y)])
+}
+
+/// A colour; grey is one number.
+pub(super) fn color(value: DVec3) -> String {
+    let [red, green, blue] = value.to_array();
+    if red == green && green == blue { number(red) } else { vector(value) }
+}
+
+/// A name as a key: bare where TOML allows that.
+pub(super) fn key_name(name: &str) -> String {
+    let is_bare =
+        !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte));
+    if is_bare { name.to_owned() } else { quoted(name) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_toml() {
+        for (value, text) in [
+            (0.0, "0"),
+            (-0.0, "0"),
+            (1.0, "1"),
+            (f64::from(0.3_f32), "0.3"),
+            (-2.5, "-2.5"),
+            (500_000.125, "500000.125"),
+            (1e-7, "1e-7"),
+            (3e20, "3e20"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+        assert_eq!((rounded(1234.56, 3), rounded(-0.012345, 2), rounded(0.0, 2)), (1230.0, -0.012, 0.0));
+        assert_eq!(
+            (color(DVec3::ONE), key_name("a-b_1"), key_name("a b")),
+            ("1".into(), "a-b_1".into(), "\"a b\"".into())
+        );
+    }
+
+    #[test]
+    fn a_comment_stays_one() {
+        let mut toml = Toml::default();
+        toml.comment(&format!("a\n[camera]\u{7} {}", "word ".repeat(40)));
+        let text = toml.finish();
+        assert!(
+            text.lines().count() > 1 && text.lines().all(|line| line.starts_with("# ") && line.len() <= 112),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,216 @@
+//! `glimt MODEL` and `glimt import`.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::json;
+
+use super::desk::Desk;
+use super::gltf::{Glb, cube, cubes};
+
+const SMALL: &str = "--once --force --width 48 --height 36 --samples 4 --error 0";
+
+/// A picture's linear values.
+fn picture(desk: &Desk, line: &str) -> Vec<f32> {
+    desk.expect(&format!("{line} {SMALL} -o picture.exr"), 0);
+    image::open(desk.path("picture.exr")).expect("a picture").to_rgb32f().into_raw()
+}
+
+fn checker() -> Vec<u8> {
+    fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/textures/checker.png")).expect("an image")
+}
+
+/// An OBJ file of a box of these sizes.
+fn box_of([x, y, z]: [i32; 3]) -> String {
+    let corner =
+        |bits: i32| format!("v {} {} {}\n", (bits & 1) * x, (bits >> 1 & 1) * y, (bits >> 2 & 1) * z);
+    let corners: String = (0..8).map(corner).collect();
+    corners + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
+}
+
+/// Rows and columns in which pixels differ from those of the ground and the sky, which look the same: least and greatest of each.
+fn covered(pixels: &[f32]) -> [usize; 4] {
+    let mut bounds = [48, 0, 36, 0];
+    for (index, pixel) in pixels.chunks(3).enumerate() {
+        let (x, y) = (index % 48, index / 48);
+        // The view of normals is black where nothing is, and the ground's normal is green.
+        if pixel[0] > 0.55
+            || pixel[2] > 0.55
+            || pixel[0] < 0.45 && pixel[0] > 0.0
+            || pixel[1] < 0.45 && pixel[1] > 0.0
+        {
+            bounds = [bounds[0].min(x), bounds[1].max(x), bounds[2].min(y), bounds[3].max(y)];
+        }
+    }
+    bounds
+}
+
+#[test]
+fn a_model_is_framed_from_every_side() {
+    let desk = Desk::new();
+    desk.write("box.obj", box_of([3, 2, 1]));
+    for (side, ratio) in [("front", 1.5), ("back", 1.5), ("left", 0.5), ("right", 0.5)] {
+        let [left, right, top, bottom] =
+            covered(&picture(&desk, &format!("box.obj --view normal --from {side}")));
+        let (width, height) = ((right - left + 1) as f32, (bottom - top + 1) as f32);
+        assert!(left > 0 && top > 0 && right < 47 && bottom < 35, "{side}: {left} {right} {top} {bottom}");
+        assert!((width / height / ratio - 1.0).abs() < 0.25, "{side}: {width} × {height}");
+        assert!(width > 36.0 || height > 26.0, "{side}: it fills the frame: {width} × {height}");
+    }
+    let stderr = desk.expect(&format!("ball.toml {SMALL} --from top"), 2);
+    assert!(stderr.contains("--from is for models"), "{stderr}");
+}
+
+/// The same shape in a format that counts z upwards stands as the one that counts y upwards.
+#[test]
+fn stl_files_stand_on_their_ground() {
+    let desk = Desk::new();
+    desk.write("box.obj", box_of([3, 2, 1]));
+    // Of x, y and z: the width, the depth to the back, the height.
+    let facets = box_of([3, 1, 2]);
+    let corners: Vec<&str> = facets.lines().filter_map(|line| line.strip_prefix("v ")).collect();
+    let faces = facets.lines().filter_map(|line| line.strip_prefix("f "));
+    let facet = |face: &str| {
+        let vertices: String = face
+            .split(' ')
+            .map(|corner| format!("vertex {}\n", corners[corner.parse::<usize>().expect("a number") - 1]))
+            .collect();
+        format!("facet normal 0 0 0\nouter loop\n{vertices}endloop\nendfacet\n")
+    };
+    desk.write("box.stl", format!("solid box\n{}endsolid box\n", faces.map(facet).collect::<String>()));
+    let [obj, stl] = ["box.obj", "box.stl"]
+        .map(|file| covered(&picture(&desk, &format!("{file} --view normal --from front"))));
+    assert_eq!(obj, stl);
+}
+
+#[test]
+fn an_import_is_the_picture_of_the_model() {
+    let desk = Desk::new();
+    desk.write("cubes.glb", cubes(&checker()));
+    let shown = picture(&desk, "cubes.glb");
+    let said = desk.expect("import cubes.glb -o scene.toml", 0);
+    assert!(said.contains("wrote scene.toml, and 2 files in scene_files"), "{said}");
+    assert_eq!(picture(&desk, "scene.toml"), shown);
+    let text = fs::read_to_string(desk.path("scene.toml")).expect("a scene");
+    for words in [
+        "[textures.checks]\nfile = \"scene_files/checks.png\"\nfactor = [1, 0.5, 0.5]\n",
+        "[materials.\"paint \\\"1\\\"\"]\ntype = \"principled\"\ncolor = { texture = \"checks\" }\nroughness = 1\n",
+        "name = \"straight\"\nfile = \"scene_files/straight.ply\"\nmaterial = \"paint \\\"1\\\"\"\ntranslate = [-1.5, 1, 0]\n",
+        "name = \"turned\"\nfile = \"scene_files/straight.ply\"\n",
+    ] {
+        assert!(text.contains(words), "{words}\nin\n{text}");
+    }
+    // The image in its folder is the one that was put into the model.
+    assert_eq!(desk.bytes("scene_files/checks.png"), checker());
+    // It never writes over a file or into a folder that is there.
+    let said = desk.expect("import cubes.glb -o scene.toml", 2);
+    assert!(said.contains("scene.toml exists already, and is left as it is"), "{said}");
+    fs::remove_file(desk.path("scene.toml")).expect("removed");
+    assert!(desk.expect("import cubes.glb -o scene.toml", 2).contains("scene_files exists already"));
+    assert!(desk.expect("import ball.toml -o b.toml", 2).contains(".gltf or .glb"));
+    assert!(desk.expect("import cubes.glb -o b.png", 2).contains("must end in .toml"));
+}
+
+#[test]
+fn approximations_are_named_counted_and_refused_if_strict() {
+    let desk = Desk::new();
+    let mut glb = Glb::default();
+    let mut cube = cube(&mut glb);
+    cube["material"] = json!(0);
+    let extensions = json!({"KHR_materials_sheen": {}});
+    desk.write("a.glb", glb.finish(json!({
+        "nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}], "materials": [{"extensions": extensions}], "animations": [{}]
+    })));
+    let said = desk.expect("import a.glb -o strict.toml --strict", 1);
+    assert!(
+        said.contains("materials[0]: its sheen is left out") && said.contains("2 approximations"),
+        "{said}"
+    );
+    assert!(!desk.path("strict.toml").exists() && !desk.path("strict_files").exists());
+    desk.expect("import a.glb", 0);
+    let text = fs::read_to_string(desk.path("a.toml")).expect("a scene");
+    assert!(
+        text.contains(
+            "# animations: 1 left out: the model is shown at rest\n# materials[0]: its sheen is left out\n"
+        ),
+        "{text}"
+    );
+    let said = desk.expect(&format!("a.glb {SMALL}"), 0);
+    assert!(said.contains("its sheen is left out"), "{said}");
+}
+
+#[test]
+fn a_model_s_own_cameras_and_lights_count() {
+    let desk = Desk::new();
+    let mut glb = Glb::default();
+    let cube = cube(&mut glb);
+    desk.write("a.glb", glb.finish(json!({
+        "nodes": [{"mesh": 0}, {"name": "eye", "camera": 0, "translation": [0, 0, 9]},
+            {"translation": [0, 5, 5], "extensions": {"KHR_lights_punctual": {"light": 0}}}],
+        "meshes": [{"primitives": [cube]}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 1, "aspectRatio": 2}}],
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 40, "color": [1, 0, 0]}]}}
+    })));
+    desk.expect("import a.glb", 0);
+    let text = fs::read_to_string(desk.path("a.toml")).expect("a scene");
+    for words in [
+        "width = 960\nheight = 480",
+        "position = [0, 0, 9]",
+        "look_at = [0, 0, 0]",
+        "fov = 57.29578",
+        "intensity = [40, 0, 0]",
+    ] {
+        assert!(text.contains(words), "{words}\nin\n{text}");
+    }
+    assert!(!text.contains("directional"), "{text}");
+}
+
+/// A part of a scene's own, and a whole file with its materials.
+#[test]
+fn a_scene_may_name_a_gltf_file_or_a_part_of_it() {
+    let desk = Desk::new();
+    desk.write("cubes.glb", cubes(&checker()));
+    let check = |text: &str, code: i32| {
+        desk.write(
+            "scene.toml",
+            format!("[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[environment]\ncolor = 1\n{text}"),
+        );
+        let output = desk.run("check scene.toml");
+        assert_eq!(output.status.code(), Some(code), "{text}\n{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8([output.stdout, output.stderr].concat()).expect("UTF-8")
+    };
+    let whole = check("[[mesh]]\nfile = \"cubes.glb\"\n", 0);
+    assert!(
+        whole.contains("1 object, 24 triangles") && whole.contains("the textures of 1 of its materials"),
+        "{whole}"
+    );
+    let part = "[[mesh]]\nfile = \"cubes.glb\"\npart = 0\n";
+    let material = "material = \"m\"\n[materials.m]\ndiffuse = { texture = \"t\" }\n[textures.t]\nfile = \"cubes.glb\"\n";
+    let said = check(&format!("{part}{material}image = 0\n"), 0);
+    assert!(said.contains("1 object, 12 triangles, 1 texture"), "{said}");
+    assert!(check(part, 2).contains("has no materials of its own"));
+    assert!(check(&format!("{part}{material}"), 2).contains("unknown file ending .glb"));
+    assert!(
+        check(&format!("{part}{material}image = 7\n"), 2).contains("images[7] does not exist: there are 1")
+    );
+    let said = check(&format!("{}{material}image = 0\n", part.replace('0', "9")), 2);
+    assert!(said.contains("part[9] does not exist: there are 1"), "{said}");
+    let said = check("[[mesh]]\nfile = \"a.obj\"\npart = 0\n", 2);
+    assert!(said.contains("no file"), "{said}");
+}
+
+#[test]
+fn a_broken_model_is_an_error_with_its_place() {
+    let desk = Desk::new();
+    for (file, content, words) in [
+        ("a.glb", &b"glTF\x02\0\0\0\0\0\0\0"[..], "it has no JSON"),
+        ("a.gltf", b"{", "line 1: column 1"),
+        ("a.gltf", b"{\"asset\": {\"version\": \"2.0\"}}", "its scene shows no faces"),
+        ("a.stl", b"solid a\nvertex", "line 2"),
+        ("a.ply", b"ply\n", "a.ply"),
+    ] {
+        desk.write(file, content);
+        let said = desk.expect(&format!("{file} {SMALL}"), 2);
+        assert!(said.contains(words) && said.contains(file), "{file}: {said}");
+    }
+}

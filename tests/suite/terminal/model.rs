@@ -1,0 +1,53 @@
+//! A model alone, in the terminal.
+
+use std::fs;
+
+use super::pty::Folder;
+
+/// An OBJ file of a red wall of this height, one unit wide, that faces the eye.
+fn wall(height: f32) -> String {
+    format!("mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 1 {height} 0\nv 0 {height} 0\nf 1 2 3 4\n")
+}
+
+#[test]
+fn a_model_saved_again_is_seen_again_and_c_writes_its_scene_once() {
+    let folder = Folder::new();
+    folder.write("a.mtl", "newmtl red\nKd 0.9 0 0\nKe 1 0 0\n");
+    folder.write("wall.obj", &wall(0.1));
+    let small = ["--samples", "2", "--width", "64", "--height", "48", "--from", "front"];
+    let call = [&[folder.program(), "wall.obj"][..], &small].concat();
+    let mut terminal = folder.terminal_with(&call, &[]);
+    terminal.wait_for_render(1);
+    let low = folder.bytes("wall.png");
+    // Another program saves it.
+    folder.write("wall.obj", &wall(0.7));
+    terminal.wait_for_render(2);
+    let options = &call[2..];
+    assert_ne!(folder.bytes("wall.png"), low);
+    assert_eq!(folder.bytes("wall.png"), once(&folder, options), "the picture of the model as it is now");
+    terminal.press("o");
+    terminal.wait_for("a model is no text");
+    terminal.press("c");
+    terminal.wait_for("wrote wall.toml, a scene of this model with this camera");
+    let text = fs::read_to_string(folder.path("wall.toml")).expect("a scene");
+    assert!(text.contains("[[mesh]]\nfile = \"wall.obj\"\n") && text.contains("[camera]"), "{text}");
+    assert_eq!(fs::read_to_string(folder.path("wall.obj")).expect("the model"), wall(0.7));
+    terminal.press("c");
+    terminal.wait_for("wall.toml exists already, and is left as it is");
+    // A file that is half written, then whole again.
+    folder.write("wall.obj", "v 0 0");
+    terminal.wait_for("wall.obj");
+    terminal.wait_for("broken");
+    folder.write("wall.obj", &wall(0.1));
+    terminal.wait("the low wall", |_| fs::read(folder.path("wall.png")).is_ok_and(|bytes| bytes == low));
+    terminal.press("q");
+    assert_eq!(terminal.end(), 0);
+}
+
+/// The bytes that `--once` writes.
+fn once(folder: &Folder, options: &[&str]) -> Vec<u8> {
+    let mut process = std::process::Command::new(folder.program());
+    process.args(["wall.obj", "--once", "-o", "once.png", "--progress", "none"]).args(options);
+    assert!(process.current_dir(folder.path("")).status().expect("it runs").success());
+    folder.bytes("once.png")
+}
