@@ -339,7 +339,7 @@ fn mistakes_have_their_place() {
     let mut beside = square();
     beside["buffers"][0]["uri"] = json!("none.bin");
     let said = open_json(&beside).expect_err("refused").to_string();
-    assert!(said.contains("none.bin: no such file; buffers[0] of a.gltf is in it"), "{said}");
+    assert!(said.contains("none.bin: no such file or directory; buffers[0] of a.gltf is in it"), "{said}");
     let zeros = json!({"componentType": 5126, "count": 4_000_000_000_u32, "type": "VEC3"});
     let said = with(&|json| json["accessors"][0] = zeros.clone());
     assert!(said.contains("4000000000 elements without a buffer view"), "{said}");
