@@ -77,13 +77,23 @@ fn killed_at_any_time_the_old_image_is_whole_and_the_next_one_has_the_same_pixel
     }
 }
 
-/// Writes checkpoints all the time: the kill meets a write.
 #[test]
 fn killed_while_it_writes_a_checkpoint_is_the_one_before_or_the_new_one() {
+    kill_while_it_writes(50);
+}
+
+#[test]
+#[ignore = "takes long"]
+fn killed_200_times_while_it_writes_a_checkpoint() {
+    kill_while_it_writes(200);
+}
+
+/// Writes checkpoints all the time: the kill meets a write.
+fn kill_while_it_writes(times: u32) {
     let desk = desk();
     let mut next = random(5);
     let line = "room.toml --once --progress none -o out.exr --checkpoint 0.000001 --samples 100000 --resume";
-    for number in 0..200 {
+    for number in 0..times {
         let child = begin(&desk, line);
         std::thread::sleep(Duration::from_secs_f64(0.02 + 0.1 * next()));
         end(child, Signal::SIGKILL);
