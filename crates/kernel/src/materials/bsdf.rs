@@ -60,7 +60,8 @@ pub struct BsdfValues {
 /// Directions at a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
-    /// Unit shading normal on the side of the light: the viewer's, but for light that comes through the surface.
+    /// Unit shading normal on the side of the light: the viewer's, but for light that comes through the surface. It is
+    /// [`turned`](RoughRow::turned).
     pub normal: Vec3,
     /// Unit direction to the viewer.
     pub to_eye: Vec3,
@@ -161,6 +162,13 @@ pub trait RoughRow: Clone {
     /// A row of any content.
     const EMPTY: Self;
 
+    /// The shading normal by which its lobes are lit, given one on the side of the light, and the direction to the viewer. Lobes of
+    /// microfacets turn it to the viewer, see [`facing`](super::microfacet::facing).
+    #[inline(always)]
+    fn turned(normal: Vec3, _to_eye: Vec3) -> Vec3 {
+        normal
+    }
+
     /// Prepares the row for other surfaces.
     fn reset(&mut self);
 
@@ -229,6 +237,7 @@ pub trait MaterialRow: RoughRow {
         folds: impl Folds,
     ) -> u32;
 
-    /// Sets shading normals on the viewer's side, and directions from the viewer; in these lanes only, if any are given.
-    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3);
+    /// Sets shading normals on the viewer's side, and directions from the viewer; in these lanes only, if any are given. All normals
+    /// are replaced by those of [`RoughRow::turned`].
+    fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3);
 }

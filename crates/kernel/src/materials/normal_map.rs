@@ -22,11 +22,7 @@ impl NormalMap {
     #[inline]
     pub fn bend(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
         let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
-        let slope = mapped.truncate() * self.strength;
-        let slope = match &self.texture.moved {
-            None => slope,
-            Some(moved) => moved.vector_before(slope.as_dvec2()).as_vec2(),
-        };
+        let slope = self.texture.direction_before(at.uv, mapped.truncate() * self.strength);
         let (tangent, bitangent) = tangents(normal, dpdu, dpdv);
         let bent = tangent * slope.x + bitangent * slope.y + normal * mapped.z.abs();
         bent.try_normalize().unwrap_or(normal)
@@ -78,6 +74,29 @@ mod tests {
         // The texture's first coordinate is −v.
         let bent = turned.bend(&middle(), Vec3::Z, Vec3::X, Vec3::Y);
         assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6, "{bent}");
+    }
+
+    #[test]
+    fn slopes_are_mirrored_with_their_texture() {
+        let leaning = Vec3::new(0.48, 0.36, 0.8);
+        // (repeat, wrap, texture coordinates, sides of the slopes)
+        let cases = [
+            (Vec2::new(1.0, 1.0), Wrap::Repeat, DVec2::new(1.5, 2.5), [1.0, 1.0]),
+            (Vec2::new(-1.0, 1.0), Wrap::Repeat, DVec2::new(0.5, 0.5), [-1.0, 1.0]),
+            (Vec2::new(2.0, -3.0), Wrap::Clamp, DVec2::new(0.5, 0.5), [1.0, -1.0]),
+            (Vec2::new(1.0, 1.0), Wrap::Mirror, DVec2::new(0.5, 0.5), [1.0, 1.0]),
+            (Vec2::new(1.0, 1.0), Wrap::Mirror, DVec2::new(1.5, -0.5), [-1.0, -1.0]),
+            (Vec2::new(-1.0, 4.0), Wrap::Mirror, DVec2::new(0.5, 0.4), [1.0, -1.0]),
+            (Vec2::new(1.0, 1.0), Wrap::Mirror, DVec2::new(f64::NAN, 2.5), [1.0, 1.0]),
+        ];
+        for (repeat, wrap, uv, sides) in cases {
+            let mut map = map(leaning);
+            let texture = Arc::make_mut(&mut map.texture);
+            (texture.repeat, texture.wrap) = (repeat, wrap);
+            let bent = map.bend(&TexturePoint::sharp(uv), Vec3::Z, Vec3::X, Vec3::Y);
+            let expected = Vec3::new(0.48 * sides[0], 0.36 * sides[1], 0.8);
+            assert!((bent - expected).length() < 1e-6, "{repeat} {wrap:?} {uv}: {bent}");
+        }
     }
 
     #[test]

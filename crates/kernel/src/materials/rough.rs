@@ -125,6 +125,15 @@ macro_rules! kinds {
                 }
             }
 
+            /// [`RoughRow::turned`].
+            #[inline(always)]
+            pub fn turned(&self, normal: Vec3, to_eye: Vec3) -> Vec3 {
+                match self {
+                    $(Self::$kind(_) => <$row as RoughRow>::turned(normal, to_eye),)+
+                    $(Self::$part(_) => <$part_row as RoughRow>::turned(normal, to_eye)),+
+                }
+            }
+
             /// [`RoughPoint::is_black`].
             #[inline(always)]
             pub fn is_black(&self) -> bool {
@@ -219,7 +228,7 @@ macro_rules! kinds {
 
             /// [`MaterialRow::orient`].
             #[inline(always)]
-            pub fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
+            pub fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
                 match self {
                     $(Self::$kind(row) => row.orient(of, normals, directions),)+
                     $(Self::$part(_) => {}),+

@@ -185,6 +185,18 @@ impl Texture {
         slopes.as_vec2() * self.repeat
     }
 
+    /// A direction in the image at texture coordinates, as one of the surface there: turned back as the image is, and mirrored where
+    /// the repetition or the wrap mirrors it. Its length stays.
+    pub fn direction_before(&self, uv: DVec2, direction: Vec2) -> Vec2 {
+        let mut direction = direction.as_dvec2();
+        if self.wrap == Wrap::Mirror {
+            let tiles = self.tiles(uv);
+            direction *= DVec2::from([tiles.x, tiles.y].map(mirrored_tile));
+        }
+        let direction = self.moved.as_ref().map_or(direction, |moved| moved.vector_before(direction));
+        direction.as_vec2() * self.repeat.signum()
+    }
+
     /// Number of texels in a unit of u and v.
     pub fn texels_across(&self) -> [f64; 2] {
         let (size, repeat) = (size(&self.texels).as_dvec2(), self.repeat.as_dvec2());
@@ -389,6 +401,12 @@ impl Wrap {
             Self::Clamp | Self::Mirror => i.max(0).min(size - 1),
         }
     }
+}
+
+/// −1 in the tiles that [`Wrap::Mirror`] mirrors, else 1.
+fn mirrored_tile(x: f64) -> f64 {
+    let x = finite(x);
+    if x - 2.0 * (x * 0.5).floor() > 1.0 { -1.0 } else { 1.0 }
 }
 
 /// The coordinate, or 0 if it is not finite.

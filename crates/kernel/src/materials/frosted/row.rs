@@ -90,12 +90,17 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
     };
 
     #[inline(always)]
+    fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
+        if THROUGH { -facing(-normal, to_eye) } else { facing(normal, to_eye) }
+    }
+
+    #[inline(always)]
     fn reset(&mut self) {}
 
     #[inline(always)]
     fn put(&mut self, i: usize, bsdf: &GlassPoint, shown: ShownLobes, place: &Place) {
         let normal = if THROUGH { -place.normal } else { place.normal };
-        set_lane(&mut self.normal, i, facing(normal, place.to_eye));
+        set_lane(&mut self.normal, i, normal);
         set_lane(&mut self.to_eye, i, place.to_eye);
         (self.near[i], self.far[i], self.alpha[i]) = (bsdf.near, bsdf.far, bsdf.alpha);
         [self.shown[i], self.unit[i]] = shown_parts(shown);

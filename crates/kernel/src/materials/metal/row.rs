@@ -104,6 +104,11 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
     };
 
     #[inline(always)]
+    fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
+        facing(normal, to_eye)
+    }
+
+    #[inline(always)]
     fn reset(&mut self) {
         self.has_index = false;
     }
@@ -111,7 +116,7 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
     #[inline(always)]
     fn put(&mut self, i: usize, bsdf: &MetalPoint, shown: ShownLobes, place: &Place) {
         let &Place { normal, to_eye, tangent } = place;
-        set_lane(&mut self.normal, i, facing(normal, to_eye));
+        set_lane(&mut self.normal, i, normal);
         set_lane(&mut self.to_eye, i, to_eye);
         set_lane(&mut self.tangent, i, tangent);
         self.set_fresnel(i, &bsdf.fresnel);
@@ -268,20 +273,20 @@ impl<const BRUSHED: bool> MaterialRow for MetalRow<BRUSHED> {
     }
 
     #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
-        let mut facings = [[0.0; LANES]; 3];
+    fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
         for i in 0..LANES {
             let to_eye = -lane(directions, i);
             set_lane(&mut self.to_eye, i, to_eye);
-            set_lane(&mut facings, i, facing(lane(normals, i), to_eye));
+            let turned = Self::turned(lane(normals, i), to_eye);
+            set_lane(normals, i, turned);
         }
         match of {
             Some(of) => {
                 for axis in 0..3 {
-                    take(of, &facings[axis], &mut self.normal[axis]);
+                    take(of, &normals[axis], &mut self.normal[axis]);
                 }
             }
-            None => self.normal = facings,
+            None => self.normal = *normals,
         }
     }
 }

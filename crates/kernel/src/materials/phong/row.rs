@@ -279,7 +279,7 @@ impl MaterialRow for PhongRow {
     }
 
     #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
+    fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
         let mut all = [[0.0; LANES]; 3];
         for i in 0..LANES {
             set_lane(&mut all, i, mirrored(lane(normals, i), -lane(directions, i)));

@@ -152,13 +152,18 @@ impl RoughRow for PlasticRow {
     };
 
     #[inline(always)]
+    fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
+        facing(normal, to_eye)
+    }
+
+    #[inline(always)]
     fn reset(&mut self) {
         (self.is_rough, self.is_smooth) = (false, false);
     }
 
     #[inline(always)]
     fn put(&mut self, i: usize, bsdf: &PlasticPoint, shown: ShownLobes, place: &Place) {
-        set_lane(&mut self.normal, i, facing(place.normal, place.to_eye));
+        set_lane(&mut self.normal, i, place.normal);
         set_lane(&mut self.to_eye, i, place.to_eye);
         self.set(i, bsdf);
         [self.shown[0][i], self.shown[1][i], self.unit[i]] = shown_parts(shown);
@@ -379,20 +384,20 @@ impl MaterialRow for PlasticRow {
     }
 
     #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
-        let mut facings = [[0.0; LANES]; 3];
+    fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
         for i in 0..LANES {
             let to_eye = -lane(directions, i);
             set_lane(&mut self.to_eye, i, to_eye);
-            set_lane(&mut facings, i, facing(lane(normals, i), to_eye));
+            let turned = Self::turned(lane(normals, i), to_eye);
+            set_lane(normals, i, turned);
         }
         match of {
             Some(of) => {
                 for axis in 0..3 {
-                    take(of, &facings[axis], &mut self.normal[axis]);
+                    take(of, &normals[axis], &mut self.normal[axis]);
                 }
             }
-            None => self.normal = facings,
+            None => self.normal = *normals,
         }
         for i in 0..LANES {
             self.look(i);

@@ -69,7 +69,7 @@ fn white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has() {
             let white = point(&plastic(Vec3::ONE, 1.0, ior, alpha));
             let subject = Subject::<PlasticRow>::new(&white, [alpha; 2], direction(cosine, 0.3));
             let furnace = subject.sampled_albedo(192).x;
-            assert!((furnace - 1.0).abs() < 2e-3, "{what}: a white one reflects {furnace}");
+            assert!((-2e-3..5e-4).contains(&(furnace - 1.0)), "{what}: a white one reflects {furnace}");
             let red = point(&plastic(RED, 1.0, ior, alpha));
             let subject = Subject::<PlasticRow>::new(&red, [alpha; 2], direction(cosine, 0.3));
             let (sampled, exact) = (subject.sampled_albedo(192), subject.albedo());

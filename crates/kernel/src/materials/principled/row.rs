@@ -96,7 +96,9 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
     fn left_by_specular(&self, i: usize, cosine: f32) -> Vec3 {
         let [normal, grazing] = self.albedos(i, cosine);
         let (reflectance, of_grazing) = (lane(&self.dielectric.0, i), self.dielectric.1[i]);
-        Vec3::ONE - reflectance * normal - Vec3::splat(of_grazing * grazing)
+        let left = Vec3::ONE - reflectance * normal - Vec3::splat(of_grazing * grazing);
+        // Facets that reflect all leave nothing, but for rounding.
+        Vec3::new(ahead(left.x), ahead(left.y), ahead(left.z))
     }
 
     #[inline(always)]
@@ -221,13 +223,18 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     };
 
     #[inline(always)]
+    fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
+        if THROUGH { -facing(-normal, to_eye) } else { facing(normal, to_eye) }
+    }
+
+    #[inline(always)]
     fn reset(&mut self) {
         (self.is_coated, self.is_diffuse, self.transmits) = (false, false, false);
     }
 
     #[inline(always)]
     fn put(&mut self, i: usize, bsdf: &PrincipledPoint, shown: ShownLobes, place: &Place) {
-        let normal = facing(if THROUGH { -place.normal } else { place.normal }, place.to_eye);
+        let normal = if THROUGH { -place.normal } else { place.normal };
         let mirrored = place.to_eye - normal * (2.0 * normal.dot(place.to_eye));
         set_lane(&mut self.normal, i, if THROUGH { -normal } else { normal });
         set_lane(&mut self.to_eye, i, if THROUGH { mirrored } else { place.to_eye });
@@ -469,20 +476,20 @@ impl MaterialRow for PrincipledRow<false> {
     }
 
     #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &Lanes3, directions: &Lanes3) {
-        let mut facings = [[0.0; LANES]; 3];
+    fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
         for i in 0..LANES {
             let to_eye = -lane(directions, i);
             set_lane(&mut self.to_eye, i, to_eye);
-            set_lane(&mut facings, i, facing(lane(normals, i), to_eye));
+            let turned = Self::turned(lane(normals, i), to_eye);
+            set_lane(normals, i, turned);
         }
         match of {
             Some(of) => {
                 for axis in 0..3 {
-                    take(of, &facings[axis], &mut self.normal[axis]);
+                    take(of, &normals[axis], &mut self.normal[axis]);
                 }
             }
-            None => self.normal = facings,
+            None => self.normal = *normals,
         }
         for i in 0..LANES {
             self.look(i);

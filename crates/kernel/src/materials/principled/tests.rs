@@ -117,7 +117,7 @@ fn albedos_are_those_of_quadrature_and_never_above_one() {
                     "α {alpha}, metallic {metallic} at a cosine of {cosine}: {sampled} is not {exact}"
                 );
                 assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
-                assert!(sampled.max_element() < 1.0 + 2e-3, "{what}");
+                assert!(sampled.max_element() < 1.0 + 5e-4, "{what}");
             }
         }
     }
@@ -194,7 +194,7 @@ fn both_sides_together_have_the_albedo_of_quadrature_and_never_more_than_all() {
             let what =
                 format!("α {alpha}, metallic {metallic}, {transmission} at {cosine}: {sampled}, {exact}");
             assert!((sampled - exact).abs().max_element() < 1e-3, "{what}");
-            assert!(sampled.max_element() < 1.0 + 2e-3, "{what}");
+            assert!(sampled.max_element() < 1.0 + 5e-4, "{what}");
         }
     }
 }

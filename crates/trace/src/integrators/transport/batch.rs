@@ -205,11 +205,12 @@ impl VertexBatch {
         self.has_facet |= 1 << i;
         self.only_specular_before |= u32::from(path.state.only_specular_before) << i;
         self.after_gloss |= u32::from(path.state.is_after_gloss) << i;
-        set_lane(&mut self.normal, i, shading.normal);
+        let normal = bsdf.turned(shading.normal, vertex.to_eye);
+        set_lane(&mut self.normal, i, normal);
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.bend[i] = shading.bend.unwrap_or(UNBENT);
         // Set the BSDF.
-        let directions = Place { normal: shading.normal, to_eye: vertex.to_eye, tangent: vertex.tangent() };
+        let directions = Place { normal, to_eye: vertex.to_eye, tangent: vertex.tangent() };
         self.bsdf.put(i, bsdf, measure.lobes(), &directions);
         // Copy the state of the path.
         (self.roulette_throughput[i], self.medium[i]) = (path.state.roulette_throughput, medium);

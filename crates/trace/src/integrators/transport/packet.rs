@@ -414,8 +414,8 @@ impl VertexBatch {
     /// Sets normals and points above facets for the lanes of smooth surfaces.
     #[inline(always)]
     fn smooth(&mut self, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts, folds: impl Folds) {
-        // Turn the shading normals to the viewer's side.
-        let mut normals = [[0.0; PACKET]; 3];
+        // Turn both normals to the viewer's side.
+        let (mut normals, mut facets) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
         let (mut ends, mut above, mut bent) = ([0.0; PACKET], [0; PACKET], [0; PACKET]);
         for i in 0..PACKET {
             let (geometric, direction) = (lane(&surface.normal, i), lane(&rays.direction, i));
@@ -423,13 +423,14 @@ impl VertexBatch {
             let is_bent =
                 (shading.x != geometric.x) | (shading.y != geometric.y) | (shading.z != geometric.z);
             bent[i] = if is_bent { TRUE } else { 0 };
-            let normal = shading * if geometric.dot(direction) > 0.0 { -1.0 } else { 1.0 };
-            set_lane(&mut normals, i, normal);
+            let side = if geometric.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+            set_lane(&mut normals, i, shading * side);
+            set_lane(&mut facets, i, geometric * side);
         }
         // Find the points above the facets.
         for i in 0..PACKET {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
-            let (is_above, end) = way_up(from, to, lane(&self.normal, i), lane(&surface.error, i));
+            let (is_above, end) = way_up(from, to, lane(&facets, i), lane(&surface.error, i));
             above[i] = if is_above { TRUE } else { 0 };
             ends[i] = end;
         }
@@ -444,18 +445,16 @@ impl VertexBatch {
                 [0; PACKET]
             }
         };
+        self.bsdf.orient(Some(&of), &mut normals, &rays.direction);
         for axis in 0..3 {
-            // Save the geometric normals before they are replaced.
-            let horizon = self.normal[axis];
-            take(&of, &horizon, &mut self.horizon[axis]);
-            take(&of, &horizon, &mut self.facet[axis]);
+            take(&of, &facets[axis], &mut self.horizon[axis]);
+            take(&of, &facets[axis], &mut self.facet[axis]);
             take(&of, &surface.point[axis], &mut self.point[axis]);
             take(&of, &normals[axis], &mut self.smooth_normal[axis]);
             take(&of, &surface.shadow_point[axis], &mut self.lifted[axis]);
             take(&rises, &surface.shadow_point[axis], &mut self.from[axis]);
             take(&of, &normals[axis], &mut self.normal[axis]);
         }
-        self.bsdf.orient(Some(&of), &normals, &rays.direction);
         take_u32(&rises, &[Ray::NO_TRIANGLE; PACKET], &mut self.start);
         take(&of, &ends, &mut self.lift_end);
         take(&of, &[UNBENT; PACKET], &mut self.bend);
@@ -484,7 +483,7 @@ impl VertexBatch {
             set_lane(&mut self.from, i, from);
             set_lane(&mut self.normal, i, normal);
         }
-        self.bsdf.orient(None, &self.normal, &rays.direction);
+        self.bsdf.orient(None, &mut self.normal, &rays.direction);
         // Replace the normals of smooth surfaces.
         if surface.smooth != 0 {
             self.smooth(rays, surface, lifts, folds);
