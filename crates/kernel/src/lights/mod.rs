@@ -44,6 +44,7 @@ pub mod tree;
 
 pub use area::{
     AreaLight, Chart, EmissionTexture, Emitter, MeshEmitter, Part, Patch, Side, area_light, back_light,
+    sheer_light,
 };
 pub use delta::{Falloff, PointLight, SpotLight};
 pub use emission::{Ball, Emitted, Numbers, Outline, PhotonSource, Start};

@@ -36,6 +36,9 @@ impl SourceRow {
     /// Number in place of an object, or of a part of one.
     pub const NONE: u32 = u32::MAX;
 
+    /// Number in place of a part, for [`Source::Sheer`]: no primitive has it.
+    const SHEER: u32 = u32::MAX - 1;
+
     /// The same source in all lanes.
     #[inline(always)]
     pub fn of(source: Source) -> Self {
@@ -56,6 +59,7 @@ impl SourceRow {
         match (self.object[lane], self.part[lane]) {
             (Self::NONE, _) => Source::Nothing,
             (object, Self::NONE) => Source::Object(object),
+            (object, Self::SHEER) => Source::Sheer(object),
             (object, part) => Source::Primitive(object, part),
         }
     }
@@ -73,6 +77,7 @@ fn numbers(source: Source) -> (u32, u32) {
     match source {
         Source::Nothing => (SourceRow::NONE, SourceRow::NONE),
         Source::Object(object) => (object, SourceRow::NONE),
+        Source::Sheer(object) => (object, SourceRow::SHEER),
         Source::Primitive(object, part) => (object, part),
     }
 }

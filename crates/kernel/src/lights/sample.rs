@@ -41,6 +41,8 @@ pub enum Source {
     Nothing,
     /// A convex object: no ray to its near side hits it before.
     Object(u32),
+    /// A place of an object that light may pass; other parts of the object may weaken a ray to it.
+    Sheer(u32),
     /// One primitive of an object.
     Primitive(u32, u32),
 }

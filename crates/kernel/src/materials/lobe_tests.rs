@@ -161,6 +161,16 @@ impl<R: RoughRow> Subject<R> {
         self.mean_of(&samples)
     }
 
+    /// The largest f·cos/pdf of samples of all lobes.
+    pub fn largest_weight(&self, side: u32) -> f64 {
+        let samples = self.samples(LobeSet::All, side);
+        let values = self.values(LobeSet::All, &samples);
+        let weights = samples.iter().zip(values).map(|(direction, (f, _, pdf))| {
+            if pdf > 0.0 { f.max_element() * self.height(*direction).max(0.0) / pdf } else { 0.0 }
+        });
+        weights.fold(0.0, f64::max)
+    }
+
     /// The mean of f·cos/pdf.
     fn mean_of(&self, samples: &[DVec3]) -> DVec3 {
         let values = self.values(LobeSet::All, samples);

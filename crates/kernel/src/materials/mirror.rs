@@ -4,43 +4,46 @@ use std::sync::Arc;
 
 use super::footprint::TexturePoint;
 use super::metal::MetalFresnel;
-use super::texture::Texture;
+use super::texture::{Color, Texture};
 use crate::math::Vec3;
 
 /// A mirror, which reflects in one direction.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mirror {
     /// The same reflectance of each colour at every angle.
-    Even(Vec3),
+    Even(Color),
     /// A smooth conductor.
     Metal(MetalFresnel),
 }
 
 impl Mirror {
-    /// Reflectance by the cosine of the angle of incidence.
+    /// Reflectance by the cosine of the angle of incidence, with its colour multiplied by another one, if there is one.
     #[inline]
-    pub fn reflectance(&self, cosine: f32, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
+    pub fn reflectance(&self, cosine: f32, tint: Option<Vec3>, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
-            Self::Even(reflectance) => *reflectance,
-            Self::Metal(fresnel) => fresnel.at(at, lookups).reflectance(cosine),
+            Self::Even(color) => color.at(at, lookups).min(Vec3::ONE) * tint.unwrap_or(Vec3::ONE),
+            Self::Metal(fresnel) => {
+                let own = fresnel.at(at, lookups);
+                tint.map_or(own, |tint| own.tinted(tint)).reflectance(cosine)
+            }
         }
     }
 
     /// [`Mirror::reflectance`] with white in place of its textures.
     pub fn bleached(&self, cosine: f32) -> Vec3 {
         match self {
-            Self::Even(reflectance) => *reflectance,
+            Self::Even(color) => color.constant().unwrap_or(Vec3::ONE),
             Self::Metal(fresnel) => fresnel.bleached().reflectance(cosine),
         }
     }
 
     /// Its textures.
     pub fn textures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        let fresnel = match self {
-            Self::Even(_) => None,
-            Self::Metal(fresnel) => Some(fresnel),
+        let (color, fresnel) = match self {
+            Self::Even(color) => (color.texture(), None),
+            Self::Metal(fresnel) => (None, Some(fresnel)),
         };
-        fresnel.into_iter().flat_map(MetalFresnel::textures)
+        color.into_iter().chain(fresnel.into_iter().flat_map(MetalFresnel::textures))
     }
 }
 

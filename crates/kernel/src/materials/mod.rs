@@ -67,7 +67,7 @@ impl Material {
             Bsdf::Mirror(mirror) => mirror.textures().next().is_some(),
             Bsdf::Coated(coated) => coated.textures().next().is_some() || coated.base.has_textures(),
             Bsdf::Glass(glass) => glass.roughness.texture().is_some(),
-            Bsdf::Pane(_) => false,
+            Bsdf::Pane(pane) => pane.tint.texture().is_some(),
         };
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         in_bsdf || self.relief.is_some() || self.emission.texture.is_some() || of_opacity.is_some()
@@ -88,7 +88,10 @@ impl Material {
     pub fn passing(&self, at: &TexturePoint, color: Vec3, cosine: f32, lookups: &mut u64) -> Vec3 {
         let there = self.opacity.as_ref().map_or(1.0, |opacity| opacity.at(at, lookups));
         let through = match &self.bsdf {
-            Bsdf::Pane(pane) => pane.transmittance(cosine) * color,
+            Bsdf::Pane(pane) => {
+                let tint = pane.tint.at(at, lookups).min(Vec3::ONE);
+                tint * color * (1.0 - pane.reflectance(cosine))
+            }
             Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => Vec3::ZERO,
         };
         through * there + Vec3::splat(1.0 - there)
@@ -103,7 +106,7 @@ impl Material {
                 coated.base.is_mipmapped() || coated.textures().any(|texture| texture.mipmaps.is_some())
             }
             Bsdf::Glass(glass) => glass.roughness.texture().is_some_and(|texture| texture.mipmaps.is_some()),
-            Bsdf::Pane(_) => false,
+            Bsdf::Pane(pane) => pane.tint.texture().is_some_and(|texture| texture.mipmaps.is_some()),
         };
         let of_opacity = self.opacity.as_ref().and_then(|opacity| opacity.value.texture());
         let of_relief = self.relief.iter().flat_map(Relief::textures);
@@ -172,9 +175,9 @@ impl Bsdf {
     pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {
         match self {
             Self::Rough(rough) => rough.albedo(at, lookups),
-            Self::Mirror(mirror) => mirror.reflectance(1.0, at, lookups),
+            Self::Mirror(mirror) => mirror.reflectance(1.0, None, at, lookups),
             Self::Glass(glass) => glass.tint,
-            Self::Pane(pane) => pane.tint,
+            Self::Pane(pane) => pane.tint.at(at, lookups),
             Self::Coated(coated) => coated.base.albedo(at, lookups),
         }
     }

@@ -1,15 +1,15 @@
 //! Thin panes: glass of two parallel sides without a thickness.
 
 use super::fresnel::dielectric;
-use crate::math::Vec3;
+use super::texture::Color;
 
 /// A pane without thickness. What it does not reflect goes straight on.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Pane {
     /// Index of refraction of the glass; outside is 1.
     pub ior: f32,
     /// Transmittance of the glass, at any angle.
-    pub tint: Vec3,
+    pub tint: Color,
 }
 
 impl Pane {
@@ -19,21 +19,16 @@ impl Pane {
         let (side, _) = dielectric(cosine.abs(), self.ior);
         2.0 * side / (1.0 + side)
     }
-
-    /// Part that goes straight on at the cosine of an angle of incidence.
-    #[inline]
-    pub fn transmittance(&self, cosine: f32) -> Vec3 {
-        self.tint * (1.0 - self.reflectance(cosine))
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Vec3;
 
     #[test]
     fn a_pane_adds_up_all_reflections_between_its_sides() {
-        let pane = Pane { ior: 1.5, tint: Vec3::ONE };
+        let pane = Pane { ior: 1.5, tint: Color::Constant(Vec3::ONE) };
         for degrees in [0.0_f32, 30.0, 60.0, 80.0, 89.0] {
             let cosine = degrees.to_radians().cos();
             let r = f64::from(dielectric(cosine, 1.5).0);

@@ -60,7 +60,7 @@ fn materials_have_the_documented_defaults() {
     };
     assert!(scene.materials.iter().all(|material| !material.emits() && material.normal_map.is_none()));
     let kinds: Vec<_> = scene.materials.into_iter().map(|material| material.kind).collect();
-    let mirror = MaterialKind::Mirror { reflectance: Vec3::splat(0.9) };
+    let mirror = MaterialKind::Mirror { reflectance: ColorSource::Constant(Vec3::splat(0.9)) };
     let roughness = NumberSource::Constant(0.0);
     assert_eq!(kinds, [phong, mirror, MaterialKind::Glass { ior: 1.5, tint: DVec3::ONE, roughness }]);
 }

@@ -186,7 +186,7 @@ impl<'a> Walker<'a> for Wavefront<'a, '_> {
 
     fn meet_pane(&mut self, path: &PathRay, vertex: &Vertex<'a>, hit: OpaqueHit, pane: &Pane) -> Straight {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.to_eye));
-        let tint = vertex.tinted(pane.tint);
+        let tint = vertex.pane_tint(path, pane, &mut self.counters.texture_lookups);
         let left = tint * (1.0 - reflectance);
         // After the last scattering, only what goes straight on finds light.
         if !self.arrive(path, vertex, hit) {

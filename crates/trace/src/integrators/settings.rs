@@ -70,7 +70,7 @@ impl RenderSettings {
             Shown::Light(Measure::Radiance(parts)) if !parts.are_reflected() => {
                 // Such parts are visible by mirrors and through glass too.
                 let ambient = parts.ambient && self.effective().render.ambient != Vec3::ZERO;
-                Lookups { ambient, lights: parts.emitted, delta_normals: true, ..Lookups::NONE }
+                Lookups { ambient, lights: parts.emitted, by_delta: true, ..Lookups::NONE }
             }
             // Boxes are drawn over the picture.
             Shown::Light(Measure::Radiance(_) | Measure::Work) | Shown::Bounds | Shown::Film(_) => {

@@ -9,7 +9,7 @@ use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
 use crate::lights::{
     AreaLight, Ball, Chart, DirectionalLight, EmissionTexture, Environment, Light, LightBounds, Lights,
-    Patch, PhotonSource, PointLight, Side, SkyMap, SpotLight, area_light, back_light,
+    Patch, PhotonSource, PointLight, Side, SkyMap, SpotLight, area_light, back_light, sheer_light,
 };
 use crate::lights::{Emitter, Part};
 use crate::materials::texels::Texels;
@@ -113,15 +113,18 @@ struct Shining {
     emission: Emission,
     /// The opacity, if it differs from point to point.
     opacity: Option<Opacity>,
+    /// Whether light may pass.
+    is_sheer: bool,
 }
 
 impl Shining {
     fn new(emission: Emission, opacity: Option<Opacity>) -> Self {
         match opacity.as_ref().and_then(Opacity::constant) {
             Some(part) => {
-                Self { emission: Emission { scale: emission.scale * part, ..emission }, opacity: None }
+                let emission = Emission { scale: emission.scale * part, ..emission };
+                Self { emission, opacity: None, is_sheer: true }
             }
-            None => Self { emission, opacity },
+            None => Self { is_sheer: opacity.is_some(), emission, opacity },
         }
     }
 
@@ -156,9 +159,11 @@ impl Shining {
 /// The lights of a shape that emits: one for each side.
 fn shape_lights(shape: &Shape, shining: &Shining, object: u32) -> impl Iterator<Item = AreaLight> {
     let of_side = move |side: &Side| {
-        let light = match side {
-            Side::Front => area_light(shape, shining.emission.scale, object)?,
-            Side::Back => back_light(shape, shining.emission.scale, object)?,
+        let radiance = shining.emission.scale;
+        let light = match (shining.is_sheer, side) {
+            (true, side) => sheer_light(shape, *side, radiance, object)?,
+            (false, Side::Front) => area_light(shape, radiance, object)?,
+            (false, Side::Back) => back_light(shape, radiance, object)?,
         };
         let light = AreaLight { bounds: shining.mean_of(light.bounds), ..light };
         Some(match shining.texture(Chart::Shape(*shape)) {

@@ -133,7 +133,7 @@ impl Geometry {
     pub(super) fn is_whole_merged(&self, source: Source) -> bool {
         match (source, &self.merged) {
             (Source::Object(object), Some(merged)) => merged.meshes.has(object),
-            (Source::Nothing | Source::Object(_) | Source::Primitive(..), _) => false,
+            (Source::Nothing | Source::Object(_) | Source::Sheer(_) | Source::Primitive(..), _) => false,
         }
     }
 
@@ -225,11 +225,11 @@ impl Geometry {
         let any = |id: u32, except: Option<u32>| self.objects[id as usize].any(ray, &ray_f64, except);
         let of_object = |id: u32| match source {
             Source::Nothing => any(id, None),
-            Source::Object(own) => own != id && any(id, None),
+            Source::Object(own) | Source::Sheer(own) => own != id && any(id, None),
             Source::Primitive(own, part) => any(id, (own == id).then_some(part)),
         };
         let test = |id: u32| match (self.merged(id), source) {
-            (Some(merged), Source::Nothing | Source::Object(_)) => merged.any(ray, None),
+            (Some(merged), Source::Nothing | Source::Object(_) | Source::Sheer(_)) => merged.any(ray, None),
             (Some(merged), Source::Primitive(own, part)) => merged.any(ray, merged.number(own, part)),
             (None, _) => of_object(id),
         };

@@ -29,7 +29,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
             shininess: *shininess,
             ambient: ambient.as_ref().map(color),
         })),
-        MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Even(*reflectance)),
+        MaterialKind::Mirror { reflectance } => Bsdf::Mirror(Mirror::Even(color(reflectance))),
         MaterialKind::Metal { fresnel, roughness, anisotropy } => {
             metal(fresnel_of(fresnel, color), number(roughness), number(anisotropy))
         }
@@ -60,7 +60,7 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
         MaterialKind::Glass { ior, tint, roughness } => {
             Bsdf::Glass(Glass::new(*ior, *tint).with_roughness(number(roughness)))
         }
-        MaterialKind::Pane { ior, tint } => Bsdf::Pane(Pane { ior: *ior, tint: *tint }),
+        MaterialKind::Pane { ior, tint } => Bsdf::Pane(Pane { ior: *ior, tint: color(tint) }),
     };
     let emission = emission(scene, images, material);
     let normal_map = material.normal_map.map(|map| NormalMap {
@@ -185,7 +185,7 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
 /// A material of a mesh file. The highlight's strength k becomes ks = 2k/(α + 2).
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (kind(own), file_glass(own)) {
-        (FileKind::Mirror, _) => Bsdf::Mirror(Mirror::Even(own.specular.min(Vec3::ONE))),
+        (FileKind::Mirror, _) => Bsdf::Mirror(Mirror::Even(Color::Constant(own.specular.min(Vec3::ONE)))),
         (FileKind::Glass, Some((ior, tint))) => {
             let roughness = own.physical.as_ref().map_or(0.0, |physical| physical.roughness);
             Bsdf::Glass(Glass::new(ior, tint).with_roughness(Number::Constant(roughness)))

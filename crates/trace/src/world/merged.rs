@@ -267,7 +267,9 @@ pub(super) mod tests {
             {
                 let any = (0_u32..).zip(&alone).any(|(id, own)| match source {
                     Source::Nothing => own.any(&ray, &ray.to_f64(), None),
-                    Source::Object(except) => id != except && own.any(&ray, &ray.to_f64(), None),
+                    Source::Object(except) | Source::Sheer(except) => {
+                        id != except && own.any(&ray, &ray.to_f64(), None)
+                    }
                     Source::Primitive(of, part) => own.any(&ray, &ray.to_f64(), (id == of).then_some(part)),
                 });
                 assert_eq!(geometry.occluded(&ray, source), any, "{ray:?} {source:?}");

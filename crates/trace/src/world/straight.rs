@@ -14,6 +14,9 @@ use crate::materials::{Material, TexturePoint};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, Lanes3, set_lane};
 
+/// Relative difference of distances that are equal within rounding.
+const SAME_PLACE: f32 = 1e-4;
+
 /// Most surfaces in a row that a ray passes straight on; the next one ends it.
 pub const MOST_STRAIGHT: u32 = 64;
 
@@ -97,8 +100,13 @@ impl World {
     fn left_on(&self, passable: &Passable, ray: &Ray, source: Source, lookups: &mut u64) -> Vec3 {
         let (mut left, mut ray, mut count) = (Vec3::ONE, *ray, 0);
         let is_own = |object: u32| source == Source::Object(object);
+        // The sampled place is an end of the ray within rounding.
+        let end = SAME_PLACE * ray.t_max;
         while let Some(hit) = self.geometry.closest_of(&ray, |object| passable.has(object) && !is_own(object))
         {
+            if source == Source::Sheer(hit.object) && hit.shape.t >= ray.t_max - end {
+                break;
+            }
             let (part, beyond) = self.beyond(&ray, &hit, lookups);
             ray = beyond;
             // The light itself stops nothing.

@@ -65,20 +65,14 @@ pub struct Lookups {
     pub lights: bool,
     /// Normal maps and heights.
     pub normals: bool,
-    /// Those of mirrors and glass, by which other surfaces are seen.
-    pub delta_normals: bool,
+    /// All of mirrors, panes, glass and smooth coats, by which other surfaces are seen.
+    pub by_delta: bool,
 }
 
 impl Lookups {
     /// All textures.
-    pub const ALL: Self = Self {
-        diffuse: true,
-        specular: true,
-        ambient: true,
-        lights: true,
-        normals: true,
-        delta_normals: true,
-    };
+    pub const ALL: Self =
+        Self { diffuse: true, specular: true, ambient: true, lights: true, normals: true, by_delta: true };
     /// No textures but those of opacity, which every picture looks up.
     pub const NONE: Self = Self {
         diffuse: false,
@@ -86,18 +80,20 @@ impl Lookups {
         ambient: false,
         lights: false,
         normals: false,
-        delta_normals: false,
+        by_delta: false,
     };
 
     /// Whether textures of a role are looked up, in a material that is δ or not.
     fn has(self, role: TextureRole, is_delta: bool) -> bool {
         match role {
             TextureRole::Diffuse => self.diffuse,
-            TextureRole::Specular => self.specular,
-            TextureRole::Facets | TextureRole::Roughness(_) => self.diffuse || self.specular,
+            TextureRole::Specular => self.specular || self.by_delta && is_delta,
+            TextureRole::Facets | TextureRole::Roughness(_) => {
+                self.diffuse || self.specular || self.by_delta && is_delta
+            }
             TextureRole::Ambient => self.ambient,
             TextureRole::Emission | TextureRole::EmissionCoat(_) => self.lights,
-            TextureRole::NormalMap | TextureRole::Bump(_) => self.normals || self.delta_normals && is_delta,
+            TextureRole::NormalMap | TextureRole::Bump(_) => self.normals || self.by_delta && is_delta,
             TextureRole::Opacity(_) => true,
         }
     }

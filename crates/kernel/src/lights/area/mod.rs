@@ -15,6 +15,7 @@ pub mod quad;
 pub mod round;
 pub(super) mod row;
 mod sample_point;
+pub mod sheer;
 pub mod sphere;
 pub mod textured_quad;
 pub mod torus;
@@ -38,6 +39,7 @@ use inside::InsideEmitter;
 use mesh::QuadOfTwo;
 use quad::QuadEmitter;
 use round::{ConeSide, CylinderSide, RoundEmitter};
+use sheer::SheerEmitter;
 use sphere::SphereEmitter;
 use textured_quad::TexturedQuadEmitter;
 use torus::TorusEmitter;
@@ -115,6 +117,8 @@ pub enum Emitter {
     Torus(TorusEmitter),
     /// The inside of a shape.
     Inside(Box<InsideEmitter>),
+    /// A side of a shape that lets light pass, whose near parts do not hide the others.
+    Sheer(Box<SheerEmitter>),
     /// Triangles of a mesh.
     Mesh(MeshEmitter),
 }
@@ -133,6 +137,7 @@ macro_rules! of_any {
             Emitter::Cone($it) => $asked,
             Emitter::Torus($it) => $asked,
             Emitter::Inside($it) => $asked,
+            Emitter::Sheer($it) => $asked,
             Emitter::Mesh($mesh) => $of_mesh,
         }
     };
@@ -180,6 +185,26 @@ pub fn area_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
     let bounds = bounds(shape, radiance)?;
     let (side, texture, part) = (Side::Front, None, Part::Whole);
     Some(AreaLight { shape: emitter, side, radiance, texture, object, part, bounds })
+}
+
+/// The light of a side of a shape that emits all over, and which light may pass. `None` if the shape is infinite, or has no area.
+pub fn sheer_light(shape: &Shape, side: Side, radiance: Vec3, object: u32) -> Option<AreaLight> {
+    let hides_itself = match (shape, side) {
+        (Shape::Quad(_) | Shape::Triangle(_) | Shape::Disk(_) | Shape::Plane(_), _) => false,
+        // From outside, each place of their front is alone in its direction.
+        (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Front) => false,
+        (Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_), Side::Back) => true,
+        (Shape::Torus(_), _) => true,
+    };
+    let light = match side {
+        Side::Front => area_light(shape, radiance, object)?,
+        Side::Back => back_light(shape, radiance, object)?,
+    };
+    let sheer = if hides_itself { SheerEmitter::new(shape, side) } else { None };
+    Some(match sheer {
+        Some(sheer) => AreaLight { shape: Emitter::Sheer(Box::new(sheer)), ..light },
+        None => light,
+    })
 }
 
 /// The light of the back of a shape that emits all over. `None` if the shape is infinite, or has no area.
@@ -246,7 +271,7 @@ impl AreaLight {
         let (Some(texture), End::At(target)) = (&self.texture, sample.end) else { return Some(sample) };
         let primitive = match sample.source {
             Source::Primitive(_, primitive) => primitive,
-            Source::Object(_) | Source::Nothing => 0,
+            Source::Object(_) | Source::Sheer(_) | Source::Nothing => 0,
         };
         Some(LightSample {
             weight: sample.weight * texture.at(target, primitive, sample.direction),
@@ -259,12 +284,18 @@ impl AreaLight {
     pub fn plain_sample(&self, point: Vec3, normal: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let own = |sample: LightSamplePoint| {
             let LightSamplePoint { direction, target, factor } = sample;
-            let (end, source) = (End::At(target), Source::Object(self.object));
+            let (end, source) = (End::At(target), self.source());
             (factor > 0.0).then(|| LightSample { end, direction, weight: self.radiance * factor, source })
         };
         of_any!(&self.shape,
             it => own(it.sample(point, u)),
             mesh => mesh.sample(point, normal, u, (self.radiance, self.object)))
+    }
+
+    /// The part of the scene that the samples lie on.
+    pub(super) fn source(&self) -> Source {
+        let is_sheer = matches!(self.shape, Emitter::Sheer(_));
+        if is_sheer { Source::Sheer(self.object) } else { Source::Object(self.object) }
     }
 
     /// [`Light::pdf`](super::Light::pdf).

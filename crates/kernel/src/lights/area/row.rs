@@ -27,7 +27,7 @@ impl AreaLight {
     /// [`AreaLight::plain_sample`] for the points whose bits are set, each by its own numbers.
     #[inline(always)]
     pub fn sample_row(&self, points: &Lanes3, normals: &Lanes3, used: u32, u: &[Lanes; 2]) -> LightRow {
-        let source = Source::Object(self.object);
+        let source = self.source();
         macro_rules! row_by {
             ($emitter:expr) => {
                 row_of!(source, i => {

@@ -69,7 +69,7 @@ impl MetalFresnel {
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> FresnelPoint {
         match self {
             Self::Schlick(color) => FresnelPoint::schlick(color.at(at, lookups)),
-            Self::Index { eta, k } => FresnelPoint { first: eta.at(at, lookups), second: k.at(at, lookups) },
+            Self::Index { eta, k } => FresnelPoint::index(eta.at(at, lookups), k.at(at, lookups)),
         }
     }
 
@@ -78,7 +78,7 @@ impl MetalFresnel {
         let bleached = |color: &Color| color.constant().unwrap_or(Vec3::ONE);
         match self {
             Self::Schlick(color) => FresnelPoint::schlick(bleached(color)),
-            Self::Index { eta, k } => FresnelPoint { first: bleached(eta), second: bleached(k) },
+            Self::Index { eta, k } => FresnelPoint::index(bleached(eta), bleached(k)),
         }
     }
 
@@ -86,7 +86,7 @@ impl MetalFresnel {
     pub fn constant(&self) -> Option<FresnelPoint> {
         match self {
             Self::Schlick(color) => color.constant().map(FresnelPoint::schlick),
-            Self::Index { eta, k } => Some(FresnelPoint { first: eta.constant()?, second: k.constant()? }),
+            Self::Index { eta, k } => Some(FresnelPoint::index(eta.constant()?, k.constant()?)),
         }
     }
 
@@ -106,8 +106,14 @@ impl FresnelPoint {
         Self { first: reflectance.min(Vec3::ONE), second: Vec3::NEG_ONE }
     }
 
+    /// Exact equations, by the complex index of refraction. From 1e8 on every metal reflects all, and squares of squares overflow.
+    pub fn index(eta: Vec3, k: Vec3) -> Self {
+        const MOST: Vec3 = Vec3::splat(1e8);
+        Self { first: eta.min(MOST), second: k.min(MOST) }
+    }
+
     /// With its colour multiplied by another one; an index of refraction is no colour.
-    fn tinted(self, color: Vec3) -> Self {
+    pub fn tinted(self, color: Vec3) -> Self {
         if self.second.x < 0.0 { Self { first: self.first * color, ..self } } else { self }
     }
 

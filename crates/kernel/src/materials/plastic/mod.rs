@@ -65,7 +65,7 @@ impl Plastic {
 
     fn point(&self, diffuse: Vec3, specular: Vec3, roughness: f32) -> PlasticPoint {
         let (albedo, is_smooth) = (self.albedos.at(roughness), self.is_smooth());
-        let diffuse = diffuse.min(Vec3::ONE);
+        let (diffuse, specular) = (diffuse.min(Vec3::ONE), specular.min(Vec3::ONE));
         PlasticPoint {
             diffuse,
             base: base(diffuse, self.ior, &albedo),

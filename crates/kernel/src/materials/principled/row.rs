@@ -1,6 +1,6 @@
 //! Surfaces of principled materials in rows of sixteen.
 
-use std::f32::consts::{FRAC_1_PI, PI};
+use std::f32::consts::FRAC_1_PI;
 
 use super::{COAT_REFLECTANCE, Principled, PrincipledPoint};
 use crate::materials::bsdf::{
@@ -24,6 +24,8 @@ pub struct PrincipledRow<const THROUGH: bool> {
     to_eye: Lanes3,
     /// [`PrincipledPoint::base`].
     base: Lanes3,
+    /// The largest component of the diffuse lobe's albedo where nothing is above it.
+    diffuse: Lanes,
     /// [`PrincipledPoint::facets`].
     facets: Lanes3,
     /// [`PrincipledPoint::grazing`].
@@ -176,7 +178,8 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         set_lane(&mut self.left, i, left);
         let [normal, grazing] = self.albedos(i, cosine);
         let specular = lane(&self.facets, i).max_element() * normal + self.grazing[i] * grazing;
-        let diffuse = (lane(&self.base, i) * left).max_element() * PI;
+        // Where facets reflect nearly all, the light from other directions passes them more easily: it needs some samples.
+        let diffuse = self.diffuse[i] * left.max_element().max(0.01);
         let mut all = specular + diffuse;
         let mut through = 0.0;
         if self.transmits {
@@ -202,6 +205,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
         normal: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
         to_eye: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
         base: [[0.0; LANES]; 3],
+        diffuse: [0.0; LANES],
         facets: [[0.0; LANES]; 3],
         grazing: [1.0; LANES],
         dielectric: ([[0.0; LANES]; 3], [0.0; LANES]),
@@ -239,6 +243,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
         set_lane(&mut self.normal, i, if THROUGH { -normal } else { normal });
         set_lane(&mut self.to_eye, i, if THROUGH { mirrored } else { place.to_eye });
         set_lane(&mut self.base, i, bsdf.base);
+        self.diffuse[i] = bsdf.ambient.max_element();
         set_lane(&mut self.transmission, i, bsdf.transmission);
         set_lane(&mut self.facets, i, bsdf.facets);
         set_lane(&mut self.dielectric.0, i, bsdf.dielectric.0);
@@ -271,6 +276,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
             set_lane(own, i, lane(other, from));
         }
         for (own, other) in [
+            (&mut self.diffuse, &other.diffuse),
             (&mut self.dielectric.1, &other.dielectric.1),
             (&mut self.grazing, &other.grazing),
             (&mut self.alpha, &other.alpha),
@@ -458,6 +464,7 @@ impl MaterialRow for PrincipledRow<false> {
                 take(&of, &[point.coat_albedo.terms[number]; LANES], &mut self.coat_terms[number]);
             }
             for (value, own) in [
+                (point.ambient.max_element(), &mut self.diffuse),
                 (point.dielectric.1, &mut self.dielectric.1),
                 (point.grazing, &mut self.grazing),
                 (point.alpha, &mut self.alpha),

@@ -123,6 +123,31 @@ fn albedos_are_those_of_quadrature_and_never_above_one() {
     }
 }
 
+#[test]
+fn where_facets_reflect_all_samples_weigh_no_more_than_grazing_light_needs() {
+    for alpha in [0.001_f32, 0.002, 0.01, 0.05] {
+        let number = Number::Constant;
+        let white = Principled::new(PrincipledInputs {
+            color: Color::Constant(Vec3::ONE),
+            metallic: number(0.0),
+            roughness: number(alpha.sqrt()),
+            ior: 1.5,
+            specular: number(1.0),
+            specular_color: Color::Constant(Vec3::splat(25.0)),
+            transmission: number(0.0),
+            clearcoat: number(0.0),
+            clearcoat_roughness: number(0.0),
+        });
+        for cosine in [0.01, 0.05, 0.3, 1.0] {
+            let subject =
+                Subject::<PrincipledRow<false>>::new(&point(&white), [alpha; 2], direction(cosine, 0.7));
+            let (largest, mean) = (subject.largest_weight(128), subject.sampled_albedo(128).x);
+            assert!(largest < 60.0, "α {alpha} at a cosine of {cosine}: a sample of {largest}");
+            assert!(mean < 1.0 + 1e-3, "α {alpha} at a cosine of {cosine}: {mean}");
+        }
+    }
+}
+
 /// Parts of the light that go through.
 const TRANSMISSIONS: [f32; 2] = [0.6, 1.0];
 

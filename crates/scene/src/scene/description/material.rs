@@ -314,7 +314,7 @@ pub enum MaterialKind {
     /// A perfect mirror of this reflectance in [0, 1].
     Mirror {
         /// Reflectance.
-        reflectance: Vec3,
+        reflectance: ColorSource,
     },
     /// Smooth or rough dielectric.
     Glass {
@@ -330,7 +330,7 @@ pub enum MaterialKind {
         /// Index of refraction, in [0.1, 10].
         ior: f32,
         /// Transmittance of the glass at any angle, in [0, 1].
-        tint: Vec3,
+        tint: ColorSource,
     },
     /// Conductor of microfacets.
     Metal {
@@ -408,9 +408,10 @@ impl MaterialKind {
                 (color, TextureRole::Ambient),
                 (specular_color, TextureRole::Facets),
             ],
-            Self::Mirror { reflectance: _ }
-            | Self::Glass { ior: _, tint: _, roughness: _ }
-            | Self::Pane { ior: _, tint: _ } => Vec::new(),
+            Self::Mirror { reflectance: color } | Self::Pane { ior: _, tint: color } => {
+                vec![(color, TextureRole::Facets)]
+            }
+            Self::Glass { ior: _, tint: _, roughness: _ } => Vec::new(),
         }
     }
 
@@ -564,13 +565,13 @@ impl Fingerprinted for MaterialKind {
                 key.index(0).f32(*shininess).add(diffuse, of).add(specular, of).add(ambient, of);
             }
             Self::Mirror { reflectance } => {
-                key.index(1).vec3(*reflectance);
+                key.index(1).add(reflectance, of);
             }
             Self::Glass { ior, tint, roughness } => {
                 key.index(2).f32(*ior).dvec3(*tint).add(roughness, of);
             }
             Self::Pane { ior, tint } => {
-                key.index(3).f32(*ior).vec3(*tint);
+                key.index(3).f32(*ior).add(tint, of);
             }
             Self::Metal { fresnel, roughness, anisotropy } => {
                 key.index(6).add(fresnel, of).add(roughness, of).add(anisotropy, of);

@@ -64,7 +64,7 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
     let kind = if key.is_given() { key.choice()? } else { Kind::Phong };
     let kind = match kind {
         Kind::Phong => Some(phong(table, textures)),
-        Kind::Mirror => Some(mirror(table)),
+        Kind::Mirror => Some(mirror(table, textures)),
         Kind::Glass => glass(table, textures),
         Kind::Metal => metal(table, textures),
         Kind::Plastic => Some(plastic(table, textures)),
@@ -201,18 +201,18 @@ fn fresnel(table: &Table<'_>, textures: &Names) -> Option<FresnelSource> {
     color.fraction_or_texture(textures).map(FresnelSource::Schlick)
 }
 
-fn mirror(table: &Table<'_>) -> MaterialKind {
-    MaterialKind::Mirror { reflectance: table.optional("reflectance").fraction().unwrap_or(Vec3::splat(0.9)) }
+fn mirror(table: &Table<'_>, textures: &Names) -> MaterialKind {
+    MaterialKind::Mirror { reflectance: reflectance(table, textures, "reflectance", 0.9) }
 }
 
 fn glass(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
     let ior = table.optional("ior").number32(Limits::Between(0.1, 10.0)).unwrap_or(1.5);
-    let tint = table.optional("tint").exact_fraction().unwrap_or(DVec3::ONE);
-    let thin = table.optional("thin");
+    let (tint, thin) = (table.optional("tint"), table.optional("thin"));
     let rough = table.optional("roughness");
     let roughness = fraction(table, textures, "roughness", 0.0);
     // Whoever writes it wrongly hardly means glass that fills its shape.
     if !thin.flag().unwrap_or(thin.is_given()) {
+        let tint = tint.exact_fraction().unwrap_or(DVec3::ONE);
         return Some(MaterialKind::Glass { ior, tint, roughness });
     }
     if roughness != NumberSource::Constant(0.0) {
@@ -221,5 +221,6 @@ fn glass(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
         table.context.report(issue);
         return None;
     }
-    Some(MaterialKind::Pane { ior, tint: tint.as_vec3() })
+    let tint = tint.fraction_or_texture(textures).unwrap_or(ColorSource::Constant(Vec3::ONE));
+    Some(MaterialKind::Pane { ior, tint })
 }

@@ -182,7 +182,7 @@ impl<'a> Walker<'a> for PhotonWavefront<'a> {
 
     fn meet_pane(&mut self, path: &PathRay, vertex: &Vertex<'a>, _: OpaqueHit, pane: &Pane) -> Straight {
         let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.to_eye));
-        let tint = vertex.tinted(pane.tint);
+        let tint = vertex.pane_tint(path, pane, &mut self.counters.texture_lookups);
         if !self.goes_on() {
             return Straight::Passes(tint * (1.0 - reflectance));
         }

@@ -6,7 +6,7 @@ use super::tile::TileContext;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Asked, Ray, SurfacePoint};
 use crate::integrators::RayCounters;
-use crate::materials::{Coated, Footprint, Material, Mirror, RoughBsdf, TexturePoint};
+use crate::materials::{Coated, Footprint, Material, Mirror, Pane, RoughBsdf, TexturePoint};
 use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Sides};
@@ -136,6 +136,14 @@ impl<'a> Vertex<'a> {
         self.color.map_or(color, |own| color * own)
     }
 
+    /// Transmittance of a pane here. For paths that share their lamps with light samples, it is what shadow rays find: that of the
+    /// point.
+    pub fn pane_tint(&self, path: &PathRay, pane: &Pane, lookups: &mut u64) -> Vec3 {
+        let is_shared = path.state.density > 0.0;
+        let at = if is_shared { TexturePoint::sharp(self.surface.uv) } else { self.texture_point };
+        self.tinted(pane.tint.at(&at, lookups).min(Vec3::ONE))
+    }
+
     /// Multiplies a BSDF by the vertex colour.
     #[inline(always)]
     pub fn tint(&self, bsdf: &mut RoughBsdf) {
@@ -186,7 +194,7 @@ impl<'a> Vertex<'a> {
     ) -> Vec3 {
         let cosine = shading.normal.dot(self.to_eye).abs().min(1.0);
         if is_colored {
-            self.tinted(mirror.reflectance(cosine, &self.texture_point, &mut counters.texture_lookups))
+            mirror.reflectance(cosine, self.color, &self.texture_point, &mut counters.texture_lookups)
         } else {
             mirror.bleached(cosine)
         }

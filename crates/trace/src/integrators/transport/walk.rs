@@ -1,4 +1,4 @@
-//! Walk of a ray to the first surface where the glass around it changes, or which is opaque and there. Paths from the eye and photons
+//! Walk of a ray to the first surface where the index of refraction around it changes, or which is opaque and there. Paths from the eye and photons
 //! walk alike; a [`Walker`] decides what happens at that surface.
 //!
 //! Thin panes, and surfaces that chance leaves out by their opacity, are passed straight on: to what it meets there, the path comes
@@ -37,7 +37,7 @@ pub enum Reached<'v, 'a> {
 pub struct Change {
     /// The medium beyond it.
     pub far: Medium,
-    /// The rough surface there. `None` if it is smooth, or both media refract alike.
+    /// The rough surface there. `None` if it is smooth.
     pub rough: Option<GlassPoint>,
 }
 
@@ -170,8 +170,8 @@ pub fn walk<'a, W: Walker<'a>>(
             }
             path.path = path.next_path(STRAIGHT);
         }
-        // Stop at a change of glass.
-        if near.glass() != far.glass() {
+        // Stop at a change of glass, if both sides refract differently.
+        if near.glass() != far.glass() && ior(tile.world, near) != ior(tile.world, far) {
             vertex.start_between(sides);
             let rough = if tile.world.has_rough_glass() {
                 rough(walker, &path, (&vertex, &hit), (sides, far))
@@ -196,7 +196,7 @@ pub fn walk<'a, W: Walker<'a>>(
     walker.reach(&path, Reached::Hidden, true);
 }
 
-/// The rough surface between a path's medium and that beyond a hit. `None` if it is smooth, or both media refract alike.
+/// The rough surface between a path's medium and that beyond a hit, which refract differently. `None` if it is smooth.
 #[cold]
 #[inline(never)]
 fn rough<'a, W: Walker<'a>>(
@@ -207,9 +207,6 @@ fn rough<'a, W: Walker<'a>>(
 ) -> Option<GlassPoint> {
     let tile = walker.tile();
     let indices = [path.medium, far].map(|medium| ior(tile.world, medium));
-    if indices[0] == indices[1] {
-        return None;
-    }
     let boundary = tile.boundary(hit, [path.medium, far], walker.crossing())?;
     let glass = tile.world.materials[boundary.material as usize].bsdf.glass()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());

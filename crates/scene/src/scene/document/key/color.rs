@@ -28,12 +28,7 @@ impl Key<'_> {
         self.color_of(Limits::AtLeast(0.0), COLOR).map(DVec3::as_vec3)
     }
 
-    /// A colour of components in [0, 1]: a part of the light.
-    pub(in super::super) fn fraction(&self) -> Option<Vec3> {
-        self.exact_fraction().map(DVec3::as_vec3)
-    }
-
-    /// The same as it is written: a part so small or so near to 1 that `f32` does not tell it from that.
+    /// A colour of components in [0, 1] as it is written: a part so small or so near to 1 that `f32` does not tell it from that.
     pub(in super::super) fn exact_fraction(&self) -> Option<DVec3> {
         self.color_of(Limits::Between(0.0, 1.0), COLOR)
     }
