@@ -42,6 +42,22 @@ TWO_SIDED = "closed_forms::two_sided::"
 
 # Fault, file, where the expression in ⟦⟧ is, what stands in its place, the test that must fail.
 FAULTS = [
+    ("a cosine by the normal that turns away from the viewer", "integrators/transport/batch.rs",
+     "set_lane(&mut self.normal, i, ⟦normal⟧);", "shading.normal",
+     MICROFACETS + "coarse_smooth_meshes_reflect_no_more_than_arrives"),
+    ("equal indices a boundary", "integrators/transport/walk.rs",
+     "near.glass() != far.glass() && ⟦ior(tile.world, near) != ior(tile.world, far)⟧ {", "true",
+     "closed_forms::touching::equal_indices_are_no_boundary_and_no_scattering"),
+    ("near sides of lamps that weaken nothing", "world/straight.rs",
+     "if ⟦source == Source::Sheer(hit.object) && hit.shape.t >= ray.t_max - end⟧ {",
+     "source == Source::Sheer(hit.object)", STRAIGHT + "lamps_that_are_half_there_shine_through_themselves"),
+    ("normal maps that are not mirrored", "materials/texture.rs", "direction.as_vec2() * ⟦self.repeat.signum()⟧",
+     "Vec2::ONE", "materials::normal_map::tests::slopes_are_mirrored_with_their_texture"),
+    ("hard shadows that lobes do not have", "integrators/direct/unshadowed.rs",
+     "⟦self.tile.world.left_on_segment(&segment, source, &mut rays.lookups)⟧", "Vec3::ONE",
+     "closed_forms::hard::lobes_of_metal_see_lamps_by_the_same_ray_to_their_middle"),
+    ("albedos below the lobe's", "materials/lobe_albedo.rs", "terms[0] += ⟦missing.fold(0.0, f64::max)⟧;", "0.0",
+     "materials::lobe_albedo::tests::polynomials_are_those_of_the_quadrature_or_just_above"),
     ("1 % of energy won at each bounce", "integrators/transport/scatter.rs", "let share = ⟦cosines[i] / densities[i]⟧;",
      "1.01 * cosines[i] / densities[i]", GLOBAL + "a_furnace_sums_its_bounces_to_the_depth_asked_for"),
     ("the cosine dropped", "integrators/transport/scatter.rs", "let share = ⟦cosines[i] / densities[i]⟧;",

@@ -127,3 +127,48 @@ fn a_direction_that_a_mesh_has_not_is_a_warning() {
     desk.write("plain.toml", scene("0.0"));
     assert!(!desk.expect("plain.toml --once -o b.exr", 0).contains("anisotropy"));
 }
+
+#[test]
+fn pictures_of_a_material_file_are_named_with_their_material() {
+    let desk = Desk::new();
+    desk.write(
+        "a.obj",
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl brick\nf 1/1 2/2 3/3\n",
+    );
+    desk.write("a.toml", format!("{CAMERA}[[mesh]]\nfile = \"a.obj\"\n"));
+    desk.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
+    desk.write("a.mtl", "newmtl brick\nmap_Kd lost.png\n");
+    let missing = desk.expect("check a.toml", 2);
+    assert!(
+        missing.contains("lost.png") && missing.contains("the material \"brick\" of a.obj names it"),
+        "{missing}"
+    );
+    desk.write("a.mtl", "newmtl brick\nmap_Bump heights.pgm\n");
+    let grey = desk.expect("check a.toml", 0);
+    assert!(grey.contains("heights.pgm is grey: heights in place of the normals of \"brick\""), "{grey}");
+}
+
+#[test]
+fn keys_that_change_nothing_on_a_mesh_are_warned_of() {
+    let desk = Desk::new();
+    let corners = "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n";
+    desk.write("a.off", format!("COFF\n3 1 0\n{corners}3 0 1 2\n"));
+    desk.write("dots.ppm", "P3\n2 1\n255\n0 0 0 255 255 255\n");
+    let warnings = |material: &str, more: &str| {
+        desk.write(
+            "a.toml",
+            format!(
+                "{CAMERA}[[mesh]]\nfile = \"a.off\"\nmaterial = \"m\"\n{more}\n[materials.m]\n{material}\n\
+                 [textures.dots]\nfile = \"dots.ppm\"\n"
+            ),
+        );
+        desk.expect("check a.toml", 0)
+    };
+    let textured = warnings("diffuse = { texture = \"dots\" }", "");
+    let message = "a.off has no texture coordinates: each triangle shows half of the textures of \"m\"";
+    assert!(textured.contains(message), "{textured}");
+    let metal = warnings("type = \"metal\"\nelement = \"gold\"", "vertex_colors = true");
+    assert!(metal.contains("`vertex_colors` changes nothing: \"m\" has no colour"), "{metal}");
+    let matte = warnings("diffuse = 0.5", "vertex_colors = true");
+    assert!(!matte.contains("changes nothing") && !matte.contains("coordinates"), "{matte}");
+}

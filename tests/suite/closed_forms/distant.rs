@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{
-    DirectionalLight, Falloff, Light, MaterialKind, PointLight, Shadows, SpotLight,
+    ColorSource, DirectionalLight, Falloff, Light, MaterialKind, PointLight, Shadows, SpotLight,
 };
 
 use super::direct::at_origin;
@@ -102,7 +102,7 @@ fn a_disc_of_light_is_seen_by_rays_that_leave() {
     assert!((beside(9.99) - radiance(20.0) - 0.25).abs() < 1e-3 && beside(10.01) == 0.25);
     assert_eq!(sun(scene(), DVec3::Z, 5.0, 0.0).value(), 0.0);
     // By a mirror.
-    let mirror = plain(MaterialKind::Mirror { reflectance: Vec3::splat(0.5) });
+    let mirror = plain(MaterialKind::Mirror { reflectance: ColorSource::Constant(Vec3::splat(0.5)) });
     let build = scene().quad(v(-1.0, -1.0, -2.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), mirror);
     let seen = sun(build, DVec3::NEG_Z, 5.0, 20.0).value();
     assert!((seen - 0.5 * radiance(20.0)).abs() < 1e-3, "{seen}");

@@ -5,7 +5,7 @@ use glimt::math::DVec3;
 use glimt::scene::description::{Falloff, Shadows, Shape};
 
 use super::glass::boxes;
-use super::scenes::{AS_IT_IS, Build, emitter, matte, receiver, scene};
+use super::scenes::{AS_IT_IS, Build, emitter, matte, metal, receiver, scene};
 use super::{mean_and_error, v};
 
 /// Every kind of light above a receiver, at a height and of a size.
@@ -47,6 +47,37 @@ fn unoccluded_light_is_the_same_with_any_shadows() {
                 (mean - soft).abs() <= allowed,
                 "{name} at {height}: {mean} ± {error}, soft {soft} ± {soft_error}"
             );
+        }
+    }
+}
+
+#[test]
+fn lobes_of_metal_see_lamps_by_the_same_ray_to_their_middle() {
+    // A lamp and its mirror image in a metal floor; a small ball before the lamp's middle, and one that stands elsewhere.
+    let floor = |roughness: f32| {
+        scene()
+            .quad(v(-0.05, 0.0, 0.05), v(0.1, 0.0, 0.0), v(0.0, 0.0, -0.1), metal(0.9, roughness, 0.0))
+            .seen(v(-0.1, 0.1, 0.02), DVec3::ZERO)
+            .depth(1)
+    };
+    let corner = v(1.0, 0.2, -1.0);
+    let lit = |build: Build| build.quad(corner, v(0.0, 0.0, 2.0), v(0.0, 1.6, 0.0), emitter(2.0));
+    let middle = corner + v(0.0, 0.8, 1.0);
+    for roughness in [0.1, 0.3] {
+        let open = mean_and_error(&lit(floor(roughness)).values(1024, 16));
+        let with = |at: DVec3, shadows: Shadows| {
+            let build = lit(floor(roughness)).sphere(at, 0.02, matte(0.0)).shadows(shadows, 1);
+            mean_and_error(&build.values(1024, 16))
+        };
+        assert_eq!(with(middle * 0.5, Shadows::Hard).0, 0.0, "the middle is hidden");
+        let beside = corner + v(0.0, 1.5, 1.9);
+        for (name, (mean, error)) in [
+            ("another place is hidden", with(beside * 0.5, Shadows::Hard)),
+            ("without shadows", with(middle * 0.5, Shadows::Off)),
+        ] {
+            let error = error.hypot(open.1);
+            assert!(error < 0.02 * open.0, "{name}: ± {error} of {}", open.0);
+            assert!((mean - open.0).abs() < 4.0 * error, "{name}: {mean}, {open:?}");
         }
     }
 }

@@ -328,7 +328,7 @@ pub fn emitter(radiance: f32) -> Material {
 }
 
 pub fn mirror(reflectance: f32) -> Material {
-    plain(MaterialKind::Mirror { reflectance: Vec3::splat(reflectance) })
+    plain(MaterialKind::Mirror { reflectance: ColorSource::Constant(Vec3::splat(reflectance)) })
 }
 
 /// Metal of a grey reflectance at normal incidence.

@@ -6,15 +6,15 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
-    Accel, Falloff, Integrator, Material, MaterialKind, NumberSource, OpacitySource, Shadows, Shape,
-    TextureFilter, Wrap,
+    Accel, ColorSource, EmissionSides, Falloff, Integrator, Material, MaterialKind, NumberSource,
+    OpacitySource, Shadows, Shape, TextureFilter, Wrap,
 };
 
 use super::scenes::{AS_IT_IS, Build, emitter, matte, mirror, phong, plain, receiver, scene};
 use super::{assert_close, assert_mean, mean_and_error, v};
 
 fn pane(tint: f32) -> Material {
-    plain(MaterialKind::Pane { ior: 1.5, tint: Vec3::splat(tint) })
+    plain(MaterialKind::Pane { ior: 1.5, tint: ColorSource::Constant(Vec3::splat(tint)) })
 }
 
 fn veiled(mut material: Material, opacity: f32) -> Material {
@@ -68,6 +68,37 @@ fn a_pane_before_a_lamp_by_angle() {
             assert_close(&format!("{degrees}° at depth {depth}"), seen.clone().depth(depth).value(), exact);
         }
         assert_mean(&format!("{degrees}°, by paths"), &path(seen).values(37, 256), exact);
+    }
+}
+
+#[test]
+fn a_tint_by_a_texture_stains_what_passes() {
+    let mut build = scene();
+    let rows: [&[Vec3]; 1] = [&[Vec3::new(0.9, 0.2, 0.1), Vec3::new(0.1, 0.3, 2.0)]];
+    let texture = build.texture(&rows, TextureFilter::Nearest, Wrap::Clamp, Vec2::ONE);
+    let stained = plain(MaterialKind::Pane { ior: 1.5, tint: ColorSource::Texture(texture) });
+    let [left, right] =
+        [DVec3::new(0.9, 0.2, 0.1), DVec3::new(0.1, 0.3, 1.0)].map(|tint| tint * (1.0 - 0.08 / 1.04));
+    // Seen through both halves.
+    let window = build.quad(v(-1.0, -1.0, -2.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), stained);
+    for build in [lamp_at(window.clone(), -4.0), path(lamp_at(window.clone(), -4.0))] {
+        for (x, exact) in [(-0.5, left), (0.5, right)] {
+            let seen = build.clone().seen(v(x, 0.0, 0.0), v(x, 0.0, -1.0)).depth(0).color();
+            assert!((seen - exact).length() < 1e-5, "{seen} is not {exact}");
+        }
+    }
+    // On a floor behind it, in the light of a small far lamp.
+    let floor = |x: f64| {
+        window
+            .clone()
+            .point_light(v(x, 0.0, 1e4), 1e8, Falloff::Square)
+            .quad(v(-2.0, -2.0, -3.0), v(4.0, 0.0, 0.0), v(0.0, 4.0, 0.0), matte(0.5))
+            .seen(v(x, 0.0, -2.5), v(x, 0.0, -3.0))
+            .color()
+    };
+    for (x, exact) in [(-0.5, left), (0.5, right)] {
+        let (seen, exact) = (floor(x), exact * (0.5 / PI));
+        assert!((seen - exact).length() < 1e-3, "{seen} is not {exact}");
     }
 }
 
@@ -214,6 +245,51 @@ fn lamps_that_are_half_there_shine_half() {
     let lit = receiver(DVec3::ZERO, 0.7).shape(disk, veiled(emitter(1.0), 0.25));
     for build in [lit.clone(), path(lit)] {
         assert_mean("a quarter", &build.values(256, 128), 0.25 * 0.7 / 5.0);
+    }
+}
+
+#[test]
+fn lamps_that_are_half_there_shine_through_themselves() {
+    // A convex lamp that emits from both sides, there by a part o, has radiance o in front and (1 − o)·o from behind.
+    let outside = receiver(v(3.0, 0.0, 0.0), 0.7);
+    let (center, o) = (v(3.0, 2.0, 0.0), 0.4);
+    let lit = |shape: &Shape, opacity: f32, sides: EmissionSides| {
+        let mut material = veiled(emitter(1.0), opacity);
+        material.emission.sides = sides;
+        outside.clone().shape(shape.clone(), material)
+    };
+    for shape in [
+        Shape::Sphere { center, radius: 0.7 },
+        Shape::Box { center, size: v(1.0, 0.6, 2.0), rotate: v(10.0, 20.0, 30.0) },
+        Shape::Cylinder { a: center, b: center + v(0.2, 1.0, 0.1), radius: 0.5, caps: true },
+        Shape::Cone { base: center, tip: center + v(0.5, 1.0, 0.0), radius: 1.0, cap: true },
+    ] {
+        let name = shape.kind();
+        let whole = mean_and_error(&lit(&shape, 1.0, EmissionSides::Front).values(256, 128)).0;
+        let both = lit(&shape, o, EmissionSides::Both);
+        let exact = whole * f64::from(o) * (2.0 - f64::from(o));
+        for (what, build) in [
+            ("whitted", both.clone()),
+            ("hard", both.clone().shadows(Shadows::Hard, 1)),
+            ("path", path(both.clone())),
+            ("photons", both.photons(100, 0.1).depth(1)),
+        ] {
+            let (mean, error) = mean_and_error(&build.values(256, 128));
+            assert!(
+                (mean - exact).abs() < 4.0 * error + 2e-3 * exact,
+                "{name} by {what}: {mean}, not {exact}"
+            );
+        }
+    }
+    // What hides parts of itself has no closed form.
+    for shape in [
+        Shape::Cylinder { a: center, b: center + v(1.0, 0.5, 0.1), radius: 0.5, caps: false },
+        Shape::Torus { center, axis: v(0.2, 1.0, 0.3), radius: 1.0, tube: 0.3 },
+    ] {
+        for sides in [EmissionSides::Front, EmissionSides::Both] {
+            let build = lit(&shape, o, sides);
+            assert_same(shape.kind(), &build.values(256, 256), &path(build).values(256, 256));
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use glimt::math::{DMat3, DVec3, Vec3};
 use glimt::scene::description::Shape;
 
 use super::glass::boxes;
+use super::global::by_paths;
 use super::scenes::{self, AS_IT_IS, Build, emitter, file_material, glass, matte, mirror, scene};
 use super::{Random, assert_close, mean_and_error, v};
 
@@ -109,6 +110,23 @@ fn two_boxes_that_share_a_face() {
         assert_within(&format!("{order:?}, white all around"), &white, 16, 1.0, 1e-3);
         let lamp = both.shape(level.square(-3.0, 5000.0), emitter(1.0));
         assert_within(&format!("{order:?}, over a lamp"), &lamp, 512, exact, 2e-3);
+    }
+}
+
+#[test]
+fn equal_indices_are_no_boundary_and_no_scattering() {
+    let level = Turned::by(DVec3::ZERO);
+    let lamp_under = |index: f64, depth: u32| {
+        stack(&level, &[(index, 1.0); 3], &[0, 1, 2], 500.0)
+            .shape(level.square(-9.0, 5000.0), emitter(1.0))
+            .seen(v(0.3, 2.0, 0.2), v(0.3, 0.0, 0.2))
+            .depth(depth)
+    };
+    // Two scatterings pass three boxes of one index, and none passes boxes of air.
+    assert_within("boxes of one index", &lamp_under(1.5, 2), 512, 0.96 * 0.96, 2e-3);
+    assert_within("by paths", &by_paths(lamp_under(1.5, 2), 2), 2048, 0.96 * 0.96, 5e-3);
+    for air in [lamp_under(1.0, 0), by_paths(lamp_under(1.0, 0), 0)] {
+        assert_eq!(air.value(), 1.0);
     }
 }
 

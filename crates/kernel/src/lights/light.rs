@@ -161,7 +161,7 @@ impl Light {
         Some(match self.family() {
             Family::Delta(light) => (Middle::At(light.brightest().position.as_vec3()), Source::Nothing),
             Family::Infinite(light) => (Middle::Towards(light.middle()?), Source::Nothing),
-            Family::Area(light) => (Middle::At(light.middle().as_vec3()), Source::Object(light.object)),
+            Family::Area(light) => (Middle::At(light.middle().as_vec3()), light.source()),
         })
     }
 

@@ -208,6 +208,11 @@ impl Lights {
         !self.by_object.is_empty() || self.are_beyond()
     }
 
+    /// Whether an object emits, or a part of it.
+    pub fn has_object(&self, object: u32) -> bool {
+        self.by_object.contains_key(&object) || self.by_back.contains_key(&object)
+    }
+
     /// All lights with their numbers.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = (u32, &Light)> {

@@ -55,6 +55,34 @@ pub fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::DVec2;
+
+    #[test]
+    fn another_colour_multiplies_that_of_a_metal_and_nothing_of_an_index() {
+        let (at, half) = (TexturePoint::sharp(DVec2::ZERO), Some(Vec3::splat(0.5)));
+        let grey = |mirror: &Mirror, cosine: f32, tint| mirror.reflectance(cosine, tint, &at, &mut 0).x;
+        let color = |reflectance: f32| Color::Constant(Vec3::splat(reflectance));
+        let even = Mirror::Even(color(0.8));
+        assert_eq!([grey(&even, 0.1, None), grey(&even, 0.1, half)], [0.8, 0.4]);
+        // Schlick: F0 + (1 − F0)(1 − cosθ)⁵ with F0 = .4.
+        let metal = Mirror::Metal(MetalFresnel::Schlick(color(0.8)));
+        assert!((grey(&metal, 0.5, half) - (0.4 + 0.6 / 32.0)).abs() < 1e-6);
+        let index = Mirror::Metal(MetalFresnel::Index { eta: color(0.2), k: color(3.9) });
+        assert_eq!(grey(&index, 0.5, half), grey(&index, 0.5, None));
+    }
+
+    #[test]
+    fn metals_of_any_index_reflect_a_part_of_the_light() {
+        let at = TexturePoint::sharp(DVec2::ZERO);
+        for (eta, k) in [(1e-30_f32, 0.0_f32), (1e30, 0.0), (0.0, 1e38), (f32::MAX, f32::MAX), (5e9, 5e9)] {
+            let [eta, k] = [eta, k].map(|part| Color::Constant(Vec3::splat(part)));
+            let metal = Mirror::Metal(MetalFresnel::Index { eta, k });
+            for cosine in [0.01, 0.5, 1.0] {
+                let part = metal.reflectance(cosine, None, &at, &mut 0).x;
+                assert!((0.999..=1.0).contains(&part), "{metal:?}: {part}");
+            }
+        }
+    }
 
     #[test]
     fn angles_in_and_out_are_equal() {

@@ -101,6 +101,16 @@ impl Texels {
         }
     }
 
+    /// Whether red, green and blue are equal in all texels.
+    pub fn is_grey(&self) -> bool {
+        match &self.data {
+            TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => {
+                bytes.iter().all(|[r, g, b]| r == g && g == b)
+            }
+            TexelData::Float(floats) => floats.iter().all(|texel| texel.x == texel.y && texel.y == texel.z),
+        }
+    }
+
     /// Number of texels.
     pub fn len(&self) -> usize {
         self.width as usize * self.height as usize

@@ -200,14 +200,16 @@ pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
 
 /// A rough material of a mesh file, with its emission and its normal map.
 fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
-    let normals = |path: &PathBuf| NormalMap {
+    let normals = own.normal_texture.as_ref().map(|path| NormalMap {
         texture: file_texture(images, &file_source(path, TextureUse::Normal)),
         strength: own.normal_strength,
-    };
+    });
+    // Grey ones are heights, of a length that the file does not tell.
+    let normals = normals.filter(|map| !map.texture.texels.is_grey());
     Material {
         bsdf: Bsdf::Rough(rough),
         emission: file_emission(images, own),
-        relief: Relief::new(own.normal_texture.as_ref().map(normals), None),
+        relief: Relief::new(normals, None),
         opacity: file_opacity(images, own),
     }
 }

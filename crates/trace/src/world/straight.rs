@@ -74,11 +74,20 @@ impl World {
 
     /// Whether nothing is left of the light on a segment.
     pub fn is_dark(&self, ray: &Ray, source: Source) -> bool {
-        let Some(passable) = &self.passable else { return self.geometry.occluded(ray, source) };
+        self.left_on_segment(ray, source, &mut 0) == Vec3::ZERO
+    }
+
+    /// The part of the light that is left on a segment to its source.
+    pub fn left_on_segment(&self, ray: &Ray, source: Source, lookups: &mut u64) -> Vec3 {
+        let Some(passable) = &self.passable else {
+            return if self.geometry.occluded(ray, source) { Vec3::ZERO } else { Vec3::ONE };
+        };
         let is_own = |object: u32| source == Source::Object(object);
         let stops = |object: u32| !passable.has(object) && !is_own(object);
-        self.geometry.closest_of(ray, stops).is_some()
-            || self.left_on(passable, ray, source, &mut 0) == Vec3::ZERO
+        if self.geometry.closest_of(ray, stops).is_some() {
+            return Vec3::ZERO;
+        }
+        self.left_on(passable, ray, source, lookups)
     }
 
     /// The part of the light that passes the surface at a hit straight on, and the ray beyond it.

@@ -32,6 +32,8 @@ pub struct NeededTexture {
     pub declared: Option<usize>,
     /// Index into [`Scene::mesh_files`] of the mesh whose material names it.
     pub mesh_file: Option<usize>,
+    /// Name of the mesh file's material, which names it. `None` for others.
+    pub material: Option<String>,
     /// Whether `[environment]` names it.
     pub is_environment: bool,
     /// Whether its mip levels are looked up.
@@ -46,6 +48,7 @@ impl NeededTexture {
             name: "environment".to_owned(),
             declared: None,
             mesh_file: None,
+            material: None,
             is_environment: true,
             has_mipmaps: false,
         }
@@ -120,19 +123,22 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
                 name: scene.textures[texture].name.clone(),
                 declared: Some(texture),
                 mesh_file: None,
+                material: None,
                 is_environment: false,
                 has_mipmaps: has_mipmaps(scene, texture),
             });
         }
     }
     for (file, mesh) in meshes.iter().enumerate().filter(|(file, _)| own_materials[*file]) {
-        for (path, used) in mesh.materials.iter().flat_map(|own| file_textures(own, lookups)) {
+        let of_material = |own| file_textures(own, lookups).map(move |texture| (own, texture));
+        for (own, (path, used)) in mesh.materials.iter().flat_map(of_material) {
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
             add(NeededTexture {
                 source: file_source(path, used),
                 name,
                 declared: None,
                 mesh_file: Some(file),
+                material: Some(own.name.clone()),
                 is_environment: false,
                 has_mipmaps: false,
             });

@@ -138,24 +138,41 @@ fn numbers(image: DynamicImage, channels: usize, of: (PixelNumber, bool)) -> Tex
         (DynamicImage::ImageRgb16(pixels), _) => floating(&pixels, channels, samples, is_srgb, word),
         (DynamicImage::ImageRgba16(pixels), _) => floating(&pixels, channels, samples, is_srgb, word),
         (DynamicImage::ImageRgb32F(pixels), _) => {
-            floating(&pixels, channels, samples, is_srgb, |value| clean(value, &mut unusable))
+            unusable = unusable_pixels(&pixels, channels, samples);
+            floating(&pixels, channels, samples, is_srgb, clean)
         }
         (DynamicImage::ImageRgba32F(pixels), _) => {
-            floating(&pixels, channels, samples, is_srgb, |value| clean(value, &mut unusable))
+            unusable = unusable_pixels(&pixels, channels, samples);
+            floating(&pixels, channels, samples, is_srgb, clean)
         }
         // Kinds that a later `image` may add.
-        (other, _) => floating(&other.into_rgba32f(), 4, samples_of(4, of), is_srgb, |value| {
-            clean(value, &mut unusable)
-        }),
+        (other, _) => {
+            let (pixels, samples) = (other.into_rgba32f(), samples_of(4, of));
+            unusable = unusable_pixels(&pixels, 4, samples);
+            floating(&pixels, 4, samples, is_srgb, clean)
+        }
     };
     Texels { width, height, data, unusable }
 }
 
-/// A usable number; counts the others, which become 0.
-fn clean(value: f32, unusable: &mut u64) -> f32 {
-    let is_usable = (0.0..=LARGEST as f32).contains(&value);
-    *unusable += u64::from(!is_usable);
-    if is_usable { value } else { 0.0 }
+fn is_usable(value: f32) -> bool {
+    (0.0..=LARGEST as f32).contains(&value)
+}
+
+/// A usable number; the others become 0.
+fn clean(value: f32) -> f32 {
+    if is_usable(value) { value } else { 0.0 }
+}
+
+/// Number of the pixels of which some sample that counts is not usable.
+fn unusable_pixels(pixels: &[f32], channels: usize, samples: Samples) -> u64 {
+    let counted = match samples {
+        Samples::One(place, _) => place..place + 1,
+        Samples::Luminance => 0..3,
+        Samples::Nothing => 0..0,
+    };
+    let is_broken = |pixel: &&[f32]| !pixel[counted.clone()].iter().all(|value| is_usable(*value));
+    pixels.chunks_exact(channels).filter(is_broken).count() as u64
 }
 
 /// Numbers that are bytes, by the number of samples of a pixel and the place of the one that counts.
@@ -229,5 +246,8 @@ mod tests {
         assert_eq!(number(float(), of(Channel::Red), false), 2.0);
         let broken = texels(float(), ImageEncoding::Number { of: of(Channel::Green), is_srgb: false });
         assert_eq!((broken.get(0, 0).x, broken.unusable), (0.0, 1));
+        // A pixel counts once, however many of its samples are broken.
+        let broken = texels(float(), ImageEncoding::Number { of: PixelNumber::Luminance, is_srgb: false });
+        assert_eq!(broken.unusable, 1);
     }
 }

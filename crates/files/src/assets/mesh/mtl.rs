@@ -1,5 +1,6 @@
 //! MTL by `tobj`, with the checks that it leaves to its caller.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use super::text::{with_line_feeds, without_mark};
@@ -10,24 +11,71 @@ use crate::math::{DVec3, Vec3};
 /// Most bytes of a material file.
 const FILE_LIMIT: u64 = 64 << 20;
 
-/// Reads the materials of an MTL file.
+/// The materials of an MTL file.
+pub(super) struct Library {
+    pub(super) materials: Vec<tobj::Material>,
+    /// What was left out of them.
+    pub(super) warnings: Vec<String>,
+}
+
+/// Reads an MTL file.
 ///
 /// # Errors
 /// The errors of reading, and [`AssetError::Malformed`] with the line.
-pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Vec<tobj::Material>, AssetError> {
+pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Library, AssetError> {
     let quiet = Watch { progress: &crate::control::unwatched, ..watch };
     let bytes = read::text(path, FILE_LIMIT, quiet)?;
     let mut text = String::with_capacity(bytes.len());
+    let mut warnings = Vec::new();
     let bytes = with_line_feeds(without_mark(&bytes));
     for (index, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
-        let line = without_comment(line);
-        check(line).map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
-        text.push_str(line);
+        let line = plain(without_comment(line));
+        check(&line).map_err(|reason| AssetError::malformed(path, Some(index + 1), reason))?;
+        if is_spectral(&line) {
+            let (file, number) = (path.display(), index + 1);
+            warnings.push(format!("{file}:{number}: spectra are not read; the usual colour stands in"));
+            text.push('\n');
+            continue;
+        }
+        text.push_str(&line);
         text.push('\n');
     }
     let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes())
         .map_err(|error| AssetError::malformed(path, None, error.to_string()))?;
-    Ok(materials)
+    Ok(Library { materials, warnings })
+}
+
+/// Statements of colours.
+const COLORS: [&str; 4] = ["Ka", "Kd", "Ks", "Ke"];
+
+/// The line in the words that `tobj` knows: a colour of one number is grey, one of CIE's XYZ becomes RGB, and a halo is forgotten.
+fn plain(line: &str) -> Cow<'_, str> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let numbers = |words: &[&str]| words.iter().map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>();
+    match words.as_slice() {
+        [color, grey] if COLORS.contains(color) => format!("{color} {grey} {grey} {grey}").into(),
+        [color, "xyz", values @ ..] if COLORS.contains(color) => match numbers(values).as_deref() {
+            Some([grey]) => rgb_line(color, [*grey; 3]).into(),
+            Some([x, y, z]) => rgb_line(color, [*x, *y, *z]).into(),
+            Some(_) | None => line.into(),
+        },
+        ["d", "-halo", number] => format!("d {number}").into(),
+        _ => line.into(),
+    }
+}
+
+/// A colour's statement by CIE's XYZ: linear Rec. 709 (ITU-R BT.709, its primaries and its white D65).
+fn rgb_line(statement: &str, [x, y, z]: [f64; 3]) -> String {
+    let red = 3.240_97 * x - 1.537_38 * y - 0.498_61 * z;
+    let green = -0.969_24 * x + 1.875_97 * y + 0.041_56 * z;
+    let blue = 0.055_63 * x - 0.203_98 * y + 1.056_97 * z;
+    format!("{statement} {red} {green} {blue}")
+}
+
+/// Whether the line gives a colour by a file of a spectrum.
+fn is_spectral(line: &str) -> bool {
+    let mut words = line.split_whitespace();
+    words.next().is_some_and(|word| COLORS.contains(&word)) && words.next() == Some("spectral")
 }
 
 /// The line without a comment, which may follow numbers. In names, `#` may be a letter like others; the look-up of a
@@ -65,6 +113,9 @@ pub(super) fn cut_at_comments(text: &str) -> impl Iterator<Item = &str> {
 fn check(line: &str) -> Result<(), String> {
     let mut words = line.split_whitespace();
     let Some(keyword) = words.next() else { return Ok(()) };
+    if is_spectral(line) {
+        return Ok(());
+    }
     let wanted = match keyword {
         "Ka" | "Kd" | "Ks" | "Ke" => 3,
         "Ns" | "Ni" | "d" | "Tr" | "Pr" | "Pm" | "Pc" | "Pcr" | "Ps" => 1,
@@ -216,6 +267,8 @@ fn file_name(statement: &str) -> Option<String> {
             rest = behind.trim_start();
         }
     }
+    // Some exporters quote names that have spaces.
+    let rest = rest.strip_prefix('"').and_then(|name| name.strip_suffix('"')).unwrap_or(rest);
     (!rest.is_empty()).then(|| rest.replace('\\', "/"))
 }
 
@@ -229,7 +282,7 @@ mod tests {
         let path = folder.path().join("a.mtl");
         std::fs::write(&path, text).expect("written");
         let token = CancelToken::new();
-        let found = load(&path, Watch { progress: &unwatched, token: &token })?;
+        let found = load(&path, Watch { progress: &unwatched, token: &token })?.materials;
         Ok(found.iter().map(|found| material(found, Path::new("models"))).collect())
     }
 
@@ -261,6 +314,23 @@ mod tests {
         assert_eq!(materials[0], expected);
         assert_eq!((materials[1].diffuse, materials[1].emission), (Vec3::splat(0.6), Vec3::ZERO));
         assert_eq!(materials[2].emission, Vec3::ONE);
+    }
+
+    #[test]
+    fn colours_are_read_as_the_format_has_them() {
+        let diffuse = |statement: &str| read(&format!("newmtl a\n{statement}\n")).expect("whole")[0].diffuse;
+        assert_eq!(diffuse("Kd 0.25 # grey"), Vec3::splat(0.25));
+        // The white of D65 and the primary red of Rec. 709.
+        assert!((diffuse("Kd xyz 0.95046 1 1.08906") - Vec3::ONE).length() < 1e-3);
+        assert!((diffuse("Kd xyz 0.41239 0.21264 0.01933") - Vec3::X).length() < 1e-3);
+        assert_eq!(diffuse("Kd spectral brass.rfl 0.5"), Vec3::splat(0.6));
+        assert_eq!(read("newmtl a\nd -halo 0.5\n").expect("whole")[0].opacity, 0.5);
+        let quoted = read("newmtl a\nmap_Kd -s 1 1 1 \"wall one.png\"\n").expect("whole");
+        assert_eq!(quoted[0].diffuse_texture, Some(PathBuf::from("models/wall one.png")));
+        for broken in ["Kd", "Kd 1 2", "Kd xyz 1 2", "Kd xyz x", "Kd x"] {
+            let error = read(&format!("newmtl a\n{broken}\n")).expect_err(broken).to_string();
+            assert!(error.ends_with("a.mtl:2: `Kd` is followed by three finite numbers"), "{error}");
+        }
     }
 
     #[test]
@@ -341,7 +411,7 @@ mod tests {
         std::fs::write(&path, format!("newmtl a\n{statements}refl -type sphere map_Kd.png\n"))
             .expect("written");
         let token = CancelToken::new();
-        let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole");
+        let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole").materials;
         let mut expected = maps.map(|map| PathBuf::from(format!("models/{map}.png")));
         expected.sort();
         assert_eq!(pictures(&found[0], Path::new("models")), expected);
@@ -368,7 +438,7 @@ mod tests {
         let path = folder.path().join("a.mtl");
         std::fs::write(&path, text).expect("written");
         let token = CancelToken::new();
-        let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole");
+        let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole").materials;
         let found = material(&found[0], folder.path());
         assert_eq!(found.diffuse_texture, file("wall.png"));
         assert_eq!(found.specular_texture, file("Map #1.png"));

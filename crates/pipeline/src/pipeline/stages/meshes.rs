@@ -117,32 +117,48 @@ pub(in crate::pipeline) fn meshes(
             findings.error(loaded, object.span.clone(), message, help);
         }
     }
-    for object in &loaded.scene.objects {
-        if let Some(mesh) = object.shape.mesh().filter(|mesh| mesh.vertex_colors)
-            && meshes[mesh.file].mesh.mesh.colors.is_empty()
-            && !meshes[mesh.file].mesh.mesh.positions.is_empty()
-        {
-            let name = files[mesh.file].value.display();
-            let message = format!("`vertex_colors` changes nothing: the vertices of {name} have no colours");
-            findings.warn(loaded, object.span.clone(), message);
-        }
-        if let (Some(mesh), Some(material)) = (object.shape.mesh(), object.material)
-            && loaded.scene.materials[material].kind.has_direction()
-            && counts.failed == 0
-            && meshes[mesh.file].mesh.mesh.uvs.is_empty()
-        {
-            let (file, name) = (files[mesh.file].value.display(), &loaded.scene.materials[material].name);
-            let message = format!(
-                "{file} has no texture coordinates: the `anisotropy` of \"{name}\" has no direction there"
-            );
-            findings.warn(loaded, object.span.clone(), message);
-        }
-    }
+    warn_about_missing_parts(loaded, files, &meshes, findings);
     if counts.failed == 0 {
         let bounds = || meshes.iter().map(|mesh| mesh.bounds()).collect();
         findings.warnings.extend(loaded.lights_facing_away(bounds));
     }
     Ok(loaded_and_kept(meshes, counts))
+}
+
+/// Warns about objects whose keys and materials ask for parts that their mesh files lack. Files that were not read lack nothing.
+fn warn_about_missing_parts(
+    loaded: &Loaded,
+    files: &[MeshFile],
+    meshes: &[Arc<KeptMesh>],
+    findings: &mut Findings,
+) {
+    for object in &loaded.scene.objects {
+        let Some(mesh) = object.shape.mesh() else { continue };
+        let (file, read) = (files[mesh.file].value.display(), &meshes[mesh.file].mesh.mesh);
+        if read.positions.is_empty() {
+            continue;
+        }
+        let material = object.material.map(|material| &loaded.scene.materials[material]);
+        let mut warn = |message| findings.warn(loaded, object.span.clone(), message);
+        if mesh.vertex_colors && read.colors.is_empty() {
+            warn(format!("`vertex_colors` changes nothing: the vertices of {file} have no colours"));
+        } else if let Some(material) = material.filter(|own| mesh.vertex_colors && !own.kind.has_color()) {
+            let name = &material.name;
+            warn(format!("`vertex_colors` changes nothing: \"{name}\" has no colour that they multiply"));
+        }
+        let Some(material) = material.filter(|_| read.uvs.is_empty()) else { continue };
+        let name = &material.name;
+        if material.kind.has_direction() {
+            warn(format!(
+                "{file} has no texture coordinates: the `anisotropy` of \"{name}\" has no direction there"
+            ));
+        }
+        if !material.textures().is_empty() {
+            warn(format!(
+                "{file} has no texture coordinates: each triangle shows half of the textures of \"{name}\""
+            ));
+        }
+    }
 }
 
 /// A mesh file and the number of its part, however the scene spells it.

@@ -179,6 +179,7 @@ pub(in crate::pipeline) fn textures(
                     }
                 }
                 warn_of_unusable(loaded, &image, texels, findings);
+                warn_of_heights(loaded, &image, texels, findings);
                 if let Some(mipmaps) = mipmaps {
                     let bytes = mipmaps.memory_bytes();
                     cache.mipmaps.insert(image.name.clone(), key, (mipmaps.clone(), bytes));
@@ -190,7 +191,14 @@ pub(in crate::pipeline) fn textures(
             Err(error) => {
                 counts.failed += 1;
                 for one in &image.asked_by {
-                    findings.asset_error(loaded, place(loaded, one), &error);
+                    match (&one.material, one.mesh_file) {
+                        (Some(material), Some(file)) => {
+                            let file = loaded.scene.mesh_files[file].value.display();
+                            let help = format!("the material \"{material}\" of {file} names it");
+                            findings.error(loaded, place(loaded, one), error.to_string(), &help);
+                        }
+                        _ => findings.asset_error(loaded, place(loaded, one), &error),
+                    }
                 }
             }
         }
@@ -214,6 +222,18 @@ fn warn_of_unusable(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findin
     let message =
         format!("{path}: {count} negative, not finite or beyond 1e18 in red, green or blue; 0 stands there");
     findings.warn(loaded, place(loaded, image.asked_by[0]), message);
+}
+
+/// Says that a grey image bends no normals.
+fn warn_of_heights(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findings: &mut Findings) {
+    let is_normal_map =
+        |one: &&&NeededTexture| one.source.encoding == ImageEncoding::Linear && one.mesh_file.is_some();
+    let Some(one) = image.asked_by.iter().find(is_normal_map).filter(|_| texels.is_grey()) else { return };
+    let (path, material) = (image.path().display(), one.material.as_deref().unwrap_or_default());
+    let message = format!(
+        "{path} is grey: heights in place of the normals of \"{material}\"; it bends nothing (`bump` takes heights)"
+    );
+    findings.warn(loaded, place(loaded, one), message);
 }
 
 /// Place in the scene of the name of the environment map.
@@ -380,6 +400,7 @@ pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<Needed
             name: texture.name.clone(),
             declared: Some(index),
             mesh_file: None,
+            material: None,
             is_environment: false,
             has_mipmaps: false,
         });

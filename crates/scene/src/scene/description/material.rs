@@ -197,6 +197,19 @@ impl MaterialKind {
         }
     }
 
+    /// Whether it has a colour, which vertex colours multiply.
+    pub fn has_color(&self) -> bool {
+        match self {
+            Self::Metal { fresnel: FresnelSource::Index { .. }, .. } | Self::Glass { .. } => false,
+            Self::Metal { fresnel: FresnelSource::Schlick(_), .. }
+            | Self::Phong { .. }
+            | Self::Mirror { .. }
+            | Self::Pane { .. }
+            | Self::Plastic { .. }
+            | Self::Principled { .. } => true,
+        }
+    }
+
     /// Whether it is glass that fills its shape.
     pub fn is_glass(&self) -> bool {
         self.substance().is_some()

@@ -1,6 +1,7 @@
 //! Rays in the narrow lobes of vertices that find the light of lamps beside light samples.
 
 use super::all_lights::{Arrived, add_work};
+use super::unshadowed::Unshadowed;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::medium::{Media, absorption};
@@ -10,6 +11,7 @@ use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, lane, set_lane};
 use crate::sampling::Decision;
+use crate::scene::description::Shadows;
 use crate::world::{Hit, Loops};
 
 /// Traces rays in the glossy lobes of the vertices whose bits are set, as many as samples of a lamp: a narrow lobe finds in a
@@ -39,7 +41,11 @@ impl Loops for LobeRays<'_> {
         for repetition in 0..count {
             // Sample a direction in each lobe.
             let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);
-            let directions = row.bsdf.sample(LobeSet::Narrow, &row.normal, &[0.0; LANES], &u);
+            let mut choices = [0.0; LANES];
+            if row.bsdf.sends_rays() {
+                [choices, _] = sampler.pairs(&row.path, Decision::Lobe, repetition, count);
+            }
+            let directions = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u);
             let Response { bsdf, cosines } = row.response(&directions);
             let densities = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &directions, &bsdf);
             let [_, narrow] = row.bsdf.parts(&directions, &bsdf);
@@ -52,8 +58,19 @@ impl Loops for LobeRays<'_> {
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
             let rays = RayRows::of(row.from, directions).leaving(row.starts(&directions));
-            let (hits, objects) = tile.world.geometry.closest_rows(&rays, &mut ends, sent, folds);
             arrived.rays.scattered += u64::from(sent.count_ones());
+            // Without soft shadows, what is met does not depend on what is before it.
+            if tile.settings.render.shadows != Shadows::Soft {
+                for i in lanes(if measure == Measure::Work { 0 } else { sent }) {
+                    let found = Unshadowed { tile, row, lane: i, ray: rays.ray(i), density: densities[i] };
+                    let radiance = found.radiance(|distance| transmittance(i, distance), &mut arrived.rays);
+                    let value = lane(&narrow, i) * radiance * (cosines[i] / (densities[i] * count as f32));
+                    let sum = lane(&arrived.light, i) + value;
+                    set_lane(&mut arrived.light, i, sum);
+                }
+                continue;
+            }
+            let (hits, objects) = tile.world.geometry.closest_rows(&rays, &mut ends, sent, folds);
             // Count the work of the rays, if the view shows it.
             if measure == Measure::Work {
                 for i in lanes(sent) {

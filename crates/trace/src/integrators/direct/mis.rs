@@ -138,22 +138,27 @@ impl TileContext<'_> {
         // No light sample finds the environment, so its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.leaves_sky { 0.0 } else { of_sky }));
         let share = |of_light: f32| weight(of_light * samples / density);
-        self.shared_beyond(sky, &path.ray, path.state.normal, share)
+        self.shared_beyond((None, sky), &path.ray, path.state.normal, share)
     }
 
     /// [`TileContext::lamp_radiance`] for a ray in a glossy lobe that leaves the scene.
     pub fn radiance_beyond(&self, ray: &Ray, normal: Vec3, density: f32) -> Vec3 {
+        self.radiance_of(None, ray, normal, density)
+    }
+
+    /// [`TileContext::radiance_beyond`] of the light of a number; of all lights without one.
+    pub fn radiance_of(&self, number: Option<u32>, ray: &Ray, normal: Vec3, density: f32) -> Vec3 {
         let sky = self.world.lights.environment().map(|environment| environment.arriving(ray.direction));
         // Light samples leave out the light of the sky if rays in lobes find it.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.lobes_find_sky { 0.0 } else { of_sky }));
-        self.shared_beyond(sky, ray, normal, |of_light| weight(of_light / density))
+        self.shared_beyond((number, sky), ray, normal, |of_light| weight(of_light / density))
     }
 
-    /// Radiance that a ray sees which leaves the scene from a surface with this normal, given the radiance of the environment and
-    /// its light-sampling pdf. Each light is weighted by its light-sampling pdf.
+    /// Radiance that a ray sees which leaves the scene from a surface with this normal, of one light or of all, given the radiance of
+    /// the environment and its light-sampling pdf. Each light is weighted by its light-sampling pdf.
     fn shared_beyond(
         &self,
-        sky: Option<(Vec3, f32)>,
+        (only, sky): (Option<u32>, Option<(Vec3, f32)>),
         ray: &Ray,
         normal: Vec3,
         share: impl Fn(f32) -> f32,
@@ -163,7 +168,9 @@ impl TileContext<'_> {
             return Vec3::ZERO;
         }
         let samples = lights.samples_at(self.behaviour.receivers, ray.origin, normal);
-        lights.beyond_with(sky, ray.direction, |number, density| share(density * samples.of(number)))
+        lights.beyond_with(sky, ray.direction, |number, density| {
+            if only.is_none_or(|only| only == number) { share(density * samples.of(number)) } else { 0.0 }
+        })
     }
 
     /// Light-sampling pdf in sr⁻¹ of a hit's direction, per requested sample, from a surface with this normal; 0 if the hit

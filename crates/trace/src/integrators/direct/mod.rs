@@ -3,7 +3,7 @@
 //!
 //! - `queue`: rows of vertices that wait for light, and what comes to them.
 //! - `all_lights`: samples of every light; `picked`: of lights picked by a tree; `shadow_rays`: the rays to these, grouped by light.
-//! - `lobe_rays`: rays in narrow lobes; `mis`: weights of these, of paths, and of light samples against each other.
+//! - `lobe_rays`: rays in narrow lobes, without soft shadows by `unshadowed`; `mis`: weights of these, of paths, and of light samples against each other.
 
 pub mod all_lights;
 pub mod lobe_rays;
@@ -11,3 +11,4 @@ pub mod mis;
 pub mod picked;
 pub mod queue;
 pub mod shadow_rays;
+pub mod unshadowed;

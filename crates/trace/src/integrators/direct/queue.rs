@@ -227,12 +227,16 @@ impl DirectLightQueue {
     /// Technique that competes with light samples.
     fn competing(&self, asked: Asked, tile: &TileContext<'_>, measure: Measure) -> CompetingTechnique {
         let is_soft = tile.settings.render.shadows == Shadows::Soft;
+        let row = &self.rows[asked.number];
         if asked.by_paths {
             CompetingTechnique::Paths
-        } else if self.rows[asked.number].bsdf.sends_rays() && tile.behaviour.mirrors {
-            if is_soft { CompetingTechnique::NarrowPaths } else { CompetingTechnique::Nothing }
+        } else if row.bsdf.sends_rays() && is_soft && tile.behaviour.mirrors {
+            CompetingTechnique::NarrowPaths
+        } else if row.bsdf.sends_rays() && !is_soft && measure != Measure::ArrivingShare {
+            // Paths in the lobes of microfacets do not bring the light of lamps.
+            CompetingTechnique::lobes(row.bsdf.narrow_lobes() & asked.used)
         } else {
-            CompetingTechnique::lobes(self.rows[asked.number].sharp(tile, measure) & asked.used)
+            CompetingTechnique::lobes(row.sharp(tile, measure) & asked.used)
         }
     }
 

@@ -256,6 +256,17 @@ impl VertexBatch {
         starts
     }
 
+    /// [`VertexBatch::starts`] for one vertex.
+    pub fn start_of(&self, i: usize, direction: Vec3) -> u32 {
+        let normal = if self.has_facet & 1 << i != 0 { &self.facet } else { &self.normal };
+        if lane(normal, i).dot(direction) > 0.0 { self.start[i] } else { Ray::NO_TRIANGLE }
+    }
+
+    /// Whether a vertex certainly sees nothing in a direction.
+    pub fn hides(&self, i: usize, direction: Vec3) -> bool {
+        self.is_bounded & 1 << i != 0 && !(lane(&self.horizon, i).dot(direction) > 0.0)
+    }
+
     /// Position of a vertex's surface, and the normal of its facet on the viewer's side.
     #[inline(always)]
     pub fn place_of(&self, i: usize) -> (Vec3, Vec3) {

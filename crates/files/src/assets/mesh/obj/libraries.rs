@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use super::super::mtl::{self, cut_at_comments};
+use super::super::mtl::{self, Library, cut_at_comments};
 use super::super::{AssetError, Source};
 use crate::assets::FileMaterial;
 
@@ -70,11 +70,12 @@ impl Libraries<'_> {
     fn load_file(&self, path: &Path) -> Result<Vec<tobj::Material>, tobj::LoadError> {
         self.found.borrow_mut().files.push(path.to_owned());
         match mtl::load(path, self.source.watch) {
-            Ok(materials) => {
+            Ok(Library { materials, warnings }) => {
                 let folder = path.parent().unwrap_or(Path::new(""));
                 let known = materials.iter().map(|found| (found.name.clone(), mtl::material(found, folder)));
                 let mut found = self.found.borrow_mut();
                 found.materials.extend(known);
+                found.warnings.extend(warnings);
                 found.pictures.extend(materials.iter().flat_map(|material| mtl::pictures(material, folder)));
                 Ok(materials)
             }
