@@ -16,6 +16,7 @@ use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
 use crate::pipeline::settings::{Checkpoints, Overrides, Resume, Side, View};
+use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
@@ -27,6 +28,7 @@ Examples:
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
   glimt helmet.glb                        a model alone: obj, off, ply, stl, glb, gltf
+  glimt helmet.glb --once --turntable 36 -o helmet.gif    all around it
   glimt import helmet.glb -o helmet.toml  a scene of it, to edit
   glimt compare a.exr reference.exr       the error of one picture against another
   glimt bench ball.toml --plot plot.svg   measure the error of each method against its seconds
@@ -245,6 +247,10 @@ pub struct RenderArgs {
     /// The side from which a model is seen, in place of its own camera
     #[arg(long, value_parser = one_of::<Side>(), value_name = "SIDE", help_heading = "Picture")]
     pub from: Option<Side>,
+    /// Render N pictures all around the point that the camera looks at, with --once; -o names a file each, as in
+    /// name_####.png, or a moving picture: .gif, .apng. --samples, --error and --time count for each picture
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = turntable, help_heading = "Picture")]
+    pub turntable: Option<u32>,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("seed"), help_heading = "Picture")]
     pub seed: Option<u32>,
@@ -304,6 +310,7 @@ impl RenderArgs {
             dof: self.dof.map(bool::from),
             view: self.view,
             from: self.from,
+            turn: self.turntable.map(|of| Turn { number: 0, of }),
             crop: self.crop,
             threads: self.threads,
             bit_depth: self.bit_depth,
@@ -489,6 +496,10 @@ fn error_bound(text: &str) -> Result<f64, String> {
         Ok(bound) if bound >= 0.0 && bound.is_finite() => Ok(bound),
         _ => Err("expected a number that is not below 0".to_owned()),
     }
+}
+
+fn turntable(text: &str) -> Result<u32, String> {
+    whole(text, 1..=turntable::MOST)
 }
 
 fn threads(text: &str) -> Result<usize, String> {

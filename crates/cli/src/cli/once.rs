@@ -9,8 +9,11 @@ use super::exit::Exit;
 use super::lower::Order;
 use super::progress::{self, Reporter};
 use super::signals;
-use crate::pipeline::protocol::{CheckpointNews, Command, Event, Failure, Report, Request, Writing};
+use crate::pipeline::protocol::{
+    CheckpointNews, Command, Event, Failure, Report, Request, Stage, StageReport, Status, Writing,
+};
 use crate::pipeline::settings::{Effective, Overrides};
+use crate::pipeline::turntable::Turn;
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::system::priority;
@@ -36,21 +39,28 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         Ok(ended) => ended,
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
     };
-    worker.send(Command::Render(Box::new(Request {
-        generation: 1,
-        scene: order.scene.clone(),
-        overrides: order.overrides.clone(),
-        preview: None,
-        write: Writing::Must,
-        force: false,
-        first: None,
-    })));
     let mut reporter = progress::reporter(order.progress, order.overrides.time_seconds, console);
     let mut deadline = Deadline::default();
     let mut written = Written::default();
-    let exit = follow(&worker, order, console, &mut *reporter, &mut written, || {
-        ended.by().is_some() && deadline.is_over(Instant::now())
-    });
+    let mut exit = Exit::DONE;
+    for overrides in pictures(&order.overrides) {
+        let turn = overrides.turn;
+        worker.send(Command::Render(Box::new(Request {
+            generation: turn.map_or(1, |turn| u64::from(turn.number) + 1),
+            scene: order.scene.clone(),
+            overrides,
+            preview: None,
+            write: Writing::Must,
+            force: false,
+            first: None,
+        })));
+        exit = follow(&worker, (order, turn), console, &mut *reporter, &mut written, || {
+            ended.by().is_some() && deadline.is_over(Instant::now())
+        });
+        if exit != Exit::DONE || ended.by().is_some() {
+            break;
+        }
+    }
     reporter.end();
     if !reporter.says_diagnostics()
         && let Some(signal) = ended.by().and_then(signals::name)
@@ -59,6 +69,15 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     }
     worker.finish(deadline.left(Instant::now()));
     ended.by().map_or(exit, Exit::signal)
+}
+
+/// The requests of a call: one, or one for each picture of a turntable.
+fn pictures(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
+    let count = overrides.turn.map_or(1, |turn| turn.of);
+    (0..count).map(|number| {
+        let turn = overrides.turn.map(|turn| Turn { number, ..turn });
+        Overrides { turn, ..overrides.clone() }
+    })
 }
 
 /// Words about the pictures when a signal ends the program.
@@ -100,7 +119,7 @@ impl Deadline {
 /// Follows the request until it is over or a signal ends it.
 fn follow(
     worker: &Handle,
-    order: &Order,
+    (order, turn): (&Order, Option<Turn>),
     console: &Console,
     reporter: &mut dyn Reporter,
     written: &mut Written,
@@ -108,6 +127,8 @@ fn follow(
 ) -> Exit {
     let mut unwritten: Vec<String> = Vec::new();
     let mut of_call: Vec<Diagnostic> = Vec::new();
+    // What was said of the first picture holds for all.
+    let is_first = turn.is_none_or(|turn| turn.number == 0);
     loop {
         if is_over() {
             return Exit::FAILED;
@@ -120,12 +141,21 @@ fn follow(
         // Warnings about the call come with those about the scene.
         if let Event::Settings { settings, .. } = &event {
             of_call.extend(without_effect(&order.overrides, settings));
+        } else if let Event::Stage { stage, .. } = &event
+            && !is_first
+            && is_read_again(stage)
+        {
+            worker.send(Command::Cancel);
+            reporter.end();
+            let what = "the scene or a file of it has changed: the pictures would not be of one turntable";
+            return console.fail(Exit::FAILED, what);
         } else if let Event::Checkpoint { news, .. } = &event {
             hear(news, &mut of_call, reporter, console);
         } else if let Event::NotKept { message, .. } = &event {
             of_call.push(warning(message, "another name with -o FILE leaves the old file as it is"));
         } else if let Event::Done { warnings, .. } = &mut event {
             warnings.append(&mut of_call);
+            warnings.retain(|_| is_first);
         }
         reporter.event(&event);
         match event {
@@ -140,7 +170,10 @@ fn follow(
                 if !reporter.says_diagnostics() {
                     console.diagnostics(&warnings);
                 }
-                return done(&report, &written.pictures, &unwritten, console, reporter);
+                let new = written.pictures.split_off(0);
+                let exit = done(&report, &new, &unwritten, console, reporter);
+                written.pictures.extend(new);
+                return exit;
             }
             Event::Failed { failure, .. } => {
                 reporter.end();
@@ -168,6 +201,11 @@ fn follow(
             | Event::Picked { .. } => {}
         }
     }
+}
+
+/// Whether a stage that reads files found another content than for the picture before.
+fn is_read_again(stage: &StageReport) -> bool {
+    matches!(stage.name, Stage::Parse | Stage::Meshes | Stage::Textures) && stage.status == Status::Done
 }
 
 /// Says what a person wants to know about checkpoints, at once: warnings as well, while something can be done.

@@ -14,6 +14,7 @@ mod hdr;
 mod identity;
 mod jpeg;
 pub mod json;
+pub mod moving;
 mod origin;
 pub mod part;
 mod place;

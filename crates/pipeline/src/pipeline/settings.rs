@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::turntable::Turn;
 use crate::choice;
 use crate::film::Rect;
 use crate::integrators::RenderSettings;
@@ -36,6 +37,8 @@ macro_rules! overrides {
             pub from: Option<Side>,
             /// The camera.
             pub camera: CameraChange,
+            /// The picture of a turntable. `None` for a single picture.
+            pub turn: Option<Turn>,
             /// Render these pixels only; the rest of the picture stays black.
             pub crop: Option<Rect>,
             /// Threads; `None` or 0: one per core.

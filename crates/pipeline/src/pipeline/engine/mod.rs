@@ -52,7 +52,7 @@ use super::stages::parse::{Origin, Parsed, parse};
 use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::render::render;
 use super::stages::textures::{Needed, TextureCache, Textures, add_declared, needed, textures};
-use super::stages::write::{Destination, Written, check_targets, finish, write_by_hand};
+use super::stages::write::{Destination, Frames, Written, check_targets, finish, write_by_hand};
 use super::stages::{Findings, Reading, Staged, Stop};
 use super::table::StageTable;
 use super::targets::conflicts;
@@ -104,6 +104,8 @@ pub(super) struct Engine {
     photons: PhotonCache,
     films: FilmCache,
     written: Written,
+    /// Frames of a turntable so far.
+    frames: Frames,
     /// Plan of the current film.
     plan: Option<Plan>,
     at_hand: Option<AtHand>,
@@ -154,6 +156,7 @@ impl Engine {
             photons: PhotonCache::default(),
             films: FilmCache::default(),
             written: Written::default(),
+            frames: Frames::default(),
             plan: None,
             at_hand: None,
             good: None,
@@ -250,6 +253,10 @@ impl Engine {
         let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: false };
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let reading = (&snapshot, meanwhile.token);
+        // Nobody comes back to the pictures before in a turntable.
+        if request.overrides.turn.is_some() {
+            self.films = FilmCache::default();
+        }
         let mut ready = self.prepare(request, &mut table, reading, findings)?;
         let photons = self.light(request, &ready, &mut table, sink, meanwhile)?;
         let share = self.share(&ready.plan, photons);
@@ -395,7 +402,7 @@ impl Engine {
     ) -> Result<Ready, Stop> {
         let Good { parsed, meshes, bodies, textures, .. } = good;
         let scene = &plan.scene;
-        let eye = Eye::new(scene, parsed.orbiter, &request.overrides.camera);
+        let eye = Eye::new(scene, parsed.orbiter, &request.overrides.camera).turned(plan.turn);
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
         // The orbiter's numbers are few: their text stands for them.
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));

@@ -109,7 +109,7 @@ impl Writer<'_> {
                 let eye = framed(
                     bounds,
                     &scene.outline,
-                    show.from.unwrap_or(Side::Iso),
+                    (show.from.unwrap_or(Side::Iso), show.turns),
                     aspect.unwrap_or(SIZE[0] / SIZE[1]),
                 );
                 camera(&mut self.toml, &eye, FOV);

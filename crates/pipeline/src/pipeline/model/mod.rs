@@ -23,16 +23,24 @@ use crate::math::DVec3;
 use crate::scene::fingerprint::Fingerprint;
 
 /// Way of showing a model.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::pipeline) struct Show {
     /// The side from which it is seen. `None` for the file's own camera, else [`Side::Iso`].
     pub(in crate::pipeline) from: Option<Side>,
     /// Width over height of the picture. `None` if the call leaves one of them open.
     pub(in crate::pipeline) aspect: Option<f64>,
+    /// Pictures of a turntable, in all of which the model is to be seen. 1 for a single picture.
+    pub(in crate::pipeline) turns: u32,
 }
 
 /// Width and height of a picture where nobody says another.
 const SIZE: [f64; 2] = [640.0, 480.0];
+
+impl Default for Show {
+    fn default() -> Self {
+        Self { from: None, aspect: None, turns: 1 }
+    }
+}
 
 impl Show {
     /// The way that a call asks for.
@@ -44,7 +52,7 @@ impl Show {
                 Some(or(width, SIZE[0]) / or(height, SIZE[1]))
             }
         };
-        Self { from: overrides.from, aspect }
+        Self { from: overrides.from, aspect, turns: overrides.turn.map_or(1, |turn| turn.of) }
     }
 
     /// Adds what the scene of a model depends on.
@@ -53,7 +61,7 @@ impl Show {
         if let Some(from) = self.from {
             key.choice(from);
         }
-        key.f64(self.aspect.unwrap_or_default());
+        key.f64(self.aspect.unwrap_or_default()).u64(self.turns.into());
     }
 }
 

@@ -12,13 +12,15 @@ use super::super::render::film_state::FilmState;
 use super::super::render::keeping::head;
 use super::super::sink::Sink;
 use super::super::targets::{conflicts, guarded};
+use super::super::turntable::Turn;
 use super::super::watch::content::{Content, Contents};
 use super::{Staged, Stop};
 use crate::choice::Choice;
 use crate::control::CancelToken;
-use crate::film::RadianceImage;
-use crate::film::SampleStats;
+use crate::film::tone::develop;
+use crate::film::{Picture, RadianceImage, SampleStats};
 use crate::integrators::{Measure, Shown};
+use crate::output::moving::{self, MovingFormat};
 use crate::output::part::{self, Kind};
 use crate::output::write::{Durability, Guard};
 use crate::output::{self, BitDepth, Finish, Format, OutputError};
@@ -94,6 +96,7 @@ fn find_targets(
         Some(_) => plan.outputs.iter().try_for_each(|path| place(path))?,
         None => plan.outputs.iter().try_for_each(check)?,
     }
+    plan.moving.iter().try_for_each(|path| place(path))?;
     plan.report.iter().try_for_each(|path| place(path))
 }
 
@@ -190,6 +193,46 @@ pub(in crate::pipeline) fn write_by_hand(canvas: &FilmState, to: Destination<'_>
     }
 }
 
+/// Frames of a turntable so far.
+#[derive(Debug, Default)]
+pub(in crate::pipeline) struct Frames(Vec<Picture>);
+
+/// Adds the picture to the frames of its turntable; with the last one, writes the moving pictures. Returns whether they are on disk.
+///
+/// # Errors
+/// The first file that could not be written, and why. Or cancelled.
+pub(in crate::pipeline) fn write_moving(
+    canvas: &FilmState,
+    to: Destination<'_>,
+    (turn, frames): (Turn, &mut Frames),
+    token: &CancelToken,
+) -> Result<Staged<bool>, Stop> {
+    let Destination { plan, inputs, sink, .. } = to;
+    let finish = finish(plan);
+    let image = finish.image(&canvas.film);
+    frames.0.truncate(turn.number as usize);
+    frames.0.push(develop(&image, &finish.tone.of_picture(&image)));
+    if !turn.is_last() {
+        return Ok(Staged::skipped(false, format!("it is kept as frame {} of {}", turn.number + 1, turn.of)));
+    }
+    let frames = std::mem::take(frames).0;
+    for path in &plan.moving {
+        let Some(format) = MovingFormat::of(path) else { continue };
+        let write = || {
+            let bytes = moving::encode(&frames, &finish.metadata, format, token)?;
+            let write = |guard: &Guard<'_>| output::write::atomic_until(path, &bytes, guard, token);
+            guarded(plan, inputs, path, sink, write)?;
+            Ok(bytes.len() as u64)
+        };
+        match write() {
+            Ok(bytes) => sink.written(path, bytes),
+            Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
+            Err(error) => return Err(Stop::work(error)),
+        }
+    }
+    Ok(Staged::done(true, format!("{} frames", frames.len())))
+}
+
 fn write_one(
     image: &RadianceImage,
     canvas: &FilmState,
@@ -241,7 +284,12 @@ fn metadata(plan: &Plan) -> Vec<(String, String)> {
         ("glimt:seed", settings.seed.to_string()),
         ("glimt:exposure", plan.tone.exposure_stops.to_string()),
     ];
-    pairs.map(|(key, value)| (key.to_owned(), value)).to_vec()
+    let mut pairs = pairs.map(|(key, value)| (key.to_owned(), value)).to_vec();
+    if let Some(Turn { number, of }) = plan.turn {
+        let which = if plan.moving.is_empty() { format!("{} of {of}", number + 1) } else { of.to_string() };
+        pairs.push(("glimt:turntable".to_owned(), which));
+    }
+    pairs
 }
 
 fn key(canvas: &FilmState, plan: &Plan, path: &Path) -> Key {
