@@ -15,7 +15,7 @@ pub use self::parts::{Engine, FarmArgs, MergeArgs};
 use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
-use crate::pipeline::settings::{Checkpoints, Overrides, Resume, Side, View};
+use crate::pipeline::settings::{Checkpoints, Layer, Overrides, Resume, Side, View};
 use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
@@ -70,6 +70,7 @@ impl Args {
             Some(Subcommand::Merge(merge)) => merge.color,
             Some(Subcommand::Farm(farm)) => farm.color,
             Some(Subcommand::Import(import)) => import.color,
+            Some(Subcommand::Info(info)) => info.color,
             Some(Subcommand::New { .. }) | None => self.render.color,
         }
     }
@@ -97,6 +98,9 @@ pub enum Subcommand {
     /// Make a scene of a glTF file, with its meshes as PLY files and its images beside it; refuses to overwrite
     #[command(after_help = IMPORT_HELP)]
     Import(ImportArgs),
+    /// Say how a picture was made: the settings that a file carries
+    #[command(after_help = INFO_HELP)]
+    Info(InfoArgs),
     /// Measure the error of a picture against a reference
     #[command(after_help = COMPARE_HELP)]
     Compare(CompareArgs),
@@ -130,6 +134,24 @@ pub struct ImportArgs {
     /// Exit with 1, and write nothing, if something has no equal
     #[arg(long)]
     pub strict: bool,
+    /// Colours of the messages
+    #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
+    pub color: ColorChoice,
+}
+
+const INFO_HELP: &str = "\
+All formats that glimt writes carry the settings; parts and checkpoints have the files that the picture was made of, too.
+
+Exit codes: 0 glimt made it; 1 the file does not say so; 2 it cannot be read, or is no picture.";
+
+/// A picture.
+#[derive(Clone, Debug, clap::Args)]
+pub struct InfoArgs {
+    /// The picture: png, apng, gif, exr, hdr, jpg, ppm; a part or a checkpoint
+    pub image: PathBuf,
+    /// One JSON object on stdout in place of the lines
+    #[arg(long)]
+    pub json: bool,
     /// Colours of the messages
     #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
     pub color: ColorChoice,
@@ -197,6 +219,10 @@ pub struct RenderArgs {
     /// ppm. [default: the scene's `output`, which lies beside the scene, else the scene's name with .png]
     #[arg(short, long = "output", value_name = "FILE", help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
+    /// Numbers about each pixel as channels beside the picture in EXR files, with --once: all, or some of albedo, normal,
+    /// depth, variance, samples, ambient, diffuse, specular, emission, with commas between them
+    #[arg(long, value_name = "all|LIST", value_parser = layers, help_heading = "Output")]
+    pub layers: Option<Layers>,
     /// Bits per channel of PNG files: 8 or 16
     #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = bit_depth, help_heading = "Output")]
     pub bit_depth: Option<u8>,
@@ -310,6 +336,7 @@ impl RenderArgs {
             dof: self.dof.map(bool::from),
             view: self.view,
             from: self.from,
+            layers: self.layers.clone().map_or_else(Vec::new, |Layers(layers)| layers),
             turn: self.turntable.map(|of| Turn { number: 0, of }),
             crop: self.crop,
             threads: self.threads,
@@ -496,6 +523,27 @@ fn error_bound(text: &str) -> Result<f64, String> {
         Ok(bound) if bound >= 0.0 && bound.is_finite() => Ok(bound),
         _ => Err("expected a number that is not below 0".to_owned()),
     }
+}
+
+/// Layers of EXR files, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layers(pub Vec<Layer>);
+
+fn layers(text: &str) -> Result<Layers, String> {
+    if text == "all" {
+        return Ok(Layers(Layer::ALL.to_vec()));
+    }
+    let mut layers = Vec::new();
+    for name in text.split(',').map(str::trim) {
+        let layer = Layer::named(name).ok_or_else(|| {
+            let known: Vec<_> = Layer::ALL.iter().map(|layer| layer.name()).collect();
+            format!("there is no layer {name:?}; there are all, {}", known.join(", "))
+        })?;
+        if !layers.contains(&layer) {
+            layers.push(layer);
+        }
+    }
+    Ok(Layers(layers))
 }
 
 fn turntable(text: &str) -> Result<u32, String> {

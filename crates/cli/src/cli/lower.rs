@@ -45,7 +45,19 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
         None => check_outputs(&args.outputs)?,
     }
     if args.turntable.is_some() && args.shard.is_some() {
-        return Err("--turntable and --shard exclude each other: a turntable is rendered by one machine".to_owned());
+        return Err(
+            "--turntable and --shard exclude each other: a turntable is rendered by one machine".to_owned()
+        );
+    }
+    if args.layers.is_some() {
+        let why = match (args.once, args.shard) {
+            (false, _) => "--layers needs --once: the terminal shows one layer at a time, by v",
+            (true, Some(_)) => "--layers and --shard exclude each other: parts hold the picture alone",
+            (true, None) => "",
+        };
+        if !why.is_empty() {
+            return Err(why.to_owned());
+        }
     }
     let mut overrides = args.overrides();
     if overrides.turn.is_some() {
@@ -112,7 +124,9 @@ fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
     for (index, path) in outputs.iter().enumerate() {
         if MovingFormat::of(path).is_some() {
             let name = path.display();
-            return Err(format!("{name} is a moving picture, which --turntable N makes; name a .png for a single one"));
+            return Err(format!(
+                "{name} is a moving picture, which --turntable N makes; name a .png for a single one"
+            ));
         }
         Format::of(path).map_err(|error| error.to_string())?;
         check_once(outputs, index)?;

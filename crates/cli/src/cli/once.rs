@@ -1,6 +1,6 @@
 //! `--once`: render, write, exit; progress on stderr, nothing on stdout.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
@@ -9,6 +9,7 @@ use super::exit::Exit;
 use super::lower::Order;
 use super::progress::{self, Reporter};
 use super::signals;
+use crate::output::moving::MovingFormat;
 use crate::pipeline::protocol::{
     CheckpointNews, Command, Event, Failure, Report, Request, Stage, StageReport, Status, Writing,
 };
@@ -39,12 +40,18 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         Ok(ended) => ended,
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
     };
-    let mut reporter = progress::reporter(order.progress, order.overrides.time_seconds, console);
     let mut deadline = Deadline::default();
     let mut written = Written::default();
+    let mut is_over = || ended.by().is_some() && deadline.is_over(Instant::now());
     let mut exit = Exit::DONE;
+    // One reporter for each picture: what a turntable shows of the one before is cleared.
+    let reporter = || progress::reporter(order.progress, order.overrides.time_seconds, console);
+    let mut reporter_of_picture = reporter();
     for overrides in pictures(&order.overrides) {
         let turn = overrides.turn;
+        if let Some(Turn { number, of }) = turn.filter(|_| reporter_of_picture.says_results()) {
+            console.say(&format!("picture {} of {of}", number + 1));
+        }
         worker.send(Command::Render(Box::new(Request {
             generation: turn.map_or(1, |turn| u64::from(turn.number) + 1),
             scene: order.scene.clone(),
@@ -54,14 +61,15 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
             force: false,
             first: None,
         })));
-        exit = follow(&worker, (order, turn), console, &mut *reporter, &mut written, || {
-            ended.by().is_some() && deadline.is_over(Instant::now())
-        });
+        reporter_of_picture = reporter();
+        let reporter = &mut *reporter_of_picture;
+        exit = follow(&worker, (order, turn), console, reporter, &mut written, &mut is_over);
+        reporter.end();
         if exit != Exit::DONE || ended.by().is_some() {
             break;
         }
     }
-    reporter.end();
+    let reporter = reporter_of_picture;
     if !reporter.says_diagnostics()
         && let Some(signal) = ended.by().and_then(signals::name)
     {
@@ -89,7 +97,8 @@ fn outcome(exit: Exit, written: &Written) -> String {
             None => "no picture was written".to_owned(),
         },
         _ if exit == Exit::DONE => "everything was written before".to_owned(),
-        names => format!("only {} was written", names.join(", ")),
+        [only] => format!("only {only} was written"),
+        [first, .., last] => format!("only {} pictures were written, {first} to {last}", names.len()),
     }
 }
 
@@ -129,6 +138,7 @@ fn follow(
     let mut of_call: Vec<Diagnostic> = Vec::new();
     // What was said of the first picture holds for all.
     let is_first = turn.is_none_or(|turn| turn.number == 0);
+    let before = written.pictures.len();
     loop {
         if is_over() {
             return Exit::FAILED;
@@ -170,10 +180,7 @@ fn follow(
                 if !reporter.says_diagnostics() {
                     console.diagnostics(&warnings);
                 }
-                let new = written.pictures.split_off(0);
-                let exit = done(&report, &new, &unwritten, console, reporter);
-                written.pictures.extend(new);
-                return exit;
+                return done(&report, (&written.pictures[before..], turn), &unwritten, console, reporter);
             }
             Event::Failed { failure, .. } => {
                 reporter.end();
@@ -273,13 +280,13 @@ fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
 
 fn done(
     report: &Report,
-    written: &[PathBuf],
+    (written, turn): (&[PathBuf], Option<Turn>),
     unwritten: &[String],
     console: &Console,
     reporter: &dyn Reporter,
 ) -> Exit {
     if reporter.says_results() {
-        written.iter().for_each(|path| console.say(&wrote(path, report)));
+        written.iter().for_each(|path| console.say(&wrote(path, report, turn)));
     }
     if !reporter.says_diagnostics() {
         unwritten.iter().for_each(|message| console.say(&format!("error: {message}")));
@@ -303,8 +310,11 @@ fn exit_of(failure: &Failure) -> Exit {
 }
 
 /// `wrote cornell.png (640×480, 64 samples, 1.93 s)`
-fn wrote(path: &std::path::Path, report: &Report) -> String {
+fn wrote(path: &Path, report: &Report, turn: Option<Turn>) -> String {
     let image = &report.image;
+    if let Some(turn) = turn.filter(|_| MovingFormat::of(path).is_some()) {
+        return format!("wrote {} ({}×{}, {} frames)", path.display(), image.width, image.height, turn.of);
+    }
     let samples = match (image.samples.min, image.samples.max) {
         (1, 1) => "1 sample".to_owned(),
         (min, max) if min == max => format!("{max} samples"),

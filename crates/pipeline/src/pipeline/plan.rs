@@ -4,8 +4,9 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::settings::{Checkpoints, Effective, Overrides, View};
+use super::settings::{Checkpoints, Effective, Layer, Overrides, View};
 use super::turntable::{self, Turn};
+use crate::choice::Choice;
 use crate::film::stretch::{Kind, Stretch};
 use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
@@ -36,6 +37,8 @@ pub(super) struct Plan {
     pub(super) moving: Vec<PathBuf>,
     /// The picture of a turntable that it is. `None` for a single picture.
     pub(super) turn: Option<Turn>,
+    /// Layers beside the picture in EXR files.
+    pub(super) layers: Vec<Layer>,
     /// Files of the other pictures of the turntable, still to come.
     pub(super) to_come: Vec<PathBuf>,
     pub(super) named_by: NamedBy,
@@ -90,7 +93,10 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         None => {
             let check = |path: &PathBuf| check_format(path, (render.width, render.height), bit_depth);
             outputs.iter().try_for_each(check)?;
-            moving.iter().try_for_each(|path| check_moving(path, (render.width, render.height), bit_depth))?;
+            check_layers(&outputs, &moving, settings.view, overrides)?;
+            moving
+                .iter()
+                .try_for_each(|path| check_moving(path, (render.width, render.height), bit_depth))?;
         }
     }
     Ok(Plan {
@@ -106,6 +112,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         moving,
         to_come,
         turn: overrides.turn,
+        layers: overrides.layers.clone(),
         named_by,
         report: report(overrides),
         replaces_foreign: overrides.replaces_foreign,
@@ -193,6 +200,32 @@ impl Outputs {
         }
         Self { outputs, moving, to_come }
     }
+}
+
+/// Whether there is a file for the layers that the call asks for.
+fn check_layers(
+    outputs: &[PathBuf],
+    moving: &[PathBuf],
+    view: View,
+    overrides: &Overrides,
+) -> Result<(), Box<Diagnostic>> {
+    if overrides.layers.is_empty() {
+        return Ok(());
+    }
+    let refused = |message: String, help: &str| {
+        let (severity, path, help) = (Severity::Error, PathBuf::new(), Some(help.to_owned()));
+        Err(Box::new(Diagnostic { severity, message, path, place: None, help }))
+    };
+    let is_exr = |path: &&PathBuf| Format::of(path).is_ok_and(|format| format == Format::Exr);
+    if let Some(other) = outputs.iter().find(|path| !is_exr(path)).or(moving.first()) {
+        let message = format!("--layers is for EXR files, and {} is none", other.display());
+        return refused(message, "write them to a file of their own, as in -o layers.exr");
+    }
+    if view != View::Beauty {
+        let message = format!("--layers goes with the view beauty, not with {}", view.name());
+        return refused(message, "leave out --view, or name the view as a layer");
+    }
+    Ok(())
 }
 
 /// Whether a moving picture can be made of such pictures.

@@ -37,6 +37,8 @@ macro_rules! overrides {
             pub from: Option<Side>,
             /// The camera.
             pub camera: CameraChange,
+            /// Layers beside the picture in EXR files.
+            pub layers: Vec<Layer>,
             /// The picture of a turntable. `None` for a single picture.
             pub turn: Option<Turn>,
             /// Render these pixels only; the rest of the picture stays black.
@@ -82,6 +84,30 @@ choice! {
         Bottom = "bottom",
         /// Before it, from above and to its right.
         Iso = "iso",
+    }
+}
+
+choice! {
+    /// Layers beside the picture in EXR files.
+    pub enum Layer {
+        /// Diffuse reflectance.
+        Albedo = "albedo",
+        /// Shading normals in the world's axes, from -1 to 1; 0 where nothing is.
+        Normal = "normal",
+        /// Distance along the view axis, 0 where nothing is.
+        Depth = "depth",
+        /// Variance of the luminance of each pixel.
+        Variance = "variance",
+        /// Samples of each pixel.
+        Samples = "samples",
+        /// Ambient part of Phong.
+        Ambient = "ambient",
+        /// Diffuse part of the light.
+        Diffuse = "diffuse",
+        /// Specular part of the light.
+        Specular = "specular",
+        /// What surfaces send out, and what is behind everything.
+        Emission = "emission",
     }
 }
 

@@ -1,11 +1,9 @@
 //! APNG: PNG with frames, one after another in the place of the picture.
 
-use std::io::Write;
-
 use ::png::{BlendOp, ColorType, DisposeOp, Encoder, EncodingError, SrgbRenderingIntent};
 
+use super::super::SOFTWARE;
 use super::super::png::add_text;
-use super::super::{SOFTWARE, stoppable};
 use super::frame_time;
 use crate::control::CancelToken;
 use crate::film::Picture;
@@ -32,12 +30,8 @@ pub(super) fn encode(
     }
     let mut writer = encoder.write_header()?;
     for frame in frames {
-        let mut data = writer.stream_writer_with_size(stoppable::BYTES)?;
-        for part in frame.pixels.as_flattened().chunks(stoppable::BYTES) {
-            token.check().map_err(std::io::Error::other)?;
-            data.write_all(part)?;
-        }
-        data.finish()?;
+        token.check().map_err(std::io::Error::other)?;
+        writer.write_image_data(frame.pixels.as_flattened())?;
     }
     writer.finish()?;
     Ok(bytes)

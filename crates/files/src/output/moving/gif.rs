@@ -65,7 +65,8 @@ fn palette(frames: &[Picture]) -> Vec<u8> {
     // An odd step does not fall on the same columns again and again.
     let step = (pixels / SAMPLES) | 1;
     let all = frames.iter().flat_map(|frame| &frame.pixels);
-    let samples: Vec<[u8; 4]> = all.step_by(step).map(|&[red, green, blue]| [red, green, blue, 255]).collect();
+    let samples: Vec<[u8; 4]> =
+        all.step_by(step).map(|&[red, green, blue]| [red, green, blue, 255]).collect();
     // Few colours need no quantiser, which would move them a little.
     let mut colors: Vec<[u8; 4]> = frames.iter().flat_map(|frame| some_colors(&frame.pixels)).collect();
     colors.sort_unstable();

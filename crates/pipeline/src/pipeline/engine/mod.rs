@@ -37,6 +37,7 @@ use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
 use super::render::first_picture::FirstPictures;
 use super::render::keeping::{Around, Claim, Keeping};
+use super::render::layers;
 use super::render::preview::Screen;
 use super::render::scheduler::Rendering;
 use super::render::share::Share;
@@ -62,6 +63,7 @@ use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
+use crate::output::LayerImage;
 use crate::output::part::Trait;
 use crate::scene::changes;
 use crate::scene::description::CameraChange;
@@ -106,6 +108,8 @@ pub(super) struct Engine {
     written: Written,
     /// Frames of a turntable so far.
     frames: Frames,
+    /// Layers of the current film.
+    layers: Vec<LayerImage>,
     /// Plan of the current film.
     plan: Option<Plan>,
     at_hand: Option<AtHand>,
@@ -157,6 +161,7 @@ impl Engine {
             films: FilmCache::default(),
             written: Written::default(),
             frames: Frames::default(),
+            layers: Vec::new(),
             plan: None,
             at_hand: None,
             good: None,
@@ -518,7 +523,7 @@ impl Engine {
         // What the stage changes is apart from what it reads.
         let (mut films, written) = (std::mem::take(&mut self.films), std::mem::take(&mut self.written));
         let written = std::cell::RefCell::new(written);
-        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
+        let to = Destination { plan, layers: &[], inputs: &self.inputs, contents: &self.contents, sink };
         let pulse = |canvas: &FilmState, is_covered: bool| {
             if !is_covered {
                 meanwhile.postpone_write(sink);
@@ -529,6 +534,9 @@ impl Engine {
                 meanwhile.run_errand(at_hand, Some(canvas), &self.inputs, sink);
             }
         };
+        let mut images = Vec::new();
+        let wanted = plan.layers.as_slice();
+        let of_picture = sink.within(layers::progress(wanted, None));
         let rendered = self.with_keeping(request, ready, (sink, meanwhile), |keeping, engine| {
             let rendering = Rendering {
                 tracer: tracer(engine.means.kernel, &pool, ready, meanwhile.token),
@@ -538,7 +546,7 @@ impl Engine {
                 most_film_bytes: engine.means.most_film_bytes,
                 force: request.force,
                 first: request.first,
-                sink,
+                sink: if wanted.is_empty() { sink } else { &of_picture },
                 pulse: &pulse,
                 take_preview: &|| orders.take_preview(),
                 is_moved: request.overrides.camera.is_any(),
@@ -546,8 +554,13 @@ impl Engine {
                 share: ready.share.clone(),
                 keeping,
             };
-            render(key, &mut films, &rendering)
+            let rendered = render(key, &mut films, &rendering)?;
+            if let Some(state) = films.current().filter(|_| request.write != Writing::No) {
+                images = layers::layers(state, &rendering, wanted)?;
+            }
+            Ok(rendered)
         });
+        self.layers = images;
         if ready.share.is_some()
             && let Some(canvas) = films.current_mut()
         {

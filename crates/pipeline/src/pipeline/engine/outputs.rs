@@ -36,7 +36,8 @@ impl Engine {
                  the scene first"
             ));
         }
-        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
+        let to =
+            Destination { plan, layers: &self.layers, inputs: &self.inputs, contents: &self.contents, sink };
         let written = &mut self.written;
         pool.install(|| write_by_hand(canvas, to, written));
     }
@@ -101,7 +102,8 @@ impl Engine {
         }
         let pool = self.pool(plan.threads)?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
-        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
+        let to =
+            Destination { plan, layers: &self.layers, inputs: &self.inputs, contents: &self.contents, sink };
         let written = &mut self.written;
         let wrote = match plan.outputs.is_empty() {
             true => Staged::done(true, ""),

@@ -37,8 +37,12 @@ pub(super) fn text(
     let (a, b) = (upright(least), upright(greatest));
     let bounds = [a.min(b), a.max(b)];
     let points: Vec<DVec3> = loaded.mesh.extremes().into_iter().map(upright).collect();
-    let eye =
-        framed(bounds, &points, (show.from.unwrap_or(Side::Iso), show.turns), show.aspect.unwrap_or(SIZE[0] / SIZE[1]));
+    let eye = framed(
+        bounds,
+        &points,
+        (show.from.unwrap_or(Side::Iso), show.turns),
+        show.aspect.unwrap_or(SIZE[0] / SIZE[1]),
+    );
     let (mut toml, mut names) = (Toml::default(), Unique::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
     render(&mut toml, None);
