@@ -57,6 +57,23 @@ fn a_model_is_framed_from_every_side() {
         assert!((width / height / ratio - 1.0).abs() < 0.25, "{side}: {width} × {height}");
         assert!(width > 36.0 || height > 26.0, "{side}: it fills the frame: {width} × {height}");
     }
+    // A tower along each axis stands upright by --up; Blender's PLY files have z up.
+    for (up, sizes) in [("x", [4, 1, 1]), ("y", [1, 4, 1]), ("z", [1, 1, 4])] {
+        desk.write("tower.obj", box_of(sizes));
+        let [left, right, top, bottom] =
+            covered(&picture(&desk, &format!("tower.obj --view normal --from front --up {up}")));
+        let (width, height) = ((right - left + 1) as f32, (bottom - top + 1) as f32);
+        assert!((3.0..5.0).contains(&(height / width)), "{up}: {width} × {height}");
+    }
+    let tower = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 2\n\
+                 property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 0 4\n0 0 4\n3 0 1 2\n3 0 2 3\n";
+    for (comment, is_high) in [("Created in Blender version 4.5.0", true), ("by hand", false)] {
+        desk.write("tower.ply", format!("ply\nformat ascii 1.0\ncomment {comment}\n{tower}"));
+        let [left, right, top, bottom] = covered(&picture(&desk, "tower.ply --view normal --from iso"));
+        assert_eq!(bottom - top > right - left, is_high, "{comment}");
+    }
+    let stderr = desk.expect(&format!("ball.toml {SMALL} --up z"), 2);
+    assert!(stderr.contains("--up is for models"), "{stderr}");
     let stderr = desk.expect(&format!("ball.toml {SMALL} --from top"), 2);
     assert!(stderr.contains("--from is for models"), "{stderr}");
 }

@@ -15,7 +15,7 @@ pub use self::parts::{Engine, FarmArgs, MergeArgs};
 use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
-use crate::pipeline::settings::{Checkpoints, Layer, Overrides, Resume, Side, View};
+use crate::pipeline::settings::{Checkpoints, Layer, Overrides, Resume, Side, UpAxis, View};
 use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
@@ -273,6 +273,9 @@ pub struct RenderArgs {
     /// The side from which a model is seen, in place of its own camera
     #[arg(long, value_parser = one_of::<Side>(), value_name = "SIDE", help_heading = "Picture")]
     pub from: Option<Side>,
+    /// The axis of a model that points upwards [default: z of stl, and of ply by Blender, else y]
+    #[arg(long, value_parser = one_of::<UpAxis>(), value_name = "AXIS", help_heading = "Picture")]
+    pub up: Option<UpAxis>,
     /// Render N pictures all around the point that the camera looks at, with --once; -o names a file each, as in
     /// name_####.png, or a moving picture: .gif, .apng. --samples, --error and --time count for each picture
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = turntable, help_heading = "Picture")]
@@ -336,6 +339,7 @@ impl RenderArgs {
             dof: self.dof.map(bool::from),
             view: self.view,
             from: self.from,
+            up: self.up,
             layers: self.layers.clone().map_or_else(Vec::new, |Layers(layers)| layers),
             turn: self.turntable.map(|of| Turn { number: 0, of }),
             crop: self.crop,

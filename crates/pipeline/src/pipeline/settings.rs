@@ -35,6 +35,8 @@ macro_rules! overrides {
             pub view: Option<View>,
             /// The side from which a model is seen, in place of its own camera.
             pub from: Option<Side>,
+            /// The axis of a model that points upwards, in place of the usual one of its format.
+            pub up: Option<UpAxis>,
             /// The camera.
             pub camera: CameraChange,
             /// Layers beside the picture in EXR files.
@@ -108,6 +110,18 @@ choice! {
         Specular = "specular",
         /// What surfaces send out, and what is behind everything.
         Emission = "emission",
+    }
+}
+
+choice! {
+    /// The axis of a mesh file that points upwards.
+    pub enum UpAxis {
+        /// x: −z is the front's right.
+        X = "x",
+        /// y, as glTF has it, and most OBJ and PLY files.
+        Y = "y",
+        /// z, as programs for construction and printing have it.
+        Z = "z",
     }
 }
 

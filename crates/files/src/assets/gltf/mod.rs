@@ -4,7 +4,6 @@
 //! validation it gives up at an index out of range, and with it, at every extension that it does not know; its errors have no place.
 
 mod accessor;
-mod base64;
 mod description;
 mod json;
 mod materials;

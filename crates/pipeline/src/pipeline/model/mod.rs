@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use self::frame::{Eye, FOV, KEY, SKY, ground_reflectance, key_direction};
 use self::gltf::{Asset, Naming};
 use self::toml::{Toml, number, vector};
-use super::settings::{Overrides, Side};
+use super::settings::{Overrides, Side, UpAxis};
 use super::stages::containers::Containers;
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
@@ -29,6 +29,8 @@ pub(in crate::pipeline) struct Show {
     pub(in crate::pipeline) from: Option<Side>,
     /// Width over height of the picture. `None` if the call leaves one of them open.
     pub(in crate::pipeline) aspect: Option<f64>,
+    /// The axis of a mesh file that points upwards. `None` for the usual one of its format.
+    pub(in crate::pipeline) up: Option<UpAxis>,
     /// Pictures of a turntable, in all of which the model is to be seen. 1 for a single picture.
     pub(in crate::pipeline) turns: u32,
 }
@@ -38,7 +40,7 @@ const SIZE: [f64; 2] = [640.0, 480.0];
 
 impl Default for Show {
     fn default() -> Self {
-        Self { from: None, aspect: None, turns: 1 }
+        Self { from: None, aspect: None, up: None, turns: 1 }
     }
 }
 
@@ -52,7 +54,12 @@ impl Show {
                 Some(or(width, SIZE[0]) / or(height, SIZE[1]))
             }
         };
-        Self { from: overrides.from, aspect, turns: overrides.turn.map_or(1, |turn| turn.of) }
+        Self {
+            from: overrides.from,
+            aspect,
+            up: overrides.up,
+            turns: overrides.turn.map_or(1, |turn| turn.of),
+        }
     }
 
     /// Adds what the scene of a model depends on.
@@ -60,6 +67,10 @@ impl Show {
         key.flag(self.from.is_some());
         if let Some(from) = self.from {
             key.choice(from);
+        }
+        key.flag(self.up.is_some());
+        if let Some(up) = self.up {
+            key.choice(up);
         }
         key.f64(self.aspect.unwrap_or_default()).u64(self.turns.into());
     }
@@ -89,6 +100,10 @@ pub(in crate::pipeline) fn text(
     token: &CancelToken,
 ) -> Result<ModelText, AssetError> {
     if is_gltf(path) {
+        if show.up.is_some_and(|up| up != UpAxis::Y) {
+            let reason = "y is up in glTF files: --up is for obj, off, ply, stl".to_owned();
+            return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
+        }
         return gltf::text(path, (show, &Naming::Inside), containers, token);
     }
     plain::text(path, show, containers, token)
