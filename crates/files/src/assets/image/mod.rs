@@ -347,7 +347,8 @@ fn check_size(
     if needed > SMALL_BYTES.saturating_add(length.saturating_mul(MOST_GROWTH)) {
         let needed = needed.div_ceil(1 << 20);
         return Err(format!(
-            "{size}, which take {needed} MiB of memory, more than a file of {length} bytes stands for"
+            "it claims {width} × {height} pixels, which take {needed} MiB of memory, more than a file of {length} bytes \
+             stands for"
         ));
     }
     Ok(texels)

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use super::frame::framed;
 use super::toml::Toml;
-use super::{FOV, ModelText, SIZE, Show, Unique, camera, file_name, ground, light, render};
+use super::{FOV, Lighting, ModelText, SIZE, Show, Unique, camera, file_name, ground, light, render};
 use crate::assets::AssetError;
 use crate::control::{CancelToken, unwatched};
 use crate::math::DVec3;
@@ -80,9 +80,9 @@ pub(super) fn text(
     );
     let (mut toml, mut names) = (Toml::default(), Unique::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
-    render(&mut toml, None);
+    render(&mut toml, None, Lighting::Ours);
     camera(&mut toml, &eye, FOV);
-    light(&mut toml, &eye, false);
+    light(&mut toml, &eye, Lighting::Ours);
     let is_colored = !loaded.mesh.colors.is_empty();
     let needs_material = loaded.lacks_materials();
     let name = names.name("model", "model");
