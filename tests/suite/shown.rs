@@ -33,12 +33,10 @@ fn covered(pixels: &[f32]) -> [usize; 4] {
     let mut bounds = [48, 0, 36, 0];
     for (index, pixel) in pixels.chunks(3).enumerate() {
         let (x, y) = (index % 48, index / 48);
-        // The view of normals is black where nothing is, and the ground's normal is green.
-        if pixel[0] > 0.55
-            || pixel[2] > 0.55
-            || pixel[0] < 0.45 && pixel[0] > 0.0
-            || pixel[1] < 0.45 && pixel[1] > 0.0
-        {
+        // The view of normals is black where nothing is, and the ground's normal is (0, 1, 0).
+        let is_ground =
+            pixel.iter().zip([0.5, 1.0, 0.5]).all(|(value, ground)| (value - ground).abs() < 0.05);
+        if !is_ground && pixel.iter().any(|value| *value > 0.0) {
             bounds = [bounds[0].min(x), bounds[1].max(x), bounds[2].min(y), bounds[3].max(y)];
         }
     }

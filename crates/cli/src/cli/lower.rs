@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::args::{Progress, RenderArgs};
 use crate::output::Format;
-use crate::output::moving::MovingFormat;
+use crate::output::MovingFormat;
 use crate::output::write::STDOUT;
 use crate::pipeline::settings::Overrides;
 use crate::pipeline::turntable;

@@ -9,7 +9,7 @@ use super::exit::Exit;
 use super::lower::Order;
 use super::progress::{self, Reporter};
 use super::signals;
-use crate::output::moving::MovingFormat;
+use crate::output::MovingFormat;
 use crate::pipeline::protocol::{
     CheckpointNews, Command, Event, Failure, Report, Request, Stage, StageReport, Status, Writing,
 };

@@ -3,8 +3,7 @@
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use super::Format;
-use super::moving::MovingFormat;
+use super::{Format, MovingFormat};
 use crate::system::in_words;
 
 /// Reasons for which a picture could not be written.

@@ -32,7 +32,7 @@ pub use attributes::Losses;
 pub use error::OutputError;
 pub use exr::mean_luminance_error;
 pub use finish::Finish;
-pub use format::{BitDepth, Format};
+pub use format::{BitDepth, Format, MovingFormat};
 pub use identity::FileIdentity;
 pub use origin::{Replaced, replaced_json, replaced_picture, replaced_plot, replaced_table, signed};
 

@@ -12,7 +12,7 @@ use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
 use crate::integrators::{FirstHit, Measure, PhotonSettings, RenderSettings, Shown};
 use crate::math::Vec3;
-use crate::output::moving::MovingFormat;
+use crate::output::MovingFormat;
 use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, Photons, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};

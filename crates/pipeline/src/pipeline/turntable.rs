@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::math::DVec3;
 use crate::math::transform::sin_cos_degrees;
-use crate::output::moving::MovingFormat;
+use crate::output::MovingFormat;
 use crate::scene::description::Pose;
 
 /// Most pictures of a turn.

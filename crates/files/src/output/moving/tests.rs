@@ -1,3 +1,5 @@
+use std::path::Path;
+
 use super::*;
 
 /// A gradient with a square that moves.

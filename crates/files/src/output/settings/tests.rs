@@ -1,5 +1,4 @@
-use super::super::moving::{self, MovingFormat};
-use super::super::{EncodeOptions, Format, encode};
+use super::super::{EncodeOptions, Format, MovingFormat, encode, moving};
 use super::*;
 use crate::control::CancelToken;
 use crate::film::{Picture, RadianceImage};

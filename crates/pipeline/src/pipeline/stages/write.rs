@@ -20,10 +20,10 @@ use crate::control::CancelToken;
 use crate::film::tone::develop;
 use crate::film::{Picture, RadianceImage, Rect, SampleStats};
 use crate::integrators::{Measure, Shown};
-use crate::output::moving::{self, MovingFormat};
 use crate::output::part::{self, Kind};
 use crate::output::write::{Durability, Guard};
 use crate::output::{self, BitDepth, Finish, Format, LayerImage, OutputError};
+use crate::output::{MovingFormat, moving};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// Files that glimt wrote, with the picture's key and the file's content at that time.
