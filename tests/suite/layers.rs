@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use exr::prelude::{FlatSamples, ReadChannels, ReadLayers, read};
+use exr::prelude::{ReadChannels, ReadLayers, read};
 
 use super::desk::Desk;
 
@@ -27,12 +27,8 @@ fn desk() -> Desk {
 fn channels(desk: &Desk, name: &str) -> BTreeMap<String, Vec<f32>> {
     let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
     let image = image.all_attributes().from_file(desk.path(name)).expect("EXR");
-    let samples = |samples: FlatSamples| match samples {
-        FlatSamples::F32(samples) => samples,
-        other => panic!("{other:?}"),
-    };
     let list = image.layer_data.channel_data.list.into_iter();
-    list.map(|channel| (channel.name.to_string(), samples(channel.sample_data))).collect()
+    list.map(|channel| (channel.name.to_string(), channel.sample_data.values_as_f32().collect())).collect()
 }
 
 fn picture(desk: &Desk, options: &str) -> Vec<f32> {

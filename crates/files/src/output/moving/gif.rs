@@ -56,7 +56,7 @@ pub(super) fn encode(
             encoder.write_lzw_pre_encoded_frame(&frame)?;
         }
     }
-    encoder.into_inner().map_err(EncodingError::from)
+    encoder.into_inner()
 }
 
 /// The colours that stand for those of all frames, three bytes each.
