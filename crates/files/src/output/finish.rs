@@ -29,7 +29,7 @@ impl Finish {
     /// The bytes of a file. `image` is the picture of the film; the layers beside it are for EXR files.
     ///
     /// # Errors
-    /// As [`encode`].
+    /// As [`encode`](super::encode).
     pub fn encode(
         &self,
         film: &Film,
