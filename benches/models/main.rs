@@ -34,7 +34,10 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     seconds.sort_by(f64::total_cmp);
     let within = seconds.iter().filter(|seconds| **seconds <= GOAL).count();
     let (least, median, most) = (seconds[0], seconds[RUNS / 2], seconds[RUNS - 1]);
-    println!("{}, 512 × 512, --error 0.05: {least:.2} {median:.2} {most:.2} s (least, median, most)", model.display());
+    println!(
+        "{}, 512 × 512, --error 0.05: {least:.2} {median:.2} {most:.2} s (least, median, most)",
+        model.display()
+    );
     println!("{within} of {RUNS} runs took at most {GOAL} s");
     println!("load: {}", fs::read_to_string("/proc/loadavg").unwrap_or_default().trim());
     Ok(())
@@ -46,7 +49,18 @@ fn run(folder: &Path, model: &Path) -> Result<f64, Box<dyn error::Error>> {
     let status = Command::new(env!("CARGO_BIN_EXE_glimt"))
         .current_dir(folder)
         .arg(model)
-        .args(["--once", "--force", "-o", "picture.png", "--width", "512", "--height", "512", "--error", "0.05"])
+        .args([
+            "--once",
+            "--force",
+            "-o",
+            "picture.png",
+            "--width",
+            "512",
+            "--height",
+            "512",
+            "--error",
+            "0.05",
+        ])
         .args(["--progress", "none"])
         .stdin(Stdio::null())
         .status()?;
@@ -57,7 +71,10 @@ fn run(folder: &Path, model: &Path) -> Result<f64, Box<dyn error::Error>> {
 fn bumps(rows: u32) -> String {
     let at = |i: u32| {
         let (row, column) = (f64::from(i / rows), f64::from(i % rows));
-        let (polar, turn) = (std::f64::consts::PI * (row + 0.5) / f64::from(rows), std::f64::consts::TAU * column / f64::from(rows));
+        let (polar, turn) = (
+            std::f64::consts::PI * (row + 0.5) / f64::from(rows),
+            std::f64::consts::TAU * column / f64::from(rows),
+        );
         let radius = 1.0 + 0.05 * (9.0 * polar).sin() * (12.0 * turn).sin();
         [radius * polar.sin() * turn.cos(), radius * polar.cos(), radius * polar.sin() * turn.sin()]
     };

@@ -6,7 +6,7 @@ use super::desk::Desk;
 
 const SMALL: &str = "--once --width 16 --height 12 --samples 2";
 
-/// What it says on stdout.
+/// Text of `glimt info` on stdout.
 fn info(desk: &Desk, line: &str, code: i32) -> String {
     let output = desk.run(&format!("info {line}"));
     let stderr = String::from_utf8(output.stderr).expect("UTF-8");

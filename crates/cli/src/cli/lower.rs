@@ -84,7 +84,7 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
     })
 }
 
-/// Whether every picture of a turntable has a file, and nothing is asked for that belongs to a single picture.
+/// Checks that every picture of a turntable has a file, and that the call has no option of a single picture.
 fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     if !args.once {
         return Err("--turntable needs --once: the terminal shows one picture".to_owned());

@@ -136,7 +136,7 @@ fn follow(
 ) -> Exit {
     let mut unwritten: Vec<String> = Vec::new();
     let mut of_call: Vec<Diagnostic> = Vec::new();
-    // What was said of the first picture holds for all.
+    // Warnings about the first picture hold for all.
     let is_first = turn.is_none_or(|turn| turn.number == 0);
     let before = written.pictures.len();
     loop {

@@ -108,7 +108,7 @@ choice! {
         Diffuse = "diffuse",
         /// Specular part of the light.
         Specular = "specular",
-        /// What surfaces send out, and what is behind everything.
+        /// Light that surfaces send out, and that of the background.
         Emission = "emission",
     }
 }

@@ -19,7 +19,7 @@ pub(super) struct Sink {
     pub(super) generation: u64,
     pub(super) events: Sender<Event>,
     pub(super) previews: PreviewSlot,
-    /// Where the fractions of progress begin and end, where the render is a part of the work. `None` if it is all of it.
+    /// First and last fraction of progress, if the render is a part of the work. `None` if it is all of it.
     pub(super) within: Option<[f64; 2]>,
 }
 

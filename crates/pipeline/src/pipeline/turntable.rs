@@ -89,7 +89,7 @@ pub(super) fn numbered(path: &Path, turn: Turn) -> Option<PathBuf> {
     Some(path.with_file_name(OsString::from(format!("{before}{number}{after}"))))
 }
 
-/// What is before the last run of `#` in a file's name, the length of the run, and what is behind it.
+/// Text before the last run of `#` in a file's name, the length of the run, and the text behind it.
 fn numbers(path: &Path) -> Option<(&str, usize, &str)> {
     let name = path.file_name()?.to_str()?;
     let (head, after) = name.rsplit_once(DIGIT)?;

@@ -1,4 +1,4 @@
-//! How a picture was made: the settings that glimt wrote into a file, read again.
+//! Settings that glimt wrote into a picture, read again: they tell how it was made.
 
 mod gif;
 mod text;

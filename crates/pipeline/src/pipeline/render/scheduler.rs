@@ -79,7 +79,7 @@ pub(in crate::pipeline) struct Scheduler<'a> {
     is_over_time: bool,
     next_progress: Instant,
     next_preview: Instant,
-    /// What becomes of each sample before it is added. `None` for samples that stay as they are.
+    /// Change of each sample before it is added. `None` for samples that stay as they are.
     pub(in crate::pipeline) changed: Option<&'a (dyn Fn(Vec3) -> Vec3 + Sync)>,
 }
 
