@@ -14,10 +14,12 @@ mod extremes;
 mod gltf;
 mod hostile;
 mod house;
+mod info;
 mod inputs;
 mod json;
 mod keeping;
 mod kernel;
+mod layers;
 mod models;
 mod mutation;
 #[cfg(target_os = "linux")]
@@ -31,4 +33,5 @@ mod same_bits;
 mod shown;
 mod stress;
 mod terminal;
+mod turntable;
 mod views;

@@ -244,7 +244,7 @@ fn wrong_values_are_answered_with_what_is_expected() {
         ("chekc ball.toml", "there is no command \"chekc\", nor a scene of that name: did you mean `check`?"),
         (
             "render ball.toml",
-            "there is no command \"render\", nor a scene of that name: there are check, new, import, compare, bench, merge, \
+            "there is no command \"render\", nor a scene of that name: there are check, new, import, info, compare, bench, merge, \
              farm",
         ),
     ] {
@@ -328,7 +328,7 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
     for (call, words) in [
         (
             "schema",
-            "there is no command \"schema\", nor a scene of that name: there are check, new, import, compare, bench",
+            "there is no command \"schema\", nor a scene of that name: there are check, new, import, info, compare, bench",
         ),
         ("man", "there is no command \"man\", nor a scene of that name"),
         ("completions zsh", "there is no command \"completions\", nor a scene of that name"),

@@ -33,12 +33,10 @@ fn covered(pixels: &[f32]) -> [usize; 4] {
     let mut bounds = [48, 0, 36, 0];
     for (index, pixel) in pixels.chunks(3).enumerate() {
         let (x, y) = (index % 48, index / 48);
-        // The view of normals is black where nothing is, and the ground's normal is green.
-        if pixel[0] > 0.55
-            || pixel[2] > 0.55
-            || pixel[0] < 0.45 && pixel[0] > 0.0
-            || pixel[1] < 0.45 && pixel[1] > 0.0
-        {
+        // The view of normals is black where nothing is, and the ground's normal is (0, 1, 0).
+        let is_ground =
+            pixel.iter().zip([0.5, 1.0, 0.5]).all(|(value, ground)| (value - ground).abs() < 0.05);
+        if !is_ground && pixel.iter().any(|value| *value > 0.0) {
             bounds = [bounds[0].min(x), bounds[1].max(x), bounds[2].min(y), bounds[3].max(y)];
         }
     }
@@ -57,6 +55,23 @@ fn a_model_is_framed_from_every_side() {
         assert!((width / height / ratio - 1.0).abs() < 0.25, "{side}: {width} × {height}");
         assert!(width > 36.0 || height > 26.0, "{side}: it fills the frame: {width} × {height}");
     }
+    // A tower along each axis stands upright by --up; Blender's PLY files have z up.
+    for (up, sizes) in [("x", [4, 1, 1]), ("y", [1, 4, 1]), ("z", [1, 1, 4])] {
+        desk.write("tower.obj", box_of(sizes));
+        let [left, right, top, bottom] =
+            covered(&picture(&desk, &format!("tower.obj --view normal --from front --up {up}")));
+        let (width, height) = ((right - left + 1) as f32, (bottom - top + 1) as f32);
+        assert!((3.0..5.0).contains(&(height / width)), "{up}: {width} × {height}");
+    }
+    let tower = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 2\n\
+                 property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n1 0 4\n0 0 4\n3 0 1 2\n3 0 2 3\n";
+    for (comment, is_high) in [("Created in Blender version 4.5.0", true), ("by hand", false)] {
+        desk.write("tower.ply", format!("ply\nformat ascii 1.0\ncomment {comment}\n{tower}"));
+        let [left, right, top, bottom] = covered(&picture(&desk, "tower.ply --view normal --from iso"));
+        assert_eq!(bottom - top > right - left, is_high, "{comment}");
+    }
+    let stderr = desk.expect(&format!("ball.toml {SMALL} --up z"), 2);
+    assert!(stderr.contains("--up is for models"), "{stderr}");
     let stderr = desk.expect(&format!("ball.toml {SMALL} --from top"), 2);
     assert!(stderr.contains("--from is for models"), "{stderr}");
 }

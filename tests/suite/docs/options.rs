@@ -29,6 +29,7 @@ fn the_tables_of_options_have_those_of_the_program() {
     for (heading, command) in [
         ("Options of a render", ""),
         ("Options of check", "check"),
+        ("Options of info", "info"),
         ("Options of compare", "compare"),
         ("Options of bench", "bench"),
         ("Options of merge", "merge"),

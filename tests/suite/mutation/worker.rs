@@ -27,7 +27,7 @@ pub(super) const TRIES: usize = 3;
 
 /// Most memory in use, a worker's own included. The largest that a small file may claim and get is an image, whose
 /// pixels are allocated before the file turns out to be too short.
-const MEMORY_BYTES: u64 = 1 << 30;
+const MEMORY_BYTES: u64 = 768 << 20;
 
 /// Most memory that may be requested.
 const ADDRESS_BYTES: u64 = 16 << 30;

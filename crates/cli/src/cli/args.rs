@@ -15,7 +15,8 @@ pub use self::parts::{Engine, FarmArgs, MergeArgs};
 use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
-use crate::pipeline::settings::{Checkpoints, Overrides, Resume, Side, View};
+use crate::pipeline::settings::{Checkpoints, Layer, Overrides, Resume, Side, UpAxis, View};
+use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
@@ -27,6 +28,7 @@ Examples:
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
   glimt helmet.glb                        a model alone: obj, off, ply, stl, glb, gltf
+  glimt helmet.glb --once --turntable 36 -o helmet.gif    all around it
   glimt import helmet.glb -o helmet.toml  a scene of it, to edit
   glimt compare a.exr reference.exr       the error of one picture against another
   glimt bench ball.toml --plot plot.svg   measure the error of each method against its seconds
@@ -68,6 +70,7 @@ impl Args {
             Some(Subcommand::Merge(merge)) => merge.color,
             Some(Subcommand::Farm(farm)) => farm.color,
             Some(Subcommand::Import(import)) => import.color,
+            Some(Subcommand::Info(info)) => info.color,
             Some(Subcommand::New { .. }) | None => self.render.color,
         }
     }
@@ -95,6 +98,9 @@ pub enum Subcommand {
     /// Make a scene of a glTF file, with its meshes as PLY files and its images beside it; refuses to overwrite
     #[command(after_help = IMPORT_HELP)]
     Import(ImportArgs),
+    /// Say how a picture was made: the settings that a file carries
+    #[command(after_help = INFO_HELP)]
+    Info(InfoArgs),
     /// Measure the error of a picture against a reference
     #[command(after_help = COMPARE_HELP)]
     Compare(CompareArgs),
@@ -128,6 +134,24 @@ pub struct ImportArgs {
     /// Exit with 1, and write nothing, if something has no equal
     #[arg(long)]
     pub strict: bool,
+    /// Colours of the messages
+    #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
+    pub color: ColorChoice,
+}
+
+const INFO_HELP: &str = "\
+All formats that glimt writes carry the settings; parts and checkpoints have the files that the picture was made of, too.
+
+Exit codes: 0 glimt made it; 1 the file does not say so; 2 it cannot be read, or is no picture.";
+
+/// A picture.
+#[derive(Clone, Debug, clap::Args)]
+pub struct InfoArgs {
+    /// The picture: png, apng, gif, exr, hdr, jpg, ppm; a part or a checkpoint
+    pub image: PathBuf,
+    /// One JSON object on stdout in place of the lines
+    #[arg(long)]
+    pub json: bool,
     /// Colours of the messages
     #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
     pub color: ColorChoice,
@@ -195,6 +219,10 @@ pub struct RenderArgs {
     /// ppm. [default: the scene's `output`, which lies beside the scene, else the scene's name with .png]
     #[arg(short, long = "output", value_name = "FILE", help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
+    /// Numbers about each pixel as channels beside the picture in EXR files, with --once: all, or some of albedo, normal,
+    /// depth, variance, samples, ambient, diffuse, specular, emission, with commas between them
+    #[arg(long, value_name = "all|LIST", value_parser = layers, help_heading = "Output")]
+    pub layers: Option<Layers>,
     /// Bits per channel of PNG files: 8 or 16
     #[arg(long, value_name = "BITS", allow_negative_numbers = true, value_parser = bit_depth, help_heading = "Output")]
     pub bit_depth: Option<u8>,
@@ -245,6 +273,13 @@ pub struct RenderArgs {
     /// The side from which a model is seen, in place of its own camera
     #[arg(long, value_parser = one_of::<Side>(), value_name = "SIDE", help_heading = "Picture")]
     pub from: Option<Side>,
+    /// The axis of a model that points upwards [default: z of stl, and of ply by Blender, else y]
+    #[arg(long, value_parser = one_of::<UpAxis>(), value_name = "AXIS", help_heading = "Picture")]
+    pub up: Option<UpAxis>,
+    /// Render N pictures all around the point that the camera looks at, with --once; -o names a file each, as in
+    /// name_####.png, or a moving picture: .gif, .apng. --samples, --error and --time count for each picture
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = turntable, help_heading = "Picture")]
+    pub turntable: Option<u32>,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("seed"), help_heading = "Picture")]
     pub seed: Option<u32>,
@@ -304,6 +339,9 @@ impl RenderArgs {
             dof: self.dof.map(bool::from),
             view: self.view,
             from: self.from,
+            up: self.up,
+            layers: self.layers.clone().map_or_else(Vec::new, |Layers(layers)| layers),
+            turn: self.turntable.map(|of| Turn { number: 0, of }),
             crop: self.crop,
             threads: self.threads,
             bit_depth: self.bit_depth,
@@ -489,6 +527,31 @@ fn error_bound(text: &str) -> Result<f64, String> {
         Ok(bound) if bound >= 0.0 && bound.is_finite() => Ok(bound),
         _ => Err("expected a number that is not below 0".to_owned()),
     }
+}
+
+/// Layers of EXR files, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layers(pub Vec<Layer>);
+
+fn layers(text: &str) -> Result<Layers, String> {
+    if text == "all" {
+        return Ok(Layers(Layer::ALL.to_vec()));
+    }
+    let mut layers = Vec::new();
+    for name in text.split(',').map(str::trim) {
+        let layer = Layer::named(name).ok_or_else(|| {
+            let known: Vec<_> = Layer::ALL.iter().map(|layer| layer.name()).collect();
+            format!("there is no layer {name:?}; there are all, {}", known.join(", "))
+        })?;
+        if !layers.contains(&layer) {
+            layers.push(layer);
+        }
+    }
+    Ok(Layers(layers))
+}
+
+fn turntable(text: &str) -> Result<u32, String> {
+    whole(text, 1..=turntable::MOST)
 }
 
 fn threads(text: &str) -> Result<usize, String> {

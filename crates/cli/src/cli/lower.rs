@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use super::args::{Progress, RenderArgs};
 use crate::output::Format;
+use crate::output::MovingFormat;
 use crate::output::write::STDOUT;
 use crate::pipeline::settings::Overrides;
+use crate::pipeline::turntable;
 use crate::tui::{ColorChoice, PreviewChoice};
 
 /// Standard output, where it stands for a file.
@@ -39,9 +41,29 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
         }
         // A part may have any name.
         Some(_) => {}
+        None if args.turntable.is_some() => check_turntable(&args)?,
         None => check_outputs(&args.outputs)?,
     }
+    if args.turntable.is_some() && args.shard.is_some() {
+        return Err(
+            "--turntable and --shard exclude each other: a turntable is rendered by one machine".to_owned()
+        );
+    }
+    if args.layers.is_some() {
+        let why = match (args.once, args.shard) {
+            (false, _) => "--layers needs --once: the terminal shows one layer at a time, by v",
+            (true, Some(_)) => "--layers and --shard exclude each other: parts hold the picture alone",
+            (true, None) => "",
+        };
+        if !why.is_empty() {
+            return Err(why.to_owned());
+        }
+    }
     let mut overrides = args.overrides();
+    if overrides.turn.is_some() {
+        // A picture is soon done again; those before it are files.
+        overrides.checkpoints.seconds = 0.0;
+    }
     if overrides.report.as_deref() == Some(Path::new(STANDARD)) {
         if !args.once {
             let why = "which has the picture: name a file, or use --once";
@@ -62,13 +84,52 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
     })
 }
 
+/// Checks that every picture of a turntable has a file, and that the call has no option of a single picture.
+fn check_turntable(args: &RenderArgs) -> Result<(), String> {
+    if !args.once {
+        return Err("--turntable needs --once: the terminal shows one picture".to_owned());
+    }
+    for (is_given, name) in [(args.resume, "--resume"), (args.keep_checkpoint, "--keep-checkpoint")] {
+        if is_given {
+            return Err(format!("{name} is for a single picture: a turntable has no checkpoints"));
+        }
+    }
+    for (index, path) in args.outputs.iter().enumerate() {
+        if MovingFormat::of(path).is_none() {
+            Format::of(path).map_err(|error| format!("{error}, or for a turntable of .gif, .apng"))?;
+        }
+        turntable::check_name(path)?;
+        check_once(&args.outputs, index)?;
+    }
+    match &args.report {
+        Some(path) if path != Path::new(STANDARD) && !turntable::has_number(path) => {
+            let name = turntable::suggested(path);
+            Err(format!("a turntable has a report for each picture: --report {}", name.display()))
+        }
+        Some(_) | None => Ok(()),
+    }
+}
+
+/// Refuses a file that was named before.
+fn check_once(outputs: &[PathBuf], index: usize) -> Result<(), String> {
+    let path = &outputs[index];
+    if outputs[..index].contains(path) {
+        return Err(format!("-o {} is given twice", path.display()));
+    }
+    Ok(())
+}
+
 /// Every ending must be known, and no file may be named twice.
 fn check_outputs(outputs: &[PathBuf]) -> Result<(), String> {
     for (index, path) in outputs.iter().enumerate() {
-        Format::of(path).map_err(|error| error.to_string())?;
-        if outputs[..index].contains(path) {
-            return Err(format!("-o {} is given twice", path.display()));
+        if MovingFormat::of(path).is_some() {
+            let name = path.display();
+            return Err(format!(
+                "{name} is a moving picture, which --turntable N makes; name a .png for a single one"
+            ));
         }
+        Format::of(path).map_err(|error| error.to_string())?;
+        check_once(outputs, index)?;
     }
     Ok(())
 }

@@ -10,6 +10,7 @@ mod console;
 mod exit;
 mod farm;
 mod import;
+mod info;
 mod live;
 mod lower;
 mod merge;
@@ -45,6 +46,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::Check { scene, sets, .. }) => check::run(&scene, &sets, &console),
         Some(Subcommand::New { file }) => new::run(&file, &console),
         Some(Subcommand::Import(args)) => import::run(&args, &console),
+        Some(Subcommand::Info(args)) => info::run(&args, &console),
         Some(Subcommand::Compare(args)) => compare::run(&args, &console),
         Some(Subcommand::Bench(args)) => bench::run(&args, &console),
         Some(Subcommand::Merge(args)) => merge::run(&args, &console),

@@ -1,6 +1,6 @@
 //! `--once`: render, write, exit; progress on stderr, nothing on stdout.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
@@ -9,8 +9,12 @@ use super::exit::Exit;
 use super::lower::Order;
 use super::progress::{self, Reporter};
 use super::signals;
-use crate::pipeline::protocol::{CheckpointNews, Command, Event, Failure, Report, Request, Writing};
+use crate::output::MovingFormat;
+use crate::pipeline::protocol::{
+    CheckpointNews, Command, Event, Failure, Report, Request, Stage, StageReport, Status, Writing,
+};
 use crate::pipeline::settings::{Effective, Overrides};
+use crate::pipeline::turntable::Turn;
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::system::priority;
@@ -36,22 +40,36 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         Ok(ended) => ended,
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
     };
-    worker.send(Command::Render(Box::new(Request {
-        generation: 1,
-        scene: order.scene.clone(),
-        overrides: order.overrides.clone(),
-        preview: None,
-        write: Writing::Must,
-        force: false,
-        first: None,
-    })));
-    let mut reporter = progress::reporter(order.progress, order.overrides.time_seconds, console);
     let mut deadline = Deadline::default();
     let mut written = Written::default();
-    let exit = follow(&worker, order, console, &mut *reporter, &mut written, || {
-        ended.by().is_some() && deadline.is_over(Instant::now())
-    });
-    reporter.end();
+    let mut is_over = || ended.by().is_some() && deadline.is_over(Instant::now());
+    let mut exit = Exit::DONE;
+    // One reporter for each picture: what a turntable shows of the one before is cleared.
+    let reporter = || progress::reporter(order.progress, order.overrides.time_seconds, console);
+    let mut reporter_of_picture = reporter();
+    for overrides in pictures(&order.overrides) {
+        let turn = overrides.turn;
+        if let Some(Turn { number, of }) = turn.filter(|_| reporter_of_picture.says_results()) {
+            console.say(&format!("picture {} of {of}", number + 1));
+        }
+        worker.send(Command::Render(Box::new(Request {
+            generation: turn.map_or(1, |turn| u64::from(turn.number) + 1),
+            scene: order.scene.clone(),
+            overrides,
+            preview: None,
+            write: Writing::Must,
+            force: false,
+            first: None,
+        })));
+        reporter_of_picture = reporter();
+        let reporter = &mut *reporter_of_picture;
+        exit = follow(&worker, (order, turn), console, reporter, &mut written, &mut is_over);
+        reporter.end();
+        if exit != Exit::DONE || ended.by().is_some() {
+            break;
+        }
+    }
+    let reporter = reporter_of_picture;
     if !reporter.says_diagnostics()
         && let Some(signal) = ended.by().and_then(signals::name)
     {
@@ -59,6 +77,15 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     }
     worker.finish(deadline.left(Instant::now()));
     ended.by().map_or(exit, Exit::signal)
+}
+
+/// The requests of a call: one, or one for each picture of a turntable.
+fn pictures(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
+    let count = overrides.turn.map_or(1, |turn| turn.of);
+    (0..count).map(|number| {
+        let turn = overrides.turn.map(|turn| Turn { number, ..turn });
+        Overrides { turn, ..overrides.clone() }
+    })
 }
 
 /// Words about the pictures when a signal ends the program.
@@ -70,7 +97,8 @@ fn outcome(exit: Exit, written: &Written) -> String {
             None => "no picture was written".to_owned(),
         },
         _ if exit == Exit::DONE => "everything was written before".to_owned(),
-        names => format!("only {} was written", names.join(", ")),
+        [only] => format!("only {only} was written"),
+        [first, .., last] => format!("only {} pictures were written, {first} to {last}", names.len()),
     }
 }
 
@@ -100,7 +128,7 @@ impl Deadline {
 /// Follows the request until it is over or a signal ends it.
 fn follow(
     worker: &Handle,
-    order: &Order,
+    (order, turn): (&Order, Option<Turn>),
     console: &Console,
     reporter: &mut dyn Reporter,
     written: &mut Written,
@@ -108,6 +136,9 @@ fn follow(
 ) -> Exit {
     let mut unwritten: Vec<String> = Vec::new();
     let mut of_call: Vec<Diagnostic> = Vec::new();
+    // Warnings about the first picture hold for all.
+    let is_first = turn.is_none_or(|turn| turn.number == 0);
+    let before = written.pictures.len();
     loop {
         if is_over() {
             return Exit::FAILED;
@@ -120,12 +151,21 @@ fn follow(
         // Warnings about the call come with those about the scene.
         if let Event::Settings { settings, .. } = &event {
             of_call.extend(without_effect(&order.overrides, settings));
+        } else if let Event::Stage { stage, .. } = &event
+            && !is_first
+            && is_read_again(stage)
+        {
+            worker.send(Command::Cancel);
+            reporter.end();
+            let what = "the scene or a file of it has changed: the pictures would not be of one turntable";
+            return console.fail(Exit::FAILED, what);
         } else if let Event::Checkpoint { news, .. } = &event {
             hear(news, &mut of_call, reporter, console);
         } else if let Event::NotKept { message, .. } = &event {
             of_call.push(warning(message, "another name with -o FILE leaves the old file as it is"));
         } else if let Event::Done { warnings, .. } = &mut event {
             warnings.append(&mut of_call);
+            warnings.retain(|_| is_first);
         }
         reporter.event(&event);
         match event {
@@ -140,7 +180,7 @@ fn follow(
                 if !reporter.says_diagnostics() {
                     console.diagnostics(&warnings);
                 }
-                return done(&report, &written.pictures, &unwritten, console, reporter);
+                return done(&report, (&written.pictures[before..], turn), &unwritten, console, reporter);
             }
             Event::Failed { failure, .. } => {
                 reporter.end();
@@ -168,6 +208,11 @@ fn follow(
             | Event::Picked { .. } => {}
         }
     }
+}
+
+/// Whether a stage that reads files found another content than for the picture before.
+fn is_read_again(stage: &StageReport) -> bool {
+    matches!(stage.name, Stage::Parse | Stage::Meshes | Stage::Textures) && stage.status == Status::Done
 }
 
 /// Says what a person wants to know about checkpoints, at once: warnings as well, while something can be done.
@@ -235,13 +280,13 @@ fn without_effect(asked: &Overrides, settings: &Effective) -> Vec<Diagnostic> {
 
 fn done(
     report: &Report,
-    written: &[PathBuf],
+    (written, turn): (&[PathBuf], Option<Turn>),
     unwritten: &[String],
     console: &Console,
     reporter: &dyn Reporter,
 ) -> Exit {
     if reporter.says_results() {
-        written.iter().for_each(|path| console.say(&wrote(path, report)));
+        written.iter().for_each(|path| console.say(&wrote(path, report, turn)));
     }
     if !reporter.says_diagnostics() {
         unwritten.iter().for_each(|message| console.say(&format!("error: {message}")));
@@ -265,8 +310,11 @@ fn exit_of(failure: &Failure) -> Exit {
 }
 
 /// `wrote cornell.png (640×480, 64 samples, 1.93 s)`
-fn wrote(path: &std::path::Path, report: &Report) -> String {
+fn wrote(path: &Path, report: &Report, turn: Option<Turn>) -> String {
     let image = &report.image;
+    if let Some(turn) = turn.filter(|_| MovingFormat::of(path).is_some()) {
+        return format!("wrote {} ({}×{}, {} frames)", path.display(), image.width, image.height, turn.of);
+    }
     let samples = match (image.samples.min, image.samples.max) {
         (1, 1) => "1 sample".to_owned(),
         (min, max) if min == max => format!("{max} samples"),

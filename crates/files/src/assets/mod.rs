@@ -77,6 +77,11 @@ pub struct LoadedMesh {
 }
 
 impl LoadedMesh {
+    /// Whether it has no normals and is of flat faces, as a box is.
+    pub fn is_faceted(&self) -> bool {
+        mesh::normals::is_faceted(&self.mesh)
+    }
+
     /// Whether there are triangles and no material for any of them.
     pub fn lacks_materials(&self) -> bool {
         self.materials.is_empty() && !self.mesh.triangles.is_empty()

@@ -3,7 +3,7 @@
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use super::Format;
+use super::{Format, MovingFormat};
 use crate::system::in_words;
 
 /// Reasons for which a picture could not be written.
@@ -41,6 +41,14 @@ pub enum OutputError {
         /// The format.
         format: Format,
         /// Property that the format lacks.
+        why: String,
+    },
+    /// The format cannot hold the moving picture, or its encoder failed.
+    #[error("a moving {format} file {why}")]
+    Moving {
+        /// The format.
+        format: MovingFormat,
+        /// The reason.
         why: String,
     },
     /// The encoder failed.

@@ -11,11 +11,13 @@ use ::exr::error::UnitResult;
 use ::exr::image::write::layers::{LayersWriter, WritableLayers};
 use ::exr::meta::MetaData;
 use ::exr::meta::attribute::{AttributeValue, Chromaticities, Text};
-use ::exr::prelude::{Encoding, Image, Layer, LayerAttributes, SpecificChannels, Vec2};
+use ::exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, Vec2,
+};
 use rayon::prelude::*;
 
 use super::stoppable::Stoppable;
-use super::{EncodeOptions, Format, OutputError, SOFTWARE, as_finite, one_line};
+use super::{EncodeOptions, Format, LayerImage, OutputError, SOFTWARE, as_finite, one_line};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 
@@ -35,16 +37,12 @@ pub fn mean_luminance_error(path: &Path) -> Option<f64> {
 }
 
 pub(super) fn encode(
-    image: &RadianceImage,
+    (image, layers): (&RadianceImage, &[LayerImage]),
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
     let size = (image.width as usize, image.height as usize);
-    let pixel = |position: Vec2<usize>| {
-        let color = image.pixels[position.y() * size.0 + position.x()];
-        (as_finite(color.x), as_finite(color.y), as_finite(color.z))
-    };
-    let channels = SpecificChannels::rgb(pixel);
+    let channels = channels(image, layers);
     let layer = Layer::new(size, attributes(options), Encoding::SMALL_LOSSLESS, channels);
     let mut file = Image::from_layer(layer);
     file.attributes.chromaticities = Some(REC_709);
@@ -57,6 +55,22 @@ pub(super) fn encode(
     })
     .map_err(|error| OutputError::encoder(Format::Exr, &error))?;
     Ok(bytes.into_bytes())
+}
+
+/// The channels of a picture and of its layers, `albedo.R` and so on.
+fn channels(image: &RadianceImage, layers: &[LayerImage]) -> AnyChannels<FlatSamples> {
+    let channel = |name: &str, image: &RadianceImage, component: usize| {
+        let samples = image.pixels.iter().map(|pixel| as_finite(pixel[component])).collect();
+        AnyChannel::new(name, FlatSamples::F32(samples))
+    };
+    let names = ["R", "G", "B"];
+    let mut channels: SmallVec<[_; 4]> =
+        (0..3).map(|component| channel(names[component], image, component)).collect();
+    for LayerImage { name, channels: of_layer, image } in layers {
+        let of_layer = of_layer.iter().take(3).enumerate();
+        channels.extend(of_layer.map(|(component, of)| channel(&format!("{name}.{of}"), image, component)));
+    }
+    AnyChannels::sort(channels)
 }
 
 /// Compresses in the caller's pool, or on the caller's thread outside of one. The encoder itself would make a pool with

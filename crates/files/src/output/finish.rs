@@ -1,6 +1,6 @@
 //! The last step of a picture: from a film to the bytes of a file, the same for one render and for merged parts.
 
-use super::{BitDepth, EncodeOptions, Format, OutputError, encode};
+use super::{BitDepth, EncodeOptions, Format, LayerImage, OutputError, encode_with};
 use crate::control::CancelToken;
 use crate::film::tone::ToneMapping;
 use crate::film::{Film, Quantity, RadianceImage, SampleStats};
@@ -26,14 +26,14 @@ impl Finish {
         film.image(self.quantity)
     }
 
-    /// The bytes of a file. `image` is the picture of the film.
+    /// The bytes of a file. `image` is the picture of the film; the layers beside it are for EXR files.
     ///
     /// # Errors
-    /// As [`encode`].
+    /// As [`encode`](super::encode).
     pub fn encode(
         &self,
         film: &Film,
-        image: &RadianceImage,
+        (image, layers): (&RadianceImage, &[LayerImage]),
         format: Format,
         token: &CancelToken,
     ) -> Result<Vec<u8>, OutputError> {
@@ -49,6 +49,6 @@ impl Finish {
         metadata.extend(range.map(|range| ("glimt:range".to_owned(), range)));
         let mean_luminance_error = if self.is_light { film.mean_luminance_error() } else { None };
         let options = EncodeOptions { tone, bit_depth: self.bit_depth, metadata, mean_luminance_error };
-        encode(image, &options, format, token)
+        encode_with((image, layers), &options, format, token)
     }
 }

@@ -112,3 +112,47 @@ impl fmt::Display for Format {
         })
     }
 }
+
+/// A file format of moving pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MovingFormat {
+    /// 256 colours, the same for all frames.
+    Gif,
+    /// 8 bit sRGB, without loss.
+    Apng,
+}
+
+impl MovingFormat {
+    const ENDINGS: [(&'static str, Self); 2] = [("gif", Self::Gif), ("apng", Self::Apng)];
+
+    /// The format of a path's ending, in small letters or capitals. `None` if it is not one of moving pictures.
+    pub fn of(path: &Path) -> Option<Self> {
+        let ending = path.extension()?;
+        let known = Self::ENDINGS.iter().find(|(known, _)| ending.eq_ignore_ascii_case(known));
+        known.map(|&(_, format)| format)
+    }
+
+    /// Checks that a file of this format can hold frames of this size.
+    ///
+    /// # Errors
+    /// [`OutputError::Moving`] with the reason.
+    pub fn check_size(self, width: u32, height: u32) -> Result<(), OutputError> {
+        const MOST: u32 = u16::MAX as u32;
+        match self {
+            Self::Gif if width > MOST || height > MOST => Err(OutputError::Moving {
+                format: self,
+                why: format!("cannot hold {width}×{height} pixels, at most {MOST}×{MOST}; use .apng"),
+            }),
+            Self::Gif | Self::Apng => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for MovingFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Gif => "GIF",
+            Self::Apng => "APNG",
+        })
+    }
+}

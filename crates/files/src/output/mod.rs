@@ -14,12 +14,14 @@ mod hdr;
 mod identity;
 mod jpeg;
 pub mod json;
+pub mod moving;
 mod origin;
 pub mod part;
 mod place;
 mod png;
 mod ppm;
 mod protection;
+pub mod settings;
 mod stoppable;
 mod temporary;
 pub mod write;
@@ -30,7 +32,7 @@ pub use attributes::Losses;
 pub use error::OutputError;
 pub use exr::mean_luminance_error;
 pub use finish::Finish;
-pub use format::{BitDepth, Format};
+pub use format::{BitDepth, Format, MovingFormat};
 pub use identity::FileIdentity;
 pub use origin::{Replaced, replaced_json, replaced_picture, replaced_plot, replaced_table, signed};
 
@@ -42,6 +44,17 @@ use crate::film::tone::ToneMapping;
 const SOFTWARE: &str = concat!("glimt ", env!("CARGO_PKG_VERSION"));
 /// Name of the program, the first word of that.
 const PROGRAM: &str = "glimt";
+
+/// Numbers about the pixels of a picture, in channels of their own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerImage {
+    /// Name of the layer.
+    pub name: &'static str,
+    /// Names of its channels, at most three: as many components of the pixels are written.
+    pub channels: &'static [&'static str],
+    /// The numbers, as many as the picture has pixels.
+    pub image: RadianceImage,
+}
 
 /// Settings for encoding a picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,13 +80,27 @@ pub fn encode(
     format: Format,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
+    encode_with((image, &[]), options, format, token)
+}
+
+/// [`encode`] with layers, which only EXR files hold.
+pub(crate) fn encode_with(
+    (image, layers): (&RadianceImage, &[LayerImage]),
+    options: &EncodeOptions,
+    format: Format,
+    token: &CancelToken,
+) -> Result<Vec<u8>, OutputError> {
     format.check_picture(image.width, image.height, options.bit_depth)?;
-    if image.pixels.len() != image.width as usize * image.height as usize {
+    let is_whole = |image: &RadianceImage| image.pixels.len() == image.width as usize * image.height as usize;
+    let fits = |layer: &LayerImage| {
+        (layer.image.width, layer.image.height) == (image.width, image.height) && is_whole(&layer.image)
+    };
+    if !is_whole(image) || !layers.iter().all(fits) {
         return Err(OutputError::encoder(format, &"the picture's size and its pixels do not agree"));
     }
     let bytes = match format {
         Format::Png => png::encode(image, options, token),
-        Format::Exr => exr::encode(image, options, token),
+        Format::Exr => exr::encode((image, layers), options, token),
         Format::Hdr => hdr::encode(image, options, token),
         Format::Jpeg => jpeg::encode(image, options, token),
         Format::Ppm => ppm::encode(image, options, token),

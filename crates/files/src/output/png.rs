@@ -47,7 +47,11 @@ fn try_encode(
 }
 
 /// Adds a text. tEXt holds Latin-1, and every reader knows it; iTXt holds the rest.
-fn add_text(encoder: &mut Encoder<'_, &mut Vec<u8>>, name: &str, value: &str) -> Result<(), EncodingError> {
+pub(super) fn add_text(
+    encoder: &mut Encoder<'_, &mut Vec<u8>>,
+    name: &str,
+    value: &str,
+) -> Result<(), EncodingError> {
     let name: String =
         name.chars().filter(|c| c.is_ascii_graphic() || *c == ' ').take(KEYWORD_BYTES).collect();
     let name = name.trim().to_owned();

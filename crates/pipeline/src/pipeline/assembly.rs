@@ -6,6 +6,7 @@ use super::cache::Memo;
 use super::keys;
 use super::stages::accel::Built;
 use super::stages::textures::Textures;
+use super::turntable::Turn;
 use crate::assets::OrbiterCamera;
 use crate::lights::Lights;
 use crate::math::DVec3;
@@ -31,6 +32,19 @@ impl Eye {
             Self { camera: own.viewpoint().changed(change).into(), orbiter: None }
         } else {
             own
+        }
+    }
+
+    /// The camera of a turntable's picture, if it is one.
+    pub(super) fn turned(self, turn: Option<Turn>) -> Self {
+        match turn {
+            // The first one is the camera's own, to the bit.
+            None | Some(Turn { number: 0, .. }) => self,
+            Some(turn) => {
+                let view = self.viewpoint();
+                let change = CameraChange { pose: Some(turn.pose(&view.pose)), ..CameraChange::default() };
+                Self { camera: view.changed(&change).into(), orbiter: None }
+            }
         }
     }
 

@@ -6,9 +6,9 @@ use super::plan::MOST_PHOTONS;
 use super::settings::{Overrides, View};
 use crate::choice::Choice;
 use crate::integrators::RenderSettings;
-use crate::scene::Loaded;
 use crate::scene::description::{Light, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::{Loaded, is_model};
 
 /// The setting that a warning comes of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +28,14 @@ pub(super) fn cautions(
     overrides: &Overrides,
 ) -> Vec<Diagnostic> {
     let place = |(cause, message)| placed(cause, message, loaded, overrides);
-    found(scene, settings).into_iter().map(place).collect()
+    // The scene of a model is ours: nobody has asked for its clamp.
+    let is_asked_for = |cause: Cause| {
+        cause != Cause::Clamp
+            || !is_model(&loaded.path)
+            || overrides.clamp.is_some()
+            || overrides.sets.iter().any(|set| set.starts_with("render.clamp"))
+    };
+    found(scene, settings).into_iter().filter(|(cause, _)| is_asked_for(*cause)).map(place).collect()
 }
 
 /// Where the setting gets its value.

@@ -33,7 +33,7 @@ pub struct Checked {
 /// All errors and warnings of the scene and its files.
 pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
     let (events, _) = mpsc::channel();
-    let sink = Sink { generation: 0, events, previews: PreviewSlot::default() };
+    let sink = Sink { generation: 0, events, previews: PreviewSlot::default(), within: None };
     let (parsed, meshes, textures, warnings) =
         Engine::new(Means::default(), Arc::default()).read_all(path, sets, &sink)?;
     let scene = &parsed.loaded.scene;

@@ -33,7 +33,16 @@ impl Foretold {
         let whole = Rect { x: 0, y: 0, width: render.width, height: render.height };
         let (film, picture) =
             Film::bytes_of((render.width, render.height), plan.crop.unwrap_or(whole), blocks(plan));
-        Self(vec![("the program", PROGRAM), ("the film", film), ("the picture", picture)])
+        let mut items = vec![("the program", PROGRAM), ("the film", film), ("the picture", picture)];
+        if !plan.layers.is_empty() {
+            // One film at a time, and a picture of each.
+            items.push(("the layers", film + picture * plan.layers.len() as u64));
+        }
+        if let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) {
+            let frame = u64::from(render.width) * u64::from(render.height) * 3;
+            items.push(("the frames", frame * u64::from(turn.of)));
+        }
+        Self(items)
     }
 
     /// The same with all that the scene names.
@@ -70,6 +79,8 @@ impl Foretold {
         let items: Vec<String> = items.map(|(name, bytes)| format!("{name} {}", words(*bytes))).collect();
         let way_out = match largest.first() {
             Some(("the film" | "the picture", _)) => "render a smaller picture, or parts of it by --crop",
+            Some(("the layers", _)) => "ask for fewer layers or a smaller picture",
+            Some(("the frames", _)) => "render fewer or smaller frames, or a file each, as in a_####.png",
             Some(("meshes" | "trees", _)) => "use --accel bvh or smaller meshes",
             Some(("textures", _)) => "use smaller textures",
             Some(("photons", _)) => "give [photons] a smaller `count`",

@@ -29,6 +29,7 @@ mod stages;
 mod table;
 mod targets;
 mod trace;
+pub mod turntable;
 pub mod watch;
 pub mod words;
 mod worker;

@@ -4,12 +4,15 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::settings::{Checkpoints, Effective, Overrides, View};
+use super::settings::{Checkpoints, Effective, Layer, Overrides, View};
+use super::turntable::{self, Turn};
+use crate::choice::Choice;
 use crate::film::stretch::{Kind, Stretch};
 use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
 use crate::integrators::{FirstHit, Measure, PhotonSettings, RenderSettings, Shown};
 use crate::math::Vec3;
+use crate::output::MovingFormat;
 use crate::output::{BitDepth, Format, OutputError};
 use crate::scene::description::{Accel, Photons, Scene, Tonemap};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -28,7 +31,16 @@ pub(super) struct Plan {
     pub(super) time_seconds: Option<f64>,
     pub(super) tone: ToneMapping,
     pub(super) bit_depth: u8,
+    /// Files of this picture.
     pub(super) outputs: Vec<PathBuf>,
+    /// Files of the moving pictures that it is a frame of.
+    pub(super) moving: Vec<PathBuf>,
+    /// The picture of a turntable that it is. `None` for a single picture.
+    pub(super) turn: Option<Turn>,
+    /// Layers beside the picture in EXR files.
+    pub(super) layers: Vec<Layer>,
+    /// Files of the other pictures of the turntable, still to come.
+    pub(super) to_come: Vec<PathBuf>,
     pub(super) named_by: NamedBy,
     pub(super) report: Option<PathBuf>,
     pub(super) replaces_foreign: bool,
@@ -73,6 +85,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
     };
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
     let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
+    let Outputs { outputs, moving, to_come } = Outputs::of(outputs, overrides.turn);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
     match overrides.shard {
         // A part has no format of pictures.
@@ -80,6 +93,10 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         None => {
             let check = |path: &PathBuf| check_format(path, (render.width, render.height), bit_depth);
             outputs.iter().try_for_each(check)?;
+            check_layers(&outputs, &moving, settings.view, overrides)?;
+            moving
+                .iter()
+                .try_for_each(|path| check_moving(path, (render.width, render.height), bit_depth))?;
         }
     }
     Ok(Plan {
@@ -90,10 +107,14 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         time_seconds: overrides.time_seconds,
         tone: tone(render.exposure, render.tonemap, settings.view),
         bit_depth,
-        effective: Effective::new(&settings, threads, &outputs),
+        effective: Effective::new(&settings, threads, &[outputs.as_slice(), &moving].concat()),
         outputs,
+        moving,
+        to_come,
+        turn: overrides.turn,
+        layers: overrides.layers.clone(),
         named_by,
-        report: overrides.report.clone(),
+        report: report(overrides),
         replaces_foreign: overrides.replaces_foreign,
         shard: overrides.shard,
         checkpoints: overrides.checkpoints,
@@ -135,11 +156,88 @@ fn outputs(of_scene: Option<&PathBuf>, path: &Path, overrides: &Overrides) -> (V
         return (overrides.outputs.clone(), NamedBy::Call);
     }
     if let Some(of_scene) = of_scene {
-        return (vec![of_scene.clone()], NamedBy::Scene);
+        return match overrides.turn {
+            None => (vec![of_scene.clone()], NamedBy::Scene),
+            // The scene names one picture: nobody has named those of a turntable.
+            Some(_) => (vec![turntable::suggested(of_scene)], NamedBy::Nobody),
+        };
     }
     let mut name = path.file_stem().unwrap_or("glimt".as_ref()).to_owned();
     name.push(".png");
-    (vec![PathBuf::from(name)], NamedBy::Nobody)
+    let name = PathBuf::from(name);
+    (vec![if overrides.turn.is_some() { turntable::suggested(&name) } else { name }], NamedBy::Nobody)
+}
+
+/// The file of the report: in a turntable one with the picture's number.
+fn report(overrides: &Overrides) -> Option<PathBuf> {
+    let path = overrides.report.as_ref()?;
+    let numbered = overrides.turn.and_then(|turn| turntable::numbered(path, turn));
+    Some(numbered.unwrap_or_else(|| path.clone()))
+}
+
+/// Files of a request, by what they hold.
+struct Outputs {
+    outputs: Vec<PathBuf>,
+    moving: Vec<PathBuf>,
+    to_come: Vec<PathBuf>,
+}
+
+impl Outputs {
+    fn of(paths: Vec<PathBuf>, turn: Option<Turn>) -> Self {
+        let (mut moving, mut to_come) = (Vec::new(), Vec::new());
+        let Some(turn) = turn else { return Self { outputs: paths, moving, to_come } };
+        let mut outputs = Vec::new();
+        for path in paths {
+            if MovingFormat::of(&path).is_some() {
+                moving.push(path);
+                continue;
+            }
+            // The other files are named with the first one, so that nothing is found in their way when hours of work are done.
+            let others = (turn.number + 1..turn.of).filter(|_| turn.number == 0);
+            let of = |number| turntable::numbered(&path, Turn { number, ..turn });
+            to_come.extend(others.filter_map(of));
+            outputs.push(of(turn.number).unwrap_or(path));
+        }
+        Self { outputs, moving, to_come }
+    }
+}
+
+/// Whether there is a file for the layers that the call asks for.
+fn check_layers(
+    outputs: &[PathBuf],
+    moving: &[PathBuf],
+    view: View,
+    overrides: &Overrides,
+) -> Result<(), Box<Diagnostic>> {
+    if overrides.layers.is_empty() {
+        return Ok(());
+    }
+    let refused = |message: String, help: &str| {
+        let (severity, path, help) = (Severity::Error, PathBuf::new(), Some(help.to_owned()));
+        Err(Box::new(Diagnostic { severity, message, path, place: None, help }))
+    };
+    let is_exr = |path: &&PathBuf| Format::of(path).is_ok_and(|format| format == Format::Exr);
+    if let Some(other) = outputs.iter().find(|path| !is_exr(path)).or(moving.first()) {
+        let message = format!("--layers is for EXR files, and {} is none", other.display());
+        return refused(message, "write them to a file of their own, as in -o layers.exr");
+    }
+    if view != View::Beauty {
+        let message = format!("--layers goes with the view beauty, not with {}", view.name());
+        return refused(message, "leave out --view, or name the view as a layer");
+    }
+    Ok(())
+}
+
+/// Whether a moving picture can be made of such pictures.
+fn check_moving(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<Diagnostic>> {
+    let Some(format) = MovingFormat::of(path) else { return Ok(()) };
+    let message = match format.check_size(size.0, size.1) {
+        Err(error) => error.to_string(),
+        Ok(()) if bit_depth != 8 => format!("a moving {format} file has 8 bits a channel"),
+        Ok(()) => return Ok(()),
+    };
+    let help = Some("write a file each, as in a_####.png".to_owned());
+    Err(Box::new(Diagnostic { severity: Severity::Error, message, path: path.to_owned(), place: None, help }))
 }
 
 fn check_crop(crop: Option<Rect>, width: u32, height: u32) -> Result<(), Box<Diagnostic>> {

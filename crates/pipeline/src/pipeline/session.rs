@@ -47,7 +47,8 @@ impl Session {
         };
         // Nobody listens: what came of it is given back.
         let (events, _) = mpsc::channel();
-        let sink = Sink { generation: self.generation, events, previews: PreviewSlot::default() };
+        let sink =
+            Sink { generation: self.generation, events, previews: PreviewSlot::default(), within: None };
         let meanwhile = Meanwhile::new(token, token, &NoOrders);
         self.engine.rendered(&request, &sink, &meanwhile)
     }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use super::turntable::Turn;
 use crate::choice;
 use crate::film::Rect;
 use crate::integrators::RenderSettings;
@@ -34,8 +35,14 @@ macro_rules! overrides {
             pub view: Option<View>,
             /// The side from which a model is seen, in place of its own camera.
             pub from: Option<Side>,
+            /// The axis of a model that points upwards, in place of the usual one of its format.
+            pub up: Option<UpAxis>,
             /// The camera.
             pub camera: CameraChange,
+            /// Layers beside the picture in EXR files.
+            pub layers: Vec<Layer>,
+            /// The picture of a turntable. `None` for a single picture.
+            pub turn: Option<Turn>,
             /// Render these pixels only; the rest of the picture stays black.
             pub crop: Option<Rect>,
             /// Threads; `None` or 0: one per core.
@@ -79,6 +86,42 @@ choice! {
         Bottom = "bottom",
         /// Before it, from above and to its right.
         Iso = "iso",
+    }
+}
+
+choice! {
+    /// Layers beside the picture in EXR files.
+    pub enum Layer {
+        /// Diffuse reflectance.
+        Albedo = "albedo",
+        /// Shading normals in the world's axes, from -1 to 1; 0 where nothing is.
+        Normal = "normal",
+        /// Distance along the view axis, 0 where nothing is.
+        Depth = "depth",
+        /// Variance of the luminance of each pixel.
+        Variance = "variance",
+        /// Samples of each pixel.
+        Samples = "samples",
+        /// Ambient part of Phong.
+        Ambient = "ambient",
+        /// Diffuse part of the light.
+        Diffuse = "diffuse",
+        /// Specular part of the light.
+        Specular = "specular",
+        /// Light that surfaces send out, and that of the background.
+        Emission = "emission",
+    }
+}
+
+choice! {
+    /// The axis of a mesh file that points upwards.
+    pub enum UpAxis {
+        /// x: −z is the front's right.
+        X = "x",
+        /// y, as glTF has it, and most OBJ and PLY files.
+        Y = "y",
+        /// z, as programs for construction and printing have it.
+        Z = "z",
     }
 }
 

@@ -19,6 +19,8 @@ pub(super) struct Sink {
     pub(super) generation: u64,
     pub(super) events: Sender<Event>,
     pub(super) previews: PreviewSlot,
+    /// First and last fraction of progress, if the render is a part of the work. `None` if it is all of it.
+    pub(super) within: Option<[f64; 2]>,
 }
 
 impl Sink {
@@ -30,7 +32,17 @@ impl Sink {
         self.send(Event::Stage { generation: self.generation, stage });
     }
 
-    pub(super) fn progress(&self, progress: RenderProgress) {
+    /// The same for a part of the work, by the part of all that is done at its begin and at its end.
+    pub(super) fn within(&self, ends: [f64; 2]) -> Self {
+        Self { within: Some(ends), ..self.clone() }
+    }
+
+    pub(super) fn progress(&self, mut progress: RenderProgress) {
+        if let Some([begin, end]) = self.within {
+            progress.fraction = begin + progress.fraction * (end - begin);
+            // The seconds of what follows are not known.
+            progress.eta_seconds = progress.eta_seconds.filter(|_| end == 1.0);
+        }
         self.send(Event::Progress { generation: self.generation, progress });
     }
 
@@ -112,7 +124,7 @@ mod tests {
     #[test]
     fn an_asset_is_said_at_most_a_hundred_times_and_ends() {
         let (events, received) = mpsc::channel();
-        let sink = Sink { generation: 3, events, previews: PreviewSlot::default() };
+        let sink = Sink { generation: 3, events, previews: PreviewSlot::default(), within: None };
         let load = |progress: &(dyn Fn(u64, u64) + Sync)| -> Result<(), ()> {
             for done in 0..10_000 {
                 progress(done, 10_000);
@@ -138,7 +150,7 @@ mod tests {
     #[test]
     fn what_failed_does_not_end() {
         let (events, received) = mpsc::channel();
-        let sink = Sink { generation: 3, events, previews: PreviewSlot::default() };
+        let sink = Sink { generation: 3, events, previews: PreviewSlot::default(), within: None };
         sink.asset("bricks", |_| -> Result<(), ()> { Err(()) }).expect_err("failed");
         drop(sink);
         let ends = received.into_iter().filter(

@@ -65,11 +65,18 @@ fn in_a_line(conflict: &Diagnostic) -> String {
     format!("{}{help}", conflict.message)
 }
 
-/// The pictures, then the report.
+/// Everything that this call writes: what the request writes, then the pictures of a turntable that are still to come.
 fn targets(plan: &Plan) -> impl Iterator<Item = Target<'_>> {
     let picture = |path| Target { path, kind: Kind::Picture(plan.named_by) };
+    targets_now(plan).chain(plan.to_come.iter().map(PathBuf::as_path).map(picture))
+}
+
+/// The pictures, then the report.
+fn targets_now(plan: &Plan) -> impl Iterator<Item = Target<'_>> {
+    let picture = |path| Target { path, kind: Kind::Picture(plan.named_by) };
     let report = plan.report.iter().map(|path| Target { path, kind: Kind::Report });
-    plan.outputs.iter().map(PathBuf::as_path).map(picture).chain(report)
+    let pictures = plan.outputs.iter().chain(&plan.moving);
+    pictures.map(PathBuf::as_path).map(picture).chain(report)
 }
 
 /// Why this target, which leads to `at`, must not be written.
@@ -83,7 +90,8 @@ fn conflict(
         if let Some(input) = inputs.get(&identity) {
             return Some(is_input(target, input));
         }
-        let mut earlier = targets(plan).take_while(|other| *other != target);
+        // Numbers keep those apart that are still to come.
+        let mut earlier = targets_now(plan).take_while(|other| *other != target);
         if let Some(twin) = earlier.find(|other| FileIdentity::of(other.path).as_ref() == Some(&identity)) {
             return Some(is_twin(target, twin.path));
         }

@@ -300,8 +300,12 @@ struct Worker {
 impl Worker {
     fn work(self) {
         let mut engine = Engine::new(self.means, self.contents.clone());
-        let mut sink =
-            Sink { generation: 0, events: self.remote.events.clone(), previews: self.previews.clone() };
+        let mut sink = Sink {
+            generation: 0,
+            events: self.remote.events.clone(),
+            previews: self.previews.clone(),
+            within: None,
+        };
         loop {
             let outcome = match self.remote.next() {
                 Task::Quit => break,

@@ -4,10 +4,11 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use base64::alphabet::STANDARD;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use base64::{DecodeError, Engine};
 use serde::de::{self, Deserializer, IgnoredAny, Visitor};
 use serde::{Deserialize, de::Error};
-
-use super::base64;
 
 /// The whole file.
 #[derive(Debug, Default, Deserialize)]
@@ -238,11 +239,27 @@ impl<'de> Deserialize<'de> for Uri {
                 if !kind.ends_with(";base64") {
                     return Err(E::custom("a data URI that is not base64"));
                 }
-                base64::decode(coded.as_bytes()).map(Uri::Data).map_err(E::custom)
+                decoded(coded).map(Uri::Data).map_err(E::custom)
             }
         }
         deserializer.deserialize_str(Reader)
     }
+}
+
+/// Base64 as data URIs have it (RFC 4648, section 4); the padding may be missing.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
+
+fn decoded(coded: &str) -> Result<Vec<u8>, String> {
+    BASE64.decode(coded).map_err(|error| match error {
+        DecodeError::InvalidByte(at, byte) => format!("byte {byte:#04x} at {at} is no digit of base64"),
+        DecodeError::InvalidLength(digits) => format!("base64 of {digits} digits"),
+        DecodeError::InvalidLastSymbol { .. } | DecodeError::InvalidPadding => {
+            "base64 that ends in the middle of a byte".to_owned()
+        }
+    })
 }
 
 #[derive(Debug, Default, Deserialize)]

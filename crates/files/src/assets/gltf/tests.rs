@@ -315,7 +315,7 @@ fn mistakes_have_their_place() {
         ("/bufferViews/1/byteOffset", json!(90), "bytes 90 + 12 of buffers[0], which has 92"),
         ("/buffers/0/byteLength", json!(93), ": buffers[0]: it claims 93 bytes, and there are 92"),
         ("/buffers/0/uri", json!("https://a/b.bin"), "is no file beside it"),
-        ("/buffers/0/uri", json!("data:;base64,Z?=="), "byte 0x3f is no digit of base64"),
+        ("/buffers/0/uri", json!("data:;base64,Z?=="), "byte 0x3f at 1 is no digit of base64"),
         ("/accessors/1/count", json!(-1), ":1: column "),
     ] {
         let said = with(&|json| *json.pointer_mut(pointer).expect("a place") = value.clone());

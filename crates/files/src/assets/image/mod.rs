@@ -285,7 +285,7 @@ impl Source {
         }
         let decoder = choose(reader, self.limits.memory_bytes).map_err(|error| reason(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
-        let texel_bytes = check_size(&*decoder, held_bytes, self.limits)?;
+        let texel_bytes = check_size(&*decoder, (self.length, held_bytes), self.limits)?;
         if is_jpeg {
             let (width, height) = decoder.dimensions();
             jpeg::check_plausible(width, height, self.length)?;
@@ -312,9 +312,18 @@ fn choose<R: BufRead + Seek + 'static>(
     }
 }
 
+/// Bytes of memory that an image may take however short its file is.
+const SMALL_BYTES: u64 = 256 << 20;
+/// Bytes of memory that a byte of a file may become: what an EXR of one colour takes, which deflate packs best.
+const MOST_GROWTH: u64 = 4200;
+
 /// Refuses an image before memory of its size is allocated; returns the bytes of the texels. Bytes of the file that the
 /// decoder holds count too.
-fn check_size(decoder: &dyn ImageDecoder, held_bytes: u64, limits: ImageLimits) -> Result<u64, String> {
+fn check_size(
+    decoder: &dyn ImageDecoder,
+    (length, held_bytes): (u64, u64),
+    limits: ImageLimits,
+) -> Result<u64, String> {
     let (width, height) = decoder.dimensions();
     let size = format!("it has {width} × {height} pixels");
     if width == 0 || height == 0 {
@@ -332,6 +341,14 @@ fn check_size(decoder: &dyn ImageDecoder, held_bytes: u64, limits: ImageLimits) 
         let (needed, most) = (needed.div_ceil(1 << 20), limits.memory_bytes >> 20);
         return Err(format!(
             "{size}, which take {needed} MiB of memory, more than the {most} MiB that one image may take"
+        ));
+    }
+    // Runs may leave out most of an image, so that a few bytes are a whole one.
+    if needed > SMALL_BYTES.saturating_add(length.saturating_mul(MOST_GROWTH)) {
+        let needed = needed.div_ceil(1 << 20);
+        return Err(format!(
+            "it claims {width} × {height} pixels, which take {needed} MiB of memory, more than a file of {length} bytes \
+             stands for"
         ));
     }
     Ok(texels)

@@ -3,7 +3,7 @@
 
 pub(in crate::assets) mod assemble;
 mod mtl;
-mod normals;
+pub(in crate::assets) mod normals;
 mod obj;
 mod off;
 mod places;

@@ -46,6 +46,29 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     Ok(normals)
 }
 
+/// Whether a mesh without normals is of flat faces, as a box is: the normals of the faces around most vertices cancel in part.
+pub(in crate::assets) fn is_faceted(mesh: &TriangleMesh) -> bool {
+    /// Least length of the mean of the unit normals around a vertex of a smooth surface: a cone of 32 degrees about them.
+    const LEAST: f32 = 0.85;
+    if !mesh.normals.is_empty() {
+        return false;
+    }
+    let mut sums = vec![(Vec3::ZERO, 0_u32); mesh.positions.len()];
+    for corners in &mesh.triangles {
+        let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize]);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        for corner in corners {
+            let (sum, count) = &mut sums[*corner as usize];
+            *sum += normal;
+            *count += 1;
+        }
+    }
+    let means = sums.iter().filter(|(_, count)| *count > 0).map(|(sum, count)| sum.length() / *count as f32);
+    let (total, vertices) =
+        means.fold((0.0, 0), |(total, vertices), mean| (total + f64::from(mean), vertices + 1));
+    total < f64::from(LEAST) * f64::from(vertices)
+}
+
 /// Replaces normals of zero.
 pub(super) fn fill_missing_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), Cancelled> {
     let made = vertex_normals(mesh, token)?;
@@ -257,5 +280,36 @@ mod tests {
         let (x, y) = (count as u32, count as u32 + 1);
         let triangles: Vec<_> = (0..count as u32).map(|vertex| [vertex, x, y]).collect();
         assert!(vertex_normals(&mesh(&positions, &triangles)).iter().all(|normal| *normal == Vec3::Z));
+    }
+
+    /// A grid of so many rows and columns over a sphere, whose neighbours share vertices.
+    fn ball(rows: u32) -> TriangleMesh {
+        let at = |i: u32| {
+            let (row, column) = (i / (2 * rows), i % (2 * rows));
+            let (polar, turn) = (std::f32::consts::PI / rows as f32 * (row as f32 + 0.5)).sin_cos();
+            let (sin, cos) = (std::f32::consts::PI / rows as f32 * column as f32).sin_cos();
+            Vec3::new(polar * cos, turn, polar * sin)
+        };
+        let quads = (0..rows - 1).flat_map(|row| (0..2 * rows).map(move |column| (row, column)));
+        let triangles = quads.flat_map(|(row, column)| {
+            let next = (column + 1) % (2 * rows);
+            let [a, b] = [row * 2 * rows + column, row * 2 * rows + next];
+            [[a, b, a + 2 * rows], [b, b + 2 * rows, a + 2 * rows]]
+        });
+        let positions = (0..rows * 2 * rows).map(at).collect();
+        TriangleMesh { positions, triangles: triangles.collect(), ..TriangleMesh::default() }
+    }
+
+    #[test]
+    fn a_box_is_faceted_and_a_ball_is_not() {
+        let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+        let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = sides.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+        let mut cube =
+            TriangleMesh { positions: (0..8).map(corner).collect(), triangles, ..TriangleMesh::default() };
+        assert!(is_faceted(&cube));
+        cube.normals = vec![Vec3::Y; 8];
+        assert!(!is_faceted(&cube), "its file says how it is shaded");
+        assert!(!is_faceted(&ball(8)) && !is_faceted(&ball(60)));
     }
 }

@@ -37,6 +37,7 @@ use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
 use super::render::first_picture::FirstPictures;
 use super::render::keeping::{Around, Claim, Keeping};
+use super::render::layers;
 use super::render::preview::Screen;
 use super::render::scheduler::Rendering;
 use super::render::share::Share;
@@ -52,7 +53,7 @@ use super::stages::parse::{Origin, Parsed, parse};
 use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::render::render;
 use super::stages::textures::{Needed, TextureCache, Textures, add_declared, needed, textures};
-use super::stages::write::{Destination, Written, check_targets, finish, write_by_hand};
+use super::stages::write::{Destination, Frames, Written, check_targets, finish, write_by_hand};
 use super::stages::{Findings, Reading, Staged, Stop};
 use super::table::StageTable;
 use super::targets::conflicts;
@@ -62,6 +63,7 @@ use crate::control::CancelToken;
 use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
+use crate::output::LayerImage;
 use crate::output::part::Trait;
 use crate::scene::changes;
 use crate::scene::description::CameraChange;
@@ -104,6 +106,10 @@ pub(super) struct Engine {
     photons: PhotonCache,
     films: FilmCache,
     written: Written,
+    /// Frames of a turntable so far.
+    frames: Frames,
+    /// Layers of the current film.
+    layers: Vec<LayerImage>,
     /// Plan of the current film.
     plan: Option<Plan>,
     at_hand: Option<AtHand>,
@@ -154,6 +160,8 @@ impl Engine {
             photons: PhotonCache::default(),
             films: FilmCache::default(),
             written: Written::default(),
+            frames: Frames::default(),
+            layers: Vec::new(),
             plan: None,
             at_hand: None,
             good: None,
@@ -250,6 +258,10 @@ impl Engine {
         let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: false };
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let reading = (&snapshot, meanwhile.token);
+        // Nobody comes back to the pictures before in a turntable.
+        if request.overrides.turn.is_some() {
+            self.films = FilmCache::default();
+        }
         let mut ready = self.prepare(request, &mut table, reading, findings)?;
         let photons = self.light(request, &ready, &mut table, sink, meanwhile)?;
         let share = self.share(&ready.plan, photons);
@@ -395,7 +407,7 @@ impl Engine {
     ) -> Result<Ready, Stop> {
         let Good { parsed, meshes, bodies, textures, .. } = good;
         let scene = &plan.scene;
-        let eye = Eye::new(scene, parsed.orbiter, &request.overrides.camera);
+        let eye = Eye::new(scene, parsed.orbiter, &request.overrides.camera).turned(plan.turn);
         let mesh_keys: Vec<Key> = meshes.iter().map(|mesh| mesh.key).collect();
         // The orbiter's numbers are few: their text stands for them.
         let orbiter = eye.orbiter.map(|camera| format!("{camera:?}"));
@@ -511,7 +523,7 @@ impl Engine {
         // What the stage changes is apart from what it reads.
         let (mut films, written) = (std::mem::take(&mut self.films), std::mem::take(&mut self.written));
         let written = std::cell::RefCell::new(written);
-        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
+        let to = Destination { plan, layers: &[], inputs: &self.inputs, contents: &self.contents, sink };
         let pulse = |canvas: &FilmState, is_covered: bool| {
             if !is_covered {
                 meanwhile.postpone_write(sink);
@@ -522,6 +534,9 @@ impl Engine {
                 meanwhile.run_errand(at_hand, Some(canvas), &self.inputs, sink);
             }
         };
+        let mut images = Vec::new();
+        let wanted = plan.layers.as_slice();
+        let of_picture = sink.within(layers::progress(wanted, None));
         let rendered = self.with_keeping(request, ready, (sink, meanwhile), |keeping, engine| {
             let rendering = Rendering {
                 tracer: tracer(engine.means.kernel, &pool, ready, meanwhile.token),
@@ -531,7 +546,7 @@ impl Engine {
                 most_film_bytes: engine.means.most_film_bytes,
                 force: request.force,
                 first: request.first,
-                sink,
+                sink: if wanted.is_empty() { sink } else { &of_picture },
                 pulse: &pulse,
                 take_preview: &|| orders.take_preview(),
                 is_moved: request.overrides.camera.is_any(),
@@ -539,8 +554,13 @@ impl Engine {
                 share: ready.share.clone(),
                 keeping,
             };
-            render(key, &mut films, &rendering)
+            let rendered = render(key, &mut films, &rendering)?;
+            if let Some(state) = films.current().filter(|_| request.write != Writing::No) {
+                images = layers::layers(state, &rendering, wanted)?;
+            }
+            Ok(rendered)
         });
+        self.layers = images;
         if ready.share.is_some()
             && let Some(canvas) = films.current_mut()
         {

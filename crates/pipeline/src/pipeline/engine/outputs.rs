@@ -5,7 +5,7 @@ use super::super::protocol::{Report, Request, Writing};
 use super::super::render::film_state::FilmState;
 use super::super::report::finish::write_report;
 use super::super::sink::Sink;
-use super::super::stages::write::{Destination, write_by_hand, write_if_wanted};
+use super::super::stages::write::{Destination, write_by_hand, write_if_wanted, write_moving};
 use super::super::stages::{Findings, Staged, Stop};
 use super::super::targets::conflicts;
 use super::Engine;
@@ -36,7 +36,8 @@ impl Engine {
                  the scene first"
             ));
         }
-        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
+        let to =
+            Destination { plan, layers: &self.layers, inputs: &self.inputs, contents: &self.contents, sink };
         let written = &mut self.written;
         pool.install(|| write_by_hand(canvas, to, written));
     }
@@ -101,8 +102,15 @@ impl Engine {
         }
         let pool = self.pool(plan.threads)?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
-        let to = Destination { plan, inputs: &self.inputs, contents: &self.contents, sink };
+        let to =
+            Destination { plan, layers: &self.layers, inputs: &self.inputs, contents: &self.contents, sink };
         let written = &mut self.written;
-        pool.install(|| write_if_wanted(request.write, canvas, to, written, token))
+        let wrote = match plan.outputs.is_empty() {
+            true => Staged::done(true, ""),
+            false => pool.install(|| write_if_wanted(request.write, canvas, to, written, token))?,
+        };
+        let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) else { return Ok(wrote) };
+        let frames = &mut self.frames;
+        pool.install(|| write_moving(canvas, to, (turn, frames), token))
     }
 }

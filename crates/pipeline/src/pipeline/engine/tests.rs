@@ -37,7 +37,7 @@ impl Desk {
         let scene = self.folder.path().join("scene.toml");
         fs::write(&scene, &self.text).expect("written");
         let (events, received) = mpsc::channel();
-        let sink = Sink { generation: 1, events, previews: PreviewSlot::default() };
+        let sink = Sink { generation: 1, events, previews: PreviewSlot::default(), within: None };
         let request = Request {
             generation: 1,
             scene,

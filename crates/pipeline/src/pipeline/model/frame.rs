@@ -3,11 +3,15 @@
 use super::toml::rounded;
 use crate::math::DVec3;
 use crate::pipeline::settings::Side;
+use crate::pipeline::turntable::Turn;
 
 /// Vertical angle in degrees.
 pub(super) const FOV: f64 = 30.0;
 /// Part of the picture's half height and half width that the model's points may fill.
 const FILLED: f64 = 0.88;
+
+/// Pictures of a turntable that are measured: more are all alike.
+const MOST_MEASURED: u32 = 72;
 
 /// A camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,20 +36,28 @@ impl Side {
     }
 }
 
-/// The eye that sees a box, of which only these points are to be seen, as large as a picture of this width over height allows.
-pub(super) fn framed([least, greatest]: [DVec3; 2], points: &[DVec3], from: Side, aspect: f64) -> Eye {
+/// The eye that sees a box, of which only these points are to be seen, as large as a picture of this width over height allows, and
+/// all pictures of a turntable with so many.
+pub(super) fn framed(
+    [least, greatest]: [DVec3; 2],
+    points: &[DVec3],
+    (from, turns): (Side, u32),
+    aspect: f64,
+) -> Eye {
     let (back, up) = from.axes();
     let middle = (least + greatest) * 0.5;
-    let right = up.cross(back).normalize_or(DVec3::X);
-    let above = back.cross(right);
     let tangent = libm::tan((FOV * 0.5).to_radians()) * FILLED;
     // Every point lies inside the frame.
     let half = (greatest - least) * 0.5;
     let mut distance = 0.0_f64;
-    for point in points {
-        let at = *point - middle;
-        let (across, upwards, near) = (at.dot(right).abs(), at.dot(above).abs(), at.dot(back));
-        distance = distance.max(near + (across / (tangent * aspect)).max(upwards / tangent));
+    for back in Turn::arms(turns.min(MOST_MEASURED), back, up) {
+        let right = up.cross(back).normalize_or(DVec3::X);
+        let above = back.cross(right);
+        for point in points {
+            let at = *point - middle;
+            let (across, upwards, near) = (at.dot(right).abs(), at.dot(above).abs(), at.dot(back));
+            distance = distance.max(near + (across / (tangent * aspect)).max(upwards / tangent));
+        }
     }
     let distance = distance.max(1e-12);
     // Digits that nobody sees are left out.
@@ -105,7 +117,7 @@ mod tests {
                 let corners: Vec<DVec3> = (0..8)
                     .map(|corner| DVec3::from([0, 1, 2].map(|axis: usize| bounds[corner >> axis & 1][axis])))
                     .collect();
-                let eye = framed(bounds, &corners, from, aspect);
+                let eye = framed(bounds, &corners, (from, 1), aspect);
                 let back = (eye.position - eye.look_at).normalize();
                 let right = eye.up.cross(back).normalize();
                 let above = back.cross(right);
@@ -124,6 +136,20 @@ mod tests {
         }
     }
 
+    /// A long model that is seen from its end stays in the frame when it is seen from its side.
+    #[test]
+    fn every_picture_of_a_turntable_has_the_model_in_it() {
+        let bounds = [DVec3::new(-0.5, 0.0, -4.0), DVec3::new(0.5, 1.0, 4.0)];
+        let corners = [bounds[0], bounds[1], DVec3::new(-0.5, 1.0, 4.0), DVec3::new(0.5, 0.0, -4.0)];
+        let distance = |turns| {
+            let eye = framed(bounds, &corners, (Side::Front, turns), 1.0);
+            (eye.position - eye.look_at).length()
+        };
+        let side = framed(bounds, &corners, (Side::Right, 1), 1.0);
+        let of_side = (side.position - side.look_at).length();
+        assert!(distance(1) < 0.6 * of_side && distance(4) >= of_side - 1e-3, "{} {of_side}", distance(4));
+    }
+
     #[test]
     fn digits_that_nobody_sees_are_left_out() {
         assert_eq!(tidied(1.234_567_8, 3e-4), 1.2346);
@@ -133,7 +159,7 @@ mod tests {
     /// A plane under the sky and the key light alone has the sky's radiance.
     #[test]
     fn the_ground_is_as_bright_as_the_sky() {
-        let eye = framed([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], Side::Iso, 1.0);
+        let eye = framed([DVec3::ZERO, DVec3::ONE], &[DVec3::ZERO, DVec3::ONE], (Side::Iso, 1), 1.0);
         let direction = key_direction(&eye).normalize();
         let irradiance = std::f64::consts::PI * SKY - direction.y * KEY;
         let radiance = ground_reflectance() * irradiance / std::f64::consts::PI;

@@ -6,12 +6,13 @@ use std::path::Path;
 use super::frame::{framed, tidied};
 use super::materials::{Materials, TextureFile};
 use super::toml::{Toml, color, list, number, vector};
-use super::{Eye, FOV, ModelText, SIZE, Show, Unique, camera, file_name, ground, light, render};
+use super::{Eye, FOV, Lighting, ModelText, SIZE, Show, Unique, camera, file_name, ground, light, render};
 use crate::assets::AssetError;
 use crate::assets::gltf::{
     Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelScene,
 };
 use crate::control::{CancelToken, unwatched};
+use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
 use crate::pipeline::settings::Side;
 use crate::pipeline::stages::containers::Containers;
@@ -98,7 +99,11 @@ impl Writer<'_> {
         let size = own
             .and_then(|camera| camera.aspect)
             .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
-        render(&mut self.toml, size);
+        let lighting = match scene.lights.is_empty() {
+            true => Lighting::Ours,
+            false => Lighting::own(irradiance(&scene.lights, bounds)),
+        };
+        render(&mut self.toml, size, lighting);
         let eye = match own {
             Some(own) => {
                 let eye = eye_of(own, bounds);
@@ -109,14 +114,14 @@ impl Writer<'_> {
                 let eye = framed(
                     bounds,
                     &scene.outline,
-                    show.from.unwrap_or(Side::Iso),
+                    (show.from.unwrap_or(Side::Iso), show.turns),
                     aspect.unwrap_or(SIZE[0] / SIZE[1]),
                 );
                 camera(&mut self.toml, &eye, FOV);
                 eye
             }
         };
-        light(&mut self.toml, &eye, !scene.lights.is_empty());
+        light(&mut self.toml, &eye, lighting);
         if !scene.lights.is_empty() {
             self.toml.section("1 cd of the file counts as 1 W/sr, 1 lx as 1 W/m².");
         }
@@ -265,6 +270,23 @@ impl super::materials::Files for Writer<'_> {
             }
         }
     }
+}
+
+/// Irradiance at normal incidence that lights may bring to the middle of a box, all of them together. Lights inside it count from
+/// a quarter of its size.
+fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
+    let (middle, size) = ((least + greatest) * 0.5, (greatest - least).length());
+    let of_light = |light: &ModelLight| {
+        let luminance = f64::from(luminance(light.intensity.as_vec3()));
+        match light.kind {
+            ModelLightKind::Directional => luminance,
+            ModelLightKind::Point | ModelLightKind::Spot { .. } => {
+                let distance = light.position.distance(middle).max(size * 0.25).max(1e-12);
+                luminance / (distance * distance)
+            }
+        }
+    };
+    lights.iter().map(of_light).sum()
 }
 
 /// The ending of an image by its first bytes.

@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 
 use self::frame::{Eye, FOV, KEY, SKY, ground_reflectance, key_direction};
 use self::gltf::{Asset, Naming};
-use self::toml::{Toml, number, vector};
-use super::settings::{Overrides, Side};
+use self::toml::{Toml, number, rounded, vector};
+use super::settings::{Overrides, Side, UpAxis};
 use super::stages::containers::Containers;
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
@@ -23,16 +23,26 @@ use crate::math::DVec3;
 use crate::scene::fingerprint::Fingerprint;
 
 /// Way of showing a model.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::pipeline) struct Show {
     /// The side from which it is seen. `None` for the file's own camera, else [`Side::Iso`].
     pub(in crate::pipeline) from: Option<Side>,
     /// Width over height of the picture. `None` if the call leaves one of them open.
     pub(in crate::pipeline) aspect: Option<f64>,
+    /// The axis of a mesh file that points upwards. `None` for the usual one of its format.
+    pub(in crate::pipeline) up: Option<UpAxis>,
+    /// Pictures of a turntable, in all of which the model is to be seen. 1 for a single picture.
+    pub(in crate::pipeline) turns: u32,
 }
 
 /// Width and height of a picture where nobody says another.
 const SIZE: [f64; 2] = [640.0, 480.0];
+
+impl Default for Show {
+    fn default() -> Self {
+        Self { from: None, aspect: None, up: None, turns: 1 }
+    }
+}
 
 impl Show {
     /// The way that a call asks for.
@@ -44,7 +54,12 @@ impl Show {
                 Some(or(width, SIZE[0]) / or(height, SIZE[1]))
             }
         };
-        Self { from: overrides.from, aspect }
+        Self {
+            from: overrides.from,
+            aspect,
+            up: overrides.up,
+            turns: overrides.turn.map_or(1, |turn| turn.of),
+        }
     }
 
     /// Adds what the scene of a model depends on.
@@ -53,7 +68,11 @@ impl Show {
         if let Some(from) = self.from {
             key.choice(from);
         }
-        key.f64(self.aspect.unwrap_or_default());
+        key.flag(self.up.is_some());
+        if let Some(up) = self.up {
+            key.choice(up);
+        }
+        key.f64(self.aspect.unwrap_or_default()).u64(self.turns.into());
     }
 }
 
@@ -81,6 +100,10 @@ pub(in crate::pipeline) fn text(
     token: &CancelToken,
 ) -> Result<ModelText, AssetError> {
     if is_gltf(path) {
+        if show.up.is_some_and(|up| up != UpAxis::Y) {
+            let reason = "y is up in glTF files: --up is for obj, off, ply, stl".to_owned();
+            return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
+        }
         return gltf::text(path, (show, &Naming::Inside), containers, token);
     }
     plain::text(path, show, containers, token)
@@ -91,8 +114,42 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
+/// Most radiance that a path brings by one vertex after its first reflection, as the key light by way of a polished surface: few
+/// samples would show it as bright dots. Four times that of the sky.
+const CLAMP: &str = "2";
+
+/// The light of a model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Lighting {
+    /// A sky and a key light.
+    Ours,
+    /// The lights of the file, with a sky that is as bright to them as ours to the key light.
+    Own {
+        /// Stops by which the picture is darker than the lights make it, at most 0.
+        exposure: f64,
+    },
+}
+
+impl Lighting {
+    /// Lights that bring so much irradiance to the model.
+    fn own(irradiance: f64) -> Self {
+        // A white surface is then as bright as under our lights.
+        const USUAL: f64 = 3.0;
+        let over = (irradiance / USUAL).max(1.0);
+        Self::Own { exposure: -(libm::log2(over) * 10.0).round() / 10.0 }
+    }
+
+    /// Radiance of the sky.
+    fn sky(self) -> f64 {
+        match self {
+            Self::Ours => SKY,
+            Self::Own { exposure } => rounded(SKY * libm::exp2(-exposure), 3),
+        }
+    }
+}
+
 /// Tables that are the same for every model: the picture, then what is around it.
-fn render(toml: &mut Toml, size: Option<[u32; 2]>) {
+fn render(toml: &mut Toml, size: Option<[u32; 2]>, light: Lighting) {
     toml.table("[render]");
     if let Some([width, height]) = size {
         toml.key("width", width.to_string());
@@ -101,6 +158,11 @@ fn render(toml: &mut Toml, size: Option<[u32; 2]>) {
     toml.key("samples", "256");
     toml.key("error", "0.05");
     toml.key("integrator", "\"path\"");
+    match light {
+        Lighting::Ours => toml.key("clamp", CLAMP),
+        Lighting::Own { exposure } if exposure != 0.0 => toml.key("exposure", number(exposure)),
+        Lighting::Own { .. } => {}
+    }
 }
 
 /// The camera that frames the model.
@@ -117,10 +179,10 @@ fn camera(toml: &mut Toml, eye: &Eye, fov: f64) {
 }
 
 /// A sky, and a key light where the model has no lights of its own.
-fn light(toml: &mut Toml, eye: &Eye, has_own: bool) {
+fn light(toml: &mut Toml, eye: &Eye, light: Lighting) {
     toml.table("[environment]");
-    toml.key("color", number(SKY));
-    if !has_own {
+    toml.key("color", number(light.sky()));
+    if light == Lighting::Ours {
         toml.table("[[light]]");
         toml.key("type", "\"directional\"");
         toml.key("direction", vector(key_direction(eye)));

@@ -1,20 +1,55 @@
 //! Scenes of mesh files without a scene of their own: OBJ, OFF, PLY, STL.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use super::frame::framed;
 use super::toml::Toml;
-use super::{FOV, ModelText, SIZE, Show, Unique, camera, file_name, ground, light, render};
+use super::{FOV, Lighting, ModelText, SIZE, Show, Unique, camera, file_name, ground, light, render};
 use crate::assets::AssetError;
 use crate::control::{CancelToken, unwatched};
 use crate::math::DVec3;
-use crate::pipeline::settings::Side;
+use crate::pipeline::settings::{Side, UpAxis};
 use crate::pipeline::stages::containers::Containers;
 use crate::scene::quoted;
 
-/// Whether a format counts z upwards, as programs for construction and printing do.
-fn is_z_up(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"))
+/// The axis that points upwards where the call does not say it: z in STL files, as programs for construction and printing have
+/// it, and in PLY files by Blender; else y.
+fn usual_up(path: &Path) -> UpAxis {
+    let has = |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
+    if has("stl") || has("ply") && is_by_blender(path) { UpAxis::Z } else { UpAxis::Y }
+}
+
+/// Whether the header of a PLY file names Blender, which leaves its axes as they are.
+fn is_by_blender(path: &Path) -> bool {
+    const START: usize = 256;
+    let mut start = [0; START];
+    let read = File::open(path).and_then(|mut file| file.read(&mut start)).unwrap_or_default();
+    let lines = start[..read].split(|byte| *byte == b'\n');
+    lines
+        .filter(|line| line.starts_with(b"comment"))
+        .any(|line| line.windows(7).any(|word| word == b"Blender"))
+}
+
+impl UpAxis {
+    /// Degrees about x, y and z that turn the axis upwards. `None` if it is already.
+    fn rotation(self) -> Option<[i32; 3]> {
+        match self {
+            Self::X => Some([0, 0, 90]),
+            Self::Y => None,
+            Self::Z => Some([-90, 0, 0]),
+        }
+    }
+
+    /// A point after this rotation.
+    fn upright(self, at: DVec3) -> DVec3 {
+        match self {
+            Self::X => DVec3::new(-at.y, at.x, at.z),
+            Self::Y => at,
+            Self::Z => DVec3::new(at.x, at.z, -at.y),
+        }
+    }
 }
 
 /// The scene of a mesh file.
@@ -32,18 +67,22 @@ pub(super) fn text(
             reason: "no usable face".to_owned(),
         });
     };
-    // The rotation that makes z point upwards takes (x, y, z) to (x, z, −y).
-    let upright = |at: DVec3| if is_z_up(path) { DVec3::new(at.x, at.z, -at.y) } else { at };
+    let up = show.up.unwrap_or_else(|| usual_up(path));
+    let upright = |at: DVec3| up.upright(at);
     let (a, b) = (upright(least), upright(greatest));
     let bounds = [a.min(b), a.max(b)];
     let points: Vec<DVec3> = loaded.mesh.extremes().into_iter().map(upright).collect();
-    let eye =
-        framed(bounds, &points, show.from.unwrap_or(Side::Iso), show.aspect.unwrap_or(SIZE[0] / SIZE[1]));
+    let eye = framed(
+        bounds,
+        &points,
+        (show.from.unwrap_or(Side::Iso), show.turns),
+        show.aspect.unwrap_or(SIZE[0] / SIZE[1]),
+    );
     let (mut toml, mut names) = (Toml::default(), Unique::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
-    render(&mut toml, None);
+    render(&mut toml, None, Lighting::Ours);
     camera(&mut toml, &eye, FOV);
-    light(&mut toml, &eye, false);
+    light(&mut toml, &eye, Lighting::Ours);
     let is_colored = !loaded.mesh.colors.is_empty();
     let needs_material = loaded.lacks_materials();
     let name = names.name("model", "model");
@@ -54,9 +93,12 @@ pub(super) fn text(
     }
     toml.table("[[mesh]]");
     toml.key("file", quoted(&file_name(path)));
-    if is_z_up(path) {
-        toml.key("rotate", "[-90, 0, 0]");
-        // Facets have no normals, and edges of parts are sharp.
+    if let Some([x, y, z]) = up.rotation() {
+        toml.key("rotate", format!("[{x}, {y}, {z}]"));
+    }
+    // Facets have no normals, and edges of parts are sharp.
+    let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
+    if is_stl || loaded.is_faceted() {
         toml.key("smooth", "false");
     }
     if needs_material {
@@ -69,4 +111,21 @@ pub(super) fn text(
     let (companions, notes, assets) = (loaded.companions.clone(), Vec::new(), Vec::new());
     containers.keep(path, loaded);
     Ok(ModelText { text: toml.finish(), companions, notes, assets })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::transform::rotation_xyz;
+
+    #[test]
+    fn an_axis_is_turned_upwards_by_the_rotation_that_the_scene_has() {
+        for (up, axis) in [(UpAxis::X, DVec3::X), (UpAxis::Y, DVec3::Y), (UpAxis::Z, DVec3::Z)] {
+            let rotation = rotation_xyz(DVec3::from(up.rotation().unwrap_or_default().map(f64::from)));
+            assert_eq!(up.upright(axis), DVec3::Y, "{up:?}");
+            for at in [axis, DVec3::new(1.0, 2.0, 3.0)] {
+                assert_eq!(rotation * at, up.upright(at), "{up:?}");
+            }
+        }
+    }
 }

@@ -130,6 +130,11 @@ impl FilmState {
         }
     }
 
+    /// Goals of a film that is to have as many samples as this one.
+    pub(super) fn goals_of_what_is_done(&self) -> Goals {
+        Goals { decided: self.done.clone(), ..Goals::none(self.done.len()) }
+    }
+
     /// Takes over how many samples the film has in each half of a cell.
     pub(super) fn count_again(&mut self) {
         let halves: Vec<_> = self.halves().collect();

@@ -15,6 +15,7 @@ use super::share::Share;
 use super::time_budget::next_round;
 use crate::film::{PILOT_SAMPLES, Pilot, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
+use crate::math::Vec3;
 use crate::pipeline::pace::Clock;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::protocol::{PreviewSize, Section};
@@ -78,6 +79,8 @@ pub(in crate::pipeline) struct Scheduler<'a> {
     is_over_time: bool,
     next_progress: Instant,
     next_preview: Instant,
+    /// Change of each sample before it is added. `None` for samples that stay as they are.
+    pub(in crate::pipeline) changed: Option<&'a (dyn Fn(Vec3) -> Vec3 + Sync)>,
 }
 
 impl<'a> Scheduler<'a> {
@@ -100,6 +103,7 @@ impl<'a> Scheduler<'a> {
             is_over_time: false,
             next_progress: Instant::now(),
             next_preview: Instant::now(),
+            changed: None,
         }
     }
 
@@ -297,7 +301,13 @@ impl<'a> Scheduler<'a> {
         let jobs = self.state.jobs(part, target);
         let tracer = Tracer { photons, first, ..self.rendering.tracer };
         let film = Arc::clone(&self.state.film);
-        let keep = |job: &Job, samples: TileSamples| film.add(job.tile, &samples);
+        let changed = self.changed;
+        let keep = |job: &Job, mut samples: TileSamples| {
+            if let Some(changed) = changed {
+                samples.radiance.iter_mut().for_each(|sample| *sample = changed(*sample));
+            }
+            film.add(job.tile, &samples);
+        };
         tracer.run(&jobs, keep, |result| {
             if let Some((job, (), cost)) = result {
                 self.units += self.state.note(job, &cost);

@@ -303,7 +303,7 @@ mod tests {
         fn new() -> Self {
             let folder = tempfile::tempdir().expect("a scratch folder");
             let events = std::sync::mpsc::channel().0;
-            let sink = Sink { generation: 0, events, previews: Default::default() };
+            let sink = Sink { generation: 0, events, previews: Default::default(), within: None };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
             let desk = Self { folder, sink, pool, cache: Pool::default(), contents: Arc::default() };
             desk.write("a.obj", OBJ);

@@ -28,6 +28,8 @@ pub(in crate::pipeline) struct Parsed {
     pub(in crate::pipeline) named: Vec<PathBuf>,
     /// Files that a model's scene was made of, beside the model.
     companions: Vec<FileRead>,
+    /// Approximations of a model's scene.
+    notes: Vec<Diagnostic>,
     orbiter_content: Option<Content>,
 }
 
@@ -48,7 +50,7 @@ fn model_scene(
     (contents, containers): (&Snapshot, &Containers),
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<(scene::Loaded, Vec<PathBuf>), Stop> {
+) -> Result<(scene::Loaded, Vec<PathBuf>, Vec<Diagnostic>), Stop> {
     let made = model::text(path, show, containers, token).map_err(|error| match error {
         AssetError::Cancelled(_) => Stop::Cancelled,
         AssetError::OutOfMemory { .. } => Stop::work(error),
@@ -64,10 +66,9 @@ fn model_scene(
             broken(&path, format!("{line}{reason}"))
         }
     })?;
-    let notes = made.notes.into_iter().map(|note| of_file(path, Severity::Warning, note));
-    findings.warnings.extend(notes);
+    let notes = made.notes.into_iter().map(|note| of_file(path, Severity::Warning, note)).collect();
     let loaded = scene::load_text(made.text.into(), path, sets);
-    Ok((loaded.map_err(|errors| Stop::Failed(Failure::Scene(errors)))?, made.companions))
+    Ok((loaded.map_err(|errors| Stop::Failed(Failure::Scene(errors)))?, made.companions, notes))
 }
 
 fn broken(path: &Path, message: String) -> Stop {
@@ -101,8 +102,11 @@ pub(in crate::pipeline) fn parse(
     });
     if is_model {
         show.add_to(&mut key);
-    } else if show.from.is_some() {
-        let message = "--from is for models: a scene has its own camera";
+    } else if show.from.is_some() || show.up.is_some() {
+        let message = match show.from {
+            Some(_) => "--from is for models: a scene has its own camera",
+            None => "--up is for models: in a scene y is up",
+        };
         return Err(Stop::Failed(Failure::Scene(vec![of_file(
             Path::new(""),
             Severity::Error,
@@ -117,26 +121,26 @@ pub(in crate::pipeline) fn parse(
         parsed.companions.iter().all(now)
     };
     let known = memo.get(key).filter(is_same).cloned();
-    let (loaded, companions) = match &known {
-        Some(parsed) => (parsed.loaded.clone(), parsed.companions.clone()),
+    let (loaded, companions, notes) = match &known {
+        Some(parsed) => (parsed.loaded.clone(), parsed.companions.clone(), parsed.notes.clone()),
         None if is_model => {
-            let (loaded, companions) = model_scene(origin, (contents, containers), findings, token)?;
+            let (loaded, companions, notes) = model_scene(origin, (contents, containers), findings, token)?;
             let read = |path: PathBuf| Ok(FileRead { content: contents.read(&path, token)?, path });
-            (Arc::new(loaded), companions.into_iter().map(read).collect::<Result<_, Cancelled>>()?)
+            (Arc::new(loaded), companions.into_iter().map(read).collect::<Result<_, Cancelled>>()?, notes)
         }
         None => {
             let loaded = scene::load(path, sets).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?;
-            (Arc::new(loaded), Vec::new())
+            (Arc::new(loaded), Vec::new(), Vec::new())
         }
     };
     companions.iter().for_each(|file| findings.read(file.clone()));
     let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
-    findings.warnings.extend(loaded.warnings.iter().cloned());
+    findings.warnings.extend(notes.iter().chain(&loaded.warnings).cloned());
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
         return Ok(Staged::reused(parsed, "the file did not change"));
     }
     let named = named(&loaded);
-    let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, orbiter_content });
+    let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, notes, orbiter_content });
     // A camera that could not be read is tried again by the next request.
     if parsed.orbiter.is_some() == orbiter_content.is_some() {
         memo.set(key, parsed.clone());

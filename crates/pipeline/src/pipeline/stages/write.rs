@@ -12,16 +12,18 @@ use super::super::render::film_state::FilmState;
 use super::super::render::keeping::head;
 use super::super::sink::Sink;
 use super::super::targets::{conflicts, guarded};
+use super::super::turntable::Turn;
 use super::super::watch::content::{Content, Contents};
 use super::{Staged, Stop};
 use crate::choice::Choice;
 use crate::control::CancelToken;
-use crate::film::RadianceImage;
-use crate::film::SampleStats;
+use crate::film::tone::develop;
+use crate::film::{Picture, RadianceImage, Rect, SampleStats};
 use crate::integrators::{Measure, Shown};
 use crate::output::part::{self, Kind};
 use crate::output::write::{Durability, Guard};
-use crate::output::{self, BitDepth, Finish, Format, OutputError};
+use crate::output::{self, BitDepth, Finish, Format, LayerImage, OutputError};
+use crate::output::{MovingFormat, moving};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// Files that glimt wrote, with the picture's key and the file's content at that time.
@@ -54,6 +56,8 @@ impl Written {
 #[derive(Clone, Copy)]
 pub(in crate::pipeline) struct Destination<'a> {
     pub(in crate::pipeline) plan: &'a Plan,
+    /// Layers of the picture for EXR files.
+    pub(in crate::pipeline) layers: &'a [LayerImage],
     pub(in crate::pipeline) inputs: &'a Inputs,
     pub(in crate::pipeline) contents: &'a Contents,
     pub(in crate::pipeline) sink: &'a Sink,
@@ -94,6 +98,7 @@ fn find_targets(
         Some(_) => plan.outputs.iter().try_for_each(|path| place(path))?,
         None => plan.outputs.iter().try_for_each(check)?,
     }
+    plan.moving.iter().try_for_each(|path| place(path))?;
     plan.report.iter().try_for_each(|path| place(path))
 }
 
@@ -190,14 +195,54 @@ pub(in crate::pipeline) fn write_by_hand(canvas: &FilmState, to: Destination<'_>
     }
 }
 
+/// Frames of a turntable so far.
+#[derive(Debug, Default)]
+pub(in crate::pipeline) struct Frames(Vec<Picture>);
+
+/// Adds the picture to the frames of its turntable; with the last one, writes the moving pictures. Returns whether they are on disk.
+///
+/// # Errors
+/// The first file that could not be written, and why. Or cancelled.
+pub(in crate::pipeline) fn write_moving(
+    canvas: &FilmState,
+    to: Destination<'_>,
+    (turn, frames): (Turn, &mut Frames),
+    token: &CancelToken,
+) -> Result<Staged<bool>, Stop> {
+    let Destination { plan, inputs, sink, .. } = to;
+    let finish = finish(plan);
+    let image = finish.image(&canvas.film);
+    frames.0.truncate(turn.number as usize);
+    frames.0.push(develop(&image, &finish.tone.of_picture(&image)));
+    if !turn.is_last() {
+        return Ok(Staged::skipped(false, format!("it is kept as frame {} of {}", turn.number + 1, turn.of)));
+    }
+    let frames = std::mem::take(frames).0;
+    for path in &plan.moving {
+        let Some(format) = MovingFormat::of(path) else { continue };
+        let write = || {
+            let bytes = moving::encode(&frames, &finish.metadata, format, token)?;
+            let write = |guard: &Guard<'_>| output::write::atomic_until(path, &bytes, guard, token);
+            guarded(plan, inputs, path, sink, write)?;
+            Ok(bytes.len() as u64)
+        };
+        match write() {
+            Ok(bytes) => sink.written(path, bytes),
+            Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
+            Err(error) => return Err(Stop::work(error)),
+        }
+    }
+    Ok(Staged::done(true, format!("{} frames", frames.len())))
+}
+
 fn write_one(
     image: &RadianceImage,
     canvas: &FilmState,
-    Destination { plan, inputs, sink, .. }: Destination<'_>,
+    Destination { plan, layers, inputs, sink, .. }: Destination<'_>,
     path: &Path,
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let bytes = finish(plan).encode(&canvas.film, image, Format::of(path)?, token)?;
+    let bytes = finish(plan).encode(&canvas.film, (image, layers), Format::of(path)?, token)?;
     guarded(plan, inputs, path, sink, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
     Ok(bytes.len() as u64)
 }
@@ -238,10 +283,31 @@ fn metadata(plan: &Plan) -> Vec<(String, String)> {
         ("glimt:max_depth", plan.settings.render.max_depth.to_string()),
         ("glimt:dof", settings.dof.to_string()),
         ("glimt:view", settings.view.name().to_owned()),
+        ("glimt:photons", settings.photons.to_string()),
+        ("glimt:error", settings.error.to_string()),
         ("glimt:seed", settings.seed.to_string()),
         ("glimt:exposure", plan.tone.exposure_stops.to_string()),
     ];
-    pairs.map(|(key, value)| (key.to_owned(), value)).to_vec()
+    let mut pairs = pairs.map(|(key, value)| (key.to_owned(), value)).to_vec();
+    let mut add = |name: &str, value: String| pairs.push((format!("glimt:{name}"), value));
+    if settings.clamp > 0.0 {
+        add("clamp", settings.clamp.to_string());
+    }
+    if let Some(seconds) = plan.time_seconds {
+        add("time", format!("{seconds} s"));
+    }
+    if let Some(Rect { x, y, width, height }) = plan.crop {
+        add("crop", format!("{x},{y},{width},{height}"));
+    }
+    if !plan.layers.is_empty() {
+        let names: Vec<_> = plan.layers.iter().map(|layer| layer.name()).collect();
+        add("layers", names.join(","));
+    }
+    if let Some(Turn { number, of }) = plan.turn {
+        let which = if plan.moving.is_empty() { format!("{} of {of}", number + 1) } else { of.to_string() };
+        add("turntable", which);
+    }
+    pairs
 }
 
 fn key(canvas: &FilmState, plan: &Plan, path: &Path) -> Key {
@@ -250,5 +316,8 @@ fn key(canvas: &FilmState, plan: &Plan, path: &Path) -> Key {
     key.key(&canvas.key).u64(min.into()).f64(mean).u64(max.into());
     key.choice(plan.settings.view).f32(plan.tone.exposure_stops).index(plan.tone.curve as usize);
     key.index(plan.tone.transfer as usize).u64(plan.bit_depth.into());
+    plan.layers.iter().for_each(|layer| {
+        key.choice(*layer);
+    });
     key.path(path).finish()
 }

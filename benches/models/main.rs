@@ -1,0 +1,97 @@
+//! A model from the command line to a picture: `glimt MODEL --once` as a new process, files and all.
+//!
+//! `cargo bench --bench models` makes a model of 100,352 triangles in a scratch folder, renders it twenty times to a PNG of
+//! 512 × 512 pixels at `--error 0.05`, and prints the seconds, how many runs took at most one, and how busy the machine was.
+//! `-- FILE` renders another model. `others.py` beside this file does the same by f3d and Blender.
+
+#![allow(clippy::print_stdout)]
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Instant;
+use std::{error, fs};
+
+const RUNS: usize = 20;
+/// Seconds that a run is to take at most.
+const GOAL: f64 = 1.0;
+
+fn main() -> Result<(), Box<dyn error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let asked = std::env::args().skip(1).find(|word| !word.starts_with('-'));
+    let model = match asked {
+        Some(file) => PathBuf::from(file).canonicalize()?,
+        None => {
+            let model = folder.path().join("bumps.ply");
+            fs::write(&model, bumps(224))?;
+            model
+        }
+    };
+    let mut seconds = Vec::new();
+    for _ in 0..RUNS {
+        seconds.push(run(folder.path(), &model)?);
+    }
+    seconds.sort_by(f64::total_cmp);
+    let within = seconds.iter().filter(|seconds| **seconds <= GOAL).count();
+    let (least, median, most) = (seconds[0], seconds[RUNS / 2], seconds[RUNS - 1]);
+    println!(
+        "{}, 512 × 512, --error 0.05: {least:.2} {median:.2} {most:.2} s (least, median, most)",
+        model.display()
+    );
+    println!("{within} of {RUNS} runs took at most {GOAL} s");
+    println!("load: {}", fs::read_to_string("/proc/loadavg").unwrap_or_default().trim());
+    Ok(())
+}
+
+/// Seconds of a process.
+fn run(folder: &Path, model: &Path) -> Result<f64, Box<dyn error::Error>> {
+    let begin = Instant::now();
+    let status = Command::new(env!("CARGO_BIN_EXE_glimt"))
+        .current_dir(folder)
+        .arg(model)
+        .args([
+            "--once",
+            "--force",
+            "-o",
+            "picture.png",
+            "--width",
+            "512",
+            "--height",
+            "512",
+            "--error",
+            "0.05",
+        ])
+        .args(["--progress", "none"])
+        .stdin(Stdio::null())
+        .status()?;
+    if status.success() { Ok(begin.elapsed().as_secs_f64()) } else { Err("glimt failed".into()) }
+}
+
+/// A ball with bumps as a text of PLY: 2·rows² triangles, near enough.
+fn bumps(rows: u32) -> String {
+    let at = |i: u32| {
+        let (row, column) = (f64::from(i / rows), f64::from(i % rows));
+        let (polar, turn) = (
+            std::f64::consts::PI * (row + 0.5) / f64::from(rows),
+            std::f64::consts::TAU * column / f64::from(rows),
+        );
+        let radius = 1.0 + 0.05 * (9.0 * polar).sin() * (12.0 * turn).sin();
+        [radius * polar.sin() * turn.cos(), radius * polar.cos(), radius * polar.sin() * turn.sin()]
+    };
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+         element face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        rows * rows,
+        2 * (rows - 1) * rows
+    );
+    for i in 0..rows * rows {
+        let [x, y, z] = at(i);
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{x:.6} {y:.6} {z:.6}");
+    }
+    for i in 0..(rows - 1) * rows {
+        let next = i / rows * rows + (i + 1) % rows;
+        let _ = writeln!(text, "3 {i} {next} {}\n3 {next} {} {}", i + rows, next + rows, i + rows);
+    }
+    text
+}

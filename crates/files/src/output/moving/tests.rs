@@ -1,0 +1,145 @@
+use std::path::Path;
+
+use super::*;
+
+/// A gradient with a square that moves.
+fn frame(number: u32) -> Picture {
+    let (width, height) = (96, 40);
+    let pixel = |i: u32| {
+        let (x, y) = (i % width, i / width);
+        let is_square = (10..20).contains(&y) && (number * 7..number * 7 + 10).contains(&x);
+        if is_square { [250, 20, 30] } else { [(x + 60) as u8, (2 * x + 9) as u8, (250 - 4 * y) as u8] }
+    };
+    Picture { width, height, pixels: (0..width * height).map(pixel).collect() }
+}
+
+fn frames() -> Vec<Picture> {
+    (0..8).map(frame).collect()
+}
+
+fn metadata() -> Vec<(String, String)> {
+    vec![("glimt:scene".to_owned(), "hüte.toml".to_owned())]
+}
+
+fn bytes(format: MovingFormat) -> Vec<u8> {
+    encode(&frames(), &metadata(), format, &CancelToken::new()).expect("encoded")
+}
+
+#[test]
+fn an_apng_gives_its_frames_back() {
+    let bytes = bytes(MovingFormat::Apng);
+    let mut reader = ::png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().expect("PNG");
+    let control = *reader.info().animation_control().expect("it moves");
+    assert_eq!((control.num_frames, control.num_plays), (8, 0));
+    for expected in frames() {
+        let mut pixels = vec![0; reader.output_buffer_size().expect("small")];
+        reader.next_frame(&mut pixels).expect("a frame");
+        assert_eq!(pixels, expected.pixels.as_flattened());
+        let delay = reader.info().frame_control().expect("a frame of several");
+        assert_eq!((delay.delay_num, delay.delay_den), (500, 1000), "8 frames in 4 s");
+    }
+    assert_eq!(reader.info().uncompressed_latin1_text[0].text, crate::output::SOFTWARE);
+    assert!(bytes == self::bytes(MovingFormat::Apng));
+}
+
+/// The decoded frames of a GIF: three bytes a pixel.
+fn decoded(bytes: &[u8]) -> Vec<Vec<u8>> {
+    let mut options = ::gif::DecodeOptions::new();
+    options.set_color_output(::gif::ColorOutput::Indexed);
+    let mut decoder = options.read_info(bytes).expect("GIF");
+    assert_eq!(decoder.repeat(), ::gif::Repeat::Infinite);
+    let palette = decoder.global_palette().expect("one for all frames").to_vec();
+    let mut frames = Vec::new();
+    while let Some(frame) = decoder.read_next_frame().expect("a frame") {
+        assert!(frame.palette.is_none() && frame.delay == 50);
+        let color = |index: &u8| &palette[3 * usize::from(*index)..][..3];
+        frames.push(frame.buffer.iter().flat_map(color).copied().collect());
+    }
+    frames
+}
+
+/// Means over blocks of 4 × 4 pixels are nearly those of the frame, far nearer than those of the nearest colours, which make bands.
+#[test]
+fn a_gif_keeps_gradients_on_average() {
+    // Slow gradients in many colours: the palette's are far apart.
+    let smooth = |number: u32| {
+        let pixel = |i: u32| {
+            let (x, y, k) = (i % 96, i / 96, number % 8);
+            [(25 * k + x / 4) as u8, (220 - 22 * k + y / 2) as u8, (90 + 60 * (k % 3) + (x + y) / 6) as u8]
+        };
+        Picture { width: 96, height: 40, pixels: (0..96 * 40).map(pixel).collect() }
+    };
+    let frames: Vec<Picture> = (0..8).map(smooth).collect();
+    let bytes = encode(&frames, &[], MovingFormat::Gif, &CancelToken::new()).expect("encoded");
+    let shown = decoded(&bytes);
+    assert_eq!(shown.len(), frames.len());
+    let palette = ::gif::DecodeOptions::new().read_info(bytes.as_slice()).expect("GIF");
+    let palette = palette.global_palette().expect("a palette").as_chunks::<3>().0.to_vec();
+    let nearest = |pixel: &[u8; 3]| {
+        let distance = |color: &&[u8; 3]| {
+            (0..3).map(|i| (i32::from(color[i]) - i32::from(pixel[i])).pow(2)).sum::<i32>()
+        };
+        *palette.iter().min_by_key(distance).expect("colours")
+    };
+    let block = |pixels: &[u8], x: usize, y: usize| {
+        let at = |i: usize| 3 * ((4 * y + i / 4) * 96 + 4 * x + i % 4);
+        [0, 1, 2].map(|channel| (0..16).map(|i| f64::from(pixels[at(i) + channel])).sum::<f64>() / 16.0)
+    };
+    // Mean distance of the blocks' means, in levels.
+    let off = |frame: &Picture, shown: &[u8]| {
+        let blocks = (0..10).flat_map(|y| (0..24).map(move |x| (x, y)));
+        let each = blocks.map(|(x, y)| {
+            let (wanted, found) = (block(frame.pixels.as_flattened(), x, y), block(shown, x, y));
+            (0..3).map(|channel| (wanted[channel] - found[channel]).abs()).fold(0.0, f64::max)
+        });
+        each.sum::<f64>() / 240.0
+    };
+    let banded = |frame: &Picture| frame.pixels.iter().flat_map(nearest).collect::<Vec<u8>>();
+    let dithered: f64 = frames.iter().zip(&shown).map(|(frame, shown)| off(frame, shown)).sum();
+    let plain: f64 = frames.iter().map(|frame| off(frame, &banded(frame))).sum();
+    assert!(dithered < 0.7 * plain && dithered / 8.0 < 2.0, "{} against {}", dithered / 8.0, plain / 8.0);
+}
+
+#[test]
+fn what_stays_in_place_is_the_same_in_each_frame_of_a_gif() {
+    let frames = frames();
+    let shown = decoded(&bytes(MovingFormat::Gif));
+    for (frame, image) in frames.iter().zip(&shown).skip(1) {
+        for (i, pixel) in frame.pixels.iter().enumerate() {
+            if *pixel == frames[0].pixels[i] {
+                assert_eq!(image[3 * i..3 * i + 3], shown[0][3 * i..3 * i + 3]);
+            }
+        }
+    }
+}
+
+#[test]
+fn few_colours_stay_as_they_are() {
+    let pixels = (0..64).map(|i| [[1, 2, 3], [250, 128, 7], [77, 77, 78]][i % 3]).collect();
+    let frame = Picture { width: 8, height: 8, pixels };
+    let frames = vec![frame; 8];
+    let bytes = encode(&frames, &[], MovingFormat::Gif, &CancelToken::new()).expect("encoded");
+    assert!(decoded(&bytes).iter().all(|shown| shown == frames[0].pixels.as_flattened()));
+}
+
+#[test]
+fn what_a_format_cannot_hold_and_what_is_cancelled_is_no_file() {
+    let token = CancelToken::new();
+    let wide = Picture { width: 70_000, height: 1, pixels: vec![[0; 3]; 70_000] };
+    let error = encode(&[wide], &[], MovingFormat::Gif, &token).expect_err("too wide").to_string();
+    assert!(error.contains("65535×65535; use .apng"), "{error}");
+    assert!(encode(&[], &[], MovingFormat::Gif, &token).is_err());
+    let odd = Picture { width: 2, height: 1, pixels: vec![[0; 3]; 2] };
+    assert!(encode(&[frame(0), odd], &[], MovingFormat::Apng, &token).is_err());
+    token.cancel();
+    for format in [MovingFormat::Gif, MovingFormat::Apng] {
+        assert!(matches!(encode(&frames(), &[], format, &token), Err(OutputError::Cancelled(_))));
+    }
+}
+
+#[test]
+fn endings_tell_the_format() {
+    assert_eq!(MovingFormat::of(Path::new("a.GIF")), Some(MovingFormat::Gif));
+    assert_eq!(MovingFormat::of(Path::new("a.apng")), Some(MovingFormat::Apng));
+    assert_eq!((MovingFormat::of(Path::new("a.png")), MovingFormat::of(Path::new("gif"))), (None, None));
+}

@@ -1,0 +1,138 @@
+//! Turntables: pictures all around `look_at`, as files with numbers or as one moving picture.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use crate::math::DVec3;
+use crate::math::transform::sin_cos_degrees;
+use crate::output::MovingFormat;
+use crate::scene::description::Pose;
+
+/// Most pictures of a turn.
+pub const MOST: u32 = 10_000;
+
+/// The sign in a file's name that stands for a digit.
+const DIGIT: char = '#';
+
+/// One picture of a turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Turn {
+    /// Its number, from 0.
+    pub number: u32,
+    /// Pictures of the turn, at least 1.
+    pub of: u32,
+}
+
+impl Turn {
+    /// Whether it is the last one.
+    pub(super) fn is_last(self) -> bool {
+        self.number + 1 == self.of
+    }
+
+    /// The camera of this picture: that of the first one, moved about the axis `up` through `look_at`, counterclockwise seen from
+    /// above.
+    pub(super) fn pose(self, first: &Pose) -> Pose {
+        if self.number == 0 {
+            return *first;
+        }
+        let angle = 360.0 * f64::from(self.number) / f64::from(self.of);
+        let (axis, arm) = (first.up.normalize_or(DVec3::Y), first.position - first.look_at);
+        // Rodrigues' formula.
+        let (sin, cos) = sin_cos_degrees(angle);
+        let turned = arm * cos + axis.cross(arm) * sin + axis * (axis.dot(arm) * (1.0 - cos));
+        Pose { position: first.look_at + turned, ..*first }
+    }
+
+    /// The arms from `look_at` to the eye in all pictures of a turn, and what is up there.
+    pub(super) fn arms(of: u32, arm: DVec3, up: DVec3) -> impl Iterator<Item = DVec3> {
+        let first = Pose { position: arm, look_at: DVec3::ZERO, up };
+        (0..of.max(1)).map(move |number| Self { number, of: of.max(1) }.pose(&first).position)
+    }
+}
+
+/// Whether a file can hold the pictures of a turn.
+///
+/// # Errors
+/// The reason why it cannot, with the way out.
+pub fn check_name(path: &Path) -> Result<(), String> {
+    if MovingFormat::of(path).is_some() || numbers(path).is_some() {
+        return Ok(());
+    }
+    let name = path.display();
+    let example = suggested(path);
+    let example = example.display();
+    Err(format!(
+        "{name} would hold one picture of the turntable: write {example} for a file each, or a .gif or .apng file"
+    ))
+}
+
+/// Whether a file's name has a place for the number of a picture.
+pub fn has_number(path: &Path) -> bool {
+    numbers(path).is_some()
+}
+
+/// The name that a file of a single picture gets in a turntable: `a.png` becomes `a_####.png`.
+pub fn suggested(path: &Path) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push("_####");
+    if let Some(ending) = path.extension() {
+        name.push(".");
+        name.push(ending);
+    }
+    path.with_file_name(name)
+}
+
+/// The file of a picture: the name with the picture's number, from 1, in place of its last run of `#`. `None` if it has none.
+pub(super) fn numbered(path: &Path, turn: Turn) -> Option<PathBuf> {
+    let (before, digits, after) = numbers(path)?;
+    let number = format!("{:0digits$}", turn.number + 1);
+    Some(path.with_file_name(OsString::from(format!("{before}{number}{after}"))))
+}
+
+/// Text before the last run of `#` in a file's name, the length of the run, and the text behind it.
+fn numbers(path: &Path) -> Option<(&str, usize, &str)> {
+    let name = path.file_name()?.to_str()?;
+    let (head, after) = name.rsplit_once(DIGIT)?;
+    let before = head.trim_end_matches(DIGIT);
+    Some((before, head.len() - before.len() + 1, after))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_camera_goes_all_around_and_keeps_its_distance() {
+        let first = Pose {
+            position: DVec3::new(1.0, 3.0, 4.0),
+            look_at: DVec3::new(1.0, 1.0, 0.0),
+            up: DVec3::new(0.0, 2.0, 0.0),
+        };
+        let at = |number| Turn { number, of: 4 }.pose(&first);
+        assert_eq!(at(0), first);
+        for (number, expected) in [(1, [5.0, 3.0, 0.0]), (2, [1.0, 3.0, -4.0]), (3, [-3.0, 3.0, 0.0])] {
+            let pose = at(number);
+            assert!(pose.position.distance(DVec3::from(expected)) < 1e-12, "{number}: {pose:?}");
+            assert_eq!((pose.look_at, pose.up), (first.look_at, first.up));
+        }
+    }
+
+    #[test]
+    fn files_have_the_number_of_their_picture() {
+        let name = |path: &str, number| numbered(Path::new(path), Turn { number, of: 100 });
+        assert_eq!(name("out/a_####.png", 6), Some("out/a_0007.png".into()));
+        assert_eq!(name("a#.exr", 99), Some("a100.exr".into()), "it grows where it must");
+        assert_eq!(name("#1_##_b.png", 0), Some("#1_01_b.png".into()));
+        assert_eq!(name("##/a.png", 0), None, "folders are not counted");
+        assert_eq!(suggested(Path::new("x/a.b.png")), Path::new("x/a.b_####.png"));
+    }
+
+    #[test]
+    fn a_file_of_one_picture_is_refused_with_the_way_out() {
+        let said = check_name(Path::new("x/a.png")).expect_err("one file");
+        assert!(said.contains("write x/a_####.png for a file each, or a .gif or .apng file"), "{said}");
+        for right in ["a_####.png", "a.gif", "a.APNG", "a#.exr"] {
+            assert_eq!(check_name(Path::new(right)), Ok(()), "{right}");
+        }
+    }
+}

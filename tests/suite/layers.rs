@@ -1,0 +1,121 @@
+//! `--layers`: channels beside the picture in EXR files.
+
+use std::collections::BTreeMap;
+
+use exr::prelude::{ReadChannels, ReadLayers, read};
+
+use super::desk::Desk;
+
+const SMALL: &str = "--once --width 32 --height 24";
+
+/// A floor with a glossy ball, a lamp and a sky.
+const ROOM: &str = "[camera]\nposition = [0, 1, 5]\nlook_at = [0, 0.6, 0]\n[environment]\ncolor = [0.2, 0.3, 0.5]\n\
+    [materials.floor]\n[materials.ball]\ndiffuse = [0.6, 0.1, 0.1]\nspecular = 0.3\nshininess = 40\n\
+    [materials.mirror]\ntype = \"mirror\"\n[materials.lamp]\nemission = 5\n\
+    [[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\nmaterial = \"floor\"\n\
+    [[sphere]]\ncenter = [0.5, 0.6, 0]\nradius = 0.6\nmaterial = \"ball\"\n\
+    [[sphere]]\ncenter = [-0.9, 0.5, 0]\nradius = 0.5\nmaterial = \"mirror\"\n\
+    [[sphere]]\ncenter = [0, 2.5, 1]\nradius = 0.3\nmaterial = \"lamp\"\n";
+
+fn desk() -> Desk {
+    let desk = Desk::new();
+    desk.write("room.toml", ROOM);
+    desk
+}
+
+/// All channels of an EXR file.
+fn channels(desk: &Desk, name: &str) -> BTreeMap<String, Vec<f32>> {
+    let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
+    let image = image.all_attributes().from_file(desk.path(name)).expect("EXR");
+    let list = image.layer_data.channel_data.list.into_iter();
+    list.map(|channel| (channel.name.to_string(), channel.sample_data.values_as_f32().collect())).collect()
+}
+
+fn picture(desk: &Desk, options: &str) -> Vec<f32> {
+    desk.expect(&format!("room.toml {SMALL} -o view.exr {options}"), 0);
+    image::open(desk.path("view.exr")).expect("a picture").to_rgb32f().into_raw()
+}
+
+/// The parts add up to the picture, also where noise decides the samples of each pixel, and with photons.
+#[test]
+fn parts_add_up_to_the_picture() {
+    let desk = desk();
+    for options in [
+        "--integrator path --samples 64 --error 0.2",
+        "--integrator whitted --photons on --samples 5",
+        "--integrator whitted --samples 4 --time 0.2",
+    ] {
+        desk.expect(&format!("room.toml {SMALL} {options} -o a.exr --layers all"), 0);
+        let all = channels(&desk, "a.exr");
+        for channel in ["R", "G", "B"] {
+            let parts =
+                ["ambient", "diffuse", "specular", "emission"].map(|part| &all[&format!("{part}.{channel}")]);
+            for (i, whole) in all[channel].iter().enumerate() {
+                let sum: f32 = parts.iter().map(|part| part[i]).sum();
+                assert!(
+                    (sum - whole).abs() <= 1e-5 * whole.max(1.0),
+                    "{options} {channel} {i}: {sum} {whole}"
+                );
+            }
+        }
+        let samples = &all["samples.X"];
+        assert!(samples.iter().all(|count| *count >= 1.0 && count.fract() == 0.0));
+    }
+}
+
+#[test]
+fn layers_are_the_views_and_the_picture_is_that_without_them() {
+    let desk = desk();
+    let same = "--samples 4 --error 0 --integrator path";
+    desk.expect(&format!("room.toml {SMALL} {same} -o a.exr --layers depth,albedo,normal,variance"), 0);
+    let all = channels(&desk, "a.exr");
+    let names: Vec<&str> = all.keys().map(String::as_str).collect();
+    let expected = [
+        "B",
+        "G",
+        "R",
+        "albedo.B",
+        "albedo.G",
+        "albedo.R",
+        "depth.Z",
+        "normal.X",
+        "normal.Y",
+        "normal.Z",
+        "variance.X",
+    ];
+    assert_eq!(names, expected);
+    let is = |name: &str, pixels: &[f32], component: usize| {
+        let expected: Vec<f32> = pixels.chunks(3).map(|pixel| pixel[component]).collect();
+        assert_eq!(all[name], expected, "{name}");
+    };
+    let beauty = picture(&desk, same);
+    ["R", "G", "B"].iter().enumerate().for_each(|(i, name)| is(name, &beauty, i));
+    is("depth.Z", &picture(&desk, &format!("{same} --view depth")), 0);
+    is("albedo.G", &picture(&desk, &format!("{same} --view albedo")), 1);
+    let error = picture(&desk, &format!("{same} --view error"));
+    for (variance, error) in all["variance.X"].iter().zip(error.chunks(3)) {
+        assert!((variance - error[0] * error[0]).abs() <= 1e-6 * variance, "{variance} {}", error[0]);
+    }
+    // Normals are signed: the floor in front looks up, the sky has none.
+    let at = |name: &str, x: usize, y: usize| all[name][y * 32 + x];
+    assert_eq!([at("normal.X", 2, 23), at("normal.Y", 2, 23), at("normal.Z", 2, 23)], [0.0, 1.0, 0.0]);
+    assert_eq!([at("normal.X", 1, 0), at("normal.Y", 1, 0), at("normal.Z", 1, 0)], [0.0; 3]);
+    assert!(all["normal.X"].iter().any(|x| *x < -0.5) && all["normal.X"].iter().any(|x| *x > 0.5));
+}
+
+#[test]
+fn layers_without_a_place_are_refused() {
+    let desk = desk();
+    for (options, words) in [
+        ("--once -o a.png --layers all", "--layers is for EXR files, and a.png is none"),
+        ("--once -o a.exr -o b.hdr --layers all", "b.hdr is none"),
+        ("--once --layers depth", "room.png is none"),
+        ("--once -o a.exr --layers depth,colour", "there is no layer \"colour\"; there are all, albedo"),
+        ("--once -o a.exr --layers depth --view normal", "goes with the view beauty"),
+        ("--once -o a.part --shard 1/2 --layers depth", "exclude each other"),
+        ("-o a.exr --layers depth", "--layers needs --once"),
+    ] {
+        let stderr = desk.expect(&format!("room.toml {options}"), 2);
+        assert!(stderr.contains(words), "{options}: {stderr}");
+    }
+}

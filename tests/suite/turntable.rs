@@ -1,0 +1,205 @@
+//! `--turntable`: pictures all around a scene or a model.
+
+use std::io::Cursor;
+use std::process::Stdio;
+use std::time::Duration;
+
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+
+use super::desk::Desk;
+
+const SMALL: &str = "--once --width 32 --height 24 --samples 2 --error 0";
+
+/// Four balls of different colours around a point, one on each side.
+fn around() -> Desk {
+    let desk = Desk::new();
+    let ball = |name: &str, color: &str, center: &str| {
+        format!(
+            "[materials.{name}]\ntype = \"phong\"\ndiffuse = 0\nemission = {color}\n\
+             [[sphere]]\ncenter = {center}\nradius = 0.8\nmaterial = \"{name}\"\n"
+        )
+    };
+    let balls = [
+        ("front", "[1, 0, 0]", "[0, 0, 2]"),
+        ("right", "[0, 1, 0]", "[2, 0, 0]"),
+        ("back", "[0, 0, 1]", "[0, 0, -2]"),
+        ("left", "[1, 1, 0]", "[-2, 0, 0]"),
+    ];
+    let camera = "[camera]\nposition = [0, 0, 6]\nlook_at = [0, 0, 0]\nfov = 20\n";
+    let balls: String = balls.iter().map(|(name, color, center)| ball(name, color, center)).collect();
+    desk.write("around.toml", format!("{camera}{balls}"));
+    desk
+}
+
+/// The pixel in the middle of a picture of 32 × 24.
+fn middle(rgb: &[u8]) -> [u8; 3] {
+    let at = 3 * (12 * 32 + 16);
+    [rgb[at], rgb[at + 1], rgb[at + 2]]
+}
+
+fn picture(desk: &Desk, name: &str) -> Vec<u8> {
+    image::open(desk.path(name)).expect("a picture").to_rgb8().into_raw()
+}
+
+/// The frames of an APNG.
+fn frames(bytes: &[u8]) -> Vec<Vec<u8>> {
+    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().expect("PNG");
+    let count = reader.info().animation_control().expect("it moves").num_frames;
+    let mut frame = || {
+        let mut pixels = vec![0; reader.output_buffer_size().expect("small")];
+        reader.next_frame(&mut pixels).expect("a frame");
+        pixels
+    };
+    (0..count).map(|_| frame()).collect()
+}
+
+#[test]
+fn the_camera_goes_around_in_numbered_files_and_in_one_that_moves() {
+    let desk = around();
+    let stderr =
+        desk.expect(&format!("around.toml {SMALL} --turntable 4 -o a_####.png -o a.apng -o a.gif"), 0);
+    let names = ["a_0001.png", "a_0002.png", "a_0003.png", "a_0004.png"];
+    let colors = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]];
+    let moving = frames(&desk.bytes("a.apng"));
+    assert_eq!(moving.len(), 4);
+    for ((name, color), frame) in names.iter().zip(colors).zip(moving) {
+        let still = picture(&desk, name);
+        assert_eq!(middle(&still), color, "{name}");
+        assert_eq!(still, frame, "{name}");
+    }
+    assert!(desk.bytes("a.gif").starts_with(b"GIF89a"));
+    assert_eq!(stderr.matches("wrote a_0003.png").count(), 1, "{stderr}");
+    assert!(stderr.contains("wrote a.gif (32×24, 4 frames)"), "{stderr}");
+    // The first one is the picture of the call without it.
+    desk.expect(&format!("around.toml {SMALL} -o single.png"), 0);
+    assert_eq!(picture(&desk, "single.png"), picture(&desk, "a_0001.png"));
+}
+
+#[test]
+fn files_and_trees_and_photons_are_made_once() {
+    let desk = Desk::new();
+    desk.write("knot.obj", std::fs::read("assets/knot.obj").expect("a mesh"));
+    desk.write(
+        "pool.toml",
+        "[camera]\nposition = [0, 2, 6]\nlook_at = [0, 0, 0]\n[photons]\nenabled = true\n[materials.m]\n\
+         [materials.g]\ntype = \"glass\"\n[[mesh]]\nfile = \"knot.obj\"\nmaterial = \"m\"\n[[sphere]]\n\
+         center = [0, 3, 0]\nradius = 0.5\nmaterial = \"g\"\n[[light]]\nposition = [0, 6, 0]\nintensity = 9\n",
+    );
+    desk.expect(&format!("pool.toml {SMALL} --turntable 3 -o a#.ppm --report r#.json"), 0);
+    for number in 2..=3 {
+        let text = std::fs::read_to_string(desk.path(&format!("r{number}.json"))).expect("a report");
+        let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(report["image"]["path"], format!("a{number}.ppm"));
+        let stages = report["stages"].as_array().expect("stages");
+        let status = |name: &str| {
+            let stage = stages.iter().find(|stage| stage["name"] == name).expect("a stage");
+            stage["status"].as_str().expect("text").to_owned()
+        };
+        for name in ["parse", "meshes", "accel", "lights", "photons"] {
+            assert_eq!(status(name), "reused", "{name} of {number}");
+        }
+        assert_eq!(status("render"), "done");
+    }
+}
+
+#[test]
+fn a_model_stays_in_the_frame() {
+    let desk = Desk::new();
+    // A long plank, seen from its end first.
+    desk.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nv -1 2 8\nv 0 3 0\nf 1 2 3 4\nf 1 2 5\nf 3 4 5\n");
+    desk.expect(&format!("plank.obj {SMALL} --turntable 4 --from front --view albedo -o b.apng"), 0);
+    for frame in frames(&desk.bytes("b.apng")) {
+        let row = |y: usize| frame[3 * 32 * y..3 * 32 * (y + 1)].to_vec();
+        let pixel = |y: usize, x: usize| row(y)[3 * x..3 * x + 3].to_vec();
+        // The ground's colour is at both edges of every row.
+        assert!((4..20).all(|y| pixel(y, 0) == pixel(y, 31)), "the model is not cut off");
+    }
+}
+
+#[test]
+fn what_a_turntable_cannot_be_is_refused_before_the_work() {
+    let desk = Desk::new();
+    let says = |line: &str, words: &str| {
+        let stderr = desk.expect(&format!("ball.toml {line}"), 2);
+        assert!(stderr.contains(words), "{line}: {stderr}");
+    };
+    says("--turntable 4 -o a.gif", "--turntable needs --once");
+    says("--once --turntable 4 -o a.png", "write a_####.png for a file each, or a .gif or .apng file");
+    says("--once -o a.gif", "a.gif is a moving picture, which --turntable N makes");
+    says("--once --turntable 0 -o a.gif", "from 1 to 10000");
+    says("--once --turntable 4 -o a.gif --shard 1/2", "--turntable and --shard exclude each other");
+    says("--once --turntable 4 -o a.gif --resume", "--resume is for a single picture");
+    says("--once --turntable 4 -o a.gif --report r.json", "--report r_####.json");
+    says("--once --turntable 4 -o a.gif --bit-depth 16", "8 bits a channel");
+    says("--once --turntable 4 -o a_#.gif -o a_#.xyz", ".xyz is not a format");
+    says("--once --turntable 4 -o a_#.png -o a_#.png", "given twice");
+    // A later picture would replace an input: nothing is rendered.
+    desk.write("a3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
+    let scene = format!("{}[textures.t]\nfile = \"a3.png\"\n", super::desk::SCENE);
+    desk.write("uses.toml", scene);
+    let stderr = desk.expect("uses.toml --once --turntable 4 -o a#.png", 2);
+    assert!(stderr.contains("cannot write a3.png"), "{stderr}");
+    assert!(!desk.path("a1.png").exists());
+    let stderr =
+        desk.expect("ball.toml --once --turntable 10000 -o a.gif --width 64 --height 64 --memory 30MiB", 1);
+    assert!(stderr.contains("the frames") && stderr.contains("render fewer or smaller frames"), "{stderr}");
+}
+
+/// Without a name they are those of the scene, and replace only what glimt wrote.
+#[test]
+fn default_names_replace_no_foreign_picture() {
+    let desk = Desk::new();
+    desk.expect("ball.toml --once --turntable 2", 0);
+    desk.expect("ball.toml --once --turntable 2 --seed 4", 0);
+    assert!(desk.path("ball_0002.png").exists() && !desk.path("ball.png").exists());
+    let foreign = std::fs::read("assets/textures/checker.png").expect("an image");
+    desk.write("ball_0002.png", &foreign);
+    let stderr = desk.expect("ball.toml --once --turntable 2 --seed 5", 2);
+    assert!(stderr.contains("cannot write ball_0002.png"), "{stderr}");
+    assert_eq!(desk.bytes("ball_0002.png"), foreign);
+    // A name in the scene is that of a single picture.
+    desk.write("named.toml", super::desk::SCENE.replace("samples = 2", "samples = 2\noutput = \"x.png\""));
+    desk.expect("named.toml --once --turntable 2", 0);
+    assert!(desk.path("x_0001.png").exists() && !desk.path("x.png").exists());
+}
+
+#[test]
+fn an_interrupted_turntable_leaves_whole_files_only() {
+    let desk = around();
+    let line = "around.toml --once --width 64 --height 48 --samples 1000 --error 0 --turntable 5000 -o a_#.png -o a.gif";
+    let mut process = desk.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
+    let begin = std::time::Instant::now();
+    while !desk.path("a_2.png").exists() {
+        assert!(begin.elapsed() < Duration::from_secs(60), "no second picture");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    kill(Pid::from_raw(process.id() as i32), Signal::SIGTERM).expect("it runs");
+    assert_eq!(process.wait().expect("it ends").code(), Some(143));
+    let names: Vec<String> = std::fs::read_dir(desk.path("."))
+        .expect("a folder")
+        .map(|entry| entry.expect("a file").file_name().into_string().expect("UTF-8"))
+        .collect();
+    let pictures: Vec<&String> = names.iter().filter(|name| name.ends_with(".png")).collect();
+    assert_eq!(pictures.len() + 2, names.len(), "nothing else is there: {names:?}");
+    pictures.iter().for_each(|name| assert_eq!(picture(&desk, name).len(), 64 * 48 * 3));
+}
+
+#[test]
+fn a_scene_that_changes_on_the_way_ends_its_turntable() {
+    let desk = around();
+    let line =
+        "around.toml --once --width 64 --height 48 --samples 200 --error 0 --turntable 5000 -o a_#.png";
+    let process = desk.glimt(line).stderr(Stdio::piped()).spawn().expect("it runs");
+    let begin = std::time::Instant::now();
+    while !desk.path("a_1.png").exists() {
+        assert!(begin.elapsed() < Duration::from_secs(60), "no picture");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let text = std::fs::read_to_string(desk.path("around.toml")).expect("a scene");
+    desk.write("around.toml", text.replace("radius = 0.8", "radius = 0.7"));
+    let output = process.wait_with_output().expect("it ends");
+    let stderr = String::from_utf8(output.stderr).expect("UTF-8");
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    assert!(stderr.contains("the pictures would not be of one turntable"), "{stderr}");
+}
