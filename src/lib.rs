@@ -111,7 +111,7 @@
 //! pipeline    -> integrators world assets scene film output lights materials math choice control system
 //! bench       -> pipeline compare output scene film math choice control
 //! tui         -> pipeline scene film math choice system
-//! cli         -> bench pipeline tui compare output scene film math choice control system
+//! cli         -> bench pipeline tui compare output scene accel film math choice control system
 //! ```
 //!
 //! ## What holds everywhere

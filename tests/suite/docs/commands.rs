@@ -12,7 +12,8 @@ use super::{Block, Page, pages, root};
 /// Programs that pages name and this test does not start.
 const OTHERS: [&str; 3] = ["cargo", "ssh", "tmux"];
 /// Commands of glimt other than rendering.
-const COMMANDS: [&str; 8] = ["check", "new", "import", "compare", "bench", "merge", "farm", "help"];
+const COMMANDS: [&str; 11] =
+    ["check", "new", "import", "compare", "bench", "merge", "farm", "completions", "man", "doctor", "help"];
 
 #[test]
 fn the_commands_of_every_page_run() {

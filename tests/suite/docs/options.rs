@@ -70,3 +70,14 @@ fn every_value_of_an_option_is_documented() {
         }
     }
 }
+
+#[test]
+fn the_page_has_the_variables_of_the_program() {
+    let rows = page("docs/command-line.md").rows("Environment variables");
+    let listed = glimt::cli::environment::VARIABLES;
+    let expected = listed.map(|(names, effect)| {
+        let names: Vec<String> = names.split(", ").map(|name| format!("`{name}`")).collect();
+        vec![names.join(", "), effect.to_owned()]
+    });
+    assert_eq!(rows, expected);
+}

@@ -6,12 +6,16 @@ pub mod args;
 mod bench;
 mod check;
 mod compare;
+mod completions;
 mod console;
+mod doctor;
+pub mod environment;
 mod exit;
 mod farm;
 mod import;
 mod live;
 mod lower;
+mod man;
 mod merge;
 mod new;
 mod once;
@@ -36,6 +40,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     // Without the handler an abort ends the process as it always did.
     let _ = crate::system::abort::catch();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
+    if let Some(exit) = completions::answer(&arguments) {
+        return exit;
+    }
+    if arguments.len() <= 1 {
+        return bare();
+    }
     let args = match Args::try_parse_from(&arguments) {
         Ok(args) => args,
         Err(error) => return misunderstood(&error, &arguments),
@@ -49,6 +59,9 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::Bench(args)) => bench::run(&args, &console),
         Some(Subcommand::Merge(args)) => merge::run(&args, &console),
         Some(Subcommand::Farm(args)) => farm::run(&args, &console),
+        Some(Subcommand::Completions { shell }) => completions::run(shell, &console),
+        Some(Subcommand::Man { command }) => man::run(command.as_deref(), &console),
+        Some(Subcommand::Doctor) => doctor::run(&console),
         None => match lower::lower(args.render) {
             Ok(order) => match no_command(&order.scene) {
                 Some(message) => console.fail(Exit::WRONG, &message),
@@ -59,6 +72,22 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         },
     };
     console.end(exit)
+}
+
+/// The way to begin, for a call without a word.
+const BEGIN: &str = "\
+glimt renders a scene file here in the terminal, again on every save.
+
+  glimt new ball.toml     write a scene to start from
+  glimt ball.toml         see it; edit it in an editor, save, and see it again
+  glimt helmet.glb        see a model
+
+`glimt -h` lists commands and options.";
+
+/// A call without a word: no scene is given, which is wrong, and the way to one is shown.
+fn bare() -> Exit {
+    Console::new(crate::tui::ColorChoice::Auto).say_lines(BEGIN);
+    Exit::WRONG
 }
 
 /// Help and the version are answers; everything else is a wrong call.

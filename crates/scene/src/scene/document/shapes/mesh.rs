@@ -4,16 +4,13 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 
 use super::super::super::description::{Located, Mesh, MeshFile, Placement, Shape};
+use super::super::super::keys::endings::{GLTF, MESHES};
 use super::super::context::Issue;
 use super::super::key::Key;
 use super::super::limits::Limits;
 use super::super::table::Table;
-use super::super::textures::GLTF;
 use crate::math::DVec3;
 use crate::math::limits::{SHORTEST, is_too_short, length};
-
-/// Endings of mesh files that can be read.
-pub(super) const MESHES: [&str; 6] = ["obj", "off", "ply", "stl", "glb", "gltf"];
 
 /// The mesh files named so far, each once, however it is written.
 #[derive(Default)]
@@ -38,7 +35,7 @@ impl MeshFiles {
 }
 
 pub(super) fn read(table: &Table<'_>, files: &mut MeshFiles) -> Option<Shape> {
-    let file = table.required("file", "\"mesh.obj\"").file(&MESHES, &[]);
+    let file = table.required("file", "\"mesh.obj\"").file(MESHES, &[]);
     let part = part(table, file.as_ref());
     let placed = placement(table);
     let smooth = table.optional("smooth").flag().unwrap_or(true);

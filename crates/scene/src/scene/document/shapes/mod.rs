@@ -14,6 +14,7 @@ mod triangle;
 use std::path::Path;
 
 use super::super::description::{MeshFile, Object, Shape};
+use super::super::keys::endings::MESHES;
 use super::context::Issue;
 use super::limits::Limits;
 use super::materials::Materials;
@@ -145,5 +146,5 @@ fn span_area(u: DVec3, v: DVec3) -> bool {
 /// Whether a file is a mesh by its name, of any version of glimt.
 pub(in crate::scene) fn is_mesh(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    mesh::MESHES.iter().any(|known| *known == ending)
+    MESHES.iter().any(|known| *known == ending)
 }
