@@ -28,6 +28,7 @@ mod options;
 mod output;
 mod parts;
 mod same_bits;
+mod schema;
 mod shell;
 mod shown;
 mod stress;

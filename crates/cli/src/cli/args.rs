@@ -87,6 +87,8 @@ impl Args {
                 Subcommand::New { .. }
                 | Subcommand::Completions { .. }
                 | Subcommand::Man { .. }
+                | Subcommand::Explain { .. }
+                | Subcommand::Schema { .. }
                 | Subcommand::Doctor,
             )
             | None => self.render.color,
@@ -105,6 +107,9 @@ pub enum Subcommand {
         /// Another value for a key of the scene, as in a render
         #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE")]
         sets: Vec<String>,
+        /// One JSON object on stdout, with a list of what is wrong, in place of messages
+        #[arg(long)]
+        json: bool,
         /// Colours of the messages
         #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
         color: ColorChoice,
@@ -113,6 +118,9 @@ pub enum Subcommand {
     New {
         /// The file to write; - is stdout
         file: PathBuf,
+        /// Begin it with a line that leads an editor to the schema, and write that beside it
+        #[arg(long)]
+        schema: bool,
     },
     /// Make a scene of a glTF file, with its meshes as PLY files and its images beside it; refuses to overwrite
     #[command(after_help = IMPORT_HELP)]
@@ -142,6 +150,20 @@ pub enum Subcommand {
         /// The command
         command: Option<String>,
     },
+    /// Print what a key of a scene means: type, unit, default, range
+    #[command(after_help = EXPLAIN_HELP)]
+    Explain {
+        /// The key, as in render.samples, materials.metal.roughness or samples; a table lists its keys
+        #[arg(add = candidates::keys())]
+        key: Option<String>,
+    },
+    /// Print the JSON Schema of a scene, by which editors complete keys and find mistakes
+    #[command(after_help = SCHEMA_HELP)]
+    Schema {
+        /// The draft of JSON Schema
+        #[arg(long, value_parser = one_of::<Draft>(), default_value = "4", value_name = "DRAFT")]
+        draft: Draft,
+    },
     /// Report what glimt finds here: terminal, colours, protocols, processor, threads, cache
     #[command(after_help = DOCTOR_HELP)]
     Doctor,
@@ -161,6 +183,41 @@ const MAN_HELP: &str = "\
   glimt man | man -l -                     read it
   glimt man > ~/.local/share/man/man1/glimt.1
   glimt man check > ~/.local/share/man/man1/glimt-check.1";
+
+const EXPLAIN_HELP: &str = "\
+  glimt explain                               all tables
+  glimt explain sphere                        the keys of a table
+  glimt explain render.samples
+  glimt explain materials.metal.roughness     of one type; materials.roughness is that of all types
+  glimt explain roughness                     wherever it occurs
+
+Exit codes: 0 explained; 2 there is no such key.";
+
+const SCHEMA_HELP: &str = "\
+A scene that begins with the line
+  #:schema glimt.schema.json
+has the schema beside it in editors with Taplo (VS Code: Even Better TOML; also Helix, Neovim, Zed). `glimt new --schema`
+writes both. Names of materials, files and geometry are left to `glimt check`.";
+
+choice! {
+    /// Drafts of JSON Schema.
+    pub enum Draft {
+        /// Draft 4, which Taplo reads.
+        Four = "4",
+        /// Draft 2020-12.
+        Latest = "2020-12",
+    }
+}
+
+impl Draft {
+    /// The name by which a schema says its draft.
+    pub(super) fn uri(self) -> &'static str {
+        match self {
+            Self::Four => "http://json-schema.org/draft-04/schema#",
+            Self::Latest => "https://json-schema.org/draft/2020-12/schema",
+        }
+    }
+}
 
 const DOCTOR_HELP: &str = "\
 On a terminal it asks the terminal what it is and does, and waits a second at most for answers. The exit code is 0

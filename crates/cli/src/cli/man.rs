@@ -40,11 +40,13 @@ pub(super) fn run(command: Option<&str>, console: &Console) -> Exit {
 fn page(command: clap::Command, is_whole: bool) -> std::io::Result<String> {
     let name = command.get_display_name().unwrap_or("glimt").to_owned();
     let notes = command.get_after_help().map(ToString::to_string);
+    let usage = command.clone().render_usage().to_string();
     let man = Man::new(command.clone().display_name(name).version(env!("CARGO_PKG_VERSION")));
     let mut bytes = Vec::new();
     man.render_title(&mut bytes)?;
     man.render_name_section(&mut bytes)?;
-    man.render_synopsis_section(&mut bytes)?;
+    // Every option in a row would be half a page.
+    section("SYNOPSIS", usage.trim_start_matches("Usage:").trim()).to_writer(&mut bytes)?;
     man.render_description_section(&mut bytes)?;
     man.render_options_section(&mut bytes)?;
     if is_whole {
@@ -63,7 +65,9 @@ fn section(heading: &str, lines: &str) -> Roff {
     let mut roff = Roff::default();
     roff.control("SH", [heading]);
     roff.control("nf", []);
-    lines.lines().for_each(|line| drop(roff.text([roman(line)])));
+    for line in lines.lines() {
+        roff.text([roman(line)]);
+    }
     roff.control("fi", []);
     roff
 }

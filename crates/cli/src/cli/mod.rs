@@ -11,6 +11,7 @@ mod console;
 mod doctor;
 pub mod environment;
 mod exit;
+mod explain;
 mod farm;
 mod import;
 mod live;
@@ -20,6 +21,7 @@ mod merge;
 mod new;
 mod once;
 mod progress;
+pub mod schema;
 mod signals;
 
 use std::ffi::OsString;
@@ -52,8 +54,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     };
     let console = Console::new(args.color());
     let exit = match args.command {
-        Some(Subcommand::Check { scene, sets, .. }) => check::run(&scene, &sets, &console),
-        Some(Subcommand::New { file }) => new::run(&file, &console),
+        Some(Subcommand::Check { scene, sets, json, .. }) => check::run(&scene, &sets, json, &console),
+        Some(Subcommand::New { file, schema }) => new::run(&file, schema, &console),
         Some(Subcommand::Import(args)) => import::run(&args, &console),
         Some(Subcommand::Compare(args)) => compare::run(&args, &console),
         Some(Subcommand::Bench(args)) => bench::run(&args, &console),
@@ -61,6 +63,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::Farm(args)) => farm::run(&args, &console),
         Some(Subcommand::Completions { shell }) => completions::run(shell, &console),
         Some(Subcommand::Man { command }) => man::run(command.as_deref(), &console),
+        Some(Subcommand::Explain { key }) => explain::run(key.as_deref(), &console),
+        Some(Subcommand::Schema { draft }) => schema::run(draft, &console),
         Some(Subcommand::Doctor) => doctor::run(&console),
         None => match lower::lower(args.render) {
             Ok(order) => match no_command(&order.scene) {

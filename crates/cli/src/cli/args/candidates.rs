@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter};
 
 use crate::scene::keys::key::{Form, KeyInfo, Kind};
-use crate::scene::keys::tables;
+use crate::scene::keys::{paths, tables};
 use crate::scene::outline::{OutlineTable, outline};
 use crate::scene::{is_mesh, text_now};
 
@@ -37,6 +37,16 @@ pub(in crate::cli) fn sets() -> ArgValueCompleter {
         let scene = std::env::args_os().map(PathBuf::from).find(|word| is_scene(word));
         let text = scene.and_then(|scene| text_now(&scene).ok());
         candidates(text.as_deref().unwrap_or_default(), current)
+    })
+}
+
+/// Completes the paths of keys, as `glimt explain` takes them.
+pub(in crate::cli) fn keys() -> ArgValueCompleter {
+    ArgValueCompleter::new(|current: &OsStr| {
+        let Some(current) = current.to_str() else { return Vec::new() };
+        let all = paths().into_iter().filter(|(path, _)| path.starts_with(current));
+        all.map(|(path, doc)| CompletionCandidate::new(path).help(Some(doc.replace('`', "").into())))
+            .collect()
     })
 }
 
