@@ -12,8 +12,21 @@ use super::{Block, Page, pages, root};
 /// Programs that pages name and this test does not start.
 const OTHERS: [&str; 3] = ["cargo", "ssh", "tmux"];
 /// Commands of glimt other than rendering.
-const COMMANDS: [&str; 11] =
-    ["check", "new", "import", "compare", "bench", "merge", "farm", "completions", "man", "doctor", "help"];
+const COMMANDS: [&str; 13] = [
+    "check",
+    "new",
+    "import",
+    "compare",
+    "bench",
+    "merge",
+    "farm",
+    "explain",
+    "schema",
+    "completions",
+    "man",
+    "doctor",
+    "help",
+];
 
 #[test]
 fn the_commands_of_every_page_run() {

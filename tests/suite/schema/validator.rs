@@ -5,35 +5,50 @@ use serde_json::{Map, Value};
 /// The paths of values that are not as a schema has them, as in `sphere.0.radius`, each with the keyword that says so.
 pub(super) fn faults(schema: &Value, value: &Value) -> Vec<(String, String)> {
     let mut found = Vec::new();
-    check(schema, value, "", &mut found);
+    check(schema, schema, value, "", &mut found);
     found
 }
 
-fn is_valid(schema: &Value, value: &Value) -> bool {
-    faults(schema, value).is_empty()
+fn is_valid(root: &Value, schema: &Value, value: &Value) -> bool {
+    let mut found = Vec::new();
+    check(root, schema, value, "", &mut found);
+    found.is_empty()
 }
 
-fn check(schema: &Value, value: &Value, path: &str, found: &mut Vec<(String, String)>) {
+/// Checks a value against a schema within the whole one, `root`.
+fn check(root: &Value, schema: &Value, value: &Value, path: &str, found: &mut Vec<(String, String)>) {
     let Value::Object(keywords) = schema else { return };
+    if let Some(Value::String(reference)) = keywords.get("$ref") {
+        let target = root.pointer(reference.trim_start_matches('#')).expect("a definition");
+        check(root, target, value, path, found);
+    }
     for (keyword, condition) in keywords {
-        if !holds(keyword, condition, value, keywords) {
+        if !holds(root, keyword, condition, value, keywords) {
             found.push((path.to_owned(), keyword.clone()));
         }
-        inside(keyword, condition, value, keywords, path, found);
+        inside(root, keyword, condition, value, keywords, path, found);
     }
 }
 
 /// Whether a value is as one keyword has it, what lies inside aside.
-fn holds(keyword: &str, condition: &Value, value: &Value, keywords: &Map<String, Value>) -> bool {
+fn holds(
+    root: &Value,
+    keyword: &str,
+    condition: &Value,
+    value: &Value,
+    keywords: &Map<String, Value>,
+) -> bool {
     let all = || condition.as_array().expect("a list").iter();
     let limit = || condition.as_f64().expect("a number");
     let flag = |name: &str| keywords.get(name) == Some(&Value::Bool(true));
     match (keyword, value) {
         ("type", _) => is_of_type(condition.as_str().expect("a type"), value),
-        ("enum", _) => all().any(|one| one == value || one.as_f64().is_some_and(|one| value.as_f64() == Some(one))),
-        ("not", _) => !is_valid(condition, value),
-        ("anyOf", _) => all().any(|one| is_valid(one, value)),
-        ("oneOf", _) => all().filter(|one| is_valid(one, value)).count() == 1,
+        ("enum", _) => {
+            all().any(|one| one == value || one.as_f64().is_some_and(|one| value.as_f64() == Some(one)))
+        }
+        ("not", _) => !is_valid(root, condition, value),
+        ("anyOf", _) => all().any(|one| is_valid(root, one, value)),
+        ("oneOf", _) => all().filter(|one| is_valid(root, one, value)).count() == 1,
         ("required", Value::Object(map)) => all().all(|key| map.contains_key(key.as_str().expect("a key"))),
         ("minItems", Value::Array(items)) => items.len() as f64 >= limit(),
         ("maxItems", Value::Array(items)) => items.len() as f64 <= limit(),
@@ -46,20 +61,45 @@ fn holds(keyword: &str, condition: &Value, value: &Value, keywords: &Map<String,
             let number = number.as_f64().expect("a number");
             number < limit() || number == limit() && !flag("exclusiveMaximum")
         }
-        ("exclusiveMinimum", Value::Number(number)) if condition.is_number() => number.as_f64() > Some(limit()),
-        ("exclusiveMaximum", Value::Number(number)) if condition.is_number() => number.as_f64() < Some(limit()),
+        ("exclusiveMinimum", Value::Number(number)) if condition.is_number() => {
+            number.as_f64() > Some(limit())
+        }
+        ("exclusiveMaximum", Value::Number(number)) if condition.is_number() => {
+            number.as_f64() < Some(limit())
+        }
         ("pattern", Value::String(text)) => matches(condition.as_str().expect("a pattern"), text),
         (
-            "required" | "minItems" | "maxItems" | "minLength" | "minimum" | "maximum" | "exclusiveMinimum"
-            | "exclusiveMaximum" | "pattern" | "properties" | "additionalProperties" | "items" | "allOf" | "if" | "then"
-            | "dependencies" | "dependentSchemas" | "title" | "description" | "default" | "$schema" | "x-taplo",
+            "required"
+            | "minItems"
+            | "maxItems"
+            | "minLength"
+            | "minimum"
+            | "maximum"
+            | "exclusiveMinimum"
+            | "exclusiveMaximum"
+            | "pattern"
+            | "properties"
+            | "additionalProperties"
+            | "items"
+            | "allOf"
+            | "if"
+            | "then"
+            | "dependencies"
+            | "dependentSchemas"
+            | "definitions"
+            | "$defs"
+            | "$ref"
+            | "default"
+            | "x-taplo",
             _,
         ) => true,
+        ("title" | "description" | "$schema", _) => condition.is_string(),
         (unknown, _) => panic!("a keyword that this validator does not know: {unknown}"),
     }
 }
 
 fn inside(
+    root: &Value,
     keyword: &str,
     condition: &Value,
     value: &Value,
@@ -73,7 +113,7 @@ fn inside(
         ("properties", Value::Object(map)) => {
             for (key, schema) in condition.as_object().expect("schemas") {
                 if let Some(value) = map.get(key) {
-                    check(schema, value, &below(key), found);
+                    check(root, schema, value, &below(key), found);
                 }
             }
         }
@@ -81,24 +121,24 @@ fn inside(
             for (key, value) in map.iter().filter(|(key, _)| !known(key)) {
                 match condition {
                     Value::Bool(false) => found.push((below(key), keyword.to_owned())),
-                    schema => check(schema, value, &below(key), found),
+                    schema => check(root, schema, value, &below(key), found),
                 }
             }
         }
         ("items", Value::Array(items)) => {
             for (index, item) in items.iter().enumerate() {
-                check(condition, item, &below(&index.to_string()), found);
+                check(root, condition, item, &below(&index.to_string()), found);
             }
         }
         ("allOf", _) => {
             let all = condition.as_array().expect("a list");
-            all.iter().for_each(|one| check(one, value, path, found));
+            all.iter().for_each(|one| check(root, one, value, path, found));
         }
-        ("if", _) if is_valid(condition, value) => check(&keywords["then"], value, path, found),
+        ("if", _) if is_valid(root, condition, value) => check(root, &keywords["then"], value, path, found),
         ("dependencies" | "dependentSchemas", Value::Object(map)) => {
             let schemas = condition.as_object().expect("schemas");
             let given = schemas.iter().filter(|(key, _)| map.contains_key(*key));
-            given.for_each(|(_, schema)| check(schema, value, path, found));
+            given.for_each(|(_, schema)| check(root, schema, value, path, found));
         }
         _ => {}
     }
@@ -130,11 +170,12 @@ fn matches(pattern: &str, text: &str) -> bool {
     };
     let Some(text) = text.map(str::to_ascii_lowercase) else { return false };
     words.split('|').any(|word| match word {
-        "#[0-9A-Fa-f]{6}" => text.strip_prefix('#').is_some_and(|digits| {
-            digits.len() == 6 && digits.chars().all(|digit| digit.is_ascii_hexdigit())
-        }),
+        "#[0-9A-Fa-f]{6}" => text
+            .strip_prefix('#')
+            .is_some_and(|digits| digits.len() == 6 && digits.chars().all(|digit| digit.is_ascii_hexdigit())),
         word => {
-            let plain: String = word.chars().filter(|c| c.is_ascii_lowercase() || c.is_ascii_digit()).collect();
+            let plain: String =
+                word.chars().filter(|c| c.is_ascii_lowercase() || c.is_ascii_digit()).collect();
             plain == text
         }
     })

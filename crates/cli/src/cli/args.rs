@@ -210,6 +210,14 @@ choice! {
 }
 
 impl Draft {
+    /// The key that holds definitions.
+    pub(super) fn definitions(self) -> &'static str {
+        match self {
+            Self::Four => "definitions",
+            Self::Latest => "$defs",
+        }
+    }
+
     /// The name by which a schema says its draft.
     pub(super) fn uri(self) -> &'static str {
         match self {

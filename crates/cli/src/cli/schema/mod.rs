@@ -7,7 +7,7 @@ mod value;
 
 use serde_json::{Map, Value, json};
 
-use self::value::value;
+use self::value::{value, written_color};
 use super::args::Draft;
 use super::console::Console;
 use super::exit::Exit;
@@ -35,7 +35,7 @@ pub fn text(draft: Draft) -> String {
 pub fn schema(draft: Draft) -> Value {
     let properties: Map<String, Value> =
         tables().iter().map(|info| (info.name.to_owned(), in_file(info, draft))).collect();
-    json!({
+    let mut schema = json!({
         "$schema": draft.uri(),
         "title": "A scene of glimt",
         "description": "See `glimt explain KEY`, and `glimt new FILE` for a commented scene.",
@@ -43,23 +43,21 @@ pub fn schema(draft: Draft) -> Value {
         "properties": properties,
         "required": ["camera"],
         "additionalProperties": false,
-    })
+    });
+    schema[draft.definitions()] = json!({ "color": written_color() });
+    schema
 }
 
 /// A table as the file holds it: once, by names, or in a list.
 fn in_file(info: &'static TableInfo, draft: Draft) -> Value {
-    let mut one = table(info, draft);
-    match info.form {
+    let one = table(info, draft);
+    let mut all = match info.form {
         Form::Single => one,
-        Form::Named => {
-            let doc = std::mem::take(&mut one["description"]);
-            json!({ "type": "object", "description": doc, "additionalProperties": one })
-        }
-        Form::List => {
-            let doc = std::mem::take(&mut one["description"]);
-            json!({ "type": "array", "description": doc, "items": one })
-        }
-    }
+        Form::Named => json!({ "type": "object", "additionalProperties": one }),
+        Form::List => json!({ "type": "array", "items": one }),
+    };
+    all["description"] = info.doc.into();
+    all
 }
 
 fn table(info: &'static TableInfo, draft: Draft) -> Value {
@@ -68,7 +66,6 @@ fn table(info: &'static TableInfo, draft: Draft) -> Value {
         (false, Draft::Four) => of_all_types(info),
         (false, Draft::Latest) => by_type(info),
     };
-    table["description"] = info.doc.into();
     for (name, condition) in conditions(info.name, draft) {
         table[name] = condition;
     }

@@ -79,22 +79,25 @@ fn numbers(count: usize, limits: Limits, draft: Draft) -> Value {
 
 /// The forms of a colour.
 fn colors(limits: Limits, draft: Draft) -> Vec<Value> {
+    let written = json!({ "$ref": format!("#/{}/color", draft.definitions()) });
+    vec![number(limits, draft), numbers(3, limits, draft), written]
+}
+
+/// A colour as a text.
+pub(super) fn written_color() -> Value {
     let mut names: Vec<&str> = color_names().collect();
     names.sort_unstable();
-    vec![
-        number(limits, draft),
-        numbers(3, limits, draft),
-        json!({ "enum": names }),
-        json!({ "type": "string", "pattern": color_pattern() }),
-    ]
+    json!({
+        "description": "An sRGB colour: `#rrggbb`, or the name that CSS has for it, in any case.",
+        "anyOf": [{ "enum": names }, { "type": "string", "pattern": color_pattern(&names) }],
+    })
 }
 
 /// `#rrggbb`, or a name in any case.
-fn color_pattern() -> String {
+fn color_pattern(names: &[&str]) -> String {
     let in_any_case =
         |text: &str| text.chars().map(|c| format!("[{}{c}]", c.to_ascii_uppercase())).collect::<String>();
-    let mut names: Vec<String> = color_names().map(in_any_case).collect();
-    names.sort_unstable();
+    let names: Vec<String> = names.iter().map(|name| in_any_case(name)).collect();
     format!("^(#[0-9A-Fa-f]{{6}}|{})$", names.join("|"))
 }
 
