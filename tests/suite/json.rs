@@ -88,7 +88,7 @@ fn check_says_as_json_what_it_says_in_words() {
     assert_eq!((&unknown["severity"], &unknown["file"]), (&Value::from("error"), &Value::from("ball.toml")));
     assert_eq!(unknown["label"], "did you mean `width`?");
     assert!(unknown["help"].as_str().is_some_and(|help| help.starts_with("expected one of `width`")));
-    assert_eq!(of("unknown key `raduis`")["line"], 18);
+    assert_eq!(of("unknown key `raduis`")["line"], 17);
     assert_eq!(of("`samples` must be")["file"], "--set");
 }
 

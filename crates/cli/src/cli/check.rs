@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::console::Console;
 use super::exit::Exit;
-use crate::output::json::line;
+use crate::output::json::in_a_line;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::{Checked, check};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -40,7 +40,7 @@ fn in_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
     let all: Vec<Value> = diagnostics.iter().map(diagnostic).collect();
     let scene = scene.to_string_lossy();
     let report = json!({ "scene": scene, "ok": exit == Exit::DONE, "diagnostics": all });
-    match line(&report) {
+    match in_a_line(&report) {
         Ok(line) => console.text(&format!("{line}\n")),
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot write JSON: {error}")),
     }
