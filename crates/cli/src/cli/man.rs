@@ -27,7 +27,7 @@ pub(super) fn run(command: Option<&str>, console: &Console) -> Exit {
         };
         return console.fail(Exit::WRONG, &format!("there is no command {name:?}: {help}"));
     };
-    match page(found.clone(), command.is_none()) {
+    match page(found, command.is_none()) {
         Ok(text) => {
             console.text(&text);
             Exit::DONE
@@ -37,7 +37,7 @@ pub(super) fn run(command: Option<&str>, console: &Console) -> Exit {
 }
 
 /// The page; that of the program has the sections that hold for all commands.
-fn page(command: clap::Command, is_whole: bool) -> std::io::Result<String> {
+fn page(command: &clap::Command, is_whole: bool) -> std::io::Result<String> {
     let name = command.get_display_name().unwrap_or("glimt").to_owned();
     let notes = command.get_after_help().map(ToString::to_string);
     let usage = command.clone().render_usage().to_string();

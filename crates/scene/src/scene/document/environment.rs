@@ -3,7 +3,6 @@
 use super::super::description::{Environment, Scene};
 use super::super::keys::endings::MAPS;
 use super::context::Issue;
-use super::limits::Limits;
 use super::table::Table;
 use crate::math::Vec3;
 
@@ -18,7 +17,7 @@ pub(super) fn read(root: &Table<'_>) -> Option<Option<Environment>> {
     let default = if file.is_given() { Vec3::ONE } else { Vec3::ZERO };
     let radiance = if color.is_given() { color.color() } else { Some(default) };
     let rotate = table.optional("rotate");
-    let degrees = if rotate.is_given() { rotate.number(Limits::Any) } else { Some(0.0) };
+    let degrees = if rotate.is_given() { rotate.number(table.limits("rotate")) } else { Some(0.0) };
     table.finish();
     if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.span().filter(|_| file.is_given())) {
         let issue =

@@ -34,7 +34,7 @@ fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
     let (file, image) = image(table);
     let filter = table.optional("filter").choice().unwrap_or(TextureFilter::Bilinear);
     let wrap = table.optional("wrap").choice().unwrap_or(Wrap::Repeat);
-    let repeat = table.optional("repeat").pair(Limits::NotZero).unwrap_or(Vec2::ONE);
+    let repeat = table.optional("repeat").pair(table.limits("repeat")).unwrap_or(Vec2::ONE);
     let rotate = table.optional("rotate").number(Limits::Any).unwrap_or(0.0);
     let offset = table.optional("offset").pair(Limits::Any).unwrap_or(Vec2::ZERO);
     let encoding = table.optional("encoding").choice().unwrap_or(Encoding::Auto);
@@ -52,7 +52,7 @@ fn image(table: &Table<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
     if !number.is_given() {
         return (key.file(MAPS, &[]), Some(None));
     }
-    (key.file(GLTF, &[]), number.whole(0..=i128::from(u32::MAX)).map(Some))
+    (key.file(GLTF, &[]), number.whole(table.range("image")).map(Some))
 }
 
 /// Reports a set of texture coordinates other than the first: no mesh file has more.

@@ -47,7 +47,7 @@ pub(super) fn read(table: &Table<'_>, files: &mut MeshFiles) -> Option<Shape> {
 fn part(table: &Table<'_>, file: Option<&Located<PathBuf>>) -> Option<Option<u32>> {
     let key = table.optional("part");
     let Some(span) = key.span() else { return Some(None) };
-    let number = key.whole(0..=i128::from(u32::MAX)).map(Some);
+    let number = key.whole(table.range("part")).map(Some);
     let ending = file.and_then(|file| file.value.extension()).unwrap_or_default().to_ascii_lowercase();
     if file.is_some() && !GLTF.iter().any(|known| ending == *known) {
         key.context.report(Issue::error(span, "`part` is for .glb and .gltf files: others have no parts"));
@@ -71,7 +71,7 @@ fn placement(table: &Table<'_>) -> Option<Placement> {
     }
     let [scale, rotate, translate] = steps;
     Some(Placement::Steps {
-        scale: scale.scale(Limits::NotZero).unwrap_or(DVec3::ONE),
+        scale: scale.scale(table.limits("scale")).unwrap_or(DVec3::ONE),
         rotate: rotate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
         translate: translate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
     })

@@ -131,7 +131,7 @@ fn axis_ends(table: &Table<'_>, names: [&'static str; 2], what: &str) -> Option<
 /// A length by its key or else a default.
 fn length(table: &Table<'_>, name: &'static str, default: f64) -> Option<f64> {
     let key = table.optional(name);
-    if key.is_given() { key.number(Limits::Length) } else { Some(default) }
+    if key.is_given() { key.number(table.limits(name)) } else { Some(default) }
 }
 
 /// Whether two edges span an area: neither is 0, and the sine of the angle between them is not lost to rounding.
