@@ -327,11 +327,11 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
     let desk = Desk::new();
     for (call, words) in [
         (
-            "schema",
-            "there is no command \"schema\", nor a scene of that name: there are check, new, import, compare, bench",
+            "paint",
+            "there is no command \"paint\", nor a scene of that name: there are check, new, import, compare, bench",
         ),
-        ("man", "there is no command \"man\", nor a scene of that name"),
-        ("completions zsh", "there is no command \"completions\", nor a scene of that name"),
+        ("turn", "there is no command \"turn\", nor a scene of that name"),
+        ("finish zsh", "there is no command \"finish\", nor a scene of that name"),
         ("chek --once", "did you mean `check`?"),
         ("--once compar", "did you mean `compare`?"),
     ] {
