@@ -18,6 +18,7 @@ mod inputs;
 mod json;
 mod keeping;
 mod kernel;
+mod library;
 mod models;
 mod mutation;
 #[cfg(target_os = "linux")]

@@ -1,9 +1,7 @@
 //! `[materials.NAME]`.
 
 use super::key::Default::{Absent, By, Is};
-use super::key::Kind::{
-    Color, ColorOrTexture, Emission, Flag, Heights, Number, NumberOrTexture, Texture, Words,
-};
+use super::key::Kind::{ColorOrTexture, Emission, Flag, Heights, Number, NumberOrTexture, Texture, Words};
 use super::key::{Form, TableInfo, TypeInfo, key, words};
 use super::limits::Limits::{Any, AtLeast, Between};
 use crate::materials::metal::elements::Element;
@@ -87,7 +85,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
             doc: "A perfect mirror",
             keys: &[key(
                 "reflectance",
-                Color(Between(0.0, 1.0)),
+                ColorOrTexture(Between(0.0, 1.0)),
                 "reflectance",
                 Is("[0.9, 0.9, 0.9]"),
                 "Share of the light that a smooth conductor reflects",
@@ -113,10 +111,10 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
                 ),
                 key(
                     "tint",
-                    Color(Between(0.0, 1.0)),
+                    ColorOrTexture(Between(0.0, 1.0)),
                     "per unit of length",
                     Is("[1, 1, 1]"),
-                    "Transmittance of one unit of length inside (Beer's law); that of a thin pane at any angle",
+                    "Transmittance of one unit of length inside (Beer's law); that of a thin pane at any angle, which may be a texture",
                 ),
                 key("thin", Flag, "", Is("false"), "Whether it is a pane without thickness"),
             ],
