@@ -19,6 +19,7 @@ mod json;
 mod keeping;
 mod kernel;
 mod library;
+mod lsp;
 mod models;
 mod mutation;
 #[cfg(target_os = "linux")]

@@ -357,8 +357,8 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
         let stderr = desk.expect(call, 2);
         assert!(stderr.contains("there is no such scene file") && stderr.contains(words), "{call}: {stderr}");
     }
-    desk.write("schema", SCENE);
-    desk.expect("schema --once -o a.png", 0);
+    desk.write("paint", SCENE);
+    desk.expect("paint --once -o a.png", 0);
 }
 
 /// Checks the way out in the message: the stacks of so many threads take more than the limit.

@@ -12,7 +12,7 @@ use super::{Block, Page, pages, root};
 /// Programs that pages name and this test does not start.
 const OTHERS: [&str; 3] = ["cargo", "ssh", "tmux"];
 /// Commands of glimt other than rendering.
-const COMMANDS: [&str; 13] = [
+const COMMANDS: [&str; 14] = [
     "check",
     "new",
     "import",
@@ -22,6 +22,7 @@ const COMMANDS: [&str; 13] = [
     "farm",
     "explain",
     "schema",
+    "lsp",
     "completions",
     "man",
     "doctor",

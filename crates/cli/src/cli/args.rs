@@ -89,6 +89,7 @@ impl Args {
                 | Subcommand::Man { .. }
                 | Subcommand::Explain { .. }
                 | Subcommand::Schema { .. }
+                | Subcommand::Lsp { .. }
                 | Subcommand::Doctor,
             )
             | None => self.render.color,
@@ -164,6 +165,13 @@ pub enum Subcommand {
         #[arg(long, value_parser = one_of::<Draft>(), default_value = "4", value_name = "DRAFT")]
         draft: Draft,
     },
+    /// Serve an editor as a language server, over stdin and stdout
+    #[command(after_help = LSP_HELP)]
+    Lsp {
+        /// Accepted and without effect: there is no other way to talk
+        #[arg(long, hide = true)]
+        stdio: bool,
+    },
     /// Report what glimt finds here: terminal, colours, protocols, processor, threads, cache
     #[command(after_help = DOCTOR_HELP)]
     Doctor,
@@ -226,6 +234,10 @@ impl Draft {
         }
     }
 }
+
+const LSP_HELP: &str = "\
+Mistakes while you type, completion of keys, words and names, what a key means, definitions of names, colours.
+The editor starts it for scenes; docs/editors.md has the lines for Neovim, Helix and others.";
 
 const DOCTOR_HELP: &str = "\
 On a terminal it asks the terminal what it is and does, and waits a second at most for answers. The exit code is 0

@@ -16,6 +16,7 @@ mod farm;
 mod import;
 mod live;
 mod lower;
+mod lsp;
 mod man;
 mod merge;
 mod new;
@@ -65,6 +66,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         Some(Subcommand::Man { command }) => man::run(command.as_deref(), &console),
         Some(Subcommand::Explain { key }) => explain::run(key.as_deref(), &console),
         Some(Subcommand::Schema { draft }) => schema::run(draft, &console),
+        Some(Subcommand::Lsp { .. }) => lsp::run(&console),
         Some(Subcommand::Doctor) => doctor::run(&console),
         None => match lower::lower(args.render) {
             Ok(order) => match no_command(&order.scene) {
