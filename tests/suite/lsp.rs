@@ -33,12 +33,12 @@ impl Editor {
         let uri = format!("file://{}", desk.path("scene.toml").display());
         let mut editor = Self { child, keys, screen: BufReader::new(screen), uri, next: 0, version: 1, desk };
         let answer =
-            editor.ask("initialize", json!({ "processId": null, "rootUri": null, "capabilities": {} }));
+            editor.ask("initialize", &json!({ "processId": null, "rootUri": null, "capabilities": {} }));
         assert_eq!(answer["serverInfo"]["name"], "glimt");
         assert_eq!(answer["capabilities"]["hoverProvider"], true);
-        editor.tell("initialized", json!({}));
+        editor.tell("initialized", &json!({}));
         let document = json!({ "uri": editor.uri, "languageId": "toml", "version": 1, "text": text });
-        editor.tell("textDocument/didOpen", json!({ "textDocument": document }));
+        editor.tell("textDocument/didOpen", &json!({ "textDocument": document }));
         editor
     }
 
@@ -48,7 +48,7 @@ impl Editor {
         self.keys.flush().expect("sent");
     }
 
-    fn tell(&mut self, method: &str, params: Value) {
+    fn tell(&mut self, method: &str, params: &Value) {
         self.send(&json!({ "jsonrpc": "2.0", "method": method, "params": params }));
     }
 
@@ -69,7 +69,7 @@ impl Editor {
     }
 
     /// The result of a request.
-    fn ask(&mut self, method: &str, params: Value) -> Value {
+    fn ask(&mut self, method: &str, params: &Value) -> Value {
         self.next += 1;
         let id = self.next;
         self.send(&json!({ "jsonrpc": "2.0", "id": id, "method": method, "params": params }));
@@ -100,7 +100,7 @@ impl Editor {
         let document = json!({ "uri": self.uri, "version": self.version });
         self.tell(
             "textDocument/didChange",
-            json!({ "textDocument": document, "contentChanges": [{ "text": text }] }),
+            &json!({ "textDocument": document, "contentChanges": [{ "text": text }] }),
         );
     }
 
@@ -111,7 +111,7 @@ impl Editor {
         let line = text[..offset].matches('\n').count();
         let character = text[..offset].rsplit('\n').next().expect("a line").encode_utf16().count();
         let position = json!({ "line": line, "character": character });
-        self.ask(method, json!({ "textDocument": { "uri": self.uri }, "position": position }))
+        self.ask(method, &json!({ "textDocument": { "uri": self.uri }, "position": position }))
     }
 
     /// The labels of what is offered at `|`, and what the first one inserts.
@@ -150,7 +150,7 @@ fn mistakes_are_shown_while_typing_and_those_of_files_after_a_save() {
     editor.desk.write("bricks.png", "no image");
     editor.change(TEXT);
     let uri = editor.uri.clone();
-    editor.tell("textDocument/didSave", json!({ "textDocument": { "uri": uri } }));
+    editor.tell("textDocument/didSave", &json!({ "textDocument": { "uri": uri } }));
     let list = editor.mistakes(|list| {
         !list.is_empty() && !list[0]["message"].as_str().unwrap_or_default().contains("raduis")
     });
@@ -203,7 +203,7 @@ fn hovering_explains_and_definitions_are_found() {
 fn colours_are_shown_in_srgb_and_written_linear() {
     let mut editor = Editor::open(&TEXT.replace("[[light]]", "[[light]]\nintensity = \"tomato\""));
     let uri = editor.uri.clone();
-    let colors = editor.ask("textDocument/documentColor", json!({ "textDocument": { "uri": uri } }));
+    let colors = editor.ask("textDocument/documentColor", &json!({ "textDocument": { "uri": uri } }));
     let [linear, named] = colors.as_array().expect("a list").as_slice() else { panic!("{colors}") };
     let parts =
         |color: &Value| ["red", "green", "blue"].map(|name| color["color"][name].as_f64().expect("a number"));
@@ -212,7 +212,7 @@ fn colours_are_shown_in_srgb_and_written_linear() {
     assert!((red - 1.0).abs() < 1e-6 && (green - 0.7354).abs() < 1e-3 && blue == 0.0);
     assert_eq!(parts(named).map(|part| (part * 255.0).round()), [255.0, 99.0, 71.0]);
     let asked = json!({ "textDocument": { "uri": uri }, "range": linear["range"], "color": { "red": 1, "green": 0.5, "blue": 0, "alpha": 1 } });
-    let texts = editor.ask("textDocument/colorPresentation", asked);
+    let texts = editor.ask("textDocument/colorPresentation", &asked);
     assert_eq!(
         (&texts[0]["label"], &texts[1]["label"]),
         (&json!("\"#ff8000\""), &json!("[1.000, 0.216, 0.000]"))
@@ -222,8 +222,8 @@ fn colours_are_shown_in_srgb_and_written_linear() {
 #[test]
 fn the_server_ends_when_it_is_told_and_when_nobody_is_left() {
     let mut editor = Editor::open(TEXT);
-    assert_eq!(editor.ask("shutdown", Value::Null), Value::Null);
-    editor.tell("exit", Value::Null);
+    assert_eq!(editor.ask("shutdown", &Value::Null), Value::Null);
+    editor.tell("exit", &Value::Null);
     assert!(editor.child.wait().expect("its end").success());
     let mut editor = Editor::open(TEXT);
     editor.next += 1;
