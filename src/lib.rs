@@ -16,7 +16,7 @@
 //! | [`sampling`] | sample streams, warps, distributions |
 //! | [`materials`] | rough BSDFs in rows (phong, metal, plastic, principled), smooth coats, mirror, glass, panes; opacity; texture lookup, normal maps, heights, Fresnel |
 //! | [`lights`] | lights without extent (`delta`), from beyond the scene (`infinite`), and shapes that emit (`area`); a tree over many lights; photon emission |
-//! | [`scene`] | the scene file: parsing, validation, diagnostics, the lowered description |
+//! | [`scene`] | the scene file: the definition of its keys, parsing, validation, diagnostics, the lowered description |
 //! | [`assets`] | bytes → meshes, glTF files, textures, orbiter cameras |
 //! | [`world`] | everything ready to trace, immutable |
 //! | [`film`] | sums of samples, the noise that their steps forecast, tone mapping, pictures |
@@ -111,7 +111,7 @@
 //! pipeline    -> integrators world assets scene film output lights materials math choice control system
 //! bench       -> pipeline compare output scene film math choice control
 //! tui         -> pipeline scene film math choice system
-//! cli         -> bench pipeline tui compare output scene film math choice control system
+//! cli         -> bench pipeline tui compare output scene accel film math choice control system
 //! ```
 //!
 //! ## What holds everywhere
@@ -125,7 +125,8 @@
 //!   mesh has an origin of its own.
 //! - Rendering cannot fail, only be cancelled. Errors are values that name the file and the place.
 //! - Only `assets`, `output`, `scene` (the scene, and whether the files that it names exist), `pipeline::watch`,
-//!   `pipeline::identity`, `pipeline::render::keeping` (checkpoints), `bench::cache`, `cli::new` and `cli::import` access files.
+//!   `pipeline::identity`, `pipeline::render::keeping` (checkpoints), `bench::cache`, `cli::new`, `cli::import` and `cli::doctor` access
+//!   files.
 //! - `unsafe` code is in `accel::wide_bvh::simd`, with a portable twin that gives the same bits, and in `system::abort`, which
 //!   restores the terminal if an allocation fails.
 //! - `tui` does not know `world`; `world` does not know pixels or time.

@@ -44,6 +44,9 @@ fn every_json_is_valid_and_harmless() {
     run(&desk, &[NAME, "--once", "--report", "r.json"]);
     assert_eq!(object(harmless(&desk.bytes("r.json")))["scene"], NAME);
 
+    let output = run(&desk, &["check", "--json", NAME]);
+    assert_eq!(object(harmless(&output.stdout))["scene"], NAME);
+
     let output = run(&desk, &["compare", "--json", &picture, &picture]);
     assert_eq!(object(harmless(&output.stdout))["a"], picture);
 }
@@ -63,4 +66,41 @@ fn what_bench_writes_of_an_odd_name_is_json_and_xml() {
     let is_named =
         |node: roxmltree::Node<'_, '_>| node.text().is_some_and(|text| text.contains("ä␁.toml, 8×"));
     assert!(document.descendants().any(is_named), "the name is there, with stand-ins");
+}
+
+#[test]
+fn check_says_as_json_what_it_says_in_words() {
+    let desk = Desk::new();
+    let scene = SCENE.replace("width", "widht").replace("radius", "raduis");
+    desk.write("ball.toml", format!("# ä\n{scene}"));
+    let output = desk.run("check ball.toml --json --set render.samples=0");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report = object(harmless(&output.stdout));
+    assert_eq!((&report["ok"], &report["scene"]), (&Value::Bool(false), &Value::from("ball.toml")));
+    let all = report["diagnostics"].as_array().expect("a list");
+    let of = |message: &str| {
+        all.iter().find(|one| one["message"].as_str().expect("a text").starts_with(message)).expect(message)
+    };
+    let unknown = of("unknown key `widht`");
+    let place = ["line", "column", "end_line", "end_column"].map(|name| unknown[name].as_u64());
+    assert_eq!(place, [Some(3), Some(1), Some(3), Some(6)]);
+    assert_eq!((&unknown["severity"], &unknown["file"]), (&Value::from("error"), &Value::from("ball.toml")));
+    assert_eq!(unknown["label"], "did you mean `width`?");
+    assert!(unknown["help"].as_str().is_some_and(|help| help.starts_with("expected one of `width`")));
+    assert_eq!(of("unknown key `raduis`")["line"], 17);
+    assert_eq!(of("`samples` must be")["file"], "--set");
+}
+
+#[test]
+fn check_of_a_scene_with_warnings_is_right_and_lists_them() {
+    let desk = Desk::new();
+    desk.write("ball.toml", format!("{SCENE}[materials.unused]\n"));
+    let output = run(&desk, &["check", "--json", "ball.toml"]);
+    let report = object(harmless(&output.stdout));
+    assert_eq!(report["ok"], true);
+    let [warning] = report["diagnostics"].as_array().expect("a list").as_slice() else { panic!("{report}") };
+    assert_eq!(warning["severity"], "warning");
+    assert_eq!(warning["message"], "the material \"unused\" is not used");
+    assert_eq!(warning["line"], SCENE.lines().count() + 1);
 }

@@ -20,6 +20,8 @@ mod json;
 mod keeping;
 mod kernel;
 mod layers;
+mod library;
+mod lsp;
 mod models;
 mod mutation;
 #[cfg(target_os = "linux")]
@@ -30,6 +32,8 @@ mod options;
 mod output;
 mod parts;
 mod same_bits;
+mod schema;
+mod shell;
 mod shown;
 mod stress;
 mod terminal;

@@ -235,7 +235,7 @@ fn a_wrong_call_is_2() {
         ("ball.toml --once --crop 0,0,33,1", "32×24"),
         ("ball.toml --once --bit-depth 16 -o a.jpg", "cannot hold 16 bits"),
         ("ball.toml --nonsense", "--nonsense"),
-        ("", "SCENE"),
+        ("--once", "SCENE"),
     ] {
         let stderr = desk.expect(line, 2);
         assert!(stderr.contains(word), "{line}: {stderr}");

@@ -327,11 +327,11 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
     let desk = Desk::new();
     for (call, words) in [
         (
-            "schema",
-            "there is no command \"schema\", nor a scene of that name: there are check, new, import, info, compare, bench",
+            "paint",
+            "there is no command \"paint\", nor a scene of that name: there are check, new, import, info, compare, bench",
         ),
-        ("man", "there is no command \"man\", nor a scene of that name"),
-        ("completions zsh", "there is no command \"completions\", nor a scene of that name"),
+        ("turn", "there is no command \"turn\", nor a scene of that name"),
+        ("finish zsh", "there is no command \"finish\", nor a scene of that name"),
         ("chek --once", "did you mean `check`?"),
         ("--once compar", "did you mean `compare`?"),
     ] {
@@ -357,8 +357,8 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
         let stderr = desk.expect(call, 2);
         assert!(stderr.contains("there is no such scene file") && stderr.contains(words), "{call}: {stderr}");
     }
-    desk.write("schema", SCENE);
-    desk.expect("schema --once -o a.png", 0);
+    desk.write("paint", SCENE);
+    desk.expect("paint --once -o a.png", 0);
 }
 
 /// Checks the way out in the message: the stacks of so many threads take more than the limit.

@@ -12,7 +12,23 @@ use super::{Block, Page, pages, root};
 /// Programs that pages name and this test does not start.
 const OTHERS: [&str; 3] = ["cargo", "ssh", "tmux"];
 /// Commands of glimt other than rendering.
-const COMMANDS: [&str; 9] = ["check", "new", "import", "info", "compare", "bench", "merge", "farm", "help"];
+const COMMANDS: [&str; 15] = [
+    "check",
+    "new",
+    "import",
+    "info",
+    "compare",
+    "bench",
+    "merge",
+    "farm",
+    "explain",
+    "schema",
+    "lsp",
+    "completions",
+    "man",
+    "doctor",
+    "help",
+];
 
 #[test]
 fn the_commands_of_every_page_run() {

@@ -35,7 +35,8 @@ fn pages() -> Vec<Page> {
     let beside = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"].map(PathBuf::from);
     let inside = fs::read_dir(root().join("docs")).expect("the folder of pages");
     let inside = inside.map(|entry| Path::new("docs").join(entry.expect("an entry").file_name()));
-    let mut names: Vec<PathBuf> = beside.into_iter().chain(inside).collect();
+    let is_page = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "md");
+    let mut names: Vec<PathBuf> = beside.into_iter().chain(inside.filter(is_page)).collect();
     names.sort();
     names.iter().map(|name| page(&name.to_string_lossy())).collect()
 }

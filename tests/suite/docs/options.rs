@@ -30,6 +30,8 @@ fn the_tables_of_options_have_those_of_the_program() {
         ("Options of a render", ""),
         ("Options of check", "check"),
         ("Options of info", "info"),
+        ("Options of new", "new"),
+        ("Options of schema", "schema"),
         ("Options of compare", "compare"),
         ("Options of bench", "bench"),
         ("Options of merge", "merge"),
@@ -63,11 +65,22 @@ fn every_value_of_an_option_is_documented() {
         pages().iter().flat_map(|page| page.prose().flat_map(codes).collect::<Vec<_>>()).collect();
     let plain = |code: &String| code.trim_matches('"').to_owned();
     let documented: BTreeSet<String> = documented.iter().map(plain).collect();
-    for command in ["", "compare", "bench", "merge", "farm"] {
+    for command in ["", "schema", "compare", "bench", "merge", "farm"] {
         let help = help(command);
         let values = help.lines().filter_map(|line| line.trim_start().strip_prefix("- ")?.split_once(':'));
         for (value, _) in values {
             assert!(documented.contains(value), "{command}: {value}");
         }
     }
+}
+
+#[test]
+fn the_page_has_the_variables_of_the_program() {
+    let rows = page("docs/command-line.md").rows("Environment variables");
+    let listed = glimt::cli::environment::VARIABLES;
+    let expected = listed.map(|(names, effect)| {
+        let names: Vec<String> = names.split(", ").map(|name| format!("`{name}`")).collect();
+        vec![names.join(", "), effect.to_owned()]
+    });
+    assert_eq!(rows, expected);
 }

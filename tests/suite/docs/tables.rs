@@ -1,83 +1,66 @@
-//! The tables of keys of a scene, beside what the program takes: keys, defaults, ranges, and the words of choices.
+//! The definition of a scene's keys, beside what the program takes (keys, defaults, ranges, the words of choices) and beside the
+//! tables of the page.
 
 use std::collections::BTreeSet;
 
 use glimt::scene::description::Scene;
 use glimt::scene::diagnostic::Diagnostic;
+use glimt::scene::keys::key::{Default, Form, KeyInfo, Kind, TableInfo, TypeInfo};
+use glimt::scene::keys::{self, limits::Limits};
 use glimt::scene::parse;
 
 use super::{codes, page, root};
 use crate::contract::{errors, placeless};
 
-/// A row: key, type, unit, range, default, meaning.
+/// A key of a table, of one of the table's types.
+#[derive(Clone)]
 struct Key {
+    info: &'static KeyInfo,
     name: String,
-    kind: String,
-    range: String,
-    default: String,
 }
 
-/// A table of the page, and the head of one in a scene.
+/// A table of the definition, and the head of one in a scene.
 struct Table {
     head: String,
+    /// The headings of the page that have its rows, with the number of rows of each.
+    headings: Vec<(String, usize)>,
     keys: Vec<Key>,
 }
 
 const WALL: &str = "[materials.wall]\n";
 const CAMERA: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
 
-/// The head of the table below a heading of the page, if it is one of keys.
-fn head(heading: &str) -> Option<String> {
-    let code = heading.strip_prefix('`')?.strip_suffix('`')?;
-    let kind = code.strip_prefix("type = ");
-    Some(match kind {
-        Some(
-            r#""phong""# | r#""mirror""# | r#""glass""# | r#""metal""# | r#""plastic""# | r#""principled""#,
-        ) => format!("[materials.it]\n{code}\n"),
-        Some(_) => format!("[[light]]\n{code}\n"),
-        None => format!("{}\n", code.replace("NAME", "it")),
-    })
+fn tables() -> Vec<Table> {
+    keys::tables().iter().flat_map(of_definition).collect()
 }
 
-fn tables() -> Vec<Table> {
-    let tables = page("docs/scene.md").tables();
-    let every: Vec<Vec<String>> =
-        tables.iter().filter(|(name, _)| name == "Every shape").flat_map(|(_, rows)| rows.clone()).collect();
-    assert_eq!(every.len(), 2);
-    let materials: Vec<Vec<String>> = tables
-        .iter()
-        .filter(|(name, _)| name == "Every material")
-        .flat_map(|(_, rows)| rows.clone())
-        .collect();
-    assert_eq!(materials.len(), 8);
-    let is_opacity = |row: &[String]| row[0].starts_with("`opacity");
-    let solid: Vec<_> = materials.iter().filter(|row| !is_opacity(row)).cloned().collect();
-    let key = |row: &Vec<String>| {
-        assert_eq!(row.len(), 6, "{row:?}");
-        let [name, kind, range, default] = [0, 1, 3, 4].map(|index| row[index].clone());
-        Key { name: name.trim_matches('`').to_owned(), kind, range, default }
-    };
-    tables
-        .iter()
-        .filter_map(|(heading, rows)| Some((head(heading)?, rows)))
-        .map(|(head, rows)| {
-            let is_shape = head.starts_with("[[") && !head.starts_with("[[light]]");
-            let is_material = head.starts_with("[materials.it]\ntype");
-            let more = match head.contains("\"glass\"") {
-                _ if is_shape => every.as_slice(),
-                true => solid.as_slice(),
-                false if is_material => materials.as_slice(),
-                false => &[],
-            };
-            let mut keys: Vec<Key> = rows.iter().chain(more).map(key).collect();
-            // A mesh may have the materials of its file.
-            let material = keys.iter_mut().find(|key| head.starts_with("[[mesh]]") && key.name == "material");
-            if let Some(material) = material {
-                material.default = "the file's".to_owned();
+/// The tables of scenes that a table of the definition stands for: one for each type.
+fn of_definition(table: &'static TableInfo) -> Vec<Table> {
+    let head = table.head().replace("NAME", "it");
+    let heading = |code: String| format!("`{code}`");
+    let key = |info: &'static KeyInfo| Key { info, name: info.name.to_owned() };
+    if table.types.is_empty() {
+        let keys: Vec<Key> = table.keys_of(None).map(key).collect();
+        let headings = match table.form {
+            // The last two are those of every shape.
+            Form::List => {
+                vec![(heading(table.head()), keys.len() - 2), ("Every shape".to_owned(), 2)]
             }
-            Table { keys, head }
-        })
-        .collect()
+            Form::Single | Form::Named => vec![(heading(table.head()), keys.len())],
+        };
+        return vec![Table { head: format!("{head}\n"), headings, keys }];
+    }
+    let of_type = |kind: &'static TypeInfo| {
+        let code = format!("type = \"{}\"", kind.name);
+        // Opacity is for surfaces.
+        let is_solid = |info: &KeyInfo| kind.name == "glass" && info.name.starts_with("opacity");
+        let keys = table.keys_of(Some(kind)).filter(|info| !is_solid(info)).map(key).collect();
+        let own = (heading(code.clone()), kind.keys.len());
+        let common = ("Every material".to_owned(), table.keys.len());
+        let headings = [own, common].into_iter().filter(|(_, count)| *count > 0).collect();
+        Table { head: format!("{head}\n{code}\n"), headings, keys }
+    };
+    table.types.iter().map(of_type).collect()
 }
 
 /// A value for a key that must be there.
@@ -97,7 +80,10 @@ fn example(head: &str, key: &str) -> &'static str {
 impl Table {
     /// A scene with this table: its required keys but for one, and a line of its own.
     fn scene(&self, without: &str, line: &str) -> String {
-        let required = self.keys.iter().filter(|key| key.default == "*required*" && key.name != without);
+        let required = self
+            .keys
+            .iter()
+            .filter(|key| matches!(key.info.default, Default::Required(_)) && key.name != without);
         let lines: String =
             required.map(|key| format!("{} = {}\n", key.name, example(&self.head, &key.name))).collect();
         let camera = if self.head.starts_with("[camera]") { "" } else { CAMERA };
@@ -134,19 +120,19 @@ impl Table {
     /// Names a default that is not the program's.
     fn wrong_default(&self, key: &Key) -> Option<String> {
         let (said, without) = self.with(key, "");
-        if key.default == "*required*" {
+        if matches!(key.info.default, Default::Required(_)) {
             let needs = said.contains(&format!("needs `{}`", key.name));
             return (!needs).then(|| format!("{}{} is not required", self.head, key.name));
         }
         let (refused, with) = self.with(key, &format!("{} = {}", key.name, key.literal()?));
         let is_right = said.is_empty() && refused.is_empty() && with == without;
-        (!is_right).then(|| format!("{}{}: {} {said}{refused}", self.head, key.name, key.default))
+        (!is_right).then(|| format!("{}{}: {:?} {said}{refused}", self.head, key.name, key.info.default))
     }
 
     /// Names a range that is not the program's.
     fn wrong_range(&self, key: &Key) -> Option<String> {
         let (inside, outside) = key.range()?;
-        let of = |number: f64| value(&key.kind, number);
+        let of = |number: f64| value(key.info.kind, number);
         let refused = inside.into_iter().map(of).find(|value| !self.takes(key, value));
         let taken = outside.into_iter().map(of).find(|value| self.takes(key, value));
         let refused = refused.map(|value| format!("{}{} = {value} is refused", self.head, key.name));
@@ -156,51 +142,115 @@ impl Table {
 
 impl Key {
     /// The default, if it is a value.
-    fn literal(&self) -> Option<&str> {
-        let literal = self.default.strip_prefix('`')?.strip_suffix('`')?;
-        Some(literal).filter(|literal| !literal.contains('`'))
+    fn literal(&self) -> Option<&'static str> {
+        match self.info.default {
+            Default::Is(value) => Some(value),
+            Default::Required(_) | Default::By(_) | Default::Absent => None,
+        }
     }
 
     /// Numbers that the range has, and numbers that it does not have.
     fn range(&self) -> Option<(Vec<f64>, Vec<f64>)> {
-        let step = if self.kind == "whole number" { 1.0 } else { 0.001 };
-        let number = |text: &str| text.trim().parse::<f64>().expect("a number");
-        Some(match self.range.as_str() {
-            "" | "any" => return None,
-            "not 0" => (vec![-2.0, 0.5], vec![0.0]),
-            "> 0" => (vec![0.25], vec![0.0, -1.0]),
-            range => match range.split_once('…') {
-                Some((least, "")) => (vec![number(least)], vec![number(least) - step]),
-                Some((least, most)) => {
-                    let (least, most) = (number(least), number(most));
-                    (vec![least, most], vec![least - step, most + step])
-                }
-                None => {
-                    let (low, high) = range.split_once(',').expect("two bounds");
-                    let low = number(low.trim_start_matches('>'));
-                    let high = number(high.trim().trim_start_matches('<'));
-                    (vec![low + step, high - step], vec![low, high])
-                }
-            },
-        })
+        match self.info.kind {
+            // Those of glTF files, which the scene of this test does not name.
+            Kind::Whole(..) if self.info.default == Default::Absent => None,
+            Kind::Whole(least, most) => {
+                Some((vec![least as f64, most as f64], vec![least as f64 - 1.0, most as f64 + 1.0]))
+            }
+            Kind::Number(limits)
+            | Kind::Color(limits)
+            | Kind::ColorOrTexture(limits)
+            | Kind::Emission(limits)
+            | Kind::NumberOrTexture(limits)
+            | Kind::Scale(limits) => ends(limits),
+            // A direction is not of length 0, and a matrix has a last row.
+            Kind::Numbers(count, _, limits) if limits != Limits::Any || count == 2 => ends(limits),
+            Kind::Numbers(..) => None,
+            Kind::Flag
+            | Kind::Words(_)
+            | Kind::Text
+            | Kind::File(_)
+            | Kind::Texture
+            | Kind::Heights
+            | Kind::Material => None,
+        }
     }
 }
 
+fn ends(limits: Limits) -> Option<(Vec<f64>, Vec<f64>)> {
+    const STEP: f64 = 0.001;
+    Some(match limits {
+        Limits::Any => (vec![-1e18, 1e18], vec![1.1e18]),
+        Limits::NotZero => (vec![-2.0, 0.5], vec![0.0]),
+        Limits::AtLeast(least) => (vec![least], vec![least - STEP]),
+        Limits::Length => (vec![0.25], vec![0.0, -1.0]),
+        Limits::LengthOrZero => (vec![0.0], vec![-1.0]),
+        Limits::Between(least, most) => (vec![least, most], vec![least - STEP, most + STEP]),
+        Limits::Inside(low, high) => (vec![low + STEP, high - STEP], vec![low, high]),
+    })
+}
+
+/// The row of a page for a key: the words of a choice in any order, and a link at the end, are the page's own.
+fn is_row(row: &[String], key: &KeyInfo) -> bool {
+    let [name, kind, unit, range, default, meaning] = row else { return false };
+    let has_kind =
+        *kind == key.kind() || matches!(key.kind, Kind::Words(_)) && codes(kind) == codes(&key.kind());
+    let meaning = unlinked(meaning);
+    let rest = meaning.strip_prefix(key.doc);
+    *name == format!("`{}`", key.name)
+        && has_kind
+        && unit == key.unit
+        && *range == key.range()
+        && *default == key.default_words()
+        && rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(". See "))
+}
+
+/// A text with the words of its links alone.
+fn unlinked(text: &str) -> String {
+    let Some((before, after)) = text.split_once("](") else { return text.to_owned() };
+    let (begin, words) = before.rsplit_once('[').unwrap_or((before, ""));
+    let rest = after.split_once(')').map_or("", |(_, rest)| rest);
+    format!("{begin}{words}{}", unlinked(rest))
+}
+
 #[test]
-fn the_page_has_the_keys_of_every_table() {
+fn the_rows_of_the_page_are_those_of_the_definition() {
+    let page = page("docs/scene.md");
+    let (mut wrong, mut count) = (Vec::new(), 0);
+    for Table { head, headings, keys: _ } in tables() {
+        let name = head.trim_matches(['[', '\n']).split([']', '.']).next().unwrap_or_default();
+        let table = keys::table(name).expect("a table");
+        let kind = head.split('"').nth(1).and_then(|kind| table.type_of(Some(kind)));
+        let rows = headings.iter().flat_map(|(heading, number)| {
+            let rows = page.rows(heading);
+            assert_eq!(rows.len(), *number, "{heading}");
+            rows
+        });
+        for (row, key) in rows.zip(table.keys_of(kind)) {
+            count += 1;
+            // The page has one row for the material of every shape.
+            let is_right = is_row(&row, key) || head == "[[mesh]]\n" && key.name == "material";
+            if !is_right {
+                let key = [key.kind(), key.unit.into(), key.range(), key.default_words(), key.doc.into()];
+                wrong.push(format!("{head}| {}\n{key:?}", row.join(" | ")));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(count > 150, "{count} rows");
+}
+
+#[test]
+fn the_definition_has_the_keys_of_every_table() {
     let tables = tables();
-    assert_eq!(tables.len(), 26);
+    assert_eq!(tables.len(), 24);
     for table in tables {
         let text = table.scene("", "zzz = 1");
         let outcome = parse(text.into(), &root().join("scenes/page.toml"));
         let mut all = outcome.diagnostics.iter();
         let unknown = all.find(|one| one.message.starts_with("unknown key `zzz`")).expect("it is unknown");
         let mut expected = codes(unknown.help.as_deref().unwrap_or_default());
-        // The tables of materials and lights have it in one of their own.
         let documented: BTreeSet<String> = table.keys.iter().map(|key| key.name.clone()).collect();
-        if documented.iter().eq(["type"]) {
-            continue;
-        }
         if table.head.contains("type = ") {
             expected.remove("type");
         }
@@ -209,7 +259,7 @@ fn the_page_has_the_keys_of_every_table() {
 }
 
 #[test]
-fn the_defaults_of_the_page_are_those_of_the_program() {
+fn the_defaults_of_the_definition_are_those_of_the_program() {
     let tables = tables();
     let keys = || tables.iter().flat_map(|table| table.keys.iter().map(move |key| (table, key)));
     let wrong: Vec<String> = keys().filter_map(|(table, key)| table.wrong_default(key)).collect();
@@ -218,16 +268,15 @@ fn the_defaults_of_the_page_are_those_of_the_program() {
 }
 
 /// A number as a value of a type.
-fn value(kind: &str, number: f64) -> String {
+fn value(kind: Kind, number: f64) -> String {
     match kind {
-        "two numbers" => format!("[{number}, {number}]"),
-        "three numbers" => format!("[{number}, {number}, {number}]"),
+        Kind::Numbers(count, ..) => format!("[{}]", vec![number.to_string(); count].join(", ")),
         _ => number.to_string(),
     }
 }
 
 #[test]
-fn the_ranges_of_the_page_are_those_of_the_program() {
+fn the_ranges_of_the_definition_are_those_of_the_program() {
     let tables = tables();
     let keys = || tables.iter().flat_map(|table| table.keys.iter().map(move |key| (table, key)));
     let wrong: Vec<String> = keys().filter_map(|(table, key)| table.wrong_range(key)).collect();
@@ -236,14 +285,12 @@ fn the_ranges_of_the_page_are_those_of_the_program() {
 }
 
 #[test]
-fn the_words_of_the_page_are_those_of_the_program() {
+fn the_words_of_the_definition_are_those_of_the_program() {
     let mut count = 0;
     for table in tables() {
         for key in &table.keys {
-            let words = codes(&key.kind);
-            if words.is_empty() || !words.iter().all(|word| word.starts_with('"')) {
-                continue;
-            }
+            let Kind::Words(list) = key.info.kind else { continue };
+            let words: BTreeSet<String> = list().iter().map(|word| format!("\"{}\"", word.name)).collect();
             let said = table.said(key, "\"zzz\"");
             let wrong =
                 said.iter().find(|one| one.message.contains("cannot be \"zzz\"")).expect("it is wrong");

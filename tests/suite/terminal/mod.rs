@@ -16,7 +16,7 @@ mod model;
 mod outputs;
 #[cfg(target_os = "linux")]
 mod polite;
-mod pty;
+pub(crate) mod pty;
 mod relay;
 mod saving;
 mod screen;

@@ -1,6 +1,7 @@
 //! Arguments of the command line.
 
 mod bench;
+mod candidates;
 mod parts;
 
 use std::ops::RangeInclusive;
@@ -12,6 +13,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 pub use self::bench::BenchArgs;
 pub use self::parts::{Engine, FarmArgs, MergeArgs};
+use super::environment;
 use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
@@ -20,13 +22,14 @@ use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
-const EXAMPLES: &str = "\
-Examples:
+/// Calls, with what they do.
+pub(super) const EXAMPLES: &str = "\
   glimt new ball.toml                     write a scene to start from
   glimt ball.toml                         edit it in an editor and see it here
   glimt ball.toml --once -o a.png -o a.exr
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
+  glimt explain materials.metal.roughness what a key means
   glimt helmet.glb                        a model alone: obj, off, ply, stl, glb, gltf
   glimt helmet.glb --once --turntable 36 -o helmet.gif    all around it
   glimt import helmet.glb -o helmet.toml  a scene of it, to edit
@@ -36,10 +39,22 @@ Examples:
   glimt merge a.png 1.part 2.part         join both
 
 The scene that `glimt new` writes has every key, with comments.
-A scene that is named like a command is given with its folder: glimt ./check
+A scene that is named like a command is given with its folder: glimt ./check";
 
-Exit codes: 0 done; 1 the work failed; 2 the call or the scene is wrong;
+/// Exit codes of all commands.
+pub(super) const EXIT_CODES: &str = "\
+0 done; 1 the work failed; 2 the call or the scene is wrong;
 130, 143, 129 ended by SIGINT, SIGTERM, SIGHUP.";
+
+/// Text after the options of `--help`.
+fn after_long_help() -> String {
+    format!("{}\n\n{}", after_help(), environment::section())
+}
+
+/// Text after the options.
+fn after_help() -> String {
+    format!("Examples:\n{EXAMPLES}\n\nExit codes: {EXIT_CODES}")
+}
 
 const STYLES: Styles = Styles::styled()
     .header(AnsiColor::Green.on_default().bold())
@@ -49,7 +64,7 @@ const STYLES: Styles = Styles::styled()
 
 /// A ray tracer that lives in the terminal: edit a scene, save it, see it.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "glimt", version, after_help = EXAMPLES, styles = STYLES)]
+#[command(name = "glimt", version, after_help = after_help(), after_long_help = after_long_help(), styles = STYLES)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, max_term_width = 100)]
 pub struct Args {
     /// A command other than rendering.
@@ -71,7 +86,16 @@ impl Args {
             Some(Subcommand::Farm(farm)) => farm.color,
             Some(Subcommand::Import(import)) => import.color,
             Some(Subcommand::Info(info)) => info.color,
-            Some(Subcommand::New { .. }) | None => self.render.color,
+            Some(
+                Subcommand::New { .. }
+                | Subcommand::Completions { .. }
+                | Subcommand::Man { .. }
+                | Subcommand::Explain { .. }
+                | Subcommand::Schema { .. }
+                | Subcommand::Lsp { .. }
+                | Subcommand::Doctor,
+            )
+            | None => self.render.color,
         }
     }
 }
@@ -82,10 +106,14 @@ pub enum Subcommand {
     /// Read and validate a scene and everything that it names; render nothing
     Check {
         /// The scene file
+        #[arg(add = candidates::scenes())]
         scene: PathBuf,
         /// Another value for a key of the scene, as in a render
-        #[arg(long = "set", value_name = "TABLE.KEY=VALUE")]
+        #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE")]
         sets: Vec<String>,
+        /// One JSON object on stdout, with a list of what is wrong, in place of messages
+        #[arg(long)]
+        json: bool,
         /// Colours of the messages
         #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW")]
         color: ColorChoice,
@@ -94,6 +122,9 @@ pub enum Subcommand {
     New {
         /// The file to write; - is stdout
         file: PathBuf,
+        /// Begin it with a line that leads an editor to the schema, and write that beside it
+        #[arg(long)]
+        schema: bool,
     },
     /// Make a scene of a glTF file, with its meshes as PLY files and its images beside it; refuses to overwrite
     #[command(after_help = IMPORT_HELP)]
@@ -113,6 +144,125 @@ pub enum Subcommand {
     /// Print the job script that renders a picture in parts on several machines
     #[command(after_help = parts::FARM_HELP)]
     Farm(Box<FarmArgs>),
+    /// Print the script that makes a shell complete commands, options, scenes and the keys of --set
+    #[command(after_help = COMPLETIONS_HELP)]
+    Completions {
+        /// The shell
+        #[arg(value_parser = one_of::<Shell>(), value_name = "SHELL")]
+        shell: Shell,
+    },
+    /// Print the manual page of glimt or of a command, as roff
+    #[command(after_help = MAN_HELP)]
+    Man {
+        /// The command
+        command: Option<String>,
+    },
+    /// Print what a key of a scene means: type, unit, default, range
+    #[command(after_help = EXPLAIN_HELP)]
+    Explain {
+        /// The key, as in render.samples, materials.metal.roughness or samples; a table lists its keys
+        #[arg(add = candidates::keys())]
+        key: Option<String>,
+    },
+    /// Print the JSON Schema of a scene, by which editors complete keys and find mistakes
+    #[command(after_help = SCHEMA_HELP)]
+    Schema {
+        /// The draft of JSON Schema
+        #[arg(long, value_parser = one_of::<Draft>(), default_value = "4", value_name = "DRAFT")]
+        draft: Draft,
+    },
+    /// Serve an editor as a language server, over stdin and stdout
+    #[command(after_help = LSP_HELP)]
+    Lsp {
+        /// Accepted and without effect: there is no other way to talk
+        #[arg(long, hide = true)]
+        stdio: bool,
+    },
+    /// Report what glimt finds here: terminal, colours, protocols, processor, threads, cache
+    #[command(after_help = DOCTOR_HELP)]
+    Doctor,
+}
+
+const COMPLETIONS_HELP: &str = "\
+Load it when the shell starts:
+  bash        source <(glimt completions bash)                in ~/.bashrc
+  zsh         source <(glimt completions zsh)                 in ~/.zshrc, after compinit
+  fish        glimt completions fish | source                 in ~/.config/fish/config.fish
+  elvish      eval (glimt completions elvish | slurp)         in ~/.config/elvish/rc.elv
+  powershell  glimt completions powershell | Out-String | Invoke-Expression   in $PROFILE
+
+The script calls glimt for each completion: --set knows the tables and names of the scene in the line.";
+
+const MAN_HELP: &str = "\
+  glimt man | man -l -                     read it
+  glimt man > ~/.local/share/man/man1/glimt.1
+  glimt man check > ~/.local/share/man/man1/glimt-check.1";
+
+const EXPLAIN_HELP: &str = "\
+  glimt explain                               all tables
+  glimt explain sphere                        the keys of a table
+  glimt explain render.samples
+  glimt explain materials.metal.roughness     of one type; materials.roughness is that of all types
+  glimt explain roughness                     wherever it occurs
+
+Exit codes: 0 explained; 2 there is no such key.";
+
+const SCHEMA_HELP: &str = "\
+A scene that begins with the line
+  #:schema glimt.schema.json
+has the schema beside it in editors with Taplo (VS Code: Even Better TOML; also Helix, Neovim, Zed). `glimt new --schema`
+writes both. Names of materials, files and geometry are left to `glimt check`.";
+
+choice! {
+    /// Drafts of JSON Schema.
+    pub enum Draft {
+        /// Draft 4, which Taplo reads.
+        Four = "4",
+        /// Draft 2020-12.
+        Latest = "2020-12",
+    }
+}
+
+impl Draft {
+    /// The key that holds definitions.
+    pub(super) fn definitions(self) -> &'static str {
+        match self {
+            Self::Four => "definitions",
+            Self::Latest => "$defs",
+        }
+    }
+
+    /// The name by which a schema says its draft.
+    pub(super) fn uri(self) -> &'static str {
+        match self {
+            Self::Four => "http://json-schema.org/draft-04/schema#",
+            Self::Latest => "https://json-schema.org/draft/2020-12/schema",
+        }
+    }
+}
+
+const LSP_HELP: &str = "\
+Mistakes while you type, completion of keys, words and names, what a key means, definitions of names, colours.
+The editor starts it for scenes; docs/editors.md has the lines for Neovim, Helix and others.";
+
+const DOCTOR_HELP: &str = "\
+On a terminal it asks the terminal what it is and does, and waits a second at most for answers. The exit code is 0
+whatever it finds.";
+
+choice! {
+    /// Shells that complete.
+    pub enum Shell {
+        /// GNU bash, 4.4 or later.
+        Bash = "bash",
+        /// The Z shell.
+        Zsh = "zsh",
+        /// fish.
+        Fish = "fish",
+        /// PowerShell.
+        Powershell = "powershell",
+        /// Elvish.
+        Elvish = "elvish",
+    }
 }
 
 const IMPORT_HELP: &str = "\
@@ -127,6 +277,7 @@ there is a file of that name.";
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
     /// The file to read: gltf, glb
+    #[arg(add = candidates::importable())]
     pub file: PathBuf,
     /// The scene to write [FILE with .toml, in the working directory]
     #[arg(short, long, value_name = "SCENE")]
@@ -204,7 +355,7 @@ pub struct CompareArgs {
 #[derive(Clone, Debug, clap::Args)]
 pub struct RenderArgs {
     /// The scene file (TOML), or a model: obj, off, ply, stl, glb, gltf
-    #[arg(required = true, value_name = "SCENE")]
+    #[arg(required = true, add = candidates::scenes_and_models(), value_name = "SCENE")]
     pub scene: Option<PathBuf>,
     /// Render once without the terminal UI, write the picture, exit
     #[arg(long)]
@@ -212,7 +363,7 @@ pub struct RenderArgs {
 
     /// Another value for a key of the scene, as in render.samples=3, materials.wall.diffuse=red, sphere.2.radius=.3
     /// (the second one) or sphere.ball.radius=.3 (by name); may be given several times. Options come after it
-    #[arg(long = "set", value_name = "TABLE.KEY=VALUE")]
+    #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 
     /// Write the picture to this file; may be given several times. The ending chooses the format: png, exr, hdr, jpg,
@@ -361,7 +512,7 @@ impl RenderArgs {
         };
         macro_rules! copy {
             ($(
-                $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $change:ident;
+                $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
             )*) => {
                 $(overrides.$name = self.$name;)*
             };

@@ -2,12 +2,20 @@
 
 use std::path::Path;
 
+use serde_json::{Value, json};
+
 use super::console::Console;
 use super::exit::Exit;
+use crate::output::json::in_a_line;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::{Checked, check};
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::report::line_and_column;
 
-pub(super) fn run(scene: &Path, sets: &[String], console: &Console) -> Exit {
+pub(super) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Console) -> Exit {
+    if is_json {
+        return in_json(scene, sets, console);
+    }
     match check(scene, sets) {
         Ok(checked) => {
             console.diagnostics(&checked.warnings);
@@ -20,6 +28,46 @@ pub(super) fn run(scene: &Path, sets: &[String], console: &Console) -> Exit {
         }
         Err(Failure::Work(message)) => console.fail(Exit::FAILED, &message),
     }
+}
+
+/// The same as one JSON object on stdout.
+fn in_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
+    let (exit, diagnostics) = match check(scene, sets) {
+        Ok(checked) => (Exit::DONE, checked.warnings),
+        Err(Failure::Scene(diagnostics)) => (Exit::WRONG, diagnostics),
+        Err(Failure::Work(message)) => return console.fail(Exit::FAILED, &message),
+    };
+    let all: Vec<Value> = diagnostics.iter().map(diagnostic).collect();
+    let scene = scene.to_string_lossy();
+    let report = json!({ "scene": scene, "ok": exit == Exit::DONE, "diagnostics": all });
+    match in_a_line(&report) {
+        Ok(line) => console.text(&format!("{line}\n")),
+        Err(error) => return console.fail(Exit::FAILED, &format!("cannot write JSON: {error}")),
+    }
+    exit
+}
+
+/// A diagnostic; lines and columns count from 1, columns in characters, and the end is the first one that is not meant.
+fn diagnostic(one: &Diagnostic) -> Value {
+    let severity = match one.severity {
+        Severity::Error => "error",
+        Severity::Warning => "warning",
+    };
+    let at = |offset| one.place.as_ref().map(|place| line_and_column(&place.source, offset));
+    let span = one.place.as_ref().map(|place| place.span.clone());
+    let (start, end) = (span.clone().and_then(|span| at(span.start)), span.and_then(|span| at(span.end)));
+    let label = one.place.as_ref().map(|place| place.label.as_str()).filter(|label| !label.is_empty());
+    json!({
+        "file": one.path.to_string_lossy(),
+        "line": start.map(|(line, _)| line),
+        "column": start.map(|(_, column)| column),
+        "end_line": end.map(|(line, _)| line),
+        "end_column": end.map(|(_, column)| column),
+        "severity": severity,
+        "message": one.message,
+        "label": label,
+        "help": one.help,
+    })
 }
 
 fn summary(scene: &Path, checked: &Checked) -> String {

@@ -6,17 +6,24 @@ pub mod args;
 mod bench;
 mod check;
 mod compare;
+mod completions;
 mod console;
+mod doctor;
+pub mod environment;
 mod exit;
+mod explain;
 mod farm;
 mod import;
 mod info;
 mod live;
 mod lower;
+mod lsp;
+mod man;
 mod merge;
 mod new;
 mod once;
 mod progress;
+pub mod schema;
 mod signals;
 
 use std::ffi::OsString;
@@ -37,20 +44,32 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
     // Without the handler an abort ends the process as it always did.
     let _ = crate::system::abort::catch();
     let arguments: Vec<OsString> = arguments.into_iter().collect();
+    if let Some(exit) = completions::answer(&arguments) {
+        return exit;
+    }
+    if arguments.len() <= 1 {
+        return bare();
+    }
     let args = match Args::try_parse_from(&arguments) {
         Ok(args) => args,
         Err(error) => return misunderstood(&error, &arguments),
     };
     let console = Console::new(args.color());
     let exit = match args.command {
-        Some(Subcommand::Check { scene, sets, .. }) => check::run(&scene, &sets, &console),
-        Some(Subcommand::New { file }) => new::run(&file, &console),
+        Some(Subcommand::Check { scene, sets, json, .. }) => check::run(&scene, &sets, json, &console),
+        Some(Subcommand::New { file, schema }) => new::run(&file, schema, &console),
         Some(Subcommand::Import(args)) => import::run(&args, &console),
         Some(Subcommand::Info(args)) => info::run(&args, &console),
         Some(Subcommand::Compare(args)) => compare::run(&args, &console),
         Some(Subcommand::Bench(args)) => bench::run(&args, &console),
         Some(Subcommand::Merge(args)) => merge::run(&args, &console),
         Some(Subcommand::Farm(args)) => farm::run(&args, &console),
+        Some(Subcommand::Completions { shell }) => completions::run(shell, &console),
+        Some(Subcommand::Man { command }) => man::run(command.as_deref(), &console),
+        Some(Subcommand::Explain { key }) => explain::run(key.as_deref(), &console),
+        Some(Subcommand::Schema { draft }) => schema::run(draft, &console),
+        Some(Subcommand::Lsp { .. }) => lsp::run(&console),
+        Some(Subcommand::Doctor) => doctor::run(&console),
         None => match lower::lower(args.render) {
             Ok(order) => match no_command(&order.scene) {
                 Some(message) => console.fail(Exit::WRONG, &message),
@@ -61,6 +80,22 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         },
     };
     console.end(exit)
+}
+
+/// The way to begin, for a call without a word.
+const BEGIN: &str = "\
+glimt renders a scene file here in the terminal, again on every save.
+
+  glimt new ball.toml     write a scene to start from
+  glimt ball.toml         see it; edit it in an editor, save, and see it again
+  glimt helmet.glb        see a model
+
+`glimt -h` lists commands and options.";
+
+/// A call without a word: no scene is given, which is wrong, and the way to one is shown.
+fn bare() -> Exit {
+    Console::new(crate::tui::ColorChoice::Auto).say_lines(BEGIN);
+    Exit::WRONG
 }
 
 /// Help and the version are answers; everything else is a wrong call.

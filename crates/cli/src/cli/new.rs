@@ -3,21 +3,27 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
+use super::args::Draft;
 use super::console::Console;
 use super::exit::Exit;
+use super::schema;
 use crate::output::{self, Format, OutputError, write};
 use crate::scene::{is_mesh, starter};
 
-pub(super) fn run(file: &Path, console: &Console) -> Exit {
+pub(super) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
+    let text = if with_schema { format!("{}{}", schema::LINE, starter()) } else { starter().to_owned() };
     if file == Path::new("-") {
-        console.text(starter());
+        console.text(&text);
         return Exit::DONE;
     }
     if let Some(message) = misnamed(file) {
         return console.fail(Exit::WRONG, &message);
     }
+    if with_schema && let Err((exit, message)) = write_schema(&file.with_file_name(schema::FILE)) {
+        return console.fail(exit, &message);
+    }
     let name = file.display();
-    match write::new_file(file, starter().as_bytes()) {
+    match write::new_file(file, text.as_bytes()) {
         Ok(()) => {
             console.say(&format!("wrote {name}"));
             console.say(&format!(
@@ -38,6 +44,28 @@ pub(super) fn run(file: &Path, console: &Console) -> Exit {
             let error = of_place.unwrap_or_else(|| OutputError::File { path: file.to_owned(), source });
             console.fail(Exit::FAILED, &error.to_string())
         }
+    }
+}
+
+/// Writes the schema beside a scene. One that is there already will do if it is the same.
+///
+/// # Errors
+/// Another file of that name, or no way to write one.
+fn write_schema(path: &Path) -> Result<(), (Exit, String)> {
+    let text = schema::text(Draft::Four);
+    match write::new_file(path, text.as_bytes()) {
+        Ok(()) => Ok(()),
+        Err(error) if error.kind() == ErrorKind::AlreadyExists => match std::fs::read(path) {
+            Ok(there) if there == text.as_bytes() => Ok(()),
+            Ok(_) | Err(_) => {
+                let name = path.display();
+                Err((
+                    Exit::WRONG,
+                    format!("{name} is another file, and is left as it is: remove it, or leave out --schema"),
+                ))
+            }
+        },
+        Err(source) => Err((Exit::FAILED, OutputError::File { path: path.to_owned(), source }.to_string())),
     }
 }
 

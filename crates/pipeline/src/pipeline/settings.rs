@@ -12,7 +12,7 @@ use crate::scene::description::{Accel, Integrator, Render, Shadows, render_keys}
 
 macro_rules! overrides {
     ($(
-        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $change:ident;
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
         /// Changes to a scene's settings for this run; `None` leaves the scene's own.
         #[derive(Clone, Debug, Default, PartialEq)]

@@ -2,7 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::{CLAMP, Progress, Switch, any_whole, nice, number_of, one_of, seconds, threads, whole, whole_of};
+use super::{
+    CLAMP, Progress, Switch, any_whole, candidates, nice, number_of, one_of, seconds, threads, whole,
+    whole_of,
+};
 use crate::scene::description::{Accel, Integrator, Shadows};
 use crate::tui::ColorChoice;
 
@@ -22,7 +25,7 @@ Exit codes: 0 measured; 1 the work failed; 2 the call or a scene is wrong; 130, 
 #[derive(Clone, Debug, clap::Args)]
 pub struct BenchArgs {
     /// The scene files
-    #[arg(value_name = "SCENE")]
+    #[arg(value_name = "SCENE", add = candidates::scenes())]
     pub scenes: Vec<PathBuf>,
 
     /// Write every picture's seconds and error, a line each
@@ -92,7 +95,7 @@ pub struct BenchArgs {
     pub accel: Vec<Accel>,
 
     /// Another value for a key of the scenes, as in a render
-    #[arg(long = "set", value_name = "TABLE.KEY=VALUE", help_heading = "All pictures and references")]
+    #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE", help_heading = "All pictures and references")]
     pub sets: Vec<String>,
     /// Scatterings along one path
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole_of("max_depth"), help_heading = "All pictures and references")]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Progress, one_of};
+use super::{Progress, candidates, one_of};
 use crate::choice;
 use crate::tui::ColorChoice;
 
@@ -61,6 +61,7 @@ choice! {
 #[derive(Clone, Debug, clap::Args)]
 pub struct FarmArgs {
     /// The scene file
+    #[arg(add = candidates::scenes())]
     pub scene: PathBuf,
     /// The picture that the parts are joined to; parts lie beside it
     #[arg(short, long, value_name = "FILE")]

@@ -1,5 +1,7 @@
 //! Outcome of a request, for callers who ask for one picture and wait for it.
 
+use std::error::Error;
+use std::fmt;
 use std::path::Path;
 
 use super::super::protocol::{Failure, Report, Request};
@@ -9,6 +11,7 @@ use super::{Engine, Meanwhile};
 use crate::film::{Quantity, RadianceImage};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
+use crate::scene::report::{Style, render};
 
 /// A picture in memory.
 #[derive(Clone, Debug)]
@@ -31,6 +34,23 @@ pub enum Unrendered {
     /// A cancel token stopped the work.
     Cancelled,
 }
+
+impl fmt::Display for Unrendered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Failed(Failure::Scene(diagnostics)) => {
+                f.write_str(render(diagnostics, COLUMNS, Style::Plain).trim_end())
+            }
+            Self::Failed(Failure::Work(message)) => f.write_str(message),
+            Self::Cancelled => f.write_str("the render was cancelled"),
+        }
+    }
+}
+
+impl Error for Unrendered {}
+
+/// Columns of a report of mistakes within an error.
+const COLUMNS: usize = 120;
 
 /// Outcome of a finished request.
 pub(super) struct Outcome {

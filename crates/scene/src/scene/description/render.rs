@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
+use super::super::keys::key::{WordList, words};
 use super::method::Integrator;
 use crate::choice;
 use crate::choice::Choice;
@@ -21,38 +22,38 @@ macro_rules! __render_keys {
         $crate::scene::description::render_keys! {
             @pass $callback [$($which)?] []
 
-            /// Pixels across, 1 … 65536.
-            width: u32 = 640, whole(1, 65_536), option;
-            /// Pixels down, 1 … 65536.
-            height: u32 = 480, whole(1, 65_536), option;
-            /// Most samples per pixel, ≥ 1.
-            samples: u32 = 64, whole(1, u32::MAX), option;
-            /// Noise threshold, relative to a tile's brightness, below which the tile gets no more samples; 0: no threshold.
-            error: f32 = 0.0, at_least(0.0), option;
-            /// Shadow rays towards each light from each shaded point, ≥ 1.
-            shadow_samples: u32 = 1, whole(1, 4096), scene;
-            /// Scatterings along one path: 0 = emitted light only, 1 = direct light.
-            max_depth: u32 = 8, whole(0, MOST_SCATTERINGS), option;
-            /// Rendering method.
-            integrator: Integrator = Integrator::Whitted, choice, option;
-            /// Shadows.
-            shadows: Shadows = Shadows::Soft, choice, option;
-            /// Most radiance that a path brings by one vertex after its first diffuse or glossy reflection; 0: no such limit.
-            clamp: f32 = 0.0, at_least(0.0), option;
-            /// Ambient radiance of the Phong model.
-            ambient: Vec3 = Vec3::ZERO, color, scene;
-            /// Radiance seen by a ray that leaves the scene.
-            background: Vec3 = Vec3::ZERO, color, scene;
-            /// Reconstruction filter.
-            filter: PixelFilter = PixelFilter::Box, choice, scene;
-            /// Exposure in stops.
-            exposure: f32 = 0.0, between(-100.0, 100.0), live;
-            /// Tone curve of 8-bit and 16-bit files.
-            tonemap: Tonemap = Tonemap::None, choice, scene;
+            /// Width of the image; at most 2^30 pixels in all.
+            width: u32 = 640, whole(1, 65_536), "pixels", option;
+            /// Height of the image.
+            height: u32 = 480, whole(1, 65_536), "pixels", option;
+            /// Most samples that a pixel gets.
+            samples: u32 = 64, whole(1, u32::MAX), "per pixel", option;
+            /// Noise at which a tile is done; 0: `samples` decide.
+            error: f32 = 0.0, at_least(0.0), "part of the brightness", option;
+            /// Shadow rays to each light of some size, for each sample.
+            shadow_samples: u32 = 1, whole(1, 4096), "per light", scene;
+            /// Bounces along one path: 0 shows emitted light only, 1 direct light.
+            max_depth: u32 = 8, whole(0, MOST_SCATTERINGS), "scatterings", option;
+            /// The rendering algorithm.
+            integrator: Integrator = Integrator::Whitted, choice, "", option;
+            /// Shadows in `whitted`.
+            shadows: Shadows = Shadows::Soft, choice, "", option;
+            /// Most that one bounce may bring: less noise, but the picture gets too dark; 0: no limit.
+            clamp: f32 = 0.0, at_least(0.0), "radiance", option;
+            /// Light from everywhere in `whitted`, in place of light that bounces.
+            ambient: Vec3 = Vec3::ZERO, color, "radiance", scene;
+            /// What a ray sees that leaves the scene; it lights nothing.
+            background: Vec3 = Vec3::ZERO, color, "radiance", scene;
+            /// Reconstruction filter of a pixel.
+            filter: PixelFilter = PixelFilter::Box, choice, "", scene;
+            /// Brightness of the image: 1 is twice as bright.
+            exposure: f32 = 0.0, between(-100.0, 100.0), "stops", live;
+            /// Tone curve of formats with 8 or 16 bits, and of the screen.
+            tonemap: Tonemap = Tonemap::None, choice, "", scene;
             /// Acceleration structure.
-            accel: Accel = Accel::Bvh, choice, option;
-            /// Seed of every random number.
-            seed: u32 = 0, whole(0, u32::MAX), option;
+            accel: Accel = Accel::Bvh, choice, "", option;
+            /// Seed of all random numbers: another seed, other noise.
+            seed: u32 = 0, whole(0, u32::MAX), "", option;
         }
     };
     // Pass the keys on that are wanted.
@@ -60,33 +61,33 @@ macro_rules! __render_keys {
     (@pass $callback:ident [] [] $($all:tt)*) => { $callback! { $($all)* } };
     (
         @pass $callback:ident [$which:ident] [$($kept:tt)*]
-        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, option; $($rest:tt)*
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, option; $($rest:tt)*
     ) => {
         $crate::scene::description::render_keys! {
             @pass $callback [$which]
-            [$($kept)* $(#[doc = $doc])* $name: $type = $default, $range $(($($limit),*))?, option;]
+            [$($kept)* $(#[doc = $doc])* $name: $type = $default, $range $(($($limit),*))?, $unit, option;]
             $($rest)*
         }
     };
     (
         @pass $callback:ident [changed] [$($kept:tt)*]
-        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, live; $($rest:tt)*
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, live; $($rest:tt)*
     ) => {
         $crate::scene::description::render_keys! {
             @pass $callback [changed]
-            [$($kept)* $(#[doc = $doc])* $name: $type = $default, $range $(($($limit),*))?, live;]
+            [$($kept)* $(#[doc = $doc])* $name: $type = $default, $range $(($($limit),*))?, $unit, live;]
             $($rest)*
         }
     };
     (
         @pass $callback:ident [$which:ident] [$($kept:tt)*]
-        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $other:ident; $($rest:tt)*
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $other:ident; $($rest:tt)*
     ) => {
         $crate::scene::description::render_keys! { @pass $callback [$which] [$($kept)*] $($rest)* }
     };
 }
 
-/// Calls a macro with the keys of `[render]`, each as `doc name: type = default, range, change;`: their one definition. The parser,
+/// Calls a macro with the keys of `[render]`, each as `doc name: type = default, range, unit, change;`: their one definition. The parser,
 /// [`Render`], the overrides of a run and the options of the command line are made from it or read it.
 ///
 /// The ranges are `whole(LEAST, MOST)`, `at_least(LEAST)`, `between(LEAST, MOST)`, `choice` and `color`. The changes:
@@ -119,14 +120,18 @@ pub enum KeyRange {
 }
 
 /// A key of `[render]`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct RenderKey {
     /// The key.
     pub name: &'static str,
-    /// Description, one sentence.
-    pub doc: String,
+    /// Description, one sentence without its full stop.
+    pub doc: &'static str,
+    /// The unit; empty for none.
+    pub unit: &'static str,
     /// Accepted values.
     pub range: KeyRange,
+    /// The accepted names with their meanings; none for other values.
+    pub words: WordList,
     /// The default, as a scene file has it.
     pub default: String,
     /// Whether an option of the command line overrides it.
@@ -151,12 +156,21 @@ macro_rules! range {
     };
 }
 
+macro_rules! words {
+    (choice, $type:ty) => {
+        words::<$type>
+    };
+    ($range:ident, $type:ty) => {
+        Vec::new
+    };
+}
+
 macro_rules! in_toml {
     (choice, $value:expr) => {
         format!("\"{}\"", $value.name())
     };
     (color, $value:expr) => {
-        format!("{:?}", $value.to_array())
+        format!("[{}]", $value.to_array().map(|part| part.to_string()).join(", "))
     };
     ($range:ident, $value:expr) => {
         format!("{:?}", $value)
@@ -165,7 +179,7 @@ macro_rules! in_toml {
 
 macro_rules! settings {
     ($(
-        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $change:ident;
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
         /// Settings of the picture.
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -181,8 +195,10 @@ macro_rules! settings {
             pub fn keys() -> Vec<RenderKey> {
                 vec![$(RenderKey {
                     name: stringify!($name),
-                    doc: concat!($($doc),*).trim().to_owned(),
+                    doc: concat!($($doc),*).trim().trim_end_matches('.'),
+                    unit: $unit,
                     range: range!($range $(($($limit),*))?, $type),
+                    words: words!($range, $type),
                     default: in_toml!($range, Self::DEFAULT.$name),
                     has_option: stringify!($change) == "option",
                 }),*]

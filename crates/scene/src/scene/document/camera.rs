@@ -30,11 +30,11 @@ pub(super) fn read(root: &Table<'_>) -> Option<Camera> {
 }
 
 fn aperture(table: &Table<'_>) -> f64 {
-    table.optional("aperture").number(Limits::LengthOrZero).unwrap_or(0.0)
+    table.optional("aperture").number(table.limits("aperture")).unwrap_or(0.0)
 }
 
 fn fov(table: &Table<'_>) -> Option<f64> {
-    table.optional("fov").number(Limits::Inside(0.0, 180.0))
+    table.optional("fov").number(table.limits("fov"))
 }
 
 fn look_at(table: &Table<'_>) -> Option<Camera> {
@@ -44,7 +44,7 @@ fn look_at(table: &Table<'_>) -> Option<Camera> {
     let up_vector = table.optional("up").vector_or(Limits::Any, DVec3::Y);
     let fov = fov(table).unwrap_or(FOV_DEGREES);
     let aperture = aperture(table);
-    let focus = table.optional("focus").number(Limits::Length);
+    let focus = table.optional("focus").number(table.limits("focus"));
 
     let (position_key, look_at_key) = (position, look_at);
     let (position, look_at) = (eye?, target?);
@@ -91,7 +91,7 @@ fn upright(table: &Table<'_>, view: DVec3, up: DVec3) -> Option<DVec3> {
 fn orbiter(table: &Table<'_>) -> Option<Camera> {
     let file = table.optional("orbiter").file(&[], &[]);
     let (fov, aperture) = (fov(table), aperture(table));
-    let focus = table.optional("focus").number(Limits::Length);
+    let focus = table.optional("focus").number(table.limits("focus"));
     for name in ["position", "look_at", "up"] {
         let message = format!("`{name}` and `orbiter` exclude each other");
         let help = "the orbiter file says where the camera is: remove one of the two";

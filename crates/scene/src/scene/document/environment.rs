@@ -1,10 +1,9 @@
 //! `[environment]`.
 
 use super::super::description::{Environment, Scene};
+use super::super::keys::endings::MAPS;
 use super::context::Issue;
-use super::limits::Limits;
 use super::table::Table;
-use super::textures::PICTURES;
 use crate::math::Vec3;
 
 /// The environment. `None` if it is invalid, `Some(None)` if it is absent.
@@ -14,11 +13,11 @@ pub(super) fn read(root: &Table<'_>) -> Option<Option<Environment>> {
         return (!key.is_given()).then_some(None);
     };
     let (color, file) = (table.optional("color"), table.optional("file"));
-    let map = if file.is_given() { file.file(&PICTURES, &[]).map(Some) } else { Some(None) };
+    let map = if file.is_given() { file.file(MAPS, &[]).map(Some) } else { Some(None) };
     let default = if file.is_given() { Vec3::ONE } else { Vec3::ZERO };
     let radiance = if color.is_given() { color.color() } else { Some(default) };
     let rotate = table.optional("rotate");
-    let degrees = if rotate.is_given() { rotate.number(Limits::Any) } else { Some(0.0) };
+    let degrees = if rotate.is_given() { rotate.number(table.limits("rotate")) } else { Some(0.0) };
     table.finish();
     if let (Some(Vec3::ZERO), Some(span)) = (radiance, color.span().filter(|_| file.is_given())) {
         let issue =

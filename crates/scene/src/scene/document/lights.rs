@@ -50,9 +50,9 @@ fn spot(table: &Table<'_>) -> Option<SpotLight> {
     let aim = table.optional("look_at");
     let look_at = aim.vector_or(Limits::Any, DVec3::ZERO);
     let angle = table.optional("angle");
-    let angle = if angle.is_given() { angle.number(Limits::Inside(0.0, 360.0)) } else { Some(45.0) };
+    let angle = if angle.is_given() { angle.number(table.limits("spot.angle")) } else { Some(45.0) };
     let blend = table.optional("blend");
-    let blend = if blend.is_given() { blend.number32(Limits::Between(0.0, 1.0)) } else { Some(0.2) };
+    let blend = if blend.is_given() { blend.number32(table.limits("spot.blend")) } else { Some(0.2) };
     let (point, look_at) = (point?, look_at?);
     let place = table.optional("position");
     if point.position == look_at {
@@ -75,7 +75,7 @@ fn directional(table: &Table<'_>) -> Option<DirectionalLight> {
     let direction = direction(table, "direction", "light", DVec3::NEG_Y);
     let irradiance = table.optional("irradiance").color().unwrap_or(Vec3::ONE);
     let key = table.optional("angle");
-    let angle = if key.is_given() { key.number(Limits::Between(0.0, 180.0)) } else { Some(0.0) };
+    let angle = if key.is_given() { key.number(table.limits("directional.angle")) } else { Some(0.0) };
     if angle.is_some_and(|angle| angle != 0.0 && angle < NARROWEST) {
         let issue = Issue::error(key.span()?, format!("`angle` must be 0, or at least {NARROWEST:e}"));
         table.context.report(issue.help("0 is a light without extent; the sun has 0.53"));

@@ -7,7 +7,6 @@ mod context;
 mod environment;
 mod key;
 mod lights;
-mod limits;
 mod materials;
 mod names;
 mod photons;
@@ -22,6 +21,7 @@ mod value;
 use std::path::{Path, PathBuf};
 
 use super::description::{Camera, Environment, Light, Scene};
+use super::keys::limits;
 use super::source::Source;
 use super::{MAX_FILE_BYTES, Outcome, Setting, facing, toml};
 use crate::math::Vec3;

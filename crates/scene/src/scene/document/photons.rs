@@ -1,7 +1,6 @@
 //! `[photons]`.
 
 use super::super::description::Photons;
-use super::limits::Limits;
 use super::table::Table;
 
 pub(super) fn read(root: &Table<'_>) -> Option<Photons> {
@@ -9,9 +8,9 @@ pub(super) fn read(root: &Table<'_>) -> Option<Photons> {
     let Some(table) = root.table("photons") else { return Some(default) };
     let photons = Photons {
         enabled: table.optional("enabled").flag().unwrap_or(default.enabled),
-        count: table.optional("count").whole(0..=1_000_000_000_000).unwrap_or(default.count),
-        radius: table.optional("radius").number(Limits::LengthOrZero).unwrap_or(default.radius),
-        bounces: table.optional("bounces").whole(0..=u32::MAX.into()).unwrap_or(default.bounces),
+        count: table.optional("count").whole(table.range("count")).unwrap_or(default.count),
+        radius: table.optional("radius").number(table.limits("radius")).unwrap_or(default.radius),
+        bounces: table.optional("bounces").whole(table.range("bounces")).unwrap_or(default.bounces),
     };
     table.finish();
     Some(photons)

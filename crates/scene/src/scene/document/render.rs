@@ -3,14 +3,12 @@
 use std::path::PathBuf;
 
 use super::super::description::{MOST_SCATTERINGS, Render, render_keys};
+use super::super::keys::endings::IMAGES;
 use super::context::Issue;
 use super::limits::Limits;
 use super::table::Table;
 
 const MAX_PIXELS: u64 = 1 << 30;
-
-/// Endings of pictures that can be written.
-pub(super) const PICTURES: [&str; 6] = ["png", "exr", "ppm", "hdr", "jpg", "jpeg"];
 
 macro_rules! read {
     ($key:expr, whole($least:expr, $most:expr)) => {
@@ -32,7 +30,7 @@ macro_rules! read {
 
 macro_rules! reader {
     ($(
-        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $change:ident;
+        $(#[doc = $doc:literal])* $name:ident: $type:ty = $default:expr, $range:ident $(($($limit:expr),*))?, $unit:literal, $change:ident;
     )*) => {
         /// Reads every key; what is absent or wrong has its default.
         fn settings(table: &Table<'_>) -> Render {
@@ -59,7 +57,7 @@ pub(super) fn read(root: &Table<'_>) -> (Option<Render>, Option<PathBuf>) {
 fn output(table: &Table<'_>) -> Option<PathBuf> {
     let key = table.optional("output");
     let text = key.text("the path of a picture, such as \"picture.png\"")?;
-    key.has_ending(text, &PICTURES, &["webp"]).then(|| table.context.resolve(text))
+    key.has_ending(text, IMAGES, &["webp"]).then(|| table.context.resolve(text))
 }
 
 fn check_size(table: &Table<'_>, render: &Render) {

@@ -2,13 +2,16 @@
 
 use std::cell::RefCell;
 use std::fmt;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
+use super::super::keys::key::Kind;
+use super::super::keys::table as table_info;
 use super::super::nearest::{meant, nearest};
 use super::super::sanitize::shortened;
 use super::super::toml::{Entries, KeyValue};
 use super::context::{Context, Issue};
 use super::key::Key;
+use super::limits::Limits;
 use super::value::{Item, Value, found};
 
 /// Name of a table in messages.
@@ -86,6 +89,53 @@ impl<'a> Table<'a> {
         }
         let entry = self.entries.get(name);
         Key::new(self.context, name, entry.as_ref().map(|one| one.span.clone()), entry.map(|one| one.value))
+    }
+
+    /// The range of a key by the definition of this table; with `TYPE.` before it, of that type.
+    pub(super) fn limits(&self, name: &str) -> Limits {
+        match self.kind_of(name) {
+            Some(
+                Kind::Number(limits)
+                | Kind::Color(limits)
+                | Kind::ColorOrTexture(limits)
+                | Kind::Emission(limits)
+                | Kind::NumberOrTexture(limits)
+                | Kind::Numbers(_, _, limits)
+                | Kind::Scale(limits),
+            ) => limits,
+            Some(
+                Kind::Whole(..)
+                | Kind::Flag
+                | Kind::Words(_)
+                | Kind::Text
+                | Kind::File(_)
+                | Kind::Texture
+                | Kind::Heights
+                | Kind::Material,
+            )
+            | None => Limits::Any,
+        }
+    }
+
+    /// The range of a whole number by the definition of this table.
+    pub(super) fn range(&self, name: &str) -> RangeInclusive<i128> {
+        match self.kind_of(name) {
+            Some(Kind::Whole(least, most)) => least.into()..=most.into(),
+            Some(_) | None => 0..=u32::MAX.into(),
+        }
+    }
+
+    /// The kind of a key by the definition. A test compares the definition with the keys that readers ask for.
+    fn kind_of(&self, name: &str) -> Option<Kind> {
+        let info = match self.title {
+            Title::Table(table) | Title::List(table) | Title::Named(table, _) => table_info(table)?,
+            Title::Root | Title::Key(_) => return None,
+        };
+        let (kind, name) = match name.split_once('.') {
+            Some((kind, name)) => (info.type_of(Some(kind)), name),
+            None => (None, name),
+        };
+        info.keys_of(kind).find(|key| key.name == name).map(|key| key.kind)
     }
 
     /// A key that must be there; `example` is what may stand after its `=`.

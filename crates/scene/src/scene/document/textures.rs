@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::super::description::{
     Channel, Encoding, Located, Material, PixelNumber, Texture, TextureFilter, TextureUse, Wrap,
 };
+use super::super::keys::endings::{GLTF, MAPS};
 use super::super::sanitize::shortened;
 use super::context::{Context, Issue};
 use super::key::Key;
@@ -12,13 +13,6 @@ use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
 use crate::math::{Vec2, Vec3};
-
-/// Endings of pictures that can be read.
-pub(super) const PICTURES: [&str; 12] =
-    ["png", "jpg", "jpeg", "ppm", "pgm", "pbm", "pnm", "tga", "bmp", "hdr", "exr", "webp"];
-
-/// Endings of files that hold numbered images.
-pub(super) const GLTF: [&str; 2] = ["glb", "gltf"];
 
 /// The textures of a file.
 pub(super) struct Textures {
@@ -40,7 +34,7 @@ fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
     let (file, image) = image(table);
     let filter = table.optional("filter").choice().unwrap_or(TextureFilter::Bilinear);
     let wrap = table.optional("wrap").choice().unwrap_or(Wrap::Repeat);
-    let repeat = table.optional("repeat").pair(Limits::NotZero).unwrap_or(Vec2::ONE);
+    let repeat = table.optional("repeat").pair(table.limits("repeat")).unwrap_or(Vec2::ONE);
     let rotate = table.optional("rotate").number(Limits::Any).unwrap_or(0.0);
     let offset = table.optional("offset").pair(Limits::Any).unwrap_or(Vec2::ZERO);
     let encoding = table.optional("encoding").choice().unwrap_or(Encoding::Auto);
@@ -56,9 +50,9 @@ fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
 fn image(table: &Table<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
     let (key, number) = (table.required("file", "\"picture.png\""), table.optional("image"));
     if !number.is_given() {
-        return (key.file(&PICTURES, &[]), Some(None));
+        return (key.file(MAPS, &[]), Some(None));
     }
-    (key.file(&GLTF, &[]), number.whole(0..=i128::from(u32::MAX)).map(Some))
+    (key.file(GLTF, &[]), number.whole(table.range("image")).map(Some))
 }
 
 /// Reports a set of texture coordinates other than the first: no mesh file has more.

@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use csscolorparser::NAMED_COLORS;
-
 use super::super::super::description::{ColorSource, EmissionSource};
+use super::super::super::keys::{color_bytes, color_names};
 use super::super::super::nearest::nearest;
 use super::super::context::Issue;
 use super::super::limits::Limits;
@@ -76,7 +75,7 @@ impl Key<'_> {
     /// None, and an error, where a value is the bare name of a texture.
     fn is_no_texture(&self, textures: &Names, expected: &str) -> Option<()> {
         if let Item::String(text) = self.value?.item()
-            && named(text).is_none()
+            && color_bytes(text).is_none()
             && textures.find(text).is_some()
         {
             let issue = Issue::error(self.span()?, format!("`{}` must be {expected}", self.name))
@@ -141,12 +140,12 @@ impl Key<'_> {
 
     /// `#rrggbb`, or a name in any case, decoded from sRGB.
     fn written_color(&self, text: &str) -> Option<Vec3> {
-        if let Some(bytes) = rgb_bytes(text).or_else(|| named(text)) {
+        if let Some(bytes) = rgb_bytes(text).or_else(|| color_bytes(text)) {
             return Some(srgb8_to_linear(bytes));
         }
         let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR}", self.name));
         let small = text.to_ascii_lowercase();
-        let issue = match (long_form(text), nearest(&small, names())) {
+        let issue = match (long_form(text), nearest(&small, color_names())) {
             (Some(long), _) => {
                 issue.label("this is not #rrggbb").help(format!("write all six digits: \"{long}\""))
             }
@@ -159,17 +158,6 @@ impl Key<'_> {
         self.context.report(issue);
         None
     }
-}
-
-/// The names of colours, in small letters (CSS Color Module Level 4, 6.1).
-fn names() -> impl Iterator<Item = &'static str> {
-    NAMED_COLORS.keys().map(|name| name.as_str())
-}
-
-/// The bytes of a colour by its name, in any case.
-fn named(text: &str) -> Option<[u8; 3]> {
-    let found = NAMED_COLORS.entries().find(|(name, _)| name.as_str().eq_ignore_ascii_case(text));
-    found.map(|(_, bytes)| *bytes)
 }
 
 /// The bytes of `#rrggbb`.
@@ -201,11 +189,11 @@ mod tests {
 
     #[test]
     fn names_are_those_of_css_in_any_case() {
-        assert_eq!(named("rebeccapurple"), Some([0x66, 0x33, 0x99]));
-        assert_eq!(named("DarkSlateGrey"), named("darkslategray"));
-        assert_eq!(names().count(), 148);
+        assert_eq!(color_bytes("rebeccapurple"), Some([0x66, 0x33, 0x99]));
+        assert_eq!(color_bytes("DarkSlateGrey"), color_bytes("darkslategray"));
+        assert_eq!(color_names().count(), 148);
         for wrong in ["", "transparent", "fff", "bad", "rgb(0,0,0)", "red "] {
-            assert_eq!(named(wrong), None, "{wrong}");
+            assert_eq!(color_bytes(wrong), None, "{wrong}");
         }
     }
 

@@ -4,16 +4,13 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 
 use super::super::super::description::{Located, Mesh, MeshFile, Placement, Shape};
+use super::super::super::keys::endings::{GLTF, MESHES};
 use super::super::context::Issue;
 use super::super::key::Key;
 use super::super::limits::Limits;
 use super::super::table::Table;
-use super::super::textures::GLTF;
 use crate::math::DVec3;
 use crate::math::limits::{SHORTEST, is_too_short, length};
-
-/// Endings of mesh files that can be read.
-pub(super) const MESHES: [&str; 6] = ["obj", "off", "ply", "stl", "glb", "gltf"];
 
 /// The mesh files named so far, each once, however it is written.
 #[derive(Default)]
@@ -38,7 +35,7 @@ impl MeshFiles {
 }
 
 pub(super) fn read(table: &Table<'_>, files: &mut MeshFiles) -> Option<Shape> {
-    let file = table.required("file", "\"mesh.obj\"").file(&MESHES, &[]);
+    let file = table.required("file", "\"mesh.obj\"").file(MESHES, &[]);
     let part = part(table, file.as_ref());
     let placed = placement(table);
     let smooth = table.optional("smooth").flag().unwrap_or(true);
@@ -50,7 +47,7 @@ pub(super) fn read(table: &Table<'_>, files: &mut MeshFiles) -> Option<Shape> {
 fn part(table: &Table<'_>, file: Option<&Located<PathBuf>>) -> Option<Option<u32>> {
     let key = table.optional("part");
     let Some(span) = key.span() else { return Some(None) };
-    let number = key.whole(0..=i128::from(u32::MAX)).map(Some);
+    let number = key.whole(table.range("part")).map(Some);
     let ending = file.and_then(|file| file.value.extension()).unwrap_or_default().to_ascii_lowercase();
     if file.is_some() && !GLTF.iter().any(|known| ending == *known) {
         key.context.report(Issue::error(span, "`part` is for .glb and .gltf files: others have no parts"));
@@ -74,7 +71,7 @@ fn placement(table: &Table<'_>) -> Option<Placement> {
     }
     let [scale, rotate, translate] = steps;
     Some(Placement::Steps {
-        scale: scale.scale(Limits::NotZero).unwrap_or(DVec3::ONE),
+        scale: scale.scale(table.limits("scale")).unwrap_or(DVec3::ONE),
         rotate: rotate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
         translate: translate.vector(Limits::Any).unwrap_or(DVec3::ZERO),
     })

@@ -14,6 +14,7 @@ mod triangle;
 use std::path::Path;
 
 use super::super::description::{MeshFile, Object, Shape};
+use super::super::keys::endings::MESHES;
 use super::context::Issue;
 use super::limits::Limits;
 use super::materials::Materials;
@@ -130,7 +131,7 @@ fn axis_ends(table: &Table<'_>, names: [&'static str; 2], what: &str) -> Option<
 /// A length by its key or else a default.
 fn length(table: &Table<'_>, name: &'static str, default: f64) -> Option<f64> {
     let key = table.optional(name);
-    if key.is_given() { key.number(Limits::Length) } else { Some(default) }
+    if key.is_given() { key.number(table.limits(name)) } else { Some(default) }
 }
 
 /// Whether two edges span an area: neither is 0, and the sine of the angle between them is not lost to rounding.
@@ -145,5 +146,5 @@ fn span_area(u: DVec3, v: DVec3) -> bool {
 /// Whether a file is a mesh by its name, of any version of glimt.
 pub(in crate::scene) fn is_mesh(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    mesh::MESHES.iter().any(|known| *known == ending)
+    MESHES.iter().any(|known| *known == ending)
 }

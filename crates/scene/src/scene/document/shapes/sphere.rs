@@ -6,6 +6,6 @@ use super::super::table::Table;
 
 pub(super) fn read(table: &Table<'_>) -> Option<Shape> {
     let center = table.required("center", "[0, 0.5, 0]").vector(Limits::Any);
-    let radius = table.required("radius", "0.5").number(Limits::Length);
+    let radius = table.required("radius", "0.5").number(table.limits("radius"));
     Some(Shape::Sphere { center: center?, radius: radius? })
 }

@@ -4,8 +4,8 @@ use crate::math::limits::{LARGEST, is_too_short};
 
 /// Numbers that a key accepts. All are finite and of magnitude at most [`LARGEST`]
 /// besides.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Limits {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Limits {
     /// Any number.
     Any,
     /// Any number but 0.
@@ -24,7 +24,7 @@ pub(super) enum Limits {
 
 impl Limits {
     /// The fault of a number, to be read after its name: `must be greater than 0`.
-    pub(super) fn violation(self, number: f64) -> Option<String> {
+    pub fn violation(self, number: f64) -> Option<String> {
         if number.is_nan() || number.is_infinite() {
             return Some("must be a finite number".to_owned());
         }
@@ -50,6 +50,19 @@ impl Limits {
             Self::LengthOrZero => number >= 0.0,
             Self::Between(least, most) => (least..=most).contains(&number),
             Self::Inside(low, high) => low < number && number < high,
+        }
+    }
+
+    /// The range in words, as the pages have it.
+    pub fn range(self) -> String {
+        match self {
+            Self::Any => "any".to_owned(),
+            Self::NotZero => "not 0".to_owned(),
+            Self::AtLeast(least) => format!("{least} …"),
+            Self::Length => "> 0".to_owned(),
+            Self::LengthOrZero => "0 …".to_owned(),
+            Self::Between(least, most) => format!("{least} … {most}"),
+            Self::Inside(low, high) => format!("> {low}, < {high}"),
         }
     }
 

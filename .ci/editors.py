@@ -1,0 +1,87 @@
+#!/usr/bin/env python3
+"""Validators that people have, on the schema and the scenes: Taplo by draft 4, check-jsonschema by both drafts.
+
+Both have to take every bundled scene, and to find mistakes of tests/broken in the lines in which `glimt check --json` finds them.
+Needs `taplo` and `check-jsonschema` on the path (both are on PyPI) and the program:
+
+    python3 .ci/editors.py target/release/glimt
+"""
+
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+# Files with this many mistakes that a schema can know have to be found, each in its line.
+LEAST_FILES = 30
+
+
+def run(*command):
+    return subprocess.run([str(word) for word in command], capture_output=True, text=True)
+
+
+def mistakes(glimt, path):
+    """Lines of errors, by the program."""
+    report = json.loads(run(glimt, "check", "--json", path).stdout)
+    return {one["line"] for one in report["diagnostics"] if one["severity"] == "error" and one["line"]}
+
+
+def by_taplo(schema, path):
+    """Lines that Taplo underlines."""
+    said = run("taplo", "lint", "--colors", "never", "--schema", schema.as_uri(), path)
+    lines = set()
+    for line, _ in re.findall(r"[┌╭][^\n]*?\.toml:(\d+):(\d+)", said.stderr + said.stdout):
+        lines.add(int(line))
+    return lines, said
+
+
+def main():
+    glimt = pathlib.Path(sys.argv[1]).resolve()
+    faults = []
+    with tempfile.TemporaryDirectory() as folder:
+        drafts = {}
+        for draft in ["4", "2020-12"]:
+            drafts[draft] = pathlib.Path(folder) / f"schema-{draft}.json"
+            drafts[draft].write_text(run(glimt, "schema", "--draft", draft).stdout)
+        meta = run("check-jsonschema", "--check-metaschema", *drafts.values())
+        if meta.returncode:
+            faults.append(f"a schema is none: {meta.stdout[:500]}")
+        scenes = sorted((ROOT / "scenes").glob("*.toml"))
+        for draft, schema in drafts.items():
+            said = run("check-jsonschema", "--schemafile", schema, *scenes)
+            if said.returncode:
+                faults.append(f"check-jsonschema, draft {draft}: {said.stdout[:500]}")
+        # By the line at the head of each, from the folder of the scenes.
+        said = run("taplo", "lint", "--colors", "never", *scenes)
+        if said.returncode:
+            faults.append(f"taplo: {said.stderr[:500]}")
+
+        found, partly, left = [], [], []
+        for path in sorted((ROOT / "tests" / "broken").glob("*.toml")):
+            wrong = mistakes(glimt, path)
+            if not wrong:
+                continue
+            lines, _ = by_taplo(drafts["4"], path)
+            kind = found if wrong <= lines else partly if wrong & lines else left
+            kind.append((path.stem, sorted(wrong), sorted(lines)))
+        for name, all_of in [("all mistakes in their lines", found), ("some of them", partly), ("none", left)]:
+            print(f"Taplo finds {name}: {len(all_of)} files")
+            for stem, wrong, lines in all_of:
+                print(f"    {stem:22} glimt {wrong}, Taplo {lines}")
+        rejected = [
+            path.stem
+            for path in sorted((ROOT / "tests" / "broken").glob("*.toml"))
+            if run("check-jsonschema", "--schemafile", drafts["2020-12"], path).returncode
+        ]
+        print(f"check-jsonschema refuses {len(rejected)} files")
+        if len(found) + len(partly) < LEAST_FILES:
+            faults.append(f"Taplo finds mistakes in {len(found) + len(partly)} files alone")
+    print(f"{len(scenes)} scenes are valid" if not faults else "\n".join(faults))
+    sys.exit(bool(faults))
+
+
+if __name__ == "__main__":
+    main()

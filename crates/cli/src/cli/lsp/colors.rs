@@ -1,0 +1,62 @@
+//! Colours of a text, as swatches in the editor: linear numbers shown in sRGB.
+
+use lsp_types::{Color, ColorInformation, ColorPresentation};
+use serde_json::{Value, json};
+
+use super::document::Document;
+use crate::math::color::{linear_to_srgb, srgb8_to_linear};
+use crate::scene::keys::color_bytes;
+use crate::scene::keys::key::Kind;
+use crate::scene::outline::OutlineKey;
+
+/// All colours of a text.
+pub(super) fn all(document: &Document) -> Value {
+    let mut found = Vec::new();
+    for table in &document.tables {
+        let known = table.known();
+        for key in &table.keys {
+            let kind = known.iter().find(|info| info.name == key.name.text).map(|info| info.kind);
+            let is_color = matches!(kind, Some(Kind::Color(_) | Kind::ColorOrTexture(_) | Kind::Emission(_)));
+            if let Some(color) = color(&document.text, key).filter(|_| is_color) {
+                found.push(ColorInformation { range: document.span(&key.value), color });
+            }
+        }
+    }
+    json!(found)
+}
+
+/// A value as a colour; numbers above 1 are as bright as a screen is.
+fn color(text: &str, key: &OutlineKey) -> Option<Color> {
+    let bytes = match &key.text {
+        Some(text) => match text.strip_prefix('#') {
+            Some(digits) if digits.len() == 6 => {
+                let number = u32::from_str_radix(digits, 16).ok()?;
+                let [_, red, green, blue] = number.to_be_bytes();
+                [red, green, blue]
+            }
+            Some(_) => return None,
+            None => color_bytes(text)?,
+        },
+        None => {
+            let list = text.get(key.value.clone())?.strip_prefix('[')?.strip_suffix(']')?;
+            let numbers: Vec<f32> =
+                list.split(',').map(|number| number.trim().parse().ok()).collect::<Option<_>>()?;
+            let &[red, green, blue] = numbers.as_slice() else { return None };
+            let [red, green, blue] = [red, green, blue].map(|linear| linear_to_srgb(linear.clamp(0.0, 1.0)));
+            return Some(Color { red, green, blue, alpha: 1.0 });
+        }
+    };
+    let [red, green, blue] = bytes.map(|byte| f32::from(byte) / 255.0);
+    Some(Color { red, green, blue, alpha: 1.0 })
+}
+
+/// A chosen colour as texts: `#rrggbb`, and linear numbers.
+pub(super) fn presentations(params: &Value) -> Option<Value> {
+    let color: Color = serde_json::from_value(params["color"].clone()).ok()?;
+    let bytes = [color.red, color.green, color.blue].map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);
+    let [red, green, blue] = bytes;
+    let linear = srgb8_to_linear(bytes).to_array().map(|part| format!("{part:.3}"));
+    let labels = [format!("\"#{red:02x}{green:02x}{blue:02x}\""), format!("[{}]", linear.join(", "))];
+    let presentation = |label: String| ColorPresentation { label, ..ColorPresentation::default() };
+    Some(json!(labels.map(presentation)))
+}

@@ -1,0 +1,134 @@
+//! Completion: tables, keys, words, and the names that the text defines.
+
+use lsp_types::{CompletionItem, CompletionItemKind, Documentation, MarkupContent, MarkupKind};
+use serde_json::{Value, json};
+
+use super::document::Document;
+use super::look::{described, texture_keys};
+use super::place::{Place, Section, place};
+use crate::scene::keys::key::{Form, KeyInfo, Kind, Word};
+use crate::scene::keys::{color_names, tables};
+
+/// What may be typed at a byte.
+pub(super) fn complete(document: &Document, offset: usize) -> Option<Value> {
+    let items = match place(&document.text, offset)? {
+        Place::Header => headers(document, offset),
+        Place::Key { of, given } => keys(of, &given),
+        Place::Value { of, key, is_quoted } if key == "type" => types(of, is_quoted),
+        Place::Value { of, key, is_quoted } => {
+            of.key(&key).map(|key| values(document, key.kind, is_quoted))?
+        }
+        Place::InnerKey { given } => {
+            let keys = texture_keys().into_iter().filter(|(name, _)| !given.iter().any(|one| one == name));
+            keys.map(|(name, doc)| item(name, CompletionItemKind::PROPERTY, doc, format!("{name} = ")))
+                .collect()
+        }
+        Place::InnerValue { key, is_quoted } => match key.as_str() {
+            "texture" => names(document, "textures", is_quoted),
+            "channel" => {
+                words(&crate::scene::keys::key::words::<crate::scene::description::Channel>(), is_quoted)
+            }
+            _ => Vec::new(),
+        },
+    };
+    Some(json!(items))
+}
+
+fn item(label: &str, kind: CompletionItemKind, doc: &str, insert: String) -> CompletionItem {
+    let documentation = MarkupContent { kind: MarkupKind::Markdown, value: doc.to_owned() };
+    CompletionItem {
+        label: label.to_owned(),
+        kind: Some(kind),
+        documentation: Some(Documentation::MarkupContent(documentation)),
+        insert_text: Some(insert),
+        ..CompletionItem::default()
+    }
+}
+
+/// Headers of tables; brackets that are there already are not offered again.
+fn headers(document: &Document, offset: usize) -> Vec<CompletionItem> {
+    let line = document.text[..offset].rsplit('\n').next().unwrap_or_default().trim_start();
+    let is_there = |table: &str| document.tables.iter().any(|one| one.info.name == table);
+    let open = tables().iter().filter(|table| table.form != Form::Single || !is_there(table.name));
+    open.map(|table| {
+        let head = table.head();
+        let rest = head.strip_prefix(line).unwrap_or(head.trim_start_matches('[')).to_owned();
+        item(&head, CompletionItemKind::MODULE, table.doc, rest)
+    })
+    .collect()
+}
+
+fn keys(of: Section, given: &[String]) -> Vec<CompletionItem> {
+    let mut items: Vec<CompletionItem> = Vec::new();
+    let is_given = |name: &str| given.iter().any(|one| one == name);
+    if !of.info.types.is_empty() && !is_given("type") {
+        let default = of.info.types.first().map_or("", |kind| kind.name);
+        items.push(item("type", CompletionItemKind::PROPERTY, "", format!("type = \"{default}\"")));
+    }
+    let key = |key: &&KeyInfo| {
+        let mut item = item(
+            key.name,
+            CompletionItemKind::PROPERTY,
+            &described(key),
+            format!("{} = {}", key.name, key.example()),
+        );
+        item.detail = Some(key.kind().replace('`', ""));
+        item
+    };
+    items.extend(of.keys().iter().filter(|key| !is_given(key.name)).map(key));
+    items
+}
+
+fn types(of: Section, is_quoted: bool) -> Vec<CompletionItem> {
+    let list: Vec<Word> =
+        of.info.types.iter().map(|kind| Word { name: kind.name, meaning: kind.doc }).collect();
+    words(&list, is_quoted)
+}
+
+fn values(document: &Document, kind: Kind, is_quoted: bool) -> Vec<CompletionItem> {
+    let texture = |more: &str| {
+        item("{ texture = … }", CompletionItemKind::STRUCT, "", format!("{{ texture = \"\"{more} }}"))
+    };
+    let colors = || {
+        let color = |name: &str| item(name, CompletionItemKind::COLOR, "", in_quotes(name, is_quoted));
+        color_names().map(color).collect::<Vec<_>>()
+    };
+    match kind {
+        Kind::Words(list) => words(&list(), is_quoted),
+        Kind::Flag => {
+            ["true", "false"].map(|flag| item(flag, CompletionItemKind::VALUE, "", flag.to_owned())).to_vec()
+        }
+        Kind::Material => names(document, "materials", is_quoted),
+        Kind::Texture | Kind::Heights => names(document, "textures", is_quoted),
+        Kind::Color(_) => colors(),
+        Kind::ColorOrTexture(_) | Kind::Emission(_) if is_quoted => colors(),
+        Kind::ColorOrTexture(_) | Kind::Emission(_) => colors().into_iter().chain([texture("")]).collect(),
+        Kind::NumberOrTexture(_) => vec![texture("")],
+        Kind::Whole(..)
+        | Kind::Number(_)
+        | Kind::Text
+        | Kind::File(_)
+        | Kind::Numbers(..)
+        | Kind::Scale(_) => Vec::new(),
+    }
+}
+
+fn words(list: &[Word], is_quoted: bool) -> Vec<CompletionItem> {
+    let word = |word: &Word| {
+        item(word.name, CompletionItemKind::ENUM_MEMBER, word.meaning, in_quotes(word.name, is_quoted))
+    };
+    list.iter().map(word).collect()
+}
+
+/// Names that the text gives to tables.
+fn names(document: &Document, table: &str, is_quoted: bool) -> Vec<CompletionItem> {
+    let named =
+        document.tables.iter().filter(|one| one.info.name == table).filter_map(|one| one.name.as_ref());
+    named
+        .map(|name| item(&name.text, CompletionItemKind::REFERENCE, "", in_quotes(&name.text, is_quoted)))
+        .collect()
+}
+
+fn in_quotes(text: &str, is_quoted: bool) -> String {
+    if is_quoted { text.to_owned() } else { crate::scene::quoted(text) }
+}

@@ -1,0 +1,55 @@
+//! Mistakes as the protocol has them.
+
+use std::path::Path;
+
+use lsp_types::{Diagnostic, DiagnosticSeverity, Range};
+
+use super::document::Document;
+use crate::pipeline::check;
+use crate::pipeline::protocol::Failure;
+use crate::scene::diagnostic::{self, Severity};
+use crate::scene::parse;
+
+/// Mistakes in a text.
+pub(super) fn of_text(document: &Document) -> Vec<Diagnostic> {
+    let found = parse(document.text.as_str().into(), &document.path).diagnostics;
+    found.iter().map(|one| diagnostic(document, one)).collect()
+}
+
+/// Mistakes in the file and in all that it names, as `glimt check` has them. `None` if the file has another text, or cannot be read.
+pub(super) fn of_files(document: &Document) -> Option<Vec<Diagnostic>> {
+    if std::fs::read_to_string(&document.path).ok()? != document.text {
+        return None;
+    }
+    let found = match check(&document.path, &[]) {
+        Ok(checked) => checked.warnings,
+        Err(Failure::Scene(diagnostics)) => diagnostics,
+        Err(Failure::Work(_)) => return None,
+    };
+    Some(found.iter().map(|one| diagnostic(document, one)).collect())
+}
+
+fn diagnostic(document: &Document, one: &diagnostic::Diagnostic) -> Diagnostic {
+    let is_here = one.path == document.path;
+    let place = one.place.as_ref();
+    let range = place.filter(|_| is_here).map_or(Range::default(), |place| document.span(&place.span));
+    let label = place.map(|place| place.label.as_str()).filter(|label| !label.is_empty());
+    let mut message =
+        if is_here { one.message.clone() } else { format!("{}: {}", name(&one.path), one.message) };
+    for (more, between) in [(label, ": "), (one.help.as_deref(), "\n")] {
+        if let Some(more) = more {
+            message.push_str(between);
+            message.push_str(more);
+        }
+    }
+    let severity = match one.severity {
+        Severity::Error => DiagnosticSeverity::ERROR,
+        Severity::Warning => DiagnosticSeverity::WARNING,
+    };
+    let source = Some("glimt".to_owned());
+    Diagnostic { range, severity: Some(severity), source, message, ..Diagnostic::default() }
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,74 @@
+//! An open text. Positions of the protocol count UTF-16 units in a line.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use lsp_types::{Position, Range as Span};
+
+use crate::scene::outline::{OutlineTable, outline};
+
+/// A text as the client has it.
+#[derive(Clone, Debug)]
+pub(super) struct Document {
+    pub(super) path: PathBuf,
+    pub(super) version: i32,
+    pub(super) text: String,
+    /// The tables of the text.
+    pub(super) tables: Vec<OutlineTable>,
+    /// Beginnings of the lines.
+    lines: Vec<usize>,
+}
+
+impl Document {
+    pub(super) fn new(path: PathBuf, version: i32, text: String) -> Self {
+        let starts = text.match_indices('\n').map(|(at, _)| at + 1);
+        let lines = std::iter::once(0).chain(starts).collect();
+        Self { path, version, tables: outline(&text), lines, text }
+    }
+
+    /// The byte of a position; of one behind the end of its line, that end.
+    pub(super) fn offset(&self, position: Position) -> usize {
+        let line = usize::try_from(position.line).unwrap_or(usize::MAX);
+        let Some(&start) = self.lines.get(line) else { return self.text.len() };
+        let text = self.text[start..].split('\n').next().unwrap_or_default();
+        let mut units = position.character;
+        for (at, character) in text.char_indices() {
+            if units == 0 {
+                return start + at;
+            }
+            units = units.saturating_sub(character.len_utf16() as u32);
+        }
+        start + text.len()
+    }
+
+    /// The position of a byte.
+    pub(super) fn position(&self, offset: usize) -> Position {
+        let offset = offset.min(self.text.len());
+        let line = self.lines.partition_point(|start| *start <= offset) - 1;
+        let before = self.text.get(self.lines[line]..offset).unwrap_or_default();
+        let units = before.encode_utf16().count();
+        Position::new(line as u32, units as u32)
+    }
+
+    pub(super) fn span(&self, range: &Range<usize>) -> Span {
+        Span::new(self.position(range.start), self.position(range.end))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_count_utf_16_units() {
+        let document = Document::new(PathBuf::new(), 0, "a = 1\n# ä𝄞x\n\n".to_owned());
+        for (offset, line, character) in
+            [(0, 0, 0), (5, 0, 5), (6, 1, 0), (10, 1, 3), (14, 1, 5), (15, 1, 6), (16, 2, 0)]
+        {
+            assert_eq!(document.position(offset), Position::new(line, character), "{offset}");
+            assert_eq!(document.offset(Position::new(line, character)), offset);
+        }
+        assert_eq!(document.offset(Position::new(0, 99)), 5);
+        assert_eq!(document.offset(Position::new(99, 0)), document.text.len());
+    }
+}

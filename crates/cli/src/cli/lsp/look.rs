@@ -1,0 +1,115 @@
+//! Hovering and definitions: what is known of the key or name under the cursor.
+
+use std::ops::Range;
+
+use lsp_types::{Hover, HoverContents, MarkupContent, MarkupKind};
+use serde_json::{Value, json};
+
+use super::document::Document;
+use crate::scene::keys::key::{Default, KeyInfo, Kind};
+use crate::scene::outline::{OutlineKey, OutlineTable};
+
+/// A key under the cursor, with its table, and the key of the table if it is one in braces.
+struct Found<'d> {
+    table: &'d OutlineTable,
+    outer: &'d OutlineKey,
+    key: &'d OutlineKey,
+}
+
+/// The key whose name or value holds a byte.
+fn found(document: &Document, offset: usize) -> Option<Found<'_>> {
+    let holds = |key: &&OutlineKey| {
+        let reach = |range: &Range<usize>| range.start <= offset && offset <= range.end;
+        reach(&key.name.span) || reach(&key.value)
+    };
+    document.tables.iter().find_map(|table| {
+        let outer = table.keys.iter().find(holds)?;
+        let key = outer.inner.iter().find(holds).unwrap_or(outer);
+        Some(Found { table, outer, key })
+    })
+}
+
+/// Description of the key under the cursor.
+pub(super) fn hover(document: &Document, offset: usize) -> Option<Value> {
+    let Found { table, outer, key } = found(document, offset)?;
+    let name = key.name.text.as_str();
+    let text = if std::ptr::eq(key, outer) {
+        match table.known().into_iter().find(|one| one.name == name) {
+            Some(info) => format!("**{name}**: {}\n\n{}", info.kind(), described(info)),
+            None if name == "type" => {
+                let types =
+                    table.info.types.iter().map(|kind| format!("- `\"{}\"`: {}", kind.name, kind.doc));
+                types.collect::<Vec<_>>().join("\n")
+            }
+            None => return None,
+        }
+    } else {
+        texture_keys().into_iter().find(|(known, _)| *known == name)?.1.to_owned()
+    };
+    let contents = HoverContents::Markup(MarkupContent { kind: MarkupKind::Markdown, value: text });
+    Some(json!(Hover { contents, range: Some(document.span(&key.name.span)) }))
+}
+
+/// Description, unit, range and default, in Markdown.
+pub(super) fn described(key: &KeyInfo) -> String {
+    let mut text = format!("{}.", key.doc);
+    let mut row = |name: &str, value: String| {
+        if !value.is_empty() {
+            text.push_str(&format!("\n- {name}: {value}"));
+        }
+    };
+    row("unit", key.unit.to_owned());
+    row("range", key.range());
+    row(
+        "default",
+        match key.default {
+            Default::Absent => String::new(),
+            Default::Required(_) | Default::Is(_) | Default::By(_) => key.default_words(),
+        },
+    );
+    if let Kind::Words(list) = key.kind {
+        list().iter().for_each(|word| text.push_str(&format!("\n- `\"{}\"`: {}", word.name, word.meaning)));
+    }
+    text
+}
+
+/// Keys within the braces of a texture.
+pub(super) fn texture_keys() -> [(&'static str, &'static str); 3] {
+    [
+        ("texture", "The name of a texture."),
+        ("channel", "The channel that holds numbers: `\"r\"`, `\"g\"`, `\"b\"` or `\"a\"`."),
+        ("scale", "A colour that multiplies the texture, in `emission`."),
+    ]
+}
+
+/// The range where the name under the cursor is defined.
+pub(super) fn definition(document: &Document, offset: usize) -> Option<Value> {
+    let Found { table, outer, key } = found(document, offset)?;
+    let group = if std::ptr::eq(key, outer) {
+        match table.known().into_iter().find(|one| one.name == key.name.text)?.kind {
+            Kind::Material => "materials",
+            Kind::Texture | Kind::Heights => "textures",
+            Kind::Whole(..)
+            | Kind::Number(_)
+            | Kind::Flag
+            | Kind::Words(_)
+            | Kind::Text
+            | Kind::File(_)
+            | Kind::Color(_)
+            | Kind::ColorOrTexture(_)
+            | Kind::Emission(_)
+            | Kind::NumberOrTexture(_)
+            | Kind::Numbers(..)
+            | Kind::Scale(_) => return None,
+        }
+    } else if key.name.text == "texture" {
+        "textures"
+    } else {
+        return None;
+    };
+    let name = key.text.as_deref()?;
+    let named =
+        document.tables.iter().filter(|one| one.info.name == group).filter_map(|one| one.name.as_ref());
+    let definition = named.into_iter().find(|one| one.text == name)?;
+    Some(json!(document.span(&definition.span)))
+}

@@ -1,0 +1,208 @@
+//! `glimt lsp`: a language server for scenes, over stdin and stdout.
+//!
+//! The client sends a whole text with every change. Each text is parsed at once, which finds what stands in it; the files that it
+//! names are read when it is opened and saved, on a thread of their own.
+
+mod colors;
+mod complete;
+mod diagnostics;
+mod document;
+mod look;
+mod place;
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use lsp_server::{Connection, ErrorCode, Message, Notification, Request, RequestId, Response};
+use lsp_types::notification::{
+    DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, DidSaveTextDocument, Notification as _,
+    PublishDiagnostics,
+};
+use lsp_types::request::{
+    ColorPresentationRequest, Completion, DocumentColor, GotoDefinition, HoverRequest, Request as _,
+};
+use lsp_types::{
+    Diagnostic, DidChangeTextDocumentParams, DidCloseTextDocumentParams, DidOpenTextDocumentParams,
+    DidSaveTextDocumentParams, PublishDiagnosticsParams, TextDocumentPositionParams, Uri,
+};
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+
+use self::document::Document;
+use super::console::Console;
+use super::exit::Exit;
+
+/// Serves until the client ends it, or its end of stdin is closed.
+pub(super) fn run(console: &Console) -> Exit {
+    let (connection, threads) = Connection::stdio();
+    let outcome = serve(connection).and_then(|()| threads.join().map_err(|error| error.to_string()));
+    match outcome {
+        Ok(()) => Exit::DONE,
+        Err(message) => console.fail(Exit::FAILED, &format!("language server: {message}")),
+    }
+}
+
+fn capabilities() -> Value {
+    json!({
+        "capabilities": {
+            "textDocumentSync": { "openClose": true, "change": 1, "save": { "includeText": false } },
+            "completionProvider": { "triggerCharacters": ["[", ".", "\"", "=", " "] },
+            "hoverProvider": true,
+            "definitionProvider": true,
+            "colorProvider": true,
+        },
+        "serverInfo": { "name": "glimt", "version": env!("CARGO_PKG_VERSION") },
+    })
+}
+
+// The connection is dropped at the end, without which its threads do not end.
+#[allow(clippy::needless_pass_by_value)]
+fn serve(connection: Connection) -> Result<(), String> {
+    let (id, _) = connection.initialize_start().map_err(|error| error.to_string())?;
+    connection.initialize_finish(id, capabilities()).map_err(|error| error.to_string())?;
+    let mut server = Server { connection: &connection, documents: Arc::default() };
+    for message in &connection.receiver {
+        match message {
+            Message::Request(request) => {
+                if connection.handle_shutdown(&request).map_err(|error| error.to_string())? {
+                    return Ok(());
+                }
+                let response = server.answer(request);
+                server.send(response.into());
+            }
+            Message::Notification(notification) => server.hear(notification),
+            // The server asks nothing.
+            Message::Response(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// Open texts by their addresses.
+type Documents = Arc<Mutex<HashMap<String, Document>>>;
+
+struct Server<'c> {
+    connection: &'c Connection,
+    documents: Documents,
+}
+
+impl Server<'_> {
+    fn documents(&self) -> MutexGuard<'_, HashMap<String, Document>> {
+        self.documents.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A client that is gone hears nothing.
+    fn send(&self, message: Message) {
+        let _ = self.connection.sender.send(message);
+    }
+
+    fn answer(&self, request: Request) -> Response {
+        let Request { id, method, params } = request;
+        let found = match method.as_str() {
+            Completion::METHOD => self.at(params, complete::complete),
+            HoverRequest::METHOD => self.at(params, look::hover),
+            GotoDefinition::METHOD => {
+                let uri = params["textDocument"]["uri"].clone();
+                self.at(params, look::definition).map(|range| json!({ "uri": uri, "range": range }))
+            }
+            DocumentColor::METHOD => self.on(&params, colors::all),
+            ColorPresentationRequest::METHOD => colors::presentations(&params),
+            _ => return unknown(id, &method),
+        };
+        match found {
+            Some(value) => Response::new_ok(id, value),
+            None => Response::new_ok(id, Value::Null),
+        }
+    }
+
+    /// What a function says of a place in a document. `None` if it says nothing.
+    fn at(&self, params: Value, look: impl FnOnce(&Document, usize) -> Option<Value>) -> Option<Value> {
+        let TextDocumentPositionParams { text_document, position } = serde_json::from_value(params).ok()?;
+        let documents = self.documents();
+        let document = documents.get(text_document.uri.as_str())?;
+        look(document, document.offset(position))
+    }
+
+    /// What a function says of a document.
+    fn on(&self, params: &Value, look: impl FnOnce(&Document) -> Value) -> Option<Value> {
+        let uri = params["textDocument"]["uri"].as_str()?;
+        self.documents().get(uri).map(look)
+    }
+
+    fn hear(&mut self, notification: Notification) {
+        let Notification { method, params } = notification;
+        match method.as_str() {
+            DidOpenTextDocument::METHOD => {
+                if let Some(DidOpenTextDocumentParams { text_document: one }) = read(params) {
+                    self.put(&one.uri, one.version, one.text);
+                    self.read_files(&one.uri);
+                }
+            }
+            DidChangeTextDocument::METHOD => {
+                if let Some(DidChangeTextDocumentParams { text_document, mut content_changes }) = read(params)
+                    && let Some(last) = content_changes.pop()
+                {
+                    self.put(&text_document.uri, text_document.version, last.text);
+                }
+            }
+            DidSaveTextDocument::METHOD => {
+                if let Some(DidSaveTextDocumentParams { text_document, .. }) = read(params) {
+                    self.read_files(&text_document.uri);
+                }
+            }
+            DidCloseTextDocument::METHOD => {
+                if let Some(DidCloseTextDocumentParams { text_document }) = read(params) {
+                    self.documents().remove(text_document.uri.as_str());
+                    self.send(published(text_document.uri, None, Vec::new()));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes a text, and says what is wrong in it.
+    fn put(&self, uri: &Uri, version: i32, text: String) {
+        let document = Document::new(path(uri), version, text);
+        let found = diagnostics::of_text(&document);
+        self.documents().insert(uri.as_str().to_owned(), document);
+        self.send(published(uri.clone(), Some(version), found));
+    }
+
+    /// Reads what the file names, and says what is wrong with all of it, unless the text is another by then.
+    fn read_files(&self, uri: &Uri) {
+        let (documents, sender, uri) =
+            (Arc::clone(&self.documents), self.connection.sender.clone(), uri.clone());
+        let Some(document) = self.documents().get(uri.as_str()).cloned() else { return };
+        let read = move || {
+            let Some(found) = diagnostics::of_files(&document) else { return };
+            let documents = documents.lock().unwrap_or_else(PoisonError::into_inner);
+            if documents.get(uri.as_str()).is_some_and(|now| now.version == document.version) {
+                // A client that is gone hears nothing.
+                let _ = sender.send(published(uri, Some(document.version), found));
+            }
+        };
+        // Without a thread, what the text says stays.
+        let _ = std::thread::Builder::new().name("read-files".to_owned()).spawn(read);
+    }
+}
+
+fn read<P: DeserializeOwned>(params: Value) -> Option<P> {
+    serde_json::from_value(params).ok()
+}
+
+/// The message with all mistakes of a text.
+fn published(uri: Uri, version: Option<i32>, diagnostics: Vec<Diagnostic>) -> Message {
+    let params = PublishDiagnosticsParams { uri, diagnostics, version };
+    Notification::new(PublishDiagnostics::METHOD.to_owned(), params).into()
+}
+
+fn unknown(id: RequestId, method: &str) -> Response {
+    Response::new_err(id, ErrorCode::MethodNotFound as i32, format!("{method} is not served"))
+}
+
+/// The path of a file by its address; other addresses have a path that no file has.
+fn path(uri: &Uri) -> PathBuf {
+    let decoded = uri.path().as_estr().decode().into_string();
+    decoded.map_or_else(|_| PathBuf::from(uri.as_str()), |path| PathBuf::from(path.into_owned()))
+}

@@ -1,0 +1,214 @@
+//! The place of the cursor in a text that may be broken just there: found by lines, as a person reads them.
+
+use crate::scene::keys::key::{KeyInfo, TableInfo, TypeInfo};
+use crate::scene::keys::table;
+
+/// A place where something may be typed.
+#[derive(Debug)]
+pub(super) enum Place {
+    /// In a header, or where one may begin.
+    Header,
+    /// A key of a table; those that the table has already.
+    Key { of: Section, given: Vec<String> },
+    /// The value of a key.
+    Value { of: Section, key: String, is_quoted: bool },
+    /// A key in the braces of a value.
+    InnerKey { given: Vec<String> },
+    /// The value of a key in the braces of a value.
+    InnerValue { key: String, is_quoted: bool },
+}
+
+/// A table with its type.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Section {
+    pub(super) info: &'static TableInfo,
+    pub(super) kind: Option<&'static TypeInfo>,
+}
+
+impl Section {
+    /// Its keys.
+    pub(super) fn keys(&self) -> Vec<&'static KeyInfo> {
+        self.info.keys_of(self.kind).collect()
+    }
+
+    pub(super) fn key(&self, name: &str) -> Option<&'static KeyInfo> {
+        self.info.keys_of(self.kind).find(|key| key.name == name)
+    }
+}
+
+/// The place of a byte. `None` in comments, and in tables that scenes do not have.
+pub(super) fn place(text: &str, offset: usize) -> Option<Place> {
+    let before = text.get(..offset)?;
+    let start = before.rfind('\n').map_or(0, |at| at + 1);
+    let line = &before[start..];
+    let trimmed = line.trim_start();
+    if is_comment(line) {
+        return None;
+    }
+    if trimmed.starts_with('[') && !trimmed.contains(']') {
+        return Some(Place::Header);
+    }
+    let Some((header, body)) = section(text, start) else {
+        return (!trimmed.contains('=')).then_some(Place::Header);
+    };
+    let mut parts = header.split('.');
+    let info = table(parts.next().unwrap_or_default().trim())?;
+    if parts.next().is_none() && info.form == crate::scene::keys::key::Form::Named {
+        // `[materials]` and then `wall = { … }`.
+        let (_, braces) = line.split_once('{')?;
+        return Some(in_table(info, braces, braces, true));
+    }
+    Some(in_table(info, body, line, false))
+}
+
+/// The place in a table whose lines, or braces, are `body`; `typed` is what is before the cursor.
+fn in_table(info: &'static TableInfo, body: &str, typed: &str, is_inline: bool) -> Place {
+    let of = Section { info, kind: kind(info, body) };
+    let (opened, closed) = (typed.matches('{').count(), typed.matches('}').count());
+    if opened > closed {
+        return inner(typed.rsplit('{').next().unwrap_or_default());
+    }
+    let current = if is_inline { last_item(typed) } else { typed };
+    match current.split_once('=') {
+        Some((key, value)) => Place::Value { of, key: key.trim().to_owned(), is_quoted: is_in_quotes(value) },
+        None => Place::Key { of, given: given(body, current.trim()) },
+    }
+}
+
+fn inner(typed: &str) -> Place {
+    let current = last_item(typed);
+    match current.split_once('=') {
+        Some((key, value)) => {
+            Place::InnerValue { key: key.trim().to_owned(), is_quoted: is_in_quotes(value) }
+        }
+        None => Place::InnerKey { given: given(&typed.replace(',', "\n"), current.trim()) },
+    }
+}
+
+/// What is typed of the last of the items between commas, those within brackets not counted.
+fn last_item(typed: &str) -> &str {
+    let mut depth = 0_i32;
+    let mut start = 0;
+    for (at, character) in typed.char_indices() {
+        match character {
+            '[' | '{' => depth += 1,
+            ']' | '}' => depth -= 1,
+            ',' if depth <= 0 => start = at + 1,
+            _ => {}
+        }
+    }
+    &typed[start..]
+}
+
+fn is_in_quotes(value: &str) -> bool {
+    value.matches('"').count() % 2 == 1
+}
+
+/// Whether the end of a line is in a comment.
+fn is_comment(line: &str) -> bool {
+    let mut is_quoted = false;
+    line.chars().any(|character| {
+        is_quoted ^= character == '"';
+        character == '#' && !is_quoted
+    })
+}
+
+/// The header above a line, without its brackets, and the lines of its table.
+fn section(text: &str, line_start: usize) -> Option<(&str, &str)> {
+    let is_header = |line: &str| line.trim_start().starts_with('[') && !line.trim_start().starts_with("[ ");
+    let mut at = line_start;
+    let header_at = loop {
+        let line = text[at..].split('\n').next().unwrap_or_default();
+        if at < line_start
+            && is_header(line)
+            && line.contains(']')
+            && !line.contains('=')
+            && !line.trim_end().ends_with(',')
+        {
+            break at;
+        }
+        if at == 0 {
+            return None;
+        }
+        at = text[..at - 1].rfind('\n').map_or(0, |end| end + 1);
+    };
+    let header = text[header_at..].split('\n').next().unwrap_or_default();
+    let name = header.trim_start().trim_start_matches('[').split(']').next().unwrap_or_default();
+    let body_at = header_at + header.len();
+    let rest = &text[body_at..];
+    let end = rest
+        .match_indices('\n')
+        .find(|(at, _)| rest[at + 1..].starts_with('['))
+        .map_or(rest.len(), |(at, _)| at);
+    Some((name.trim(), &rest[..end]))
+}
+
+/// The type of a table by its `type`, or the default.
+fn kind(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
+    let named = body.split(['\n', ',', '{', '}']).find_map(|item| {
+        let (key, value) = item.split_once('=')?;
+        (key.trim() == "type").then(|| value.trim().trim_matches('"').to_owned())
+    });
+    info.type_of(named.as_deref()).or_else(|| info.type_of(None))
+}
+
+/// Keys that lines have, but for the one that is typed.
+fn given(body: &str, typed: &str) -> Vec<String> {
+    let keys = body.lines().filter_map(|line| line.split_once('=')).map(|(key, _)| key.trim().to_owned());
+    keys.filter(|key| key != typed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The place of `|` in a text.
+    fn at(text: &str) -> Option<Place> {
+        let offset = text.find('|').expect("a cursor");
+        place(&text.replace('|', ""), offset)
+    }
+
+    #[test]
+    fn a_place_is_known_in_texts_that_are_being_typed() {
+        assert!(matches!(at("|"), Some(Place::Header)));
+        assert!(matches!(at("[ren|"), Some(Place::Header)));
+        assert!(at("# [ren|").is_none() && at("[render]\nwidth = 3 # so|").is_none());
+        let Some(Place::Key { of, given }) =
+            at("[render]\nwidth = 3\nhe|\nseed = 1\n\n[camera]\nup = [0, 1, 0]\n")
+        else {
+            panic!()
+        };
+        assert_eq!((of.info.name, given), ("render", vec!["width".to_owned(), "seed".to_owned()]));
+        let Some(Place::Value { of, key, is_quoted }) = at("[[light]]\ntype = \"spot\"\nfalloff = \"|\n")
+        else {
+            panic!()
+        };
+        assert_eq!((of.kind.map(|kind| kind.name), key.as_str(), is_quoted), (Some("spot"), "falloff", true));
+        assert!(at("[nonsense]\na|").is_none());
+    }
+
+    #[test]
+    fn braces_hold_tables_and_textures() {
+        let Some(Place::Key { of, given }) = at("[materials]\nwall = { type = \"metal\", ro| }") else {
+            panic!()
+        };
+        assert_eq!((of.kind.map(|kind| kind.name), given.len()), (Some("metal"), 0));
+        let Some(Place::InnerValue { key, is_quoted }) = at("[materials.a]\ndiffuse = { texture = \"|\" }")
+        else {
+            panic!()
+        };
+        assert_eq!((key.as_str(), is_quoted), ("texture", true));
+        assert!(matches!(at("[materials]\na = { diffuse = { |"), Some(Place::InnerKey { .. })));
+        let Some(Place::Value { key, .. }) = at("[materials]\na = { diffuse = [1, 2, 3], emission = |")
+        else {
+            panic!()
+        };
+        assert_eq!(key, "emission");
+    }
+
+    #[test]
+    fn arrays_over_lines_are_no_headers() {
+        let Some(Place::Key { of, .. }) = at("[[mesh]]\nmatrix = [\n[1, 0],\n]\nsmo|") else { panic!() };
+        assert_eq!(of.info.name, "mesh");
+    }
+}

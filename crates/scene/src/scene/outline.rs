@@ -1,0 +1,230 @@
+//! The tables of a text as they stand there, with the places of keys, values and names, whatever else is wrong with the text: for
+//! completions and editors.
+
+use std::ops::Range;
+
+use super::keys::key::{Form, KeyInfo, TableInfo, TypeInfo};
+use super::keys::tables;
+use super::toml::{self, Entries, Item, KeyValue, Value};
+
+/// A table of the text that the definition knows.
+#[derive(Clone, Debug)]
+pub struct OutlineTable {
+    /// Its definition.
+    pub info: &'static TableInfo,
+    /// Its type, if the definition has types: that of its `type`, or the default. `None` for a type that is not known.
+    pub kind: Option<&'static TypeInfo>,
+    /// `NAME` of `[materials.NAME]`, or the `name` of a shape.
+    pub name: Option<Spelled>,
+    /// Number among the tables of a list, from 1; else 1.
+    pub number: usize,
+    /// Its header, or its braces.
+    pub span: Range<usize>,
+    /// Its keys.
+    pub keys: Vec<OutlineKey>,
+}
+
+/// A name and its place.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Spelled {
+    /// The name.
+    pub text: String,
+    /// Bytes of the text.
+    pub span: Range<usize>,
+}
+
+/// A key with its value.
+#[derive(Clone, Debug)]
+pub struct OutlineKey {
+    /// The key.
+    pub name: Spelled,
+    /// Bytes of the value.
+    pub value: Range<usize>,
+    /// The value, if it is a string.
+    pub text: Option<String>,
+    /// The keys in the braces of the value.
+    pub inner: Vec<OutlineKey>,
+}
+
+/// The tables of a text, in the order of the definition.
+pub fn outline(text: &str) -> Vec<OutlineTable> {
+    let (document, _) = toml::parse(text);
+    let of = |info: &'static TableInfo| {
+        let found = document.root().get(info.name);
+        found.map_or_else(Vec::new, |found| in_table(info, &found))
+    };
+    tables().iter().flat_map(of).collect()
+}
+
+/// The tables of one definition.
+fn in_table(info: &'static TableInfo, found: &KeyValue<'_>) -> Vec<OutlineTable> {
+    match info.form {
+        Form::Single => {
+            entries(found.value).map(|all| table(info, None, 1, found.value, &all)).into_iter().collect()
+        }
+        Form::Named => {
+            let named = entries(found.value).into_iter().flat_map(|all| all.iter().collect::<Vec<_>>());
+            named
+                .filter_map(|one| {
+                    let name = Spelled { text: one.key.to_owned(), span: one.span };
+                    Some(table(info, Some(name), 1, one.value, &entries(one.value)?))
+                })
+                .collect()
+        }
+        Form::List => {
+            let elements = found.value.array().into_iter().flat_map(|array| array.iter().collect::<Vec<_>>());
+            elements
+                .enumerate()
+                .filter_map(|(index, value)| {
+                    let all = entries(value)?;
+                    let name = all.get("name").and_then(|name| spelled(name.value));
+                    Some(table(info, name, index + 1, value, &all))
+                })
+                .collect()
+        }
+    }
+}
+
+fn table(
+    info: &'static TableInfo,
+    name: Option<Spelled>,
+    number: usize,
+    value: Value<'_>,
+    all: &Entries<'_>,
+) -> OutlineTable {
+    let kind = all.get("type").map(|kind| spelled(kind.value));
+    let kind = match &kind {
+        Some(Some(kind)) => info.type_of(Some(&kind.text)),
+        Some(None) => None,
+        None => info.type_of(None),
+    };
+    OutlineTable { info, kind, name, number, span: value.span(), keys: keys(all) }
+}
+
+fn keys(all: &Entries<'_>) -> Vec<OutlineKey> {
+    let key = |one: KeyValue<'_>| OutlineKey {
+        name: Spelled { text: one.key.to_owned(), span: one.span },
+        value: one.value.span(),
+        text: spelled(one.value).map(|text| text.text),
+        inner: entries(one.value).map_or_else(Vec::new, |inner| keys(&inner)),
+    };
+    all.iter().map(key).collect()
+}
+
+/// The text of a value that is one.
+fn spelled(value: Value<'_>) -> Option<Spelled> {
+    match value.item() {
+        Item::String(text) => Some(Spelled { text: text.to_owned(), span: value.span() }),
+        Item::Integer { .. }
+        | Item::Float(_)
+        | Item::Boolean(_)
+        | Item::Datetime
+        | Item::Array(_)
+        | Item::Table(_) => None,
+    }
+}
+
+fn entries(value: Value<'_>) -> Option<Entries<'_>> {
+    match value.item() {
+        Item::Table(entries) => Some(entries),
+        Item::String(_)
+        | Item::Integer { .. }
+        | Item::Float(_)
+        | Item::Boolean(_)
+        | Item::Datetime
+        | Item::Array(_) => None,
+    }
+}
+
+impl OutlineTable {
+    /// The keys that the table may have: of its type, or if that is not known, of all types.
+    pub fn known(&self) -> Vec<&'static KeyInfo> {
+        match self.kind {
+            None if !self.info.types.is_empty() => {
+                let all = self.info.types.iter().flat_map(|kind| kind.keys);
+                let mut known: Vec<&'static KeyInfo> = Vec::new();
+                for key in all.chain(self.info.keys) {
+                    if !known.iter().any(|other| other.name == key.name) {
+                        known.push(key);
+                    }
+                }
+                known
+            }
+            kind => self.info.keys_of(kind).collect(),
+        }
+    }
+
+    /// The beginnings of the paths that lead to its keys, as `--set` takes them.
+    pub fn paths(&self) -> Vec<String> {
+        let table = self.info.name;
+        let name = self.name.as_ref().map(|name| format!("{table}.{}", part(&name.text)));
+        match self.info.form {
+            Form::Single => vec![table.to_owned()],
+            Form::Named => name.into_iter().collect(),
+            Form::List => [format!("{table}.{}", self.number)].into_iter().chain(name).collect(),
+        }
+    }
+}
+
+/// A part of a dotted key, in quotes if it needs them.
+fn part(name: &str) -> String {
+    let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { super::quoted(name) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "[render]\nsamples = 3\n[materials]\nwall = { type = \"mirror\" }\n\"back wall\".diffuse = { texture = \"a\" }\n\
+                        [[sphere]]\nname = \"ball\"\n[[sphere]]\n[[light]]\ntype = \"sun\"\n[nonsense]\na = 1\n[broken";
+
+    #[test]
+    fn tables_have_their_names_types_and_paths() {
+        let found: Vec<(Vec<String>, &str)> = outline(TEXT)
+            .iter()
+            .map(|table| (table.paths(), table.kind.map_or("", |kind| kind.name)))
+            .collect();
+        let expected: [(&[&str], &str); 6] = [
+            (&["render"], ""),
+            (&["materials.wall"], "mirror"),
+            (&["materials.\"back wall\""], "phong"),
+            (&["sphere.1", "sphere.ball"], ""),
+            (&["sphere.2"], ""),
+            (&["light.1"], ""),
+        ];
+        assert_eq!(found.len(), expected.len(), "{found:?}");
+        for ((paths, kind), (expected, expected_kind)) in found.iter().zip(expected) {
+            assert_eq!(
+                (paths.iter().map(String::as_str).collect::<Vec<_>>().as_slice(), *kind),
+                (expected, expected_kind)
+            );
+        }
+    }
+
+    #[test]
+    fn keys_have_their_places_also_in_braces() {
+        let tables = outline(TEXT);
+        let wall = tables.iter().find(|table| table.paths() == ["materials.\"back wall\""]).expect("a table");
+        let [diffuse] = wall.keys.as_slice() else { panic!("{wall:?}") };
+        assert_eq!(&TEXT[diffuse.name.span.clone()], "diffuse");
+        assert_eq!(&TEXT[diffuse.value.clone()], "{ texture = \"a\" }");
+        assert_eq!(diffuse.inner[0].text.as_deref(), Some("a"));
+    }
+
+    #[test]
+    fn an_unknown_type_may_have_the_keys_of_every_type() {
+        let tables = outline(TEXT);
+        let known = |path: &str| {
+            let table =
+                tables.iter().find(|table| table.paths().contains(&path.to_owned())).expect("a table");
+            table.known().iter().map(|key| key.name).collect::<Vec<_>>()
+        };
+        assert_eq!(
+            known("light.1"),
+            ["position", "intensity", "falloff", "look_at", "angle", "blend", "direction", "irradiance"]
+        );
+        assert!(known("materials.wall").starts_with(&["reflectance", "emission"]));
+        assert!(known("sphere.2").ends_with(&["material", "name"]));
+    }
+}

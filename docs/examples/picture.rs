@@ -1,0 +1,20 @@
+//! A scene to a picture, by the library: `cargo run --release --example picture`.
+
+use std::error::Error;
+
+use glimt::control::CancelToken;
+use glimt::output::{EncodeOptions, Format, encode};
+use glimt::pipeline::{session::Session, settings::Overrides};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    picture("scenes/cornell.toml", "cornell.png")
+}
+
+/// Renders a scene with few samples and writes it as PNG.
+pub(crate) fn picture(scene: &str, png: &str) -> Result<(), Box<dyn Error>> {
+    let token = CancelToken::new();
+    let options = Overrides { samples: Some(4), ..Overrides::default() };
+    let rendered = Session::default().render(scene.as_ref(), &options, &token)?;
+    let bytes = encode(&rendered.image, &EncodeOptions::default(), Format::Png, &token)?;
+    Ok(std::fs::write(png, bytes)?)
+}

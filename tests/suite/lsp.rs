@@ -1,0 +1,238 @@
+//! `glimt lsp` as an editor talks to it: over stdin and stdout of the process.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdin, ChildStdout, Stdio};
+
+use serde_json::{Value, json};
+
+use crate::desk::Desk;
+
+const TEXT: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n\n[textures.bricks]\nfile = \"bricks.png\"\n\n\
+                    [materials.wall]\ntype = \"metal\"\ncolor = [1, 0.5, 0]\nroughness = { texture = \"bricks\" }\n\n\
+                    [[sphere]]\ncenter = [0, 1, 0]\nradius = 0.5\nmaterial = \"wall\"\n\n[[light]]\n";
+
+/// An editor with one text open.
+struct Editor {
+    child: Child,
+    keys: ChildStdin,
+    screen: BufReader<ChildStdout>,
+    uri: String,
+    next: u64,
+    version: u64,
+    desk: Desk,
+}
+
+impl Editor {
+    fn open(text: &str) -> Self {
+        let desk = Desk::new();
+        desk.write("scene.toml", text);
+        image::RgbImage::new(2, 2).save(desk.path("bricks.png")).expect("written");
+        let mut process = desk.glimt("lsp");
+        let mut child = process.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
+        let (keys, screen) = (child.stdin.take().expect("stdin"), child.stdout.take().expect("stdout"));
+        let uri = format!("file://{}", desk.path("scene.toml").display());
+        let mut editor = Self { child, keys, screen: BufReader::new(screen), uri, next: 0, version: 1, desk };
+        let answer =
+            editor.ask("initialize", &json!({ "processId": null, "rootUri": null, "capabilities": {} }));
+        assert_eq!(answer["serverInfo"]["name"], "glimt");
+        assert_eq!(answer["capabilities"]["hoverProvider"], true);
+        editor.tell("initialized", &json!({}));
+        let document = json!({ "uri": editor.uri, "languageId": "toml", "version": 1, "text": text });
+        editor.tell("textDocument/didOpen", &json!({ "textDocument": document }));
+        editor
+    }
+
+    fn send(&mut self, message: &Value) {
+        let text = message.to_string();
+        write!(self.keys, "Content-Length: {}\r\n\r\n{text}", text.len()).expect("sent");
+        self.keys.flush().expect("sent");
+    }
+
+    fn tell(&mut self, method: &str, params: &Value) {
+        self.send(&json!({ "jsonrpc": "2.0", "method": method, "params": params }));
+    }
+
+    fn hear(&mut self) -> Value {
+        let mut length = 0;
+        loop {
+            let mut line = String::new();
+            assert!(self.screen.read_line(&mut line).expect("a line") > 0, "the server is gone");
+            match line.trim_end().split_once(": ") {
+                Some(("Content-Length", number)) => length = number.parse().expect("a number"),
+                Some(_) => {}
+                None => break,
+            }
+        }
+        let mut bytes = vec![0; length];
+        self.screen.read_exact(&mut bytes).expect("a message");
+        serde_json::from_slice(&bytes).expect("JSON")
+    }
+
+    /// The result of a request.
+    fn ask(&mut self, method: &str, params: &Value) -> Value {
+        self.next += 1;
+        let id = self.next;
+        self.send(&json!({ "jsonrpc": "2.0", "id": id, "method": method, "params": params }));
+        loop {
+            let mut message = self.hear();
+            if message["id"] == id {
+                assert_eq!(message.get("error"), None, "{message}");
+                return message["result"].take();
+            }
+        }
+    }
+
+    /// The next list of mistakes that holds what is asked for.
+    fn mistakes(&mut self, holds: impl Fn(&[Value]) -> bool) -> Vec<Value> {
+        loop {
+            let message = self.hear();
+            if message["method"] == "textDocument/publishDiagnostics" {
+                let list = message["params"]["diagnostics"].as_array().expect("a list").clone();
+                if holds(&list) {
+                    return list;
+                }
+            }
+        }
+    }
+
+    fn change(&mut self, text: &str) {
+        self.version += 1;
+        let document = json!({ "uri": self.uri, "version": self.version });
+        self.tell(
+            "textDocument/didChange",
+            &json!({ "textDocument": document, "contentChanges": [{ "text": text }] }),
+        );
+    }
+
+    /// Asks about the place of `|` in a text, which the document becomes.
+    fn at(&mut self, method: &str, text: &str) -> Value {
+        let offset = text.find('|').expect("a cursor");
+        self.change(&text.replacen('|', "", 1));
+        let line = text[..offset].matches('\n').count();
+        let character = text[..offset].rsplit('\n').next().expect("a line").encode_utf16().count();
+        let position = json!({ "line": line, "character": character });
+        self.ask(method, &json!({ "textDocument": { "uri": self.uri }, "position": position }))
+    }
+
+    /// The labels of what is offered at `|`, and what the first one inserts.
+    fn offered(&mut self, text: &str) -> (Vec<String>, String) {
+        let answer = self.at("textDocument/completion", text);
+        let items = answer.as_array().cloned().unwrap_or_default();
+        let text = |item: &Value, name: &str| item[name].as_str().unwrap_or_default().to_owned();
+        let first = items.first().map_or(String::new(), |item| text(item, "insertText"));
+        (items.iter().map(|item| text(item, "label")).collect(), first)
+    }
+}
+
+impl Drop for Editor {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[test]
+fn mistakes_are_shown_while_typing_and_those_of_files_after_a_save() {
+    let mut editor = Editor::open(TEXT);
+    assert_eq!(editor.mistakes(|_| true), [Value::Null; 0]);
+    editor.change(&TEXT.replace("radius", "# ä\nraduis"));
+    let list = editor.mistakes(|list| !list.is_empty());
+    let unknown =
+        list.iter().find(|one| one["message"].as_str().is_some_and(|text| text.contains("`raduis`")));
+    let unknown = unknown.expect("the mistake");
+    assert_eq!(
+        unknown["range"],
+        json!({ "start": { "line": 15, "character": 0 }, "end": { "line": 15, "character": 6 } })
+    );
+    assert_eq!((&unknown["severity"], &unknown["source"]), (&json!(1), &json!("glimt")));
+    assert!(unknown["message"].as_str().is_some_and(|text| text.contains("did you mean `radius`?")));
+    // An image that is none: only reading it tells.
+    editor.desk.write("bricks.png", "no image");
+    editor.change(TEXT);
+    let uri = editor.uri.clone();
+    editor.tell("textDocument/didSave", &json!({ "textDocument": { "uri": uri } }));
+    let list = editor.mistakes(|list| {
+        !list.is_empty() && !list[0]["message"].as_str().unwrap_or_default().contains("raduis")
+    });
+    assert!(list[0]["message"].as_str().is_some_and(|text| text.contains("bricks")), "{list:?}");
+}
+
+#[test]
+fn keys_words_and_names_are_offered() {
+    let mut editor = Editor::open(TEXT);
+    let (keys, first) = editor.offered(&TEXT.replace("radius = 0.5", "r|"));
+    assert_eq!(
+        (keys.as_slice(), first.as_str()),
+        (["radius", "name"].map(str::to_owned).as_slice(), "radius = 0.5")
+    );
+    let (keys, _) = editor.offered(&TEXT.replace("color = [1, 0.5, 0]", "an|"));
+    assert!(keys.contains(&"anisotropy".to_owned()) && !keys.contains(&"diffuse".to_owned()), "{keys:?}");
+    let (types, first) = editor.offered(&TEXT.replace("\"metal\"", "|"));
+    assert!(types.contains(&"glass".to_owned()) && first == "\"phong\"", "{types:?} {first}");
+    assert_eq!(
+        editor.offered(&TEXT.replace("\"wall\"", "\"|\"")),
+        (vec!["wall".to_owned()], "wall".to_owned())
+    );
+    assert_eq!(editor.offered(&TEXT.replace("\"bricks\" }", "| }")).1, "\"bricks\"");
+    let (heads, first) = editor.offered(&format!("{TEXT}\n[ren|"));
+    assert!(
+        heads.contains(&"[render]".to_owned()) && !heads.contains(&"[camera]".to_owned()) && first == "der]",
+        "{heads:?} {first}"
+    );
+    assert_eq!(editor.offered(&TEXT.replace("0.5, 0]", "0.5, 0] # r|")).0, [""; 0]);
+}
+
+#[test]
+fn hovering_explains_and_definitions_are_found() {
+    let mut editor = Editor::open(TEXT);
+    let hover = editor.at("textDocument/hover", &TEXT.replace("roughness", "rough|ness"));
+    let text = hover["contents"]["value"].as_str().expect("a text");
+    assert!(
+        text.contains("The root of α of GGX") && text.contains("default: `0.2`") && text.contains("0 … 1"),
+        "{text}"
+    );
+    assert_eq!(editor.at("textDocument/hover", &TEXT.replace("[[light]]", "|[[light]]")), Value::Null);
+    let place = editor.at("textDocument/definition", &TEXT.replace("\"wall\"", "\"wa|ll\""));
+    assert_eq!(place["uri"], editor.uri);
+    assert_eq!(place["range"]["start"], json!({ "line": 7, "character": 11 }));
+    let place = editor.at("textDocument/definition", &TEXT.replace("\"bricks\" }", "\"bri|cks\" }"));
+    assert_eq!(place["range"]["start"], json!({ "line": 4, "character": 10 }));
+}
+
+#[test]
+fn colours_are_shown_in_srgb_and_written_linear() {
+    let mut editor = Editor::open(&TEXT.replace("[[light]]", "[[light]]\nintensity = \"tomato\""));
+    let uri = editor.uri.clone();
+    let colors = editor.ask("textDocument/documentColor", &json!({ "textDocument": { "uri": uri } }));
+    let [linear, named] = colors.as_array().expect("a list").as_slice() else { panic!("{colors}") };
+    let parts =
+        |color: &Value| ["red", "green", "blue"].map(|name| color["color"][name].as_f64().expect("a number"));
+    // 0.5 linear is 0.735 in sRGB (IEC 61966-2-1).
+    let [red, green, blue] = parts(linear);
+    assert!((red - 1.0).abs() < 1e-6 && (green - 0.7354).abs() < 1e-3 && blue == 0.0);
+    assert_eq!(parts(named).map(|part| (part * 255.0).round()), [255.0, 99.0, 71.0]);
+    let asked = json!({ "textDocument": { "uri": uri }, "range": linear["range"], "color": { "red": 1, "green": 0.5, "blue": 0, "alpha": 1 } });
+    let texts = editor.ask("textDocument/colorPresentation", &asked);
+    assert_eq!(
+        (&texts[0]["label"], &texts[1]["label"]),
+        (&json!("\"#ff8000\""), &json!("[1.000, 0.216, 0.000]"))
+    );
+}
+
+#[test]
+fn the_server_ends_when_it_is_told_and_when_nobody_is_left() {
+    let mut editor = Editor::open(TEXT);
+    assert_eq!(editor.ask("shutdown", &Value::Null), Value::Null);
+    editor.tell("exit", &Value::Null);
+    assert!(editor.child.wait().expect("its end").success());
+    let mut editor = Editor::open(TEXT);
+    editor.next += 1;
+    editor.send(&json!({ "jsonrpc": "2.0", "id": editor.next, "method": "workspace/symbol", "params": {} }));
+    let unknown = loop {
+        let message = editor.hear();
+        if message["id"] == editor.next {
+            break message;
+        }
+    };
+    assert_eq!(unknown["error"]["code"], -32601);
+}

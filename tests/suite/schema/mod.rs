@@ -1,0 +1,189 @@
+//! The schema of scenes, in both drafts: it takes what the program takes, and finds mistakes where they stand.
+
+mod validator;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use glimt::choice::Choice;
+use glimt::cli::args::Draft;
+use glimt::cli::schema::{FILE, LINE, schema, text};
+use glimt::scene::starter;
+use serde_json::Value;
+
+use self::validator::faults;
+use crate::desk::Desk;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A text of TOML as JSON. `None` if it is broken.
+fn json(text: &str) -> Option<Value> {
+    fn of(value: toml::Value) -> Value {
+        match value {
+            toml::Value::String(text) => text.into(),
+            toml::Value::Integer(number) => number.into(),
+            toml::Value::Float(number) => number.into(),
+            toml::Value::Boolean(flag) => flag.into(),
+            toml::Value::Datetime(date) => date.to_string().into(),
+            toml::Value::Array(items) => items.into_iter().map(of).collect(),
+            toml::Value::Table(map) => map.into_iter().map(|(key, value)| (key, of(value))).collect(),
+        }
+    }
+    Some(of(toml::Value::Table(text.parse().ok()?)))
+}
+
+/// The faults that each draft finds in a scene.
+fn found(text: &str) -> Vec<Vec<(String, String)>> {
+    let scene = json(text).expect("TOML");
+    Draft::ALL.iter().map(|draft| faults(&schema(*draft), &scene)).collect()
+}
+
+fn files(folder: &str) -> Vec<PathBuf> {
+    let entries = fs::read_dir(root().join(folder)).expect("a folder");
+    let paths = entries.map(|entry| entry.expect("an entry").path());
+    let mut files: Vec<_> =
+        paths.filter(|path| path.extension().is_some_and(|ending| ending == "toml")).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn the_schema_beside_the_scenes_is_the_programs() {
+    let path = root().join("scenes").join(FILE);
+    let there = fs::read_to_string(&path).unwrap_or_default();
+    assert!(there == text(Draft::Four), "glimt schema > scenes/{FILE}");
+    for scene in files("scenes") {
+        let text = fs::read_to_string(&scene).expect("a scene");
+        assert!(text.starts_with(LINE), "{}: {LINE}", scene.display());
+    }
+}
+
+#[test]
+fn every_bundled_scene_and_the_starter_are_valid() {
+    for path in files("scenes") {
+        let text = fs::read_to_string(&path).expect("a scene");
+        assert_eq!(found(&text), [[], []], "{}", path.display());
+    }
+    assert_eq!(found(starter()), [[], []]);
+    // With every key that may be there beside the others.
+    let stands_alone = ["orbiter", "matrix", "image", "opacity"];
+    let uncommented = |line: &str| match line.strip_prefix("# ") {
+        Some(text)
+            if text.starts_with('[')
+                || text.split_once(" = ").is_some_and(|(key, _)| {
+                    key.chars().all(|c| c.is_ascii_lowercase() || c == '_') && !stands_alone.contains(&key)
+                }) =>
+        {
+            format!("{text}\n")
+        }
+        _ => format!("{line}\n"),
+    };
+    let whole: String = starter().lines().map(uncommented).collect();
+    assert_eq!(found(&whole), [[], []], "{whole}");
+}
+
+const SCENE: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n";
+
+#[test]
+fn mistakes_are_found_where_they_stand() {
+    for (line, place) in [
+        ("[render]\nwidth = 0", "render.width"),
+        ("[render]\nsamples = 2.5", "render.samples"),
+        ("[render]\nintegrator = \"paths\"", "render.integrator"),
+        ("[render]\nheigth = 480", "render.heigth"),
+        ("[render]\noutput = \"a.tiff\"", "render.output"),
+        ("[render]\nbackground = [0, -1, 0]", "render.background"),
+        ("[render]\nbackground = \"blu\"", "render.background"),
+        ("[render]\nbackground = \"#ff00f\"", "render.background"),
+        ("[photons]\nenabled = \"yes\"", "photons.enabled"),
+        ("[textures.a]\nfile = \"a.txt\"", "textures.a.file"),
+        ("[textures.a]\nrepeat = [1, 2]", "textures.a"),
+        ("[textures.a]\nfile = \"a.png\"\nrepeat = [1, 0]", "textures.a.repeat.1"),
+        ("[materials.a]\ntype = \"chrome\"", "materials.a.type"),
+        ("[materials.a]\nroughnes = 0.5", "materials.a.roughnes"),
+        ("[materials.a]\ntype = \"metal\"\nelement = \"gold\"\nroughness = 2", "materials.a.roughness"),
+        ("[materials.a]\ntype = \"metal\"\nelement = \"gold\"\ncolor = 1", "materials.a"),
+        ("[materials.a]\ntype = \"metal\"", "materials.a"),
+        ("[materials.a]\nemission = { textur = \"a\" }", "materials.a.emission"),
+        ("[materials.a]\nbump = 3", "materials.a.bump"),
+        ("[[sphere]]\ncenter = [0, 0]\nradius = 1\nmaterial = \"a\"", "sphere.0.center"),
+        ("[[sphere]]\ncenter = [0, 0, 0]\nradius = -1\nmaterial = \"a\"", "sphere.0.radius"),
+        ("[[sphere]]\ncenter = [0, 0, 0]\nradius = 1", "sphere.0"),
+        ("[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"a\"\nname = \"7\"", "sphere.0.name"),
+        ("[[mesh]]\nfile = \"a.obj\"\nmatrix = [1]", "mesh.0.matrix"),
+        ("[[light]]\ntype = \"spot\"\nblend = 2", "light.0.blend"),
+        ("[[light]]\nfallof = \"none\"", "light.0.fallof"),
+        ("[[sphre]]", "sphre"),
+        ("[environment]\nfile = \"sky.txt\"", "environment.file"),
+    ] {
+        for (draft, faults) in Draft::ALL.iter().zip(found(&format!("{SCENE}{line}\n"))) {
+            assert!(!faults.is_empty(), "{} {line}", draft.name());
+            for (path, keyword) in faults {
+                assert_eq!(path, place, "{} {line}: {keyword}", draft.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn what_excludes_another_is_a_mistake() {
+    for wrong in [
+        "[render]",
+        "[camera]\nposition = [0, 1, 4]",
+        "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\norbiter = \"a.txt\"",
+        "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[mesh]]\nfile = \"a.obj\"\nmatrix = [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]\nscale = 2",
+        "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[materials.a]\nshininess = 3\ntype = \"glass\"",
+        "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[materials.a]\nreflectance = 0.3",
+        "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[materials.a]\ntype = \"metal\"\neta = 1",
+    ] {
+        assert!(found(wrong).iter().all(|faults| !faults.is_empty()), "{wrong}: {:?}", found(wrong));
+    }
+    assert_eq!(found("[camera]\norbiter = \"a.txt\"\nfov = 30"), [[], []]);
+}
+
+/// A scene without errors for the program is one for the schema too, as far as whole files show it.
+#[test]
+fn nothing_is_a_mistake_that_the_program_takes() {
+    let mut count = 0;
+    for path in files("tests/broken") {
+        let text = fs::read_to_string(&path).expect("a file");
+        let has_errors = glimt::scene::parse(text.as_str().into(), &path).scene.is_none();
+        let Some(scene) = json(&text).filter(|_| !has_errors) else { continue };
+        for draft in Draft::ALL {
+            assert_eq!(faults(&schema(*draft), &scene), [], "{}", path.display());
+        }
+        count += 1;
+    }
+    assert!(count >= 3, "{count} files with warnings alone");
+}
+
+#[test]
+fn a_new_scene_may_have_its_schema_beside_it() {
+    let desk = Desk::new();
+    desk.expect("new --schema first.toml", 0);
+    let scene = String::from_utf8(desk.bytes("first.toml")).expect("UTF-8");
+    assert_eq!(scene, format!("{LINE}{}", starter()));
+    assert_eq!(String::from_utf8(desk.bytes(FILE)).expect("UTF-8"), text(Draft::Four));
+    assert!(desk.run("check first.toml").status.success());
+    // The same schema will do for another scene; another file of that name stays.
+    desk.expect("new --schema second.toml", 0);
+    desk.write(FILE, "mine");
+    assert!(desk.expect("new --schema third.toml", 2).contains("is another file"));
+    assert!(!desk.path("third.toml").exists() && desk.bytes(FILE) == b"mine");
+}
+
+#[test]
+fn both_drafts_are_printed() {
+    let desk = Desk::new();
+    for (line, draft, uri) in [
+        ("schema", Draft::Four, "http://json-schema.org/draft-04/schema#"),
+        ("schema --draft 2020-12", Draft::Latest, "https://json-schema.org/draft/2020-12/schema"),
+    ] {
+        let output = desk.run(line);
+        let printed: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert_eq!(printed, schema(draft));
+        assert_eq!(printed["$schema"], uri);
+    }
+}

@@ -1,0 +1,199 @@
+//! The program in a person's shell: completions, the manual page, the call without a word, the environment, `glimt doctor`.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::process::Command;
+
+use glimt::cli::environment::VARIABLES;
+
+use crate::desk::Desk;
+use crate::terminal::pty::Folder;
+
+/// What bash offers for a line, whose last word is being typed.
+fn in_bash(desk: &Desk, line: &str) -> Vec<String> {
+    // As bash does when the key is pressed; `=` ends a word there.
+    let script = r#"
+        source <(glimt completions bash)
+        COMP_LINE=$1 COMP_TYPE=9 COMP_WORDBREAKS=$' \t\n"\'><=;|&(:'
+        COMP_WORDS=($1); [[ $1 == *' ' ]] && COMP_WORDS+=("")
+        COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
+        _clap_complete_glimt glimt "${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD - 1]}"
+        printf '%s\n' "${COMPREPLY[@]}"
+    "#;
+    let program = desk.glimt("").get_program().to_owned();
+    let folder = std::path::Path::new(&program).parent().expect("a folder").to_owned();
+    let path = std::env::join_paths(
+        [folder].into_iter().chain(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())),
+    );
+    let mut bash = Command::new("bash");
+    bash.args(["--norc", "-c", script, "bash", line]).current_dir(desk.0.path());
+    let output = bash.env("PATH", path.expect("a path")).output().expect("bash");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    text.lines().filter(|line| !line.is_empty()).map(str::to_owned).collect()
+}
+
+#[test]
+fn bash_completes_commands_scenes_models_and_keys_of_the_scene() {
+    let desk = Desk::new();
+    for name in ["knot.obj", "notes.txt", "view.png"] {
+        desk.write(name, "");
+    }
+    fs::create_dir(desk.path("more")).expect("a folder");
+    let first = in_bash(&desk, "glimt ");
+    for wanted in ["check", "doctor", "ball.toml", "knot.obj", "more/"] {
+        assert!(first.iter().any(|word| word == wanted), "{wanted}: {first:?}");
+    }
+    assert!(!first.iter().any(|word| ["notes.txt", "view.png"].contains(&word.as_str())), "{first:?}");
+    assert_eq!(in_bash(&desk, "glimt check k"), [""; 0], "only scenes are checked");
+    assert_eq!(in_bash(&desk, "glimt compl"), ["completions"]);
+    assert_eq!(in_bash(&desk, "glimt ball.toml --integrator "), ["whitted", "path"]);
+    assert_eq!(in_bash(&desk, "glimt ball.toml --set materials.ball.d"), ["materials.ball.diffuse="]);
+    assert_eq!(in_bash(&desk, "glimt check ball.toml --set light.1.f"), ["light.1.falloff="]);
+    assert_eq!(in_bash(&desk, "glimt ball.toml --set photons.e"), ["photons.enabled="]);
+}
+
+#[test]
+fn every_shell_has_its_script() {
+    let desk = Desk::new();
+    for (shell, mark) in [
+        ("bash", "complete -o nospace"),
+        ("zsh", "#compdef glimt"),
+        ("fish", "complete --keep-order"),
+        ("powershell", "Register-ArgumentCompleter"),
+        ("elvish", "edit:completion:arg-completer[glimt]"),
+    ] {
+        let output = desk.run(&format!("completions {shell}"));
+        let script = String::from_utf8(output.stdout).expect("UTF-8");
+        assert!(output.status.success() && script.contains(mark), "{shell}: {script}");
+        assert!(script.contains("GLIMT_COMPLETE"), "{shell}: {script}");
+    }
+    assert!(
+        desk.expect("completions tcsh", 2).contains("[possible values: bash, zsh, fish, powershell, elvish]")
+    );
+}
+
+#[test]
+fn the_manual_has_every_command_option_and_variable() {
+    let desk = Desk::new();
+    let page = |line: &str| String::from_utf8(desk.run(line).stdout).expect("UTF-8").replace("\\-", "-");
+    let whole = page("man");
+    for part in [
+        ".TH glimt 1",
+        ".SH EXAMPLES",
+        ".SH \"EXIT STATUS\"",
+        ".SH ENVIRONMENT",
+        "--checkpoint",
+        "glimt-check(1)",
+    ] {
+        assert!(whole.contains(part), "{part}: {whole}");
+    }
+    for (names, _) in VARIABLES {
+        assert!(whole.contains(names), "{names}");
+    }
+    let check = page("man check");
+    assert!(check.contains(".TH glimt-check 1") && check.contains("--set"), "{check}");
+    assert!(!check.contains("--checkpoint"));
+    assert!(desk.expect("man chekc", 2).contains("did you mean `check`?"));
+}
+
+#[test]
+fn a_call_without_a_word_leads_to_a_scene() {
+    let desk = Desk::new();
+    let said = desk.expect("", 2);
+    assert!(said.contains("glimt new ball.toml") && said.contains("glimt -h"), "{said}");
+    assert!(said.lines().count() < 10, "{said}");
+    // An option alone is a call that lacks its scene.
+    assert!(desk.expect("--once", 2).contains("<SCENE>"));
+}
+
+#[test]
+fn the_long_help_names_the_environment_and_the_short_one_does_not() {
+    let desk = Desk::new();
+    let help = |option: &str| String::from_utf8(desk.run(option).stdout).expect("UTF-8");
+    let (long, short) = (help("--help"), help("-h"));
+    for (names, _) in VARIABLES {
+        assert!(long.contains(names), "{names}");
+    }
+    assert!(!short.contains("SSH_TTY") && short.contains("Exit codes:"), "{short}");
+}
+
+/// Names in capitals that sources ask the environment for, in the ways that they have of asking.
+fn asked_in(text: &str) -> BTreeSet<String> {
+    let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+    let is_name = |word: &&str| {
+        word.len() > 2
+            && word.chars().all(|c| c.is_ascii_uppercase() || c == '_')
+            && word.starts_with(char::is_alphabetic)
+    };
+    code.split('"').skip(1).step_by(2).filter(is_name).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_list_of_variables_has_what_the_sources_ask_for() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let listed: BTreeSet<String> =
+        VARIABLES.iter().flat_map(|(names, _)| names.split(", ")).map(str::to_owned).collect();
+    let mut asked = BTreeSet::new();
+    let mut folders = vec![root.join("crates"), root.join("src")];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            let text = if path.is_dir() {
+                let is_test = path.ends_with("tests") || path.ends_with("target");
+                folders.extend(Some(path.clone()).filter(|_| !is_test));
+                continue;
+            } else {
+                fs::read_to_string(&path).unwrap_or_default()
+            };
+            let asks =
+                ["env::var", "variable(", "Fn(&str) -> Option<String>"].iter().any(|way| text.contains(way));
+            let is_source = path.extension().is_some_and(|ending| ending == "rs");
+            if asks && is_source && !path.ends_with("by_hand.rs") {
+                asked.extend(asked_in(&text));
+            }
+        }
+    }
+    asked.remove("CARGO_PKG_VERSION");
+    // Libraries ask for these: those of arguments, help and progress bars.
+    let of_libraries = ["CLICOLOR", "CLICOLOR_FORCE", "COLUMNS", "LANG"].map(str::to_owned);
+    asked.extend(of_libraries);
+    assert_eq!(asked, listed);
+}
+
+#[test]
+fn doctor_reports_without_a_terminal() {
+    let desk = Desk::new();
+    let mut glimt = desk.glimt("doctor");
+    glimt.env("GLIMT_SIMD", "portable").env("XDG_CACHE_HOME", desk.path("cache")).env("VISUAL", "hx");
+    let output = glimt.output().expect("it runs");
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    assert!(output.status.success(), "{text}");
+    for part in [
+        "by GLIMT_SIMD=portable",
+        "terminal    none",
+        "hx, by VISUAL",
+        "cache/glimt/references: not there yet",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+#[test]
+fn doctor_reports_what_the_terminal_answers() {
+    let folder = Folder::new();
+    let program = folder.program();
+    let mut terminal = folder.terminal_with(&[program, "doctor"], &[]);
+    terminal.press("\x1b[0n\x1bP>|foot(1.20.2)\x1b\\\x1b_Gi=4211;OK\x1b\\\x1b[?2026;2$y\x1b[?62;4;22c");
+    terminal.wait_for("cache");
+    let text = terminal.text();
+    for part in [
+        "foot(1.20.2) (xterm-256color), 80 × 24 cells",
+        "24 bits by the environment",
+        "octants; pixels with --preview kitty or sixel",
+        "frames appear at once",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert_eq!(terminal.end(), 0);
+}
