@@ -444,7 +444,8 @@ mod tests {
         let tables: String = names.iter().map(|name| table(name) + &ball(name)).collect();
         let mut bench = Bench::new(&format!("{SCENE}{tables}"));
         for name in names {
-            bench.write(&format!("{name}.ppm"), "P6 16000 16000 255\n");
+            // As long as a file of so many pixels may be at the least.
+            bench.write(&format!("{name}.ppm"), &format!("P6 16000 16000 255\n{}", " ".repeat(400_000)));
         }
         let Failure::Scene(errors) = bench.failed() else { panic!("errors in the scene") };
         let over: Vec<_> = errors.iter().filter(|error| error.message.contains("together")).collect();

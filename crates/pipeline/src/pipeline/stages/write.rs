@@ -242,7 +242,12 @@ fn write_one(
     path: &Path,
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let bytes = finish(plan).encode(&canvas.film, (image, layers), Format::of(path)?, token)?;
+    let mut finish = finish(plan);
+    // A budget that suffices changes nothing.
+    if let Some(seconds) = canvas.ended_by {
+        finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
+    }
+    let bytes = finish.encode(&canvas.film, (image, layers), Format::of(path)?, token)?;
     guarded(plan, inputs, path, sink, |guard| output::write::atomic_until(path, &bytes, guard, token))?;
     Ok(bytes.len() as u64)
 }
@@ -292,9 +297,6 @@ fn metadata(plan: &Plan) -> Vec<(String, String)> {
     let mut add = |name: &str, value: String| pairs.push((format!("glimt:{name}"), value));
     if settings.clamp > 0.0 {
         add("clamp", settings.clamp.to_string());
-    }
-    if let Some(seconds) = plan.time_seconds {
-        add("time", format!("{seconds} s"));
     }
     if let Some(Rect { x, y, width, height }) = plan.crop {
         add("crop", format!("{x},{y},{width},{height}"));
