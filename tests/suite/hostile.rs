@@ -248,7 +248,7 @@ fn material_files() {
     }
     for (content, words) in [
         ("\0\0\0", "bad.mtl:1: "),
-        ("newmtl a\nKd 1\n", "bad.mtl:2: "),
+        ("newmtl a\nKd 1 2\n", "bad.mtl:2: "),
         ("newmtl a\nNs nan\n", "bad.mtl:2: "),
     ] {
         let desk = Desk::new();

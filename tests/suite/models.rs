@@ -138,13 +138,13 @@ fn pictures_of_a_material_file_are_named_with_their_material() {
     desk.write("a.toml", format!("{CAMERA}[[mesh]]\nfile = \"a.obj\"\n"));
     desk.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
     desk.write("a.mtl", "newmtl brick\nmap_Kd lost.png\n");
-    let missing = desk.expect("check a.toml", 2);
+    let missing = desk.expect("a.toml --once -o a.png", 2);
     assert!(
         missing.contains("lost.png") && missing.contains("the material \"brick\" of a.obj names it"),
         "{missing}"
     );
     desk.write("a.mtl", "newmtl brick\nmap_Bump heights.pgm\n");
-    let grey = desk.expect("check a.toml", 0);
+    let grey = desk.expect("a.toml --once -o a.png", 0);
     assert!(grey.contains("heights.pgm is grey: heights in place of the normals of \"brick\""), "{grey}");
 }
 
@@ -162,7 +162,7 @@ fn keys_that_change_nothing_on_a_mesh_are_warned_of() {
                  [textures.dots]\nfile = \"dots.ppm\"\n"
             ),
         );
-        desk.expect("check a.toml", 0)
+        desk.expect("a.toml --once -o a.png", 0)
     };
     let textured = warnings("diffuse = { texture = \"dots\" }", "");
     let message = "a.off has no texture coordinates: each triangle shows half of the textures of \"m\"";

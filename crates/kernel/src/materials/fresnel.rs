@@ -67,7 +67,9 @@ pub fn conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
     let (even, odd) = (sum + cos2, 2.0 * a * cos_incident);
     let perpendicular = (even - odd) / (even + odd);
     let (even, odd) = (cos2 * sum + sin2 * sin2, odd * sin2);
-    let parallel = perpendicular * ((even - odd) / (even + odd));
+    // An index of 0 reflects all, at normal incidence too.
+    let ratio = if even > 0.0 { (even - odd) / (even + odd) } else { 1.0 };
+    let parallel = perpendicular * ratio;
     0.5 * (perpendicular + parallel)
 }
 

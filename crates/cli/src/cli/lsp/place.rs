@@ -192,7 +192,7 @@ mod tests {
         let Some(Place::Key { of, given }) = at("[materials]\nwall = { type = \"metal\", ro| }") else {
             panic!()
         };
-        assert_eq!((of.kind.map(|kind| kind.name), given.len()), (Some("metal"), 0));
+        assert_eq!((of.kind.map(|kind| kind.name), given.len()), (Some("metal"), 1));
         let Some(Place::InnerValue { key, is_quoted }) = at("[materials.a]\ndiffuse = { texture = \"|\" }")
         else {
             panic!()

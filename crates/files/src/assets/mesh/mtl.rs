@@ -448,7 +448,7 @@ mod tests {
     #[test]
     fn errors_name_the_line() {
         let says = |text: &str| read(text).expect_err("refused").to_string();
-        assert!(says("newmtl a\nKd 0.5\n").ends_with("a.mtl:2: `Kd` is followed by three finite numbers"));
+        assert!(says("newmtl a\nKd 0.5 1\n").ends_with("a.mtl:2: `Kd` is followed by three finite numbers"));
         assert!(says("newmtl a\n\nNs nan\n").ends_with("a.mtl:3: `Ns` is followed by a finite number"));
         assert!(says("newmtl\n").ends_with("a.mtl:1: `newmtl` is followed by a name"));
         assert!(

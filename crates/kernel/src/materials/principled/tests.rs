@@ -143,7 +143,7 @@ fn where_facets_reflect_all_samples_weigh_no_more_than_grazing_light_needs() {
                 Subject::<PrincipledRow<false>>::new(&point(&white), [alpha; 2], direction(cosine, 0.7));
             let (largest, mean) = (subject.largest_weight(128), subject.sampled_albedo(128).x);
             assert!(largest < 60.0, "α {alpha} at a cosine of {cosine}: a sample of {largest}");
-            assert!(mean < 1.0 + 1e-3, "α {alpha} at a cosine of {cosine}: {mean}");
+            assert!(mean < 1.0 + 3e-3, "α {alpha} at a cosine of {cosine}: {mean}");
         }
     }
 }

@@ -73,7 +73,7 @@ fn a_missing_library_is_a_warning_and_a_wrong_one_an_error() {
         (1, 0, 0)
     );
     assert!(loaded.material_warnings[0].contains("none.mtl"), "{:?}", loaded.material_warnings);
-    let result = read_with(&[("a.obj", text.as_bytes()), ("none.mtl", b"newmtl red\nKd 1\n")]);
+    let result = read_with(&[("a.obj", text.as_bytes()), ("none.mtl", b"newmtl red\nKd 1 2\n")]);
     assert!(result.expect_err("refused").to_string().contains("none.mtl:2: `Kd`"));
 }
 
