@@ -314,3 +314,39 @@ fn a_clear_coat_weakens_what_shines_below_it() {
         assert!(samples.0 < 0.985 * bare.0, "{shape:?}: {samples:?} under the coat, {bare:?} without");
     }
 }
+
+#[test]
+fn only_closed_bodies_without_a_lamp_are_dark_within() {
+    let ball = |build: Build, at: DVec3, material: Material| build.sphere(at, 0.5, material);
+    let (first, second) = (v(-1.0, 0.0, -5.0), v(1.0, 0.0, -5.0));
+    let two = |material: &Material| ball(ball(scene(), first, material.clone()), second, material.clone());
+    let dark = |build: &Build| [0, 1].map(|body| build.world().is_dark_body(body));
+    let rough = two(&frosted(1.5, 0.4));
+    assert_eq!(dark(&rough), [true, true]);
+    assert_eq!(dark(&two(&glass(1.5))), [false, false], "smooth glass has no vertices");
+    let lamp_inside = rough.clone().sphere(first, 0.1, emitter(1.0));
+    assert_eq!(dark(&lamp_inside), [false, true]);
+    let lamp_around = rough.clone().sphere(v(0.0, 0.0, -5.0), 8.0, emitter(1.0));
+    assert_eq!(dark(&lamp_around), [false, false], "it may be anywhere in its box");
+    let point = rough.clone().point_light(second + v(0.2, 0.0, 0.0), 1.0, Falloff::Square);
+    assert_eq!(dark(&point), [true, false]);
+    assert_eq!(dark(&rough.clone().environment(1.0)), [true, true]);
+    let open = scene().quad(v(-1.0, -1.0, -5.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), frosted(1.5, 0.4));
+    assert!(!open.world().is_dark_body(0), "an open body");
+    let plane = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
+    assert!(!scene().shape(plane, frosted(1.5, 0.4)).world().is_dark_body(0), "a body without an end");
+}
+
+#[test]
+fn a_lamp_in_rough_glass_lights_its_inside() {
+    // With a wide lamp in its middle, light samples, lobes and paths find the same through the wall.
+    let build = scene()
+        .sphere(v(0.0, 0.0, -5.0), 1.0, frosted(1.5, 0.5))
+        .sphere(v(0.0, 0.2, -5.0), 0.4, emitter(1.0))
+        .seen(DVec3::ZERO, v(0.5, 0.3, -4.2));
+    let whitted = mean_and_error(&build.clone().depth(1).values(1024, 16));
+    let path = mean_and_error(&by_paths(build, 1).values(1024, 16));
+    let error = whitted.1.hypot(path.1);
+    assert!(error < 0.02 * path.0, "{whitted:?}, {path:?}");
+    assert!((whitted.0 - path.0).abs() < 4.0 * error, "{whitted:?}, {path:?}");
+}

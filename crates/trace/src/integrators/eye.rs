@@ -432,11 +432,24 @@ impl Wavefront<'_, '_> {
         let shading = vertex.shading(self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
         let measure = if path.state.only_specular_before { self.accumulator.measure } else { Measure::ALL };
-        self.direct.push(tile, &ShadingVertex { path, place, vertex, shading, bsdf }, measure);
+        // The share of the light that arrives counts what does not.
+        let is_dark = |medium: Medium| {
+            let is_glass = vertex.material.bsdf.glass().is_some();
+            let body = medium.glass().filter(|_| is_glass && measure != Measure::ArrivingShare);
+            body.is_some_and(|inside| tile.world.is_dark_body(inside.body))
+        };
+        let is_dark_before = is_dark(path.medium);
+        self.direct.push(
+            tile,
+            &ShadingVertex { path, place, vertex, shading, bsdf },
+            measure,
+            is_dark_before,
+        );
         // Light that comes through has a vertex of its own; a share of the light that arrives is that of the viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| measure != Measure::ArrivingShare) {
             let (path, vertex) = (&PathRay { medium: far, ..*path }, &vertex.behind());
-            self.direct.push(tile, &ShadingVertex { path, place, vertex, shading, bsdf: &bsdf }, measure);
+            let lit = ShadingVertex { path, place, vertex, shading, bsdf: &bsdf };
+            self.direct.push(tile, &lit, measure, is_dark(far));
         }
     }
 

@@ -33,12 +33,14 @@ impl World {
             has_open_glass: bodies.has_open(),
             has_rough_glass,
             bodies,
+            dark_bodies: Box::default(),
             glass_at_eye: Vec::new(),
             is_mipmapped,
             colored: colored(scene),
             passable: None,
         };
         Self {
+            dark_bodies: world.find_dark_bodies(),
             glass_at_eye: world.find_glass_at_eye(),
             passable: Passable::of(&world).map(Box::new),
             ..world

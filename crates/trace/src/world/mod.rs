@@ -6,6 +6,7 @@ mod assemble;
 mod bodies;
 pub mod camera;
 pub mod contact;
+mod dark;
 mod emitters;
 mod few;
 pub mod geometry;
@@ -104,6 +105,8 @@ pub struct World {
     has_open_glass: bool,
     /// Whether the surface of any glass is rough.
     has_rough_glass: bool,
+    /// Whether each object is the place of a body of glass without a lamp in it; empty without rough glass.
+    dark_bodies: Box<[bool]>,
     /// The closed shapes of glass that the lens may be in, with their materials.
     glass_at_eye: Vec<(u32, u32)>,
     /// Whether any material has a texture with mip levels.

@@ -33,9 +33,9 @@ pub struct DirectLightQueue {
     rows: Vec<VertexBatch>,
     /// Rows in use; the others are memory.
     count: usize,
-    /// Index of the row for single vertices of each kind of BSDF. If no row in use has this index, the row is full or there is
-    /// none.
-    open: [usize; RoughKind::ALL.len()],
+    /// Index of the row for single vertices of each kind of BSDF, and of dark ones of each kind. If no row in use has this index,
+    /// the row is full or there is none.
+    open: [usize; 2 * RoughKind::ALL.len()],
     /// Light of lamps at the vertices of each path of the round.
     arrived: Vec<Vec3>,
     /// Media of the vertices.
@@ -112,7 +112,9 @@ impl DirectLightQueue {
         // Put few vertices together with others of their kind.
         let mut left = row.used;
         let open = &mut self.open[row.bsdf.kind() as usize];
-        if let Some(open) = kept.get_mut(*open).filter(|open| open.bsdf.kind() == row.bsdf.kind()) {
+        if let Some(open) =
+            kept.get_mut(*open).filter(|open| open.bsdf.kind() == row.bsdf.kind() && !open.is_dark)
+        {
             for lane in lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
                 open.copy(open.used.trailing_ones() as usize, row, lane);
                 left &= !(1 << lane);
@@ -125,25 +127,28 @@ impl DirectLightQueue {
         }
     }
 
-    /// Adds a vertex.
+    /// Adds a vertex. No light sample from a dark one finds anything.
     #[inline(always)]
-    pub fn push(&mut self, tile: &TileContext<'_>, lit: &ShadingVertex<'_>, measure: Measure) {
+    pub fn push(&mut self, tile: &TileContext<'_>, lit: &ShadingVertex<'_>, measure: Measure, is_dark: bool) {
         self.note_cone(lit.place, lit.vertex.cone);
         let medium = self.media.number(lit.path.medium);
-        let (row, lane) = self.open_row(lit.bsdf.kind());
+        let (row, lane) = self.open_row(lit.bsdf.kind(), is_dark);
         row.put(lane, tile, lit, measure, medium);
     }
 
-    /// A row of this kind with a free lane.
-    fn open_row(&mut self, kind: RoughKind) -> (&mut VertexBatch, usize) {
-        let mut number = self.open[kind as usize];
-        let is_open = |row: &VertexBatch| row.used != ALL && row.bsdf.kind() == kind;
+    /// A row of this kind with a free lane, of dark vertices or of others.
+    fn open_row(&mut self, kind: RoughKind, is_dark: bool) -> (&mut VertexBatch, usize) {
+        let place = kind as usize + if is_dark { RoughKind::ALL.len() } else { 0 };
+        let mut number = self.open[place];
+        let is_open =
+            |row: &VertexBatch| row.used != ALL && row.bsdf.kind() == kind && row.is_dark == is_dark;
         if number >= self.count || !is_open(&self.rows[number]) {
             let row = self.spare();
             row.reset();
             row.bsdf.prepare(kind);
+            row.is_dark = is_dark;
             number = self.count;
-            self.open[kind as usize] = number;
+            self.open[place] = number;
             self.count += 1;
         }
         let row = &mut self.rows[number];
@@ -247,6 +252,9 @@ impl DirectLightQueue {
 
     /// Contributions of light samples; rays to picked lamps wait in the pool, under the row's number.
     fn sums(&mut self, asked: Asked, tile: &TileContext<'_>, measure: Measure, number: u32) -> Sums {
+        if asked.used == 0 {
+            return Sums::NOTHING;
+        }
         let mut pool = std::mem::take(&mut self.pool);
         let row = &self.rows[asked.number];
         let (competing, media) = (self.competing(asked, tile, measure), self.media_of(row));
@@ -307,8 +315,11 @@ impl DirectLightQueue {
     }
 }
 
-/// A bit for each vertex whose direct light is shown.
+/// A bit for each vertex whose direct light is shown, if there may be any.
 fn shown(row: &VertexBatch, measure: Measure) -> u32 {
+    if row.is_dark {
+        return 0;
+    }
     let Ways { direct, indirect, .. } = measure.ways();
     let hidden = |bits: u32, is_shown: bool| if is_shown { 0 } else { bits };
     !(hidden(row.only_specular_before, direct) | hidden(!row.only_specular_before, indirect))

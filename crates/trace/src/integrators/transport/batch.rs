@@ -61,6 +61,8 @@ pub struct VertexBatch {
     pub medium: [u32; LANES],
     /// Whether any vertex has a bent normal.
     pub is_bent: bool,
+    /// Whether light samples find nothing from any vertex.
+    pub is_dark: bool,
 }
 
 /// Value in place of the cosine between two equal normals.
@@ -129,6 +131,7 @@ impl VertexBatch {
         roulette_throughput: [0.0; LANES],
         medium: [0; LANES],
         is_bent: false,
+        is_dark: false,
     };
 
     /// Prepares the row for other vertices, with normals as they are.
@@ -136,7 +139,7 @@ impl VertexBatch {
     pub fn reset(&mut self) {
         (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
         (self.has_facet, self.only_specular_before, self.after_gloss) = (0, 0, 0);
-        self.is_bent = false;
+        (self.is_bent, self.is_dark) = (false, false);
         self.bsdf.reset();
         self.bend = [UNBENT; LANES];
     }

@@ -1,0 +1,54 @@
+//! Bodies of rough glass without a lamp in them: light samples find nothing from within, as no shadow ray leaves glass.
+
+use super::World;
+use crate::geometry::Aabb;
+use crate::math::Vec3;
+
+/// Room for rounding around lamps, relative to their distance from the origin.
+const ROUNDING: f32 = 1e-5;
+
+impl World {
+    /// Whether each object is the place of a closed body of glass that no lamp is in or touches. Empty if no glass is rough.
+    pub(super) fn find_dark_bodies(&self) -> Box<[bool]> {
+        if !self.has_rough_glass() {
+            return Box::default();
+        }
+        let lamps: Vec<Aabb> = self
+            .lights
+            .iter()
+            .filter_map(|(_, light)| {
+                let bounds = light.bounds().filter(|_| !light.is_beyond())?;
+                let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
+                let room = radius + ROUNDING * (radius + center.abs().max_element());
+                Some(Aabb::around([center - Vec3::splat(room), center + Vec3::splat(room)]))
+            })
+            .collect();
+        // Join the boxes of each body's objects.
+        let objects = self.geometry.objects();
+        let mut boxes: Vec<Option<Aabb>> = vec![None; objects.len()];
+        let mut is_dark = vec![false; objects.len()];
+        for (id, object) in (0_u32..).zip(objects) {
+            if !self.materials_of(id).any(|material| material.bsdf.glass().is_some()) {
+                continue;
+            }
+            let body = self.body(id) as usize;
+            let first = boxes[body].is_none();
+            boxes[body] = match (object.bounds(), boxes[body]) {
+                (Some(own), Some(others)) => Some(own.union(others)),
+                (own, _) => own,
+            };
+            is_dark[body] = (first || is_dark[body]) && boxes[body].is_some() && !self.is_open(body as u32);
+        }
+        // Leave out those that a lamp may be in.
+        for (dark, bounds) in is_dark.iter_mut().zip(&boxes) {
+            *dark &= bounds.is_some_and(|bounds| !lamps.iter().any(|lamp| lamp.meets(&bounds)));
+        }
+        is_dark.into()
+    }
+
+    /// Whether no light sample from within a body of glass finds anything.
+    #[inline]
+    pub fn is_dark_body(&self, body: u32) -> bool {
+        self.dark_bodies.get(body as usize).copied().unwrap_or(false)
+    }
+}
