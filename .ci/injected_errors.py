@@ -192,7 +192,7 @@ FAULTS = [
      PLASTIC + "white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has"),
     ("what a coat returns inside is lost", "materials/lobe_albedo.rs", "diffuse / (Vec3::ONE - ⟦diffuse * returned⟧)", "Vec3::ZERO",
      PLASTIC + "white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has"),
-    ("an albedo off by 1 %", "materials/lobe_albedo.rs", "sum += ⟦2.0 * radius * by_radius⟧ * by_turn", "2.02 * radius * by_radius",
+    ("an albedo off by 1 %", "materials/lobe_albedo.rs", "sum += ⟦area⟧ * reflectance(between) * left;", "1.01 * area",
      PLASTIC + "white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has"),
     ("a clear coat that takes nothing from the light", "materials/principled/row.rs",
      "if self.is_coated { ⟦self.through[i] * (1.0 - self.coat_albedo(i, ahead(cosine)))⟧ }", "1.0",
