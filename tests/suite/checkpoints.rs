@@ -83,7 +83,7 @@ fn killed_while_it_writes_a_checkpoint_is_the_one_before_or_the_new_one() {
 }
 
 #[test]
-#[ignore = "takes long"]
+#[ignore = "sixteen seconds: cargo test --release --test suite killed_200_times -- --ignored"]
 fn killed_200_times_while_it_writes_a_checkpoint() {
     kill_while_it_writes(200);
 }
@@ -106,9 +106,9 @@ fn kill_while_it_writes(times: u32) {
     assert!(desk.path("out.exr.checkpoint").exists());
 }
 
-/// Whether the machine is fast enough is no matter of the program's: `cargo test --release --test suite hangup -- --ignored`.
+/// Whether the machine is fast enough is no matter of the program's.
 #[test]
-#[ignore = "measures time"]
+#[ignore = "measures time, 84 s: cargo test --release --test suite hangup -- --ignored"]
 fn after_a_hangup_a_large_render_has_its_checkpoint_within_two_seconds() {
     let desk = desk();
     let is_over = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));

@@ -82,7 +82,7 @@ impl Editor {
         }
     }
 
-    /// The next list of mistakes that holds what is asked for.
+    /// The next list of mistakes for which `holds` is true.
     fn mistakes(&mut self, holds: impl Fn(&[Value]) -> bool) -> Vec<Value> {
         loop {
             let message = self.hear();

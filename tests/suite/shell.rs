@@ -9,7 +9,7 @@ use glimt::cli::environment::VARIABLES;
 use crate::desk::Desk;
 use crate::terminal::pty::Folder;
 
-/// What bash offers for a line, whose last word is being typed.
+/// The candidates of bash for a line, whose last word is being typed.
 fn in_bash(desk: &Desk, line: &str) -> Vec<String> {
     // As bash does when the key is pressed; `=` ends a word there.
     let script = r#"

@@ -1,4 +1,4 @@
-//! The schema of scenes, in both drafts: it takes what the program takes, and finds mistakes where they stand.
+//! The schema of scenes, in both drafts: it takes what the program takes, and finds mistakes at their places.
 
 mod validator;
 

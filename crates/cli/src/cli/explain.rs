@@ -77,7 +77,7 @@ fn keys_of(table: &'static TableInfo) -> impl Iterator<Item = (String, &'static 
     own.chain(table.keys.iter().map(|key| (format!("{}.{}", table.name, key.name), key)))
 }
 
-/// A key: what it takes, what it means, an example.
+/// The text about a key: its description, type, range, default, and an example.
 fn one(path: &str, key: &KeyInfo) -> String {
     let mut text = format!("{path}\n    {}\n\n", sentence(key.doc));
     let mut row = |name: &str, value: String| {

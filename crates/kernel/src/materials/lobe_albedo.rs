@@ -45,7 +45,7 @@ impl LobeAlbedo {
 
     /// Fits a polynomial. The mean is that of the polynomial: what a lobe leaves to a base by this albedo adds up with it.
     fn fitted(albedo: impl Fn(f64) -> f64) -> Self {
-        const NODES: usize = 48;
+        const NODES: usize = 32;
         // Evaluate the albedo, more densely at grazing angles; those below .03 count less.
         let nodes: [(f64, f64); NODES] = std::array::from_fn(|i| {
             let t = 0.5 - 0.5 * libm::cos(std::f64::consts::PI * (i as f64 + 0.5) / NODES as f64);
@@ -248,15 +248,22 @@ impl Facets {
         [between, 2.0 * between * half.z - to_eye.z]
     }
 
-    /// The ends of the chord's part from where light is mirrored away from the surface, in half chords from its middle. `None` if
-    /// there is no such part.
-    fn lit(&self, x: f64) -> Option<[f64; 2]> {
+    /// Height of the mirrored direction, at a part of the half chord from its middle.
+    fn height(&self, x: f64, part: f64) -> f64 {
+        self.mirrored(x, (1.0 - x * x).sqrt() * part)[1]
+    }
+
+    /// A part of the half chord where light is mirrored away from the surface. `None` if there is none.
+    fn lit(&self, x: f64) -> Option<f64> {
         const STEPS: u32 = 12;
-        let chord = (1.0 - x * x).sqrt();
-        let height = |part: f64| self.mirrored(x, chord * part)[1];
         let parts = (0..=STEPS).map(|i| 2.0 * f64::from(i) / f64::from(STEPS) - 1.0);
-        let best = parts.max_by(|one, other| height(*one).total_cmp(&height(*other)))?;
-        (height(best) > 0.0).then(|| [-1.0, 1.0].map(|end| border(best, end, |part| height(part) > 0.0)))
+        let heights = parts.map(|part| (part, self.height(x, part)));
+        heights.max_by(|one, other| one.1.total_cmp(&other.1)).filter(|best| best.1 > 0.0).map(|best| best.0)
+    }
+
+    /// The ends of the part of the chord around `lit` where it is so, in half chords from its middle.
+    fn ends(&self, x: f64, lit: f64) -> [f64; 2] {
+        [-1.0, 1.0].map(|end| border(lit, end, |part| self.height(x, part) > 0.0))
     }
 }
 
@@ -271,7 +278,7 @@ fn border(mut from: f64, mut to: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(to) {
         return to;
     }
-    for _ in 0..24 {
+    for _ in 0..16 {
         let middle = 0.5 * (from + to);
         *(if holds(middle) { &mut from } else { &mut to }) = middle;
     }
@@ -297,7 +304,8 @@ fn quadrature<const ACROSS: usize, const ALONG: usize>(
     let mut sum = 0.0;
     for (turn, by_turn) in at_the_ends(ACROSS) {
         let (x, chord) = libm::sincos(widest * turn);
-        let Some([from, to]) = facets.lit(x) else { continue };
+        let Some(lit) = facets.lit(x) else { continue };
+        let [from, to] = facets.ends(x, lit);
         for &(part, by_part) in &along {
             let [between, mirrored] = facets.mirrored(x, chord * (from + (to - from) * part));
             let left = (1.0 + facets.masked) / (1.0 + facets.masked + lambda(mirrored.max(1e-12), alpha));

@@ -17,7 +17,7 @@ use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
 
 #[test]
-#[ignore = "needs a person at a terminal: cargo test --release -p glimt-tui --lib by_hand -- --ignored --nocapture"]
+#[ignore = "needs a person at a terminal for a minute: cargo test --release -p glimt-tui --lib by_hand -- --ignored --nocapture"]
 fn by_hand() {
     let scene = PathBuf::from(std::env::var("GLIMT_BY_HAND").unwrap_or_default());
     let (commands, orders) = channel();

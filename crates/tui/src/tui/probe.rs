@@ -73,7 +73,7 @@ const QUESTIONS: &[u8] =
 
 /// Asks the terminal. `None` if stdin and stdout are not one.
 ///
-/// Multiplexers and consoles that may print questions are asked DA1 alone.
+/// It asks multiplexers and consoles DA1 alone, as they may print other questions.
 pub fn probe() -> Option<Probe> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         return None;

@@ -9,7 +9,7 @@ use super::place::{Place, Section, place};
 use crate::scene::keys::key::{Form, KeyInfo, Kind, Word};
 use crate::scene::keys::{color_names, tables};
 
-/// What may be typed at a byte.
+/// The candidates at a byte of the text. `None` if the text is nothing of a scene there.
 pub(super) fn complete(document: &Document, offset: usize) -> Option<Value> {
     let items = match place(&document.text, offset)? {
         Place::Header => headers(document, offset),
@@ -98,8 +98,9 @@ fn values(document: &Document, kind: Kind, is_quoted: bool) -> Vec<CompletionIte
         Kind::Flag => {
             ["true", "false"].map(|flag| item(flag, CompletionItemKind::VALUE, "", flag.to_owned())).to_vec()
         }
-        Kind::Material => names(document, "materials", is_quoted),
-        Kind::Texture | Kind::Heights => names(document, "textures", is_quoted),
+        Kind::Material | Kind::Texture | Kind::Heights => {
+            kind.named_in().map_or_else(Vec::new, |table| names(document, table, is_quoted))
+        }
         Kind::Color(_) => colors(),
         Kind::ColorOrTexture(_) | Kind::Emission(_) if is_quoted => colors(),
         Kind::ColorOrTexture(_) | Kind::Emission(_) => colors().into_iter().chain([texture("")]).collect(),

@@ -86,22 +86,7 @@ pub(super) fn texture_keys() -> [(&'static str, &'static str); 3] {
 pub(super) fn definition(document: &Document, offset: usize) -> Option<Value> {
     let Found { table, outer, key } = found(document, offset)?;
     let group = if std::ptr::eq(key, outer) {
-        match table.known().into_iter().find(|one| one.name == key.name.text)?.kind {
-            Kind::Material => "materials",
-            Kind::Texture | Kind::Heights => "textures",
-            Kind::Whole(..)
-            | Kind::Number(_)
-            | Kind::Flag
-            | Kind::Words(_)
-            | Kind::Text
-            | Kind::File(_)
-            | Kind::Color(_)
-            | Kind::ColorOrTexture(_)
-            | Kind::Emission(_)
-            | Kind::NumberOrTexture(_)
-            | Kind::Numbers(..)
-            | Kind::Scale(_) => return None,
-        }
+        table.known().into_iter().find(|one| one.name == key.name.text)?.kind.named_in()?
     } else if key.name.text == "texture" {
         "textures"
     } else {

@@ -116,7 +116,7 @@ impl Server<'_> {
         }
     }
 
-    /// What a function says of a place in a document. `None` if it says nothing.
+    /// The answer of a function about a place in a document. `None` if it has none.
     fn at(&self, params: Value, look: impl FnOnce(&Document, usize) -> Option<Value>) -> Option<Value> {
         let TextDocumentPositionParams { text_document, position } = serde_json::from_value(params).ok()?;
         let documents = self.documents();
@@ -124,7 +124,7 @@ impl Server<'_> {
         look(document, document.offset(position))
     }
 
-    /// What a function says of a document.
+    /// The answer of a function about a document. `None` if the document is not open.
     fn on(&self, params: &Value, look: impl FnOnce(&Document) -> Value) -> Option<Value> {
         let uri = params["textDocument"]["uri"].as_str()?;
         self.documents().get(uri).map(look)

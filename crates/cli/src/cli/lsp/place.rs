@@ -6,7 +6,7 @@ use crate::scene::keys::table;
 /// A place where something may be typed.
 #[derive(Debug)]
 pub(super) enum Place {
-    /// In a header, or where one may begin.
+    /// A header, or a line on which one may begin.
     Header,
     /// A key of a table; those that the table has already.
     Key { of: Section, given: Vec<String> },
@@ -85,7 +85,7 @@ fn inner(typed: &str) -> Place {
     }
 }
 
-/// What is typed of the last of the items between commas, those within brackets not counted.
+/// The typed part of the last item; commas within brackets end none.
 fn last_item(typed: &str) -> &str {
     let mut depth = 0_i32;
     let mut start = 0;

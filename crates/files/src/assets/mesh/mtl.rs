@@ -14,7 +14,7 @@ const FILE_LIMIT: u64 = 64 << 20;
 /// The materials of an MTL file.
 pub(super) struct Library {
     pub(super) materials: Vec<tobj::Material>,
-    /// What was left out of them.
+    /// Warnings of statements that were left out.
     pub(super) warnings: Vec<String>,
 }
 

@@ -28,7 +28,7 @@ macro_rules! __render_keys {
             height: u32 = 480, whole(1, 65_536), "pixels", option;
             /// Most samples that a pixel gets.
             samples: u32 = 64, whole(1, u32::MAX), "per pixel", option;
-            /// Noise at which a tile is done; 0: `samples` decide.
+            /// Noise at which a tile is done; with 0, `samples` decide.
             error: f32 = 0.0, at_least(0.0), "part of the brightness", option;
             /// Shadow rays to each light of some size, for each sample.
             shadow_samples: u32 = 1, whole(1, 4096), "per light", scene;
@@ -38,11 +38,11 @@ macro_rules! __render_keys {
             integrator: Integrator = Integrator::Whitted, choice, "", option;
             /// Shadows in `whitted`.
             shadows: Shadows = Shadows::Soft, choice, "", option;
-            /// Most that one bounce may bring: less noise, but the picture gets too dark; 0: no limit.
+            /// Most that one bounce may bring: less noise, but the picture gets too dark; 0 is no limit.
             clamp: f32 = 0.0, at_least(0.0), "radiance", option;
             /// Light from everywhere in `whitted`, in place of light that bounces.
             ambient: Vec3 = Vec3::ZERO, color, "radiance", scene;
-            /// What a ray sees that leaves the scene; it lights nothing.
+            /// Radiance that a ray sees when it leaves the scene; it lights nothing.
             background: Vec3 = Vec3::ZERO, color, "radiance", scene;
             /// Reconstruction filter of a pixel.
             filter: PixelFilter = PixelFilter::Box, choice, "", scene;

@@ -8,7 +8,7 @@ use crate::choice::Choice;
 pub struct TableInfo {
     /// Its name in the file.
     pub name: &'static str,
-    /// How the file holds it.
+    /// Its form in the file.
     pub form: Form,
     /// Description, one sentence without its full stop.
     pub doc: &'static str,
@@ -78,7 +78,7 @@ pub enum Kind {
     Emission(Limits),
     /// A number or a texture.
     NumberOrTexture(Limits),
-    /// So many numbers, by what they are together.
+    /// An array of so many numbers, with the name of the whole.
     Numbers(usize, &'static str, Limits),
     /// A number or three.
     Scale(Limits),
@@ -88,6 +88,28 @@ pub enum Kind {
     Heights,
     /// The name of a material.
     Material,
+}
+
+impl Kind {
+    /// The table that gives the value its name. `None` if the value is no name.
+    pub fn named_in(self) -> Option<&'static str> {
+        match self {
+            Self::Material => Some("materials"),
+            Self::Texture | Self::Heights => Some("textures"),
+            Self::Whole(..)
+            | Self::Number(_)
+            | Self::Flag
+            | Self::Words(_)
+            | Self::Text
+            | Self::File(_)
+            | Self::Color(_)
+            | Self::ColorOrTexture(_)
+            | Self::Emission(_)
+            | Self::NumberOrTexture(_)
+            | Self::Numbers(..)
+            | Self::Scale(_) => None,
+        }
+    }
 }
 
 /// The words of a choice, in the order in which they are offered.

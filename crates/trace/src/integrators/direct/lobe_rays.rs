@@ -59,7 +59,7 @@ impl Loops for LobeRays<'_> {
             }
             let rays = RayRows::of(row.from, directions).leaving(row.starts(&directions));
             arrived.rays.scattered += u64::from(sent.count_ones());
-            // Without soft shadows, what is met does not depend on what is before it.
+            // Without soft shadows, add the light of each lamp on the rays, whatever is before it.
             if tile.settings.render.shadows != Shadows::Soft {
                 for i in lanes(if measure == Measure::Work { 0 } else { sent }) {
                     let found = Unshadowed { tile, row, lane: i, ray: rays.ray(i), density: densities[i] };
