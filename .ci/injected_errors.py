@@ -57,7 +57,7 @@ FAULTS = [
      "⟦self.tile.world.left_on_segment(&segment, source, &mut rays.lookups)⟧", "Vec3::ONE",
      "closed_forms::hard::lobes_of_metal_see_lamps_by_the_same_ray_to_their_middle"),
     ("bodies that are dark with a lamp in them", "world/dark.rs",
-     "*dark &= ⟦bounds.is_some_and(|bounds| !lamps.iter().any(|lamp| lamp.meets(&bounds)))⟧;", "bounds.is_some()",
+     "closed.is_some_and(|bounds| ⟦!holds_lamp(bounds)⟧)", "!holds_lamp(bounds) || true",
      FROSTED + "only_closed_bodies_without_a_lamp_are_dark_within"),
     ("albedos below the lobe's", "materials/lobe_albedo.rs", "terms[0] += ⟦missing.fold(0.0, f64::max)⟧;", "0.0",
      "materials::lobe_albedo::tests::polynomials_are_those_of_the_quadrature_or_just_above"),

@@ -330,7 +330,7 @@ fn only_closed_bodies_without_a_lamp_are_dark_within() {
     assert_eq!(dark(&lamp_around), [false, false], "it may be anywhere in its box");
     let point = rough.clone().point_light(second + v(0.2, 0.0, 0.0), 1.0, Falloff::Square);
     assert_eq!(dark(&point), [true, false]);
-    assert_eq!(dark(&rough.clone().environment(1.0)), [true, true]);
+    assert_eq!(dark(&rough.environment(1.0)), [true, true]);
     let open = scene().quad(v(-1.0, -1.0, -5.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), frosted(1.5, 0.4));
     assert!(!open.world().is_dark_body(0), "an open body");
     let plane = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };

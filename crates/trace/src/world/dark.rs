@@ -25,25 +25,22 @@ impl World {
             .collect();
         // Join the boxes of each body's objects.
         let objects = self.geometry.objects();
+        let everywhere = Aabb::around([Vec3::NEG_INFINITY, Vec3::INFINITY]);
         let mut boxes: Vec<Option<Aabb>> = vec![None; objects.len()];
-        let mut is_dark = vec![false; objects.len()];
         for (id, object) in (0_u32..).zip(objects) {
-            if !self.materials_of(id).any(|material| material.bsdf.glass().is_some()) {
-                continue;
+            if self.materials_of(id).any(|material| material.bsdf.glass().is_some()) {
+                let (own, joined) =
+                    (object.bounds().unwrap_or(everywhere), &mut boxes[self.body(id) as usize]);
+                *joined = Some(joined.map_or(own, |others| others.union(own)));
             }
-            let body = self.body(id) as usize;
-            let first = boxes[body].is_none();
-            boxes[body] = match (object.bounds(), boxes[body]) {
-                (Some(own), Some(others)) => Some(own.union(others)),
-                (own, _) => own,
-            };
-            is_dark[body] = (first || is_dark[body]) && boxes[body].is_some() && !self.is_open(body as u32);
         }
-        // Leave out those that a lamp may be in.
-        for (dark, bounds) in is_dark.iter_mut().zip(&boxes) {
-            *dark &= bounds.is_some_and(|bounds| !lamps.iter().any(|lamp| lamp.meets(&bounds)));
-        }
-        is_dark.into()
+        // Leave out those that a lamp may be in, and those that rays may leave.
+        let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.meets(bounds));
+        let is_dark = |(body, bounds): (u32, &Option<Aabb>)| {
+            let closed = bounds.as_ref().filter(|bounds| bounds.extent().is_finite() && !self.is_open(body));
+            closed.is_some_and(|bounds| !holds_lamp(bounds))
+        };
+        (0..).zip(&boxes).map(is_dark).collect()
     }
 
     /// Whether no light sample from within a body of glass finds anything.

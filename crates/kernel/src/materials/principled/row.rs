@@ -178,8 +178,7 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         set_lane(&mut self.left, i, left);
         let [normal, grazing] = self.albedos(i, cosine);
         let specular = lane(&self.facets, i).max_element() * normal + self.grazing[i] * grazing;
-        // Where facets reflect nearly all, the light from other directions passes them more easily: it needs some samples.
-        let diffuse = self.diffuse[i] * left.max_element().max(0.01);
+        let diffuse = self.diffuse[i] * left.max_element();
         let mut all = specular + diffuse;
         let mut through = 0.0;
         if self.transmits {

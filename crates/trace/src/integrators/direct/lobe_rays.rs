@@ -61,7 +61,9 @@ impl Loops for LobeRays<'_> {
             arrived.rays.scattered += u64::from(sent.count_ones());
             // Without soft shadows, add the light of each lamp on the rays, whatever is before it.
             if tile.settings.render.shadows != Shadows::Soft {
-                for i in lanes(if measure == Measure::Work { 0 } else { sent }) {
+                // Their work is that of the rays to the middles.
+                let lit = if measure == Measure::Work { 0 } else { sent };
+                for i in lanes(lit) {
                     let found = Unshadowed { tile, row, lane: i, ray: rays.ray(i), density: densities[i] };
                     let radiance = found.radiance(|distance| transmittance(i, distance), &mut arrived.rays);
                     let value = lane(&narrow, i) * radiance * (cosines[i] / (densities[i] * count as f32));

@@ -3,7 +3,8 @@
 //!
 //! - `queue`: rows of vertices that wait for light, and what comes to them.
 //! - `all_lights`: samples of every light; `picked`: of lights picked by a tree; `shadow_rays`: the rays to these, grouped by light.
-//! - `lobe_rays`: rays in narrow lobes, without soft shadows by `unshadowed`; `mis`: weights of these, of paths, and of light samples against each other.
+//! - `lobe_rays`: rays in narrow lobes; `unshadowed`: the same without soft shadows.
+//! - `mis`: weights of these, of paths, and of light samples against each other.
 
 pub mod all_lights;
 pub mod lobe_rays;

@@ -1,5 +1,5 @@
-//! Walk of a ray to the first surface where the index of refraction around it changes, or which is opaque and there. Paths from the eye and photons
-//! walk alike; a [`Walker`] decides what happens at that surface.
+//! Walk of a ray to the first surface where the index of refraction around it changes, or which is opaque and there. Paths from
+//! the eye and photons walk alike; a [`Walker`] decides what happens at that surface.
 //!
 //! Thin panes, and surfaces that chance leaves out by their opacity, are passed straight on: to what it meets there, the path comes
 //! from its last vertex, as shadow rays do.
