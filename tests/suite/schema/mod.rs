@@ -172,6 +172,11 @@ fn a_new_scene_may_have_its_schema_beside_it() {
     desk.write(FILE, "mine");
     assert!(desk.expect("new --schema third.toml", 2).contains("is another file"));
     assert!(!desk.path("third.toml").exists() && desk.bytes(FILE) == b"mine");
+    // A scene that is there already gets none.
+    let other = Desk::new();
+    other.write("there.toml", "mine");
+    assert!(other.expect("new --schema there.toml", 2).contains("exists already"));
+    assert!(!other.path(FILE).exists() && other.bytes("there.toml") == b"mine");
 }
 
 #[test]

@@ -22,6 +22,11 @@ pub(super) fn run(path: Option<&str>, console: &Console) -> Exit {
     }
 }
 
+/// Whether tables may be of a type.
+fn has_type(table: &TableInfo, name: &str) -> bool {
+    table.types.iter().any(|kind| kind.name == name)
+}
+
 fn overview() -> String {
     let line = |table: &TableInfo| format!("{:<20}{}\n", table.head(), plain(table.doc));
     tables().iter().map(line).collect()
@@ -37,6 +42,11 @@ fn explained(path: &str) -> Option<String> {
     match parts.as_slice() {
         [name] => match table(name) {
             Some(table) => Some(whole_table(table)),
+            None if tables().iter().any(|table| has_type(table, name)) => {
+                let types = tables().iter().filter(|table| has_type(table, name));
+                let texts = types.filter_map(|table| Some(whole_type(table, table.type_of(Some(name))?)));
+                Some(texts.collect::<Vec<_>>().join("\n"))
+            }
             None => found(all_keys().filter(|(_, key)| key.name == *name).collect()),
         },
         [name, second] => {
@@ -52,6 +62,9 @@ fn explained(path: &str) -> Option<String> {
         [name, second, third] => {
             let table = table(name)?;
             let kind = table.type_of(Some(second))?;
+            if *third == "type" {
+                return Some(types(table));
+            }
             let path = format!("{}.{}", table.name, kind.name);
             found(
                 table
@@ -191,6 +204,8 @@ mod tests {
             let text = explained(&path).unwrap_or_default();
             assert!(text.contains(&plain(doc)), "{path}: {text}");
         }
+        assert!(explained("phong").is_some_and(|text| text.contains("shininess")));
+        assert_eq!(explained("materials.metal.type"), explained("materials.type"));
         assert_eq!(explained("nothing"), None);
         assert_eq!(explained("materials.gold.roughness"), None);
     }

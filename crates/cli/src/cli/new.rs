@@ -19,8 +19,15 @@ pub(super) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     if let Some(message) = misnamed(file) {
         return console.fail(Exit::WRONG, &message);
     }
-    if with_schema && let Err((exit, message)) = write_schema(&file.with_file_name(schema::FILE)) {
-        return console.fail(exit, &message);
+    // A scene that is refused leaves no schema behind.
+    let is_free = file.symlink_metadata().is_err();
+    let schema = file.with_file_name(schema::FILE);
+    if with_schema && is_free {
+        match write_schema(&schema) {
+            Ok(true) => console.say(&format!("wrote {}", schema.display())),
+            Ok(false) => {}
+            Err((exit, message)) => return console.fail(exit, &message),
+        }
     }
     let name = file.display();
     match write::new_file(file, text.as_bytes()) {
@@ -47,16 +54,16 @@ pub(super) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     }
 }
 
-/// Writes the schema beside a scene. One that is there already will do if it is the same.
+/// Writes the schema beside a scene; returns whether it was not there. One that is there already will do if it is the same.
 ///
 /// # Errors
 /// Another file of that name, or no way to write one.
-fn write_schema(path: &Path) -> Result<(), (Exit, String)> {
+fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
     let text = schema::text(Draft::Four);
     match write::new_file(path, text.as_bytes()) {
-        Ok(()) => Ok(()),
+        Ok(()) => Ok(true),
         Err(error) if error.kind() == ErrorKind::AlreadyExists => match std::fs::read(path) {
-            Ok(there) if there == text.as_bytes() => Ok(()),
+            Ok(there) if there == text.as_bytes() => Ok(false),
             Ok(_) | Err(_) => {
                 let name = path.display();
                 Err((

@@ -83,8 +83,8 @@ pub fn probe() -> Option<Probe> {
     let is_plain = ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
         || variable("TERM_PROGRAM").is_some_and(|program| program == "Apple_Terminal");
     let way = way(variable);
-    let answers =
-        if term == "dumb" { None } else { ask(if is_plain { b"" } else { QUESTIONS }).ok().flatten() };
+    let questions: &[u8] = if is_plain || way.is_multiplexed { b"" } else { QUESTIONS };
+    let answers = if term == "dumb" { None } else { ask(questions).ok().flatten() };
     Some(Probe {
         cells: (window.columns, window.rows),
         cell_pixels: window.cell_pixels,

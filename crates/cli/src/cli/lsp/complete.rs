@@ -1,6 +1,9 @@
 //! Completion: tables, keys, words, and the names that the text defines.
 
-use lsp_types::{CompletionItem, CompletionItemKind, Documentation, MarkupContent, MarkupKind};
+use lsp_types::{
+    CompletionItem, CompletionItemKind, CompletionTextEdit, Documentation, MarkupContent, MarkupKind, Range,
+    TextEdit,
+};
 use serde_json::{Value, json};
 
 use super::document::Document;
@@ -13,7 +16,7 @@ use crate::scene::keys::{color_names, tables};
 pub(super) fn complete(document: &Document, offset: usize) -> Option<Value> {
     let items = match place(&document.text, offset)? {
         Place::Header => headers(document, offset),
-        Place::Key { of, given } => keys(of, &given),
+        Place::Key { of, given, is_assigned } => keys(of, &given, is_assigned),
         Place::Value { of, key, is_quoted } if key == "type" => types(of, is_quoted),
         Place::Value { of, key, is_quoted } => {
             of.key(&key).map(|key| values(document, key.kind, is_quoted))?
@@ -45,33 +48,41 @@ fn item(label: &str, kind: CompletionItemKind, doc: &str, insert: String) -> Com
     }
 }
 
-/// Headers of tables; brackets that are there already are not offered again.
+/// Headers of tables, each in the place of what is typed of one, with the brackets that an editor may have closed.
 fn headers(document: &Document, offset: usize) -> Vec<CompletionItem> {
-    let line = document.text[..offset].rsplit('\n').next().unwrap_or_default().trim_start();
+    let before = &document.text[..offset];
+    let line = before.rsplit('\n').next().unwrap_or_default().trim_start();
+    let rest = &document.text[offset..];
+    let closed = rest.len() - rest.trim_start_matches(']').len();
+    let [start, end] = [offset - line.len(), offset + closed].map(|at| document.position(at));
     let is_there = |table: &str| document.tables.iter().any(|one| one.info.name == table);
     let open = tables().iter().filter(|table| table.form != Form::Single || !is_there(table.name));
     open.map(|table| {
         let head = table.head();
-        let rest = head.strip_prefix(line).unwrap_or(head.trim_start_matches('[')).to_owned();
-        item(&head, CompletionItemKind::MODULE, table.doc, rest)
+        let edit = TextEdit { range: Range { start, end }, new_text: head.clone() };
+        CompletionItem {
+            text_edit: Some(CompletionTextEdit::Edit(edit)),
+            filter_text: Some(head.clone()),
+            insert_text: None,
+            ..item(&head, CompletionItemKind::MODULE, table.doc, String::new())
+        }
     })
     .collect()
 }
 
-fn keys(of: Section, given: &[String]) -> Vec<CompletionItem> {
+/// Keys of a table that are not given. Without a value, if their `=` is there.
+fn keys(of: Section, given: &[String], is_assigned: bool) -> Vec<CompletionItem> {
+    let whole =
+        |name: &str, value: &str| if is_assigned { name.to_owned() } else { format!("{name} = {value}") };
     let mut items: Vec<CompletionItem> = Vec::new();
     let is_given = |name: &str| given.iter().any(|one| one == name);
     if !of.info.types.is_empty() && !is_given("type") {
         let default = of.info.types.first().map_or("", |kind| kind.name);
-        items.push(item("type", CompletionItemKind::PROPERTY, "", format!("type = \"{default}\"")));
+        items.push(item("type", CompletionItemKind::PROPERTY, "", whole("type", &format!("\"{default}\""))));
     }
     let key = |key: &&KeyInfo| {
-        let mut item = item(
-            key.name,
-            CompletionItemKind::PROPERTY,
-            &described(key),
-            format!("{} = {}", key.name, key.example()),
-        );
+        let mut item =
+            item(key.name, CompletionItemKind::PROPERTY, &described(key), whole(key.name, &key.example()));
         item.detail = Some(key.kind().replace('`', ""));
         item
     };

@@ -47,7 +47,7 @@ fn capabilities() -> Value {
     json!({
         "capabilities": {
             "textDocumentSync": { "openClose": true, "change": 1, "save": { "includeText": false } },
-            "completionProvider": { "triggerCharacters": ["[", ".", "\"", "=", " "] },
+            "completionProvider": { "triggerCharacters": ["[", ".", "\"", "="] },
             "hoverProvider": true,
             "definitionProvider": true,
             "colorProvider": true,

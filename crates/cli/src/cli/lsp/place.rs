@@ -8,8 +8,8 @@ use crate::scene::keys::table;
 pub(super) enum Place {
     /// A header, or a line on which one may begin.
     Header,
-    /// A key of a table; those that the table has already.
-    Key { of: Section, given: Vec<String> },
+    /// A key of a table; those that the table has already, and whether its `=` is there.
+    Key { of: Section, given: Vec<String>, is_assigned: bool },
     /// The value of a key.
     Value { of: Section, key: String, is_quoted: bool },
     /// A key in the braces of a value.
@@ -51,28 +51,40 @@ pub(super) fn place(text: &str, offset: usize) -> Option<Place> {
     let Some((header, body)) = section(text, start) else {
         return (!trimmed.contains('=')).then_some(Place::Header);
     };
+    let after = text[offset..].split('\n').next().unwrap_or_default();
     let mut parts = header.split('.');
     let info = table(parts.next().unwrap_or_default().trim())?;
     if parts.next().is_none() && info.form == crate::scene::keys::key::Form::Named {
         // `[materials]` and then `wall = { … }`.
         let (_, braces) = line.split_once('{')?;
-        return Some(in_table(info, braces, braces, true));
+        let items = format!("{braces}{after}").replace(',', "\n");
+        return in_table(info, &items, (braces, after), true);
     }
-    Some(in_table(info, body, line, false))
+    in_table(info, body, (line, after), false)
 }
 
-/// The place in a table whose lines, or braces, are `body`; `typed` is what is before the cursor.
-fn in_table(info: &'static TableInfo, body: &str, typed: &str, is_inline: bool) -> Place {
+/// The place in a table whose lines, or items in braces, are `body`; the texts are those before and behind the cursor. `None` in
+/// arrays, and behind values that are whole.
+fn in_table(
+    info: &'static TableInfo,
+    body: &str,
+    (typed, after): (&str, &str),
+    is_inline: bool,
+) -> Option<Place> {
     let of = Section { info, kind: kind(info, body) };
     let (opened, closed) = (typed.matches('{').count(), typed.matches('}').count());
     if opened > closed {
-        return inner(typed.rsplit('{').next().unwrap_or_default());
+        return Some(inner(typed.rsplit('{').next().unwrap_or_default()));
     }
     let current = if is_inline { last_item(typed) } else { typed };
-    match current.split_once('=') {
-        Some((key, value)) => Place::Value { of, key: key.trim().to_owned(), is_quoted: is_in_quotes(value) },
-        None => Place::Key { of, given: given(body, current.trim()) },
-    }
+    let Some((key, value)) = current.split_once('=') else {
+        let is_assigned =
+            after.trim_start_matches(|c: char| c.is_alphanumeric() || c == '_').trim_start().starts_with('=');
+        return Some(Place::Key { of, given: given(body, current.trim()), is_assigned });
+    };
+    let is_whole = !is_in_quotes(value) && value.contains(['"', '\'']);
+    let is_open = !(is_whole || value.contains('['));
+    is_open.then(|| Place::Value { of, key: key.trim().to_owned(), is_quoted: is_in_quotes(value) })
 }
 
 fn inner(typed: &str) -> Place {
@@ -113,6 +125,12 @@ fn is_comment(line: &str) -> bool {
     })
 }
 
+/// A line up to its comment.
+fn without_comment(line: &str) -> &str {
+    let ends = line.match_indices('#').map(|(at, _)| &line[..at]);
+    ends.into_iter().find(|text| !is_in_quotes(text)).unwrap_or(line)
+}
+
 /// The header above a line, without its brackets, and the lines of its table.
 fn section(text: &str, line_start: usize) -> Option<(&str, &str)> {
     let is_header = |line: &str| line.trim_start().starts_with('[') && !line.trim_start().starts_with("[ ");
@@ -122,8 +140,7 @@ fn section(text: &str, line_start: usize) -> Option<(&str, &str)> {
         if at < line_start
             && is_header(line)
             && line.contains(']')
-            && !line.contains('=')
-            && !line.trim_end().ends_with(',')
+            && !without_comment(line).contains(['=', ','])
         {
             break at;
         }
@@ -147,9 +164,15 @@ fn section(text: &str, line_start: usize) -> Option<(&str, &str)> {
 fn kind(info: &'static TableInfo, body: &str) -> Option<&'static TypeInfo> {
     let named = body.split(['\n', ',', '{', '}']).find_map(|item| {
         let (key, value) = item.split_once('=')?;
-        (key.trim() == "type").then(|| value.trim().trim_matches('"').to_owned())
+        (key.trim() == "type").then(|| in_quotes(value)).flatten()
     });
-    info.type_of(named.as_deref()).or_else(|| info.type_of(None))
+    info.type_of(named).or_else(|| info.type_of(None))
+}
+
+/// The text of the first string of a value.
+fn in_quotes(value: &str) -> Option<&str> {
+    let (_, rest) = value.split_once(['"', '\''])?;
+    Some(rest.split(['"', '\'']).next().unwrap_or(rest))
 }
 
 /// Keys that lines have, but for the one that is typed.
@@ -173,7 +196,7 @@ mod tests {
         assert!(matches!(at("|"), Some(Place::Header)));
         assert!(matches!(at("[ren|"), Some(Place::Header)));
         assert!(at("# [ren|").is_none() && at("[render]\nwidth = 3 # so|").is_none());
-        let Some(Place::Key { of, given }) =
+        let Some(Place::Key { of, given, .. }) =
             at("[render]\nwidth = 3\nhe|\nseed = 1\n\n[camera]\nup = [0, 1, 0]\n")
         else {
             panic!()
@@ -189,10 +212,17 @@ mod tests {
 
     #[test]
     fn braces_hold_tables_and_textures() {
-        let Some(Place::Key { of, given }) = at("[materials]\nwall = { type = \"metal\", ro| }") else {
-            panic!()
-        };
-        assert_eq!((of.kind.map(|kind| kind.name), given.len()), (Some("metal"), 1));
+        for text in [
+            "[materials]\nwall = { type = \"metal\", color = 0.5, ro| }",
+            "[materials]\nwall = { ro|, type = 'metal', color = 0.5 }",
+        ] {
+            let Some(Place::Key { of, mut given, .. }) = at(text) else { panic!("{text}") };
+            given.sort();
+            assert_eq!(
+                (of.kind.map(|kind| kind.name), given),
+                (Some("metal"), vec!["color".to_owned(), "type".to_owned()])
+            );
+        }
         let Some(Place::InnerValue { key, is_quoted }) = at("[materials.a]\ndiffuse = { texture = \"|\" }")
         else {
             panic!()
@@ -204,6 +234,29 @@ mod tests {
             panic!()
         };
         assert_eq!(key, "emission");
+    }
+
+    #[test]
+    fn comments_hide_neither_types_nor_headers() {
+        let kind = |text: &str| match at(text) {
+            Some(Place::Key { of, .. }) => (of.info.name, of.kind.map(|kind| kind.name)),
+            _ => panic!("{text}"),
+        };
+        assert_eq!(
+            kind("[materials.a]\ntype = \"metal\"   # \"phong\", gold\nro|"),
+            ("materials", Some("metal"))
+        );
+        assert_eq!(kind("[materials.a] # x = 1, 2\ntype = 'glass'\nro|"), ("materials", Some("glass")));
+        assert_eq!(kind("[camera]\nup = [0, 1, 0]\n[render] # a = b\nwi|").0, "render");
+    }
+
+    #[test]
+    fn nothing_is_typed_in_arrays_and_behind_values() {
+        assert!(at("[materials.a]\ndiffuse = [1, |").is_none());
+        assert!(at("[render]\nintegrator = \"path\" |").is_none());
+        let is_assigned = |text: &str| matches!(at(text), Some(Place::Key { is_assigned: true, .. }));
+        assert!(is_assigned("[[sphere]]\nrad| = 0.5") && is_assigned("[[sphere]]\nra|dius = 0.5"));
+        assert!(!is_assigned("[[sphere]]\nrad|"));
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub(super) const MATERIALS: TableInfo = TableInfo {
         key("emission_sides", Words(words::<EmissionSides>), "", Is("\"front\""), "The sides that emit"),
         key("normal_map", Texture, "", Absent, "Tangent-space normal map"),
         key("normal_strength", Number(AtLeast(0.0)), "", Is("1.0"), "How far the map bends the normals"),
-        key("bump", Heights, "", Absent, "Heights that bend the normals; see below"),
+        key("bump", Heights, "", Absent, "Heights that bend the normals"),
         key(
             "bump_scale",
             Number(Any),
