@@ -30,11 +30,25 @@ pub type Truths = [u32; LANES];
 /// Value of a lane of [`Truths`] in which the condition holds.
 pub const TRUE: u32 = u32::MAX;
 
+/// Work in loops without branches over rows. What it calls in its loops must be inlined, and no closure, or it is compiled
+/// without the instructions.
+pub trait Loops {
+    /// Result of the work.
+    type Done;
+
+    /// Does the work, folding rows by these instructions.
+    fn run(self, folds: impl Folds) -> Self::Done;
+}
+
 /// Instructions that fold rows. A value is the right to use them: for instructions that a processor may lack, values exist only
 /// if the processor has them.
 pub trait Folds: Copy {
     /// One bit for each lane in which the condition holds.
     fn bits(self, holds: &Truths) -> u32;
+
+    /// Does work by the same instructions in a function of its own, which all callers share: for work of which a call costs little
+    /// and each copy much of the program's size.
+    fn call<L: Loops>(self, work: L) -> L::Done;
 }
 
 /// Folds by instructions that every processor has.
@@ -60,6 +74,11 @@ impl Folds for PlainFolds {
             row[i] |= row[i + 2];
         }
         row[0] | row[1]
+    }
+
+    #[inline(never)]
+    fn call<L: Loops>(self, work: L) -> L::Done {
+        work.run(self)
     }
 }
 

@@ -159,6 +159,10 @@ pub trait RoughRow: Clone {
     /// Whether a ray in its narrow lobe goes on where other paths end, to find what the lobe mirrors.
     const SENDS_RAYS: bool;
 
+    /// Whether its functions are compiled into each place that calls them. Other kinds have one copy for each instruction set: a call
+    /// costs them little, and copies make a large program.
+    const IS_COPIED: bool = false;
+
     /// A row of any content.
     const EMPTY: Self;
 

@@ -1,6 +1,7 @@
 //! Materials: reflection, transmission and emission of surfaces.
 
 pub mod bsdf;
+mod calls;
 pub mod coated;
 pub mod emission;
 pub mod footprint;

@@ -4,6 +4,7 @@ use super::bsdf::{
     BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughPoint, RoughRow, ShownLobes,
     UvRow,
 };
+use super::calls::RoughCalls;
 use super::footprint::TexturePoint;
 use super::frosted::GlassRow;
 use super::metal::{BrushedMetalRow, Metal, RoundMetalRow};
@@ -248,19 +249,24 @@ macro_rules! kinds {
 
             /// [`RoughRow::f`].
             #[inline(always)]
-            pub fn f(&self, directions: &Lanes3) -> BsdfValues {
+            pub fn f(&self, directions: &Lanes3, folds: impl Folds) -> BsdfValues {
                 match self {
-                    $(Self::$kind(row) => row.f(directions),)+
-                    $(Self::$part(row) => row.f(directions)),+
+                    $(Self::$kind(row) => row.call_f(directions, folds),)+
+                    $(Self::$part(row) => row.call_f(directions, folds)),+
                 }
             }
 
             /// [`RoughRow::parts`].
             #[inline(always)]
-            pub fn parts(&self, directions: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
+            pub fn parts(
+                &self,
+                directions: &Lanes3,
+                values: &BsdfValues,
+                folds: impl Folds,
+            ) -> [Lanes3; 2] {
                 match self {
-                    $(Self::$kind(row) => row.parts(directions, values),)+
-                    $(Self::$part(row) => row.parts(directions, values)),+
+                    $(Self::$kind(row) => row.call_parts(directions, values, folds),)+
+                    $(Self::$part(row) => row.call_parts(directions, values, folds)),+
                 }
             }
 
@@ -281,19 +287,27 @@ macro_rules! kinds {
                 normals: &Lanes3,
                 directions: &Lanes3,
                 values: &BsdfValues,
+                folds: impl Folds,
             ) -> Lanes {
                 match self {
-                    $(Self::$kind(row) => row.pdf(lobes, normals, directions, values),)+
-                    $(Self::$part(row) => row.pdf(lobes, normals, directions, values)),+
+                    $(Self::$kind(row) => row.call_pdf(lobes, normals, directions, values, folds),)+
+                    $(Self::$part(row) => row.call_pdf(lobes, normals, directions, values, folds)),+
                 }
             }
 
             /// [`RoughRow::sample`].
             #[inline(always)]
-            pub fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
+            pub fn sample(
+                &self,
+                lobes: LobeSet,
+                normals: &Lanes3,
+                choices: &Lanes,
+                u: &[Lanes; 2],
+                folds: impl Folds,
+            ) -> Lanes3 {
                 match self {
-                    $(Self::$kind(row) => row.sample(lobes, normals, choices, u),)+
-                    $(Self::$part(row) => row.sample(lobes, normals, choices, u)),+
+                    $(Self::$kind(row) => row.call_sample(lobes, normals, choices, u, folds),)+
+                    $(Self::$part(row) => row.call_sample(lobes, normals, choices, u, folds)),+
                 }
             }
 

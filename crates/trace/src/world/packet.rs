@@ -25,10 +25,7 @@ impl Geometry {
         traced: u32,
         folds: impl Folds,
     ) -> (HitRows, [u32; PACKET]) {
-        let mut nearest =
-            Nearest { geometry: self, rows, hits: HitRows::none(), object: [NONE; PACKET], folds };
-        self.visited().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, folds);
-        (nearest.hits, nearest.object)
+        folds.call(ClosestRows { geometry: self, rows, ends, traced })
     }
 
     /// [`Geometry::occluded`] for the segments of a packet, each with its light: a bit for each that is occluded. `traced` are the
@@ -42,12 +39,7 @@ impl Geometry {
         sources: &SourceRow,
         folds: impl Folds,
     ) -> u32 {
-        let by_each = traced & self.to_whole_merged(sources);
-        if by_each != 0 {
-            return self.occluded_by_each(rows, ends, traced, sources);
-        }
-        let mut blockers = Blockers::new(self, rows, sources, folds);
-        self.visited().any_packet(rows, ends, traced, self.unbounded(), &mut blockers, folds)
+        folds.call(OccludedRows { geometry: self, rows, ends, traced, sources })
     }
 }
 
@@ -72,6 +64,50 @@ impl Geometry {
         let is_occluded =
             |&lane: &usize| self.occluded(&Ray { t_max: ends[lane], ..rows.ray(lane) }, sources.source(lane));
         lanes(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
+    }
+}
+
+/// [`Geometry::closest_rows`].
+struct ClosestRows<'a> {
+    geometry: &'a Geometry,
+    rows: &'a RayRows,
+    ends: &'a mut Ends,
+    traced: u32,
+}
+
+impl Loops for ClosestRows<'_> {
+    type Done = (HitRows, [u32; PACKET]);
+
+    #[inline(always)]
+    fn run(self, folds: impl Folds) -> Self::Done {
+        let Self { geometry, rows, ends, traced } = self;
+        let mut nearest = Nearest { geometry, rows, hits: HitRows::none(), object: [NONE; PACKET], folds };
+        geometry.visited().closest_packet(rows, ends, traced, geometry.unbounded(), &mut nearest, folds);
+        (nearest.hits, nearest.object)
+    }
+}
+
+/// [`Geometry::occluded_rows`].
+struct OccludedRows<'a> {
+    geometry: &'a Geometry,
+    rows: &'a RayRows,
+    ends: &'a Ends,
+    traced: u32,
+    sources: &'a SourceRow,
+}
+
+impl Loops for OccludedRows<'_> {
+    type Done = u32;
+
+    #[inline(always)]
+    fn run(self, folds: impl Folds) -> u32 {
+        let Self { geometry, rows, ends, traced, sources } = self;
+        let by_each = traced & geometry.to_whole_merged(sources);
+        if by_each != 0 {
+            return geometry.occluded_by_each(rows, ends, traced, sources);
+        }
+        let mut blockers = Blockers::new(geometry, rows, sources, folds);
+        geometry.visited().any_packet(rows, ends, traced, geometry.unbounded(), &mut blockers, folds)
     }
 }
 

@@ -98,6 +98,8 @@ impl RoughRow for PhongRow {
 
     const SENDS_RAYS: bool = false;
 
+    const IS_COPIED: bool = true;
+
     const EMPTY: Self = Self {
         mirrored_eye: [[0.0; LANES]; 3],
         diffuse: [[0.0; LANES]; 3],

@@ -27,6 +27,8 @@ pub struct Lighting<'a, const WEIGHED: bool> {
     pub competing: CompetingTechnique,
     /// Media of the vertices. `None` if all are in air.
     pub media: Option<&'a Media>,
+    /// Whether to take only the lights from beyond the scene.
+    pub only_beyond: bool,
 }
 
 /// Rays for the direct light of vertices.
@@ -96,16 +98,17 @@ impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
     #[inline(always)]
     fn run(self, folds: impl Folds) -> Sums {
         let mut sums = Sums::NOTHING;
-        self.add_all(|_| true, &mut sums, folds);
+        self.add_all(&mut sums, folds);
         sums
     }
 }
 
 impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
-    /// Adds the light of all lights that `takes` accepts.
+    /// Adds the light of the lights.
     #[inline(always)]
-    pub fn add_all(&self, takes: impl Fn(&Light) -> bool, sums: &mut Sums, folds: impl Folds) {
+    fn add_all(&self, sums: &mut Sums, folds: impl Folds) {
         let render = &self.tile.settings.render;
+        let takes = |light: &Light| !self.only_beyond || light.is_beyond();
         let mut sampler = None;
         for (number, light) in self.tile.world.lights.iter().filter(|(_, light)| takes(light)) {
             if WEIGHED && self.tile.leaves_sky && light.is_from_all_around() {
@@ -119,45 +122,44 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 Shadows::Off => true,
             };
             // Take the only direction, or the requested number of samples.
-            if light.is_single() {
-                let nowhere = [[0.0; LANES]; 2];
-                let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &nowhere);
-                let (values, active, _) = self.values(&samples, 1.0, folds);
+            let is_single = light.is_single();
+            let count = if is_single { 1 } else { render.shadow_samples };
+            if !is_single && sampler.is_none() {
+                sampler = Some(self.row.sampler(self.tile));
+            }
+            for repetition in 0..count {
+                let u = match &sampler {
+                    Some(sampler) if !is_single => {
+                        sampler.pairs(&self.row.path, Decision::Light(number), repetition, count)
+                    }
+                    Some(_) | None => [[0.0; LANES]; 2],
+                };
+                let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
+                let (mut values, active, response) = self.values(&samples, 1.0 / count as f32, folds);
+                // Multiply by the emission texture.
+                if let Some(pattern) = light.emission_texture() {
+                    values = self.tinted(pattern, &samples, active, values);
+                    sums.rays.lookups += u64::from(active.count_ones());
+                }
+                // Weight against the competing technique, which finds no light without extent.
+                if WEIGHED && !is_single {
+                    let leaves_gloss = self.tile.lobes_find_sky && light.is_from_all_around();
+                    let of_light = if leaves_gloss && self.competing.are_lobes() {
+                        // Pretend that light samples hardly ever come, so that lobes bring all.
+                        [f32::MAX; LANES]
+                    } else {
+                        light.inverse_densities(&samples)
+                    };
+                    let competing = self.competing.rays_per_sample(count);
+                    values = self.competing.weighted(
+                        self.row,
+                        (&samples, &response),
+                        values,
+                        (&of_light, competing),
+                        folds,
+                    );
+                }
                 self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
-            } else {
-                let count = render.shadow_samples;
-                if sampler.is_none() {
-                    sampler = Some(self.row.sampler(self.tile));
-                }
-                let Some(sampler) = &sampler else { continue };
-                for repetition in 0..count {
-                    let u = sampler.pairs(&self.row.path, Decision::Light(number), repetition, count);
-                    let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
-                    let (mut values, active, response) = self.values(&samples, 1.0 / count as f32, folds);
-                    // Multiply by the emission texture.
-                    if let Some(pattern) = light.emission_texture() {
-                        values = self.tinted(pattern, &samples, active, values);
-                        sums.rays.lookups += u64::from(active.count_ones());
-                    }
-                    // Weight against the competing technique.
-                    if WEIGHED {
-                        let leaves_gloss = self.tile.lobes_find_sky && light.is_from_all_around();
-                        let of_light = if leaves_gloss && self.competing.are_lobes() {
-                            // Pretend that light samples hardly ever come, so that lobes bring all.
-                            [f32::MAX; LANES]
-                        } else {
-                            light.inverse_densities(&samples)
-                        };
-                        let competing = self.competing.rays_per_sample(count);
-                        values = self.competing.weighted(
-                            self.row,
-                            (&samples, &response),
-                            values,
-                            (&of_light, competing),
-                        );
-                    }
-                    self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
-                }
             }
             // Trace the one ray to the middle of the light.
             if waiting.active != 0 {
@@ -314,7 +316,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// Contribution of each sample if it is not occluded, a bit for each that is not 0, and the response of its vertex.
     #[inline(always)]
     pub fn values(&self, samples: &LightRow, share: f32, folds: impl Folds) -> (Lanes3, u32, Response) {
-        let response = self.row.response(&samples.directions);
+        let response = self.row.response(&samples.directions, folds);
         let Response { bsdf: BsdfValues { f, .. }, cosines } = &response;
         let mut arriving = samples.weights;
         if self.measure == Measure::ArrivingShare {

@@ -45,10 +45,10 @@ impl Loops for LobeRays<'_> {
             if row.bsdf.sends_rays() {
                 [choices, _] = sampler.pairs(&row.path, Decision::Lobe, repetition, count);
             }
-            let directions = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u);
-            let Response { bsdf, cosines } = row.response(&directions);
-            let densities = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &directions, &bsdf);
-            let [_, narrow] = row.bsdf.parts(&directions, &bsdf);
+            let directions = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u, folds);
+            let Response { bsdf, cosines } = row.response(&directions, folds);
+            let densities = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &directions, &bsdf, folds);
+            let [_, narrow] = row.bsdf.parts(&directions, &bsdf, folds);
             // Trace the rays above the surfaces.
             let mut sent = sharp & !row.hidden(&directions, folds);
             let mut ends = [-1.0; LANES];

@@ -9,7 +9,7 @@ use crate::lights::{LightHit, LightRow, Side, Source};
 use crate::materials::TexturePoint;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
 use crate::world::{Hit, MOST_STRAIGHT};
 
 /// Technique that competes with light samples.
@@ -58,6 +58,7 @@ impl CompetingTechnique {
         (samples, response): (&LightRow, &Response),
         mut values: Lanes3,
         (of_light, competing): (&Lanes, f32),
+        folds: impl Folds,
     ) -> Lanes3 {
         // Weight each sample against the lobes in which rays leave its vertex.
         let (lobes, start) = match self {
@@ -66,7 +67,7 @@ impl CompetingTechnique {
             Self::NarrowPaths => (LobeSet::Narrow, !0),
             Self::Lobes(sharp) => (LobeSet::Narrow, sharp),
         };
-        let densities = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf);
+        let densities = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf, folds);
         let mut weights = [1.0; LANES];
         for i in 0..LANES {
             let weight = weight(densities[i] * of_light[i] * competing);
@@ -81,7 +82,7 @@ impl CompetingTechnique {
                 }
             }
             LobeSet::Narrow => {
-                let [wide, narrow] = row.bsdf.parts(&samples.directions, &response.bsdf);
+                let [wide, narrow] = row.bsdf.parts(&samples.directions, &response.bsdf, folds);
                 for i in 0..LANES {
                     let left = left_of_narrow(lane(&wide, i), lane(&narrow, i), weights[i]);
                     let value = lane(&values, i) * left;

@@ -6,7 +6,7 @@ use super::all_lights::{Lighting, Sums, add_where};
 use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::rows::lanes;
 use crate::integrators::view::Measure;
-use crate::lights::{Light, LightRow, LightTree, Lobe, Middle, Picks, Receiver, ReceiverRow, Selection};
+use crate::lights::{LightRow, LightTree, Lobe, Middle, Picks, Receiver, ReceiverRow, Selection};
 use crate::materials::bsdf::NarrowLobe;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, lane, set_lane};
@@ -48,7 +48,7 @@ impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
         let mut sums = Sums::NOTHING;
         // Sample all lights beyond the scene, if the tree leaves them out.
         if selection.leaves_beyond {
-            lighting.add_all(Light::is_beyond, &mut sums, folds);
+            sums = folds.call(Lighting { only_beyond: true, ..lighting });
         }
         let samples = lighting.tile.settings.render.shadow_samples;
         let (each, tree) = (selection.picks.count, selection.tree);
@@ -251,7 +251,8 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             // Each group of picks has its own pdf, and as many rays in lobes as requested samples compete with all groups.
             let competing =
                 self.competing.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
-            values = self.competing.weighted(row, (&samples, &response), values, (&inverse, competing));
+            values =
+                self.competing.weighted(row, (&samples, &response), values, (&inverse, competing), folds);
         }
         if active == 0 {
             return;

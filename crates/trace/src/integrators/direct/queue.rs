@@ -259,8 +259,8 @@ impl DirectLightQueue {
         let row = &self.rows[asked.number];
         let (competing, media) = (self.competing(asked, tile, measure), self.media_of(row));
         let (instructions, used) = (tile.world.geometry.instructions(), asked.used);
-        let plain = Lighting::<false> { tile, row, used, measure, competing, media };
-        let weighed = Lighting::<true> { tile, row, used, measure, competing, media };
+        let plain = Lighting::<false> { tile, row, used, measure, competing, media, only_beyond: false };
+        let weighed = Lighting::<true> { tile, row, used, measure, competing, media, only_beyond: false };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
         let sums = match (competing, tile.world.lights.selection(tile.behaviour.receivers)) {
             (Nothing, None) => instructions.run(plain),

@@ -225,7 +225,7 @@ impl VertexBatch {
 
     /// Response of the vertices to light from these directions.
     #[inline(always)]
-    pub fn response(&self, directions: &Lanes3) -> Response {
+    pub fn response(&self, directions: &Lanes3, folds: impl Folds) -> Response {
         let mut cosines = [0.0; LANES];
         for i in 0..LANES {
             cosines[i] = lane(&self.normal, i).dot(lane(directions, i));
@@ -236,7 +236,7 @@ impl VertexBatch {
                 cosines[i] *= terminator(cosines[i], smooth, self.bend[i]);
             }
         }
-        Response { bsdf: self.bsdf.f(directions), cosines }
+        Response { bsdf: self.bsdf.f(directions, folds), cosines }
     }
 
     /// [`Ray::start`] of rays from the vertices in these directions: none of a ray that goes behind its facet.

@@ -135,15 +135,15 @@ impl Loops for BsdfSampling<'_> {
         let are_narrow = row.bsdf.has_narrow_lobes();
         let [lobe, _] =
             if are_narrow { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; LANES]; 2] };
-        let directions = row.bsdf.sample(continuation.lobes, &row.normal, &lobe, &u);
+        let directions = row.bsdf.sample(continuation.lobes, &row.normal, &lobe, &u, folds);
         // Evaluate the BSDF and the pdf there.
-        let Response { bsdf, cosines } = row.response(&directions);
-        let densities = row.bsdf.pdf(continuation.lobes, &row.normal, &directions, &bsdf);
+        let Response { bsdf, cosines } = row.response(&directions, folds);
+        let densities = row.bsdf.pdf(continuation.lobes, &row.normal, &directions, &bsdf, folds);
         let grey = row.bsdf.grey(&bsdf);
         let mut roulette_throughput = [0.0; LANES];
         let f = match continuation.lobes {
             LobeSet::All => bsdf.f,
-            LobeSet::Narrow => row.bsdf.parts(&directions, &bsdf)[1],
+            LobeSet::Narrow => row.bsdf.parts(&directions, &bsdf, folds)[1],
         };
         let mut factors = f;
         let mut alive = 0_u32;

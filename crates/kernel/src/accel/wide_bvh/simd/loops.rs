@@ -5,19 +5,10 @@
 use std::arch::x86_64::*;
 
 use super::Instructions;
-use crate::math::lanes::{Folds, PlainFolds};
+pub use crate::math::lanes::Loops;
+use crate::math::lanes::PlainFolds;
 #[cfg(target_arch = "x86_64")]
-use crate::math::lanes::{LANES, Truths};
-
-/// Work in loops without branches over rows. What it calls in its loops must be inlined, and no closure, or it is compiled
-/// without the instructions.
-pub trait Loops {
-    /// Result of the work.
-    type Done;
-
-    /// Does the work, folding rows by these instructions.
-    fn run(self, folds: impl Folds) -> Self::Done;
-}
+use crate::math::lanes::{Folds, LANES, Truths};
 
 impl Instructions {
     /// Does the work by these instructions, or by the best that the processor has.
@@ -38,12 +29,14 @@ impl Instructions {
 }
 
 #[cfg(target_arch = "x86_64")]
+#[inline(never)]
 #[target_feature(enable = "avx2")]
 fn avx2<L: Loops>(work: L) -> L::Done {
     work.run(Avx2Folds(()))
 }
 
 #[cfg(target_arch = "x86_64")]
+#[inline(never)]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 fn avx512<L: Loops>(work: L) -> L::Done {
     work.run(Avx512Folds(()))
@@ -61,6 +54,12 @@ impl Folds for Avx2Folds {
         // SAFETY: a value is made where the processor has AVX2 alone.
         unsafe { avx2_bits(holds) }
     }
+
+    #[inline(always)]
+    fn call<L: Loops>(self, work: L) -> L::Done {
+        // SAFETY: as above.
+        unsafe { avx2(work) }
+    }
 }
 
 /// Proof that the processor has AVX-512F, VL, DQ and BW.
@@ -74,6 +73,12 @@ impl Folds for Avx512Folds {
     fn bits(self, holds: &Truths) -> u32 {
         // SAFETY: a value is made where the processor has AVX-512F, VL, DQ and BW alone.
         unsafe { avx512_bits(holds) }
+    }
+
+    #[inline(always)]
+    fn call<L: Loops>(self, work: L) -> L::Done {
+        // SAFETY: as above.
+        unsafe { avx512(work) }
     }
 }
 
@@ -99,7 +104,7 @@ fn avx512_bits(holds: &Truths) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::lanes::truths;
+    use crate::math::lanes::{Folds, truths};
 
     struct Folding(u32);
 
