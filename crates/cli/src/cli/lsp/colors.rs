@@ -28,20 +28,15 @@ pub(super) fn all(document: &Document) -> Value {
 /// A value as a colour; numbers above 1 are as bright as a screen is.
 fn color(text: &str, key: &OutlineKey) -> Option<Color> {
     let bytes = match &key.text {
-        Some(text) => match text.strip_prefix('#') {
-            Some(digits) if digits.len() == 6 => {
-                let number = u32::from_str_radix(digits, 16).ok()?;
-                let [_, red, green, blue] = number.to_be_bytes();
-                [red, green, blue]
-            }
-            Some(_) => return None,
-            None => color_bytes(text)?,
-        },
+        Some(text) => color_bytes(text)?,
         None => {
             let list = text.get(key.value.clone())?.strip_prefix('[')?.strip_suffix(']')?;
             let numbers: Vec<f32> =
                 list.split(',').map(|number| number.trim().parse().ok()).collect::<Option<_>>()?;
             let &[red, green, blue] = numbers.as_slice() else { return None };
+            if !numbers.iter().all(|number| number.is_finite()) {
+                return None;
+            }
             let [red, green, blue] = [red, green, blue].map(|linear| linear_to_srgb(linear.clamp(0.0, 1.0)));
             return Some(Color { red, green, blue, alpha: 1.0 });
         }

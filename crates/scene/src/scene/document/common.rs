@@ -1,7 +1,6 @@
 //! The keys that all materials have.
 
 use super::super::description::{Bump, EmissionSource, NormalMap, NumberSource, OpacitySource};
-use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
 
@@ -15,22 +14,21 @@ pub(super) fn emission(table: &Table<'_>, textures: &Names) -> EmissionSource {
 /// `normal_map` and `normal_strength`.
 pub(super) fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMap> {
     let texture = table.optional("normal_map").name_in(textures);
-    let strength = table.optional("normal_strength").number32(Limits::AtLeast(0.0)).unwrap_or(1.0);
+    let strength = table.optional("normal_strength").number32(table.limits("normal_strength")).unwrap_or(1.0);
     texture.map(|texture| NormalMap { texture, strength })
 }
 
 /// `bump` and `bump_scale`.
 pub(super) fn bump(table: &Table<'_>, textures: &Names) -> Option<Bump> {
     let texture = table.optional("bump").texture_of_numbers(textures);
-    let scale = table.optional("bump_scale").number32(Limits::Any).unwrap_or(0.01);
+    let scale = table.optional("bump_scale").number32(table.limits("bump_scale")).unwrap_or(0.01);
     texture.map(|(texture, channel)| Bump { texture, channel, scale })
 }
 
 /// `opacity` and `opacity_cutoff`.
 pub(super) fn opacity(table: &Table<'_>, textures: &Names) -> OpacitySource {
-    let part = Limits::Between(0.0, 1.0);
-    let value = table.optional("opacity").number_or_texture(textures, part);
-    let cutoff = table.optional("opacity_cutoff").number32(part).unwrap_or(0.0);
+    let value = table.optional("opacity").number_or_texture(textures, table.limits("opacity"));
+    let cutoff = table.optional("opacity_cutoff").number32(table.limits("opacity_cutoff")).unwrap_or(0.0);
     OpacitySource { value: value.unwrap_or(NumberSource::Constant(1.0)), cutoff }
 }
 

@@ -6,7 +6,6 @@ use super::super::description::{
 use super::common;
 use super::context::Issue;
 use super::key::Key;
-use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
 use crate::choice;
@@ -85,8 +84,8 @@ fn material(name: String, table: &Table<'_>, textures: &Names) -> Option<Materia
 fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
     let (diffuse_key, specular_key) = (table.optional("diffuse"), table.optional("specular"));
     let ambient_key = table.optional("ambient");
-    let (diffuse, specular) =
-        (diffuse_key.color_or_texture(textures), specular_key.color_or_texture(textures));
+    let color = |key: &Key<'_>, name| key.color_or_texture(textures, table.limits(name));
+    let (diffuse, specular) = (color(&diffuse_key, "phong.diffuse"), color(&specular_key, "phong.specular"));
     let is_wrong = |key: &Key<'_>, color: &Option<ColorSource>| key.is_given() && color.is_none();
     let untold = is_wrong(&diffuse_key, &diffuse) || is_wrong(&specular_key, &specular);
     let diffuse = diffuse.unwrap_or(ColorSource::Constant(Vec3::splat(0.7)));
@@ -99,8 +98,8 @@ fn phong(table: &Table<'_>, textures: &Names) -> MaterialKind {
     MaterialKind::Phong {
         diffuse,
         specular,
-        shininess: table.optional("shininess").number32(Limits::Between(0.0, 1e6)).unwrap_or(32.0),
-        ambient: ambient_key.color_or_texture(textures),
+        shininess: table.optional("shininess").number32(table.limits("phong.shininess")).unwrap_or(32.0),
+        ambient: color(&ambient_key, "phong.ambient"),
     }
 }
 
@@ -125,55 +124,60 @@ fn warn_about_gain(kd_key: &Key<'_>, ks_key: &Key<'_>, kd: &ColorSource, ks: &Co
 
 fn metal(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
     let fresnel = fresnel(table, textures);
-    let anisotropy = table.optional("anisotropy").number_or_texture(textures, Limits::Between(-1.0, 1.0));
     Some(MaterialKind::Metal {
-        roughness: fraction(table, textures, "roughness", 0.2),
-        anisotropy: anisotropy.unwrap_or(NumberSource::Constant(0.0)),
+        roughness: number(table, textures, "metal.roughness", 0.2),
+        anisotropy: number(table, textures, "metal.anisotropy", 0.0),
         fresnel: fresnel?,
     })
 }
 
-/// Range of the indices of refraction of coats.
-const COAT_IOR: Limits = Limits::Between(1.0, 10.0);
-
 fn plastic(table: &Table<'_>, textures: &Names) -> MaterialKind {
-    let color = |name, default| reflectance(table, textures, name, default);
     MaterialKind::Plastic {
-        diffuse: color("diffuse", 0.7),
-        specular: color("specular", 1.0),
-        ior: table.optional("ior").number32(COAT_IOR).unwrap_or(1.5),
-        roughness: fraction(table, textures, "roughness", 0.1),
+        diffuse: color(table, textures, "plastic.diffuse", 0.7),
+        specular: color(table, textures, "plastic.specular", 1.0),
+        ior: ior(table, "plastic.ior"),
+        roughness: number(table, textures, "plastic.roughness", 0.1),
     }
 }
 
 fn principled(table: &Table<'_>, textures: &Names) -> MaterialKind {
-    let number = |name, default| fraction(table, textures, name, default);
+    let (color, number) = (
+        |path, default| color(table, textures, path, default),
+        |path, default| number(table, textures, path, default),
+    );
     MaterialKind::Principled {
-        color: reflectance(table, textures, "color", 0.8),
-        metallic: number("metallic", 0.0),
-        roughness: number("roughness", 0.5),
-        ior: table.optional("ior").number32(COAT_IOR).unwrap_or(1.5),
-        specular: number("specular", 1.0),
-        specular_color: table
-            .optional("specular_color")
-            .color_or_texture(textures)
-            .unwrap_or(ColorSource::Constant(Vec3::ONE)),
-        transmission: number("transmission", 0.0),
-        clearcoat: number("clearcoat", 0.0),
-        clearcoat_roughness: number("clearcoat_roughness", 0.0),
+        color: color("principled.color", 0.8),
+        metallic: number("principled.metallic", 0.0),
+        roughness: number("principled.roughness", 0.5),
+        ior: ior(table, "principled.ior"),
+        specular: number("principled.specular", 1.0),
+        specular_color: color("principled.specular_color", 1.0),
+        transmission: number("principled.transmission", 0.0),
+        clearcoat: number("principled.clearcoat", 0.0),
+        clearcoat_roughness: number("principled.clearcoat_roughness", 0.0),
     }
 }
 
-/// A part of the light, or a texture.
-fn reflectance(table: &Table<'_>, textures: &Names, name: &'static str, default: f32) -> ColorSource {
-    let color = table.optional(name).fraction_or_texture(textures);
+/// The key of a path `TYPE.KEY`.
+fn key<'a>(table: &Table<'a>, path: &'static str) -> Key<'a> {
+    table.optional(path.split_once('.').map_or(path, |(_, name)| name))
+}
+
+/// A colour or a texture, in the range that the definition has for `TYPE.KEY`.
+fn color(table: &Table<'_>, textures: &Names, path: &'static str, default: f32) -> ColorSource {
+    let color = key(table, path).color_or_texture(textures, table.limits(path));
     color.unwrap_or(ColorSource::Constant(Vec3::splat(default)))
 }
 
-/// A number in [0, 1], or a texture.
-fn fraction(table: &Table<'_>, textures: &Names, name: &'static str, default: f32) -> NumberSource {
-    let number = table.optional(name).number_or_texture(textures, Limits::Between(0.0, 1.0));
+/// A number or a texture, in the range that the definition has for `TYPE.KEY`.
+fn number(table: &Table<'_>, textures: &Names, path: &'static str, default: f32) -> NumberSource {
+    let number = key(table, path).number_or_texture(textures, table.limits(path));
     number.unwrap_or(NumberSource::Constant(default))
+}
+
+/// An index of refraction.
+fn ior(table: &Table<'_>, path: &'static str) -> f32 {
+    key(table, path).number32(table.limits(path)).unwrap_or(1.5)
 }
 
 /// The reflectance of a metal, which it has by exactly one of three groups of keys.
@@ -193,26 +197,27 @@ fn fresnel(table: &Table<'_>, textures: &Names) -> Option<FresnelSource> {
         return Some(FresnelSource::Index { eta, k });
     }
     if is_index {
-        let [eta, k] = ["eta", "k"].map(|name| table.required(name, "[0.2, 0.9, 1.1]"));
-        let [eta, k] = [eta, k].map(|key| key.color_or_texture(textures));
+        let [eta, k] = [("eta", "metal.eta"), ("k", "metal.k")].map(|(name, path)| {
+            table.required(name, "[0.2, 0.9, 1.1]").color_or_texture(textures, table.limits(path))
+        });
         return Some(FresnelSource::Index { eta: eta?, k: k? });
     }
     let color = table.required("color", "[0.9, 0.8, 0.4]");
-    color.fraction_or_texture(textures).map(FresnelSource::Schlick)
+    color.color_or_texture(textures, table.limits("metal.color")).map(FresnelSource::Schlick)
 }
 
 fn mirror(table: &Table<'_>, textures: &Names) -> MaterialKind {
-    MaterialKind::Mirror { reflectance: reflectance(table, textures, "reflectance", 0.9) }
+    MaterialKind::Mirror { reflectance: color(table, textures, "mirror.reflectance", 0.9) }
 }
 
 fn glass(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
-    let ior = table.optional("ior").number32(Limits::Between(0.1, 10.0)).unwrap_or(1.5);
+    let ior = ior(table, "glass.ior");
     let (tint, thin) = (table.optional("tint"), table.optional("thin"));
     let rough = table.optional("roughness");
-    let roughness = fraction(table, textures, "roughness", 0.0);
+    let roughness = number(table, textures, "glass.roughness", 0.0);
     // Whoever writes it wrongly hardly means glass that fills its shape.
     if !thin.flag().unwrap_or(thin.is_given()) {
-        let tint = tint.exact_fraction().unwrap_or(DVec3::ONE);
+        let tint = tint.exact_color(table.limits("glass.tint")).unwrap_or(DVec3::ONE);
         return Some(MaterialKind::Glass { ior, tint, roughness });
     }
     if roughness != NumberSource::Constant(0.0) {
@@ -221,6 +226,8 @@ fn glass(table: &Table<'_>, textures: &Names) -> Option<MaterialKind> {
         table.context.report(issue);
         return None;
     }
-    let tint = tint.fraction_or_texture(textures).unwrap_or(ColorSource::Constant(Vec3::ONE));
+    let tint = tint
+        .color_or_texture(textures, table.limits("glass.tint"))
+        .unwrap_or(ColorSource::Constant(Vec3::ONE));
     Some(MaterialKind::Pane { ior, tint })
 }

@@ -215,12 +215,18 @@ impl Kind {
     fn example(self) -> String {
         match self {
             Self::Whole(least, _) => least.to_string(),
-            Self::Number(_) | Self::NumberOrTexture(_) | Self::Scale(_) => "0.5".to_owned(),
+            Self::Number(_) => "0.25".to_owned(),
+            Self::NumberOrTexture(_) | Self::Scale(_) => "0.5".to_owned(),
             Self::Flag => "true".to_owned(),
             Self::Words(list) => format!("\"{}\"", list().first().map_or("", |word| word.name)),
             Self::Text | Self::Texture | Self::Heights | Self::Material => "\"name\"".to_owned(),
             Self::File(endings) => format!("\"file.{}\"", endings.first().copied().unwrap_or("txt")),
             Self::Color(_) | Self::ColorOrTexture(_) | Self::Emission(_) => "[0.5, 0.5, 0.5]".to_owned(),
+            // A matrix has rows of four; that of no change has ones from corner to corner.
+            Self::Numbers(16, ..) => {
+                let number = |i: usize| if i.is_multiple_of(5) { "1" } else { "0" };
+                format!("[{}]", (0..16).map(number).collect::<Vec<_>>().join(", "))
+            }
             Self::Numbers(count, ..) => format!("[{}]", vec!["0"; count].join(", ")),
         }
     }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::super::super::description::{ColorSource, EmissionSource};
-use super::super::super::keys::{color_bytes, color_names};
+use super::super::super::keys::{color_bytes, color_names, hex_digits};
 use super::super::super::nearest::nearest;
 use super::super::context::Issue;
 use super::super::limits::Limits;
@@ -24,25 +24,16 @@ const EMISSION: &str =
 impl Key<'_> {
     /// A colour ≥ 0, decoded to linear.
     pub(in super::super) fn color(&self) -> Option<Vec3> {
-        self.color_of(Limits::AtLeast(0.0), COLOR).map(DVec3::as_vec3)
+        self.exact_color(Limits::AtLeast(0.0)).map(DVec3::as_vec3)
     }
 
-    /// A colour of components in [0, 1] as it is written: a part so small or so near to 1 that `f32` does not tell it from that.
-    pub(in super::super) fn exact_fraction(&self) -> Option<DVec3> {
-        self.color_of(Limits::Between(0.0, 1.0), COLOR)
+    /// A colour as it is written: a part so small or so near to 1 that `f32` does not tell it from that.
+    pub(in super::super) fn exact_color(&self, limits: Limits) -> Option<DVec3> {
+        self.color_of(limits, COLOR)
     }
 
-    /// A colour ≥ 0 or a texture.
-    pub(in super::super) fn color_or_texture(&self, textures: &Names) -> Option<ColorSource> {
-        self.color_or_texture_of(textures, Limits::AtLeast(0.0))
-    }
-
-    /// A colour of components in [0, 1] or a texture.
-    pub(in super::super) fn fraction_or_texture(&self, textures: &Names) -> Option<ColorSource> {
-        self.color_or_texture_of(textures, Limits::Between(0.0, 1.0))
-    }
-
-    fn color_or_texture_of(&self, textures: &Names, limits: Limits) -> Option<ColorSource> {
+    /// A colour or a texture.
+    pub(in super::super) fn color_or_texture(&self, textures: &Names, limits: Limits) -> Option<ColorSource> {
         if self.is_table() {
             return self.texture(textures).map(ColorSource::Texture);
         }
@@ -140,7 +131,7 @@ impl Key<'_> {
 
     /// `#rrggbb`, or a name in any case, decoded from sRGB.
     fn written_color(&self, text: &str) -> Option<Vec3> {
-        if let Some(bytes) = rgb_bytes(text).or_else(|| color_bytes(text)) {
+        if let Some(bytes) = color_bytes(text) {
             return Some(srgb8_to_linear(bytes));
         }
         let issue = Issue::error(self.span()?, format!("`{}` must be {COLOR}", self.name));
@@ -160,14 +151,6 @@ impl Key<'_> {
     }
 }
 
-/// The bytes of `#rrggbb`.
-fn rgb_bytes(text: &str) -> Option<[u8; 3]> {
-    let digits = hex_digits(text).filter(|digits| digits.len() == 6)?;
-    let number = u32::from_str_radix(digits, 16).ok()?;
-    let [_, red, green, blue] = number.to_be_bytes();
-    Some([red, green, blue])
-}
-
 /// `#rrggbb` for `#rgb` and for `rrggbb`.
 fn long_form(text: &str) -> Option<String> {
     match hex_digits(text) {
@@ -179,31 +162,12 @@ fn long_form(text: &str) -> Option<String> {
     }
 }
 
-fn hex_digits(text: &str) -> Option<&str> {
-    text.strip_prefix('#').filter(|digits| digits.bytes().all(|digit| digit.is_ascii_hexdigit()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn names_are_those_of_css_in_any_case() {
-        assert_eq!(color_bytes("rebeccapurple"), Some([0x66, 0x33, 0x99]));
-        assert_eq!(color_bytes("DarkSlateGrey"), color_bytes("darkslategray"));
-        assert_eq!(color_names().count(), 148);
-        for wrong in ["", "transparent", "fff", "bad", "rgb(0,0,0)", "red "] {
-            assert_eq!(color_bytes(wrong), None, "{wrong}");
-        }
-    }
-
-    #[test]
-    fn only_six_digits_are_a_colour() {
-        assert_eq!(rgb_bytes("#ff8000"), Some([255, 128, 0]));
-        assert_eq!(rgb_bytes("#FF80aa"), Some([255, 128, 170]));
-        for wrong in ["", "#", "ff8000", "#ff800", "#ff80000", "#gg8000", "#+f8000", "#ä1234"] {
-            assert_eq!(rgb_bytes(wrong), None, "{wrong}");
-        }
+    fn short_and_bare_digits_lead_to_the_long_form() {
         assert_eq!(long_form("#f80").as_deref(), Some("#ff8800"));
         assert_eq!(long_form("ff8000").as_deref(), Some("#ff8000"));
         assert_eq!(long_form("red"), None);
