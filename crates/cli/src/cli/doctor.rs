@@ -8,7 +8,7 @@ use super::console::Console;
 use super::exit::Exit;
 use crate::accel::wide_bvh::Instructions;
 use crate::bench::cache;
-use crate::tui::{Answers, ColorDepth, Probe, probe};
+use crate::tui::{self, Answers, ColorDepth, Probe, probe};
 
 /// Prints a line for each finding.
 pub(super) fn run(console: &Console) -> Exit {
@@ -54,7 +54,10 @@ fn terminal(probe: &Probe) -> Vec<(&'static str, String)> {
     let term = variable("TERM").unwrap_or_else(|| "TERM is not set".to_owned());
     let name = probe.answers.as_ref().and_then(|answers| answers.name.clone());
     let ((columns, rows), (width, height)) = (probe.cells, probe.cell_pixels);
-    let size = format!("{columns} × {rows} cells of {width} × {height} pixels");
+    let size = match (columns, rows) {
+        (0, _) | (_, 0) => "of unknown size".to_owned(),
+        _ => format!("{columns} × {rows} cells of {width} × {height} pixels"),
+    };
     let way = match (probe.is_multiplexed, probe.is_remote) {
         (true, true) => ", in tmux or screen, over SSH",
         (true, false) => ", in tmux or screen",
@@ -77,20 +80,19 @@ fn colours(probe: &Probe) -> String {
     let says_more = probe.answers.as_ref().is_some_and(|answers| answers.has_true_color);
     let asked =
         if says_more && probe.depth != ColorDepth::TrueColor { "; the terminal reports 24 bits" } else { "" };
-    let background = probe.answers.as_ref().and_then(|answers| answers.background.as_ref());
-    let background = background.map_or(String::new(), |color| format!("; background {color}"));
+    let background = probe.answers.as_ref().and_then(|answers| answers.background);
+    let background = background
+        .map_or(String::new(), |[red, green, blue]| format!("; background #{red:02x}{green:02x}{blue:02x}"));
     format!("{depth} by the environment{asked}{background}")
 }
 
 fn preview(probe: &Probe) -> String {
     let protocol = |name, is_there| if is_there { Some(name) } else { None };
-    let iterm =
-        variable("TERM_PROGRAM").is_some_and(|program| ["iTerm.app", "WezTerm"].contains(&program.as_str()));
     let answers = probe.answers.clone().unwrap_or_default();
     let pixels = [
         protocol("kitty", answers.has_kitty),
         protocol("sixel", answers.has_sixel),
-        protocol("iterm2", iterm),
+        protocol("iterm2", probe.has_iterm),
     ];
     let pixels: Vec<&str> = pixels.into_iter().flatten().collect();
     let more = match pixels.as_slice() {
@@ -107,10 +109,10 @@ fn round_trip(answers: Option<&Answers>) -> String {
 }
 
 fn editor() -> String {
-    let named = ["VISUAL", "EDITOR"].into_iter().find_map(|name| Some((name, variable(name)?)));
-    named.map_or("vi: neither VISUAL nor EDITOR is set".to_owned(), |(name, editor)| {
-        format!("{editor}, by {name}")
-    })
+    match tui::editor(|name| std::env::var(name).ok()) {
+        (editor, Some(variable)) => format!("{editor}, by {variable}"),
+        (editor, None) => format!("{editor}: neither VISUAL nor EDITOR is set"),
+    }
 }
 
 fn cache_folder() -> String {

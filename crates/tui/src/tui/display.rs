@@ -14,11 +14,11 @@ use super::line::{Line, Question};
 use super::paint::{Fidelity, Painter};
 
 /// Whether the terminal draws what lies between two marks at once (mode 2026).
-const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
+pub(super) const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
 /// Question for the device attributes (DA1): the last of the first questions.
-const ATTRIBUTES: &[u8] = b"\x1b[c";
+pub(super) const ATTRIBUTES: &[u8] = b"\x1b[c";
 /// A status report (DSR).
-const STATUS: &[u8] = b"\x1b[5n";
+pub(super) const STATUS: &[u8] = b"\x1b[5n";
 const BEGIN: &[u8] = b"\x1b[?2026h";
 const END: &[u8] = b"\x1b[?2026l";
 /// Smaller slices do not flicker.

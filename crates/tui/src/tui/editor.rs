@@ -18,8 +18,16 @@ const DEFAULT: &str = "vi";
 
 /// The editor that the environment names: words for a shell.
 pub(super) fn name(variable: impl Fn(&str) -> Option<String>) -> String {
-    let set = |name: &str| variable(name).filter(|value| !value.trim().is_empty());
-    set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| DEFAULT.to_owned())
+    editor(variable).0
+}
+
+/// The editor that the environment names, as words for a shell, and the variable that names it. `None` for that if none does.
+pub fn editor(variable: impl Fn(&str) -> Option<String>) -> (String, Option<&'static str>) {
+    let set = |name: &'static str| {
+        let editor = variable(name).filter(|value| !value.trim().is_empty())?;
+        Some((editor, Some(name)))
+    };
+    set("VISUAL").or_else(|| set("EDITOR")).unwrap_or_else(|| (DEFAULT.to_owned(), None))
 }
 
 /// Runs the editor at this place until it ends. Where it is stopped, so is this program, until both are continued. A
@@ -116,6 +124,11 @@ mod tests {
         assert_eq!(of(&[("VISUAL", "hx"), ("EDITOR", "ed")]), "hx");
         assert_eq!(of(&[("VISUAL", " "), ("EDITOR", "ed")]), "ed");
         assert_eq!(of(&[]), "vi");
+        assert_eq!(
+            editor(|name| (name == "EDITOR").then(|| "ed".to_owned())),
+            ("ed".to_owned(), Some("EDITOR"))
+        );
+        assert_eq!(editor(|_| None), ("vi".to_owned(), None));
     }
 
     #[test]

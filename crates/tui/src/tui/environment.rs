@@ -22,8 +22,14 @@ pub(super) fn way(variable: impl Fn(&str) -> Option<String>) -> Way {
     }
 }
 
-/// Questions to ask the terminal. Multiplexers answer for themselves or not at all; the Linux console and Apple's terminal may
-/// print sequences that they do not know.
+/// Whether the terminal may print sequences that it does not know, as the Linux console and Apple's terminal do.
+pub(super) fn is_plain(variable: impl Fn(&str) -> Option<String>) -> bool {
+    let term = variable("TERM").unwrap_or_default();
+    ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
+        || variable("TERM_PROGRAM").is_some_and(|program| program == "Apple_Terminal")
+}
+
+/// Questions to ask the terminal. Multiplexers answer for themselves or not at all; plain terminals may print them.
 pub(super) fn ask(
     preview: PreviewChoice,
     color: ColorChoice,
@@ -33,8 +39,7 @@ pub(super) fn ask(
     let get = |name: &str| variable(name).unwrap_or_default();
     let term = get("TERM");
     let is_outermost = !way(&variable).is_multiplexed;
-    let is_plain = ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
-        || get("TERM_PROGRAM") == "Apple_Terminal";
+    let is_plain = is_plain(&variable);
     let has_palette = matches!(depth, ColorDepth::Indexed256 | ColorDepth::Ansi16);
     let is_ramp = PreviewKind::of(preview, depth) == PreviewKind::Ascii;
     Ask {

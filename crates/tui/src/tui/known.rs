@@ -21,6 +21,29 @@ const KNOWN: [(&str, Option<[u32; 2]>); 6] = [
     ("contour", None),
 ];
 
+/// A terminal that has 24 bits of colour and repeats characters (REP).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Program {
+    /// Its name in `TERM_PROGRAM`.
+    name: &'static str,
+    /// Whether it shows images by iTerm2's protocol.
+    pub(super) has_iterm: bool,
+}
+
+impl Program {
+    const ALL: [Self; 4] = [
+        Self { name: "iTerm.app", has_iterm: true },
+        Self { name: "WezTerm", has_iterm: true },
+        Self { name: "vscode", has_iterm: true },
+        Self { name: "ghostty", has_iterm: false },
+    ];
+
+    /// The terminal of this name. `None` if nothing is known of it.
+    pub(super) fn of(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|program| program.name == name)
+    }
+}
+
 impl Blocks {
     /// Blocks by a terminal's name and version: `foot(1.20.2)`, `ghostty 1.2.0`.
     pub(super) fn of(report: &str) -> Self {

@@ -42,6 +42,7 @@ mod fixtures;
 mod tests;
 
 pub use color::{ColorChoice, ColorDepth, in_xterm};
+pub use editor::editor;
 pub use graphics::PixelScreen;
 pub use mosaic::filled;
 pub use options::{Changed, Ended, ExitStatus, News, Options, PreviewChoice, TuiError};

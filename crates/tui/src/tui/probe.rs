@@ -8,8 +8,10 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{FlushArg, SetArg, cfmakeraw, tcgetattr, tcsetattr};
 
 use super::color::{self, ColorChoice, ColorDepth};
-use super::environment::way;
-use super::known::Blocks;
+use super::display::{ATTRIBUTES, STATUS, SYNCHRONIZED};
+use super::environment::{is_plain, way};
+use super::input::{Decoder, Input};
+use super::known::{Answer, Ask, Blocks, Program};
 use super::terminal;
 
 /// Answers of a terminal, and what its environment says.
@@ -25,6 +27,8 @@ pub struct Probe {
     pub is_multiplexed: bool,
     /// Whether the shell came over a network.
     pub is_remote: bool,
+    /// Whether it shows images by iTerm2's protocol, by its name in the environment.
+    pub has_iterm: bool,
     /// The terminal's answers. `None` if it gives none.
     pub answers: Option<Answers>,
 }
@@ -44,8 +48,8 @@ pub struct Answers {
     pub has_sixel: bool,
     /// Whether large changes appear at once (DECRQM 2026).
     pub is_synchronized: bool,
-    /// Background in sRGB, as it says it (OSC 11).
-    pub background: Option<String>,
+    /// Background in sRGB (OSC 11).
+    pub background: Option<[u8; 3]>,
 }
 
 impl Probe {
@@ -64,33 +68,34 @@ impl Probe {
 /// Time to wait for answers.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// The end of every sequence of questions: DA1, which all terminals answer.
-const LAST: &[u8] = b"\x1b[c";
-
-/// XTVERSION, capabilities `RGB` and `Tc`, mode 2026, the background, an image of one pixel that is not kept.
-const QUESTIONS: &[u8] =
-    b"\x1b[>q\x1bP+q524742\x1b\\\x1bP+q5463\x1b\\\x1b[?2026$p\x1b]11;?\x1b\\\x1b_Gi=4211,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\";
+/// An image of one pixel that kitty's protocol does not keep.
+const IMAGE: &[u8] = b"\x1b_Gi=4211,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\";
 
 /// Asks the terminal. `None` if stdin and stdout are not one.
 ///
-/// It asks multiplexers and consoles DA1 alone, as they may print other questions.
+/// It asks multiplexers and consoles for their attributes alone, as they may print other questions.
 pub fn probe() -> Option<Probe> {
     if !(io::stdin().is_terminal() && io::stdout().is_terminal()) {
         return None;
     }
     let variable = |name: &str| std::env::var(name).ok();
-    let (term, window) = (variable("TERM").unwrap_or_default(), terminal::window(None));
-    let is_plain = ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
-        || variable("TERM_PROGRAM").is_some_and(|program| program == "Apple_Terminal");
-    let way = way(variable);
-    let questions: &[u8] = if is_plain || way.is_multiplexed { b"" } else { QUESTIONS };
-    let answers = if term == "dumb" { None } else { ask(questions).ok().flatten() };
+    let (window, way) = (terminal::window(None), way(variable));
+    let questions = if is_plain(variable) || way.is_multiplexed {
+        Vec::new()
+    } else {
+        let ask = Ask { blocks: true, true_color: true, background: true, palette: false };
+        [&ask.questions(), SYNCHRONIZED, IMAGE].concat()
+    };
+    let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
+    let answers = if is_dumb { None } else { ask(&questions).ok().flatten() };
+    let program = variable("TERM_PROGRAM").and_then(|program| Program::of(&program));
     Some(Probe {
         cells: (window.columns, window.rows),
         cell_pixels: window.cell_pixels,
         depth: color::depth(ColorChoice::Auto, variable),
         is_multiplexed: way.is_multiplexed,
         is_remote: way.is_remote,
+        has_iterm: program.is_some_and(|program| program.has_iterm),
         answers,
     })
 }
@@ -110,16 +115,15 @@ fn ask(questions: &[u8]) -> io::Result<Option<Answers>> {
 }
 
 fn converse(questions: &[u8]) -> io::Result<Option<Answers>> {
-    let begin = Instant::now();
-    send(b"\x1b[5n")?;
-    let mut heard = Vec::new();
-    if !listen(&mut heard, begin, |heard| ends(heard, b'n').is_some())? {
+    let (begin, mut heard) = (Instant::now(), Heard::default());
+    send(STATUS)?;
+    if !listen(&mut heard, begin, |heard| heard.has(Answer::Ready))? {
         return Ok(None);
     }
     let round_trip = begin.elapsed();
-    send(&[questions, LAST].concat())?;
-    listen(&mut heard, Instant::now(), |heard| attributes(heard).is_some())?;
-    Ok(Some(Answers { round_trip, ..read(&heard) }))
+    send(&[questions, ATTRIBUTES].concat())?;
+    listen(&mut heard, Instant::now(), |heard| heard.has(Answer::Attributes))?;
+    Ok(Some(Answers { round_trip, ..heard.answers() }))
 }
 
 fn send(bytes: &[u8]) -> io::Result<()> {
@@ -129,7 +133,7 @@ fn send(bytes: &[u8]) -> io::Result<()> {
 }
 
 /// Reads until all is heard, or it takes too long; whether it is.
-fn listen(heard: &mut Vec<u8>, begin: Instant, is_all: impl Fn(&[u8]) -> bool) -> io::Result<bool> {
+fn listen(heard: &mut Heard, begin: Instant, is_all: impl Fn(&Heard) -> bool) -> io::Result<bool> {
     let stdin = io::stdin();
     let mut bytes = [0; 4096];
     while !is_all(heard) {
@@ -141,51 +145,67 @@ fn listen(heard: &mut Vec<u8>, begin: Instant, is_all: impl Fn(&[u8]) -> bool) -
         }
         match nix::unistd::read(&stdin, &mut bytes)? {
             0 => return Ok(false),
-            count => heard.extend_from_slice(&bytes[..count]),
+            count => heard.hear(&bytes[..count]),
         }
     }
     Ok(true)
 }
 
-/// Parameters of the first control sequence (CSI) with this last byte.
-fn ends(heard: &[u8], last: u8) -> Option<String> {
-    sequences(heard, b"\x1b[").find_map(|rest| {
-        let end = rest.iter().position(|byte| (0x40..=0x7e).contains(byte))?;
-        (rest[end] == last).then(|| String::from_utf8_lossy(&rest[..end]).into_owned())
-    })
+/// Bytes from the terminal, and the answers in them.
+#[derive(Default)]
+struct Heard {
+    decoder: Decoder,
+    answers: Vec<Answer>,
+    /// All of it, for what the front end does not ask for.
+    bytes: Vec<u8>,
 }
 
-/// Everything behind each beginning of a sequence.
-fn sequences<'h>(heard: &'h [u8], begin: &'static [u8]) -> impl Iterator<Item = &'h [u8]> {
-    (0..heard.len())
-        .filter(move |at| heard[*at..].starts_with(begin))
-        .map(move |at| &heard[at + begin.len()..])
-}
+impl Heard {
+    fn hear(&mut self, bytes: &[u8]) {
+        self.bytes.extend_from_slice(bytes);
+        let answer = |input| match input {
+            Input::Answer(answer) => Some(answer),
+            Input::Key(_) | Input::Mouse(_) | Input::Paste => None,
+        };
+        self.answers.extend(self.decoder.decode(bytes, Instant::now()).into_iter().filter_map(answer));
+    }
 
-/// Attributes of DA1, once they are there.
-fn attributes(heard: &[u8]) -> Option<String> {
-    ends(heard, b'c').filter(|text| text.starts_with('?'))
-}
+    fn has(&self, answer: Answer) -> bool {
+        self.answers.contains(&answer)
+    }
 
-/// Text of the first string that begins so, up to its end (ST or BEL).
-fn string(heard: &[u8], begin: &'static [u8]) -> Option<String> {
-    let rest = sequences(heard, begin).next()?;
-    let end = rest.iter().position(|byte| matches!(byte, 0x1b | 0x07))?;
-    Some(String::from_utf8_lossy(&rest[..end]).into_owned())
-}
+    /// The answers among all that was heard.
+    fn answers(&self) -> Answers {
+        let background = |answer: &Answer| match answer {
+            Answer::Background(rgb) => Some(*rgb),
+            Answer::Ready
+            | Answer::Attributes
+            | Answer::Synchronized { .. }
+            | Answer::Blocks(_)
+            | Answer::TrueColor
+            | Answer::Ink { .. }
+            | Answer::Other => None,
+        };
+        let attributes = self.between(b"\x1b[?", b'c').unwrap_or_default();
+        Answers {
+            round_trip: Duration::ZERO,
+            name: self.between(b"\x1bP>|", 0x1b),
+            has_true_color: self.has(Answer::TrueColor),
+            has_kitty: self.between(b"\x1b_Gi=4211;", 0x1b).is_some_and(|text| text == "OK"),
+            has_sixel: attributes.split(';').any(|attribute| attribute == "4"),
+            is_synchronized: self.has(Answer::Synchronized { is_known: true }),
+            background: self.answers.iter().find_map(background),
+        }
+    }
 
-/// The answers among all that was heard.
-fn read(heard: &[u8]) -> Answers {
-    let has = |list: &str, wanted: &str| list.split([';', '?']).any(|one| one == wanted);
-    Answers {
-        round_trip: Duration::ZERO,
-        name: string(heard, b"\x1bP>|"),
-        has_true_color: string(heard, b"\x1bP1+r").is_some_and(|text| !text.is_empty()),
-        has_kitty: string(heard, b"\x1b_Gi=4211;").is_some_and(|text| text == "OK"),
-        has_sixel: attributes(heard).is_some_and(|list| has(&list, "4")),
-        is_synchronized: ends(heard, b'y')
-            .is_some_and(|text| ["?2026;1$", "?2026;2$", "?2026;3$"].contains(&text.as_str())),
-        background: string(heard, b"\x1b]11;"),
+    /// The first text between a beginning and the end byte, without another escape character in it.
+    fn between(&self, begin: &[u8], end: u8) -> Option<String> {
+        let starts = self.bytes.windows(begin.len()).enumerate().filter(|(_, window)| *window == begin);
+        starts.into_iter().find_map(|(at, _)| {
+            let rest = &self.bytes[at + begin.len()..];
+            let text = rest.split(|byte| *byte == end || *byte == 0x1b).next()?;
+            (rest.get(text.len()) == Some(&end)).then(|| String::from_utf8_lossy(text).into_owned())
+        })
     }
 }
 
@@ -193,20 +213,28 @@ fn read(heard: &[u8]) -> Answers {
 mod tests {
     use super::*;
 
+    fn heard(bytes: &[u8]) -> Heard {
+        let mut heard = Heard::default();
+        heard.hear(bytes);
+        heard
+    }
+
     #[test]
     fn answers_are_found_in_any_order() {
-        let heard = b"\x1b[0n\x1bP>|foot(1.20.2)\x1b\\\x1bP1+r524742=38\x1b\\\x1b[?2026;2$y\x1b]11;rgb:1c1c/1c1c/1c1c\x1b\\\x1b_Gi=4211;OK\x1b\\\x1b[?62;4;22c";
-        let answers = read(heard);
+        let heard = heard(
+            b"\x1b[0n\x1bP>|foot(1.20.2)\x1b\\\x1bP1+r524742=38\x1b\\\x1b[?2026;2$y\x1b]11;rgb:1c1c/1c1c/1c1c\x1b\\\x1b_Gi=4211;OK\x1b\\\x1b[?62;4;22c",
+        );
+        let answers = heard.answers();
         assert_eq!(answers.name.as_deref(), Some("foot(1.20.2)"));
-        assert_eq!(answers.background.as_deref(), Some("rgb:1c1c/1c1c/1c1c"));
+        assert_eq!(answers.background, Some([0x1c; 3]));
         assert!(answers.has_true_color && answers.has_kitty && answers.has_sixel && answers.is_synchronized);
-        assert_eq!(ends(heard, b'n').as_deref(), Some("0"));
+        assert!(heard.has(Answer::Ready) && heard.has(Answer::Attributes));
     }
 
     #[test]
     fn refusals_are_no_abilities() {
-        let answers = read(b"\x1bP0+r524742\x1b\\\x1b[?2026;0$y\x1b_Gi=4211;ENOTSUPPORTED\x1b\\\x1b[?1;42c");
-        assert_eq!(answers, Answers::default());
-        assert_eq!(attributes(b"\x1b[?62;"), None);
+        let refused = heard(b"\x1bP0+r524742\x1b\\\x1b[?2026;0$y\x1b_Gi=4211;ENOTSUPPORTED\x1b\\\x1b[?1;42c");
+        assert_eq!(refused.answers(), Answers::default());
+        assert!(!heard(b"\x1b[?62;").has(Answer::Attributes));
     }
 }

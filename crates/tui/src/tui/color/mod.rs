@@ -15,6 +15,7 @@ pub use self::palette::in_xterm;
 pub(super) use self::palette::{Ansi, XTERM, ansi, fixed, nearest_256};
 pub(super) use self::pattern::finer;
 pub(super) use self::shades::Shades;
+use super::known::Program;
 use crate::choice;
 
 choice! {
@@ -85,9 +86,10 @@ fn has_no_colors(term: &str) -> bool {
 
 fn is_true_color(term: &str, program: &str) -> bool {
     const TERMS: [&str; 8] = ["kitty", "alacritty", "foot", "wezterm", "ghostty", "contour", "iterm2", "rio"];
-    const PROGRAMS: [&str; 4] = ["iTerm.app", "WezTerm", "ghostty", "vscode"];
     // Inside tmux TERM_PROGRAM is `tmux`, so that what the outer terminal can do does not leak in.
-    term.ends_with("-direct") || TERMS.iter().any(|name| term.contains(name)) || PROGRAMS.contains(&program)
+    term.ends_with("-direct")
+        || TERMS.iter().any(|name| term.contains(name))
+        || Program::of(program).is_some()
 }
 
 /// Whether the environment says that the terminal's background is light: rxvt's `COLORFGBG`, which some others set as well.

@@ -29,7 +29,7 @@ pub(super) enum Protocol {
     Kitty,
     /// DEC's: foot, xterm with `-ti vt340`, mlterm, tmux.
     Sixel,
-    /// iTerm2's: iTerm2, WezTerm, VS Code.
+    /// iTerm2's, for the terminals that [`Program`](super::known::Program) names.
     Iterm,
 }
 

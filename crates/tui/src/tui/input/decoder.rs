@@ -28,7 +28,7 @@ const LONGEST_ANSWER: usize = 32;
 
 /// Turns bytes into inputs.
 #[derive(Default)]
-pub(super) struct Decoder {
+pub(in crate::tui) struct Decoder {
     parser: vte::Parser,
     meaning: Meaning,
     held: Held,
@@ -57,7 +57,7 @@ enum Held {
 
 impl Decoder {
     /// Decodes these bytes, together with those before.
-    pub(super) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<Input> {
+    pub(in crate::tui) fn decode(&mut self, bytes: &[u8], now: Instant) -> Vec<Input> {
         // An escape character and a doubt are not over: what had to follow them is here, if late. Nor is a paste: its text
         // may have waited for a busy reader, which is no silence.
         if matches!(self.held, Held::Sequence { .. }) {

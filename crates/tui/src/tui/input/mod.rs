@@ -19,7 +19,7 @@ use std::time::Instant;
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
-use self::decoder::Decoder;
+pub(super) use self::decoder::Decoder;
 pub(super) use self::sent::Input;
 use super::event::{Event, Source};
 

@@ -1,15 +1,16 @@
 //! Abilities of a terminal, by its name.
 
+use crate::tui::known::Program;
+
 /// Whether the terminal knows REP (ECMA-48 8.3.103: the character before so many times more), by the names that it
 /// leaves in the environment. Many call themselves `xterm-256color`, and not all of those do.
 pub fn can_repeat(variable: impl Fn(&str) -> Option<String>) -> bool {
     const TERMS: [&str; 8] =
         ["xterm-kitty", "alacritty", "foot", "xterm-ghostty", "wezterm", "contour", "tmux", "rio"];
-    const PROGRAMS: [&str; 4] = ["iTerm.app", "WezTerm", "ghostty", "vscode"];
     let get = |name: &str| variable(name).unwrap_or_default();
     let (term, program) = (get("TERM"), get("TERM_PROGRAM"));
     TERMS.iter().any(|name| term.starts_with(name))
-        || (get("TMUX").is_empty() && PROGRAMS.contains(&program.as_str()))
+        || (get("TMUX").is_empty() && Program::of(&program).is_some())
 }
 
 #[cfg(test)]
