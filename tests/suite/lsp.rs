@@ -187,6 +187,11 @@ fn keys_words_and_names_are_offered() {
         assert_eq!((&item["textEdit"]["newText"], &item["filterText"]), (&json!(label), &json!(label)));
     }
     assert_eq!(editor.offered(&TEXT.replace("0.5, 0]", "0.5, 0] # r|")).0, [""; 0]);
+    // Lines of an array hold numbers, not keys.
+    for typed in ["|", "1, 0,\n|\n]"] {
+        let text = TEXT.replace("[[light]]", &format!("[[mesh]]\nmatrix = [\n{typed}"));
+        assert_eq!(editor.offered(&text).0, [""; 0], "{text}");
+    }
 }
 
 #[test]
@@ -208,7 +213,9 @@ fn hovering_explains_and_definitions_are_found() {
 
 #[test]
 fn colours_are_shown_in_srgb_and_written_linear() {
-    let mut editor = Editor::open(&TEXT.replace("[[light]]", "[[light]]\nintensity = \"tomato\""));
+    let text =
+        TEXT.replace("[[light]]", "[[light]]\nintensity = \"tomato\"\n[[light]]\nintensity = \"#+12345\"");
+    let mut editor = Editor::open(&text);
     let uri = editor.uri.clone();
     let colors = editor.ask("textDocument/documentColor", &json!({ "textDocument": { "uri": uri } }));
     let [linear, named] = colors.as_array().expect("a list").as_slice() else { panic!("{colors}") };

@@ -7,6 +7,10 @@ use std::sync::mpsc;
 use super::engine::{Engine, Means};
 use super::protocol::{Failure, PreviewSlot};
 use super::sink::Sink;
+use super::stages::meshes::Meshes;
+use super::stages::parse::Parsed;
+use super::stages::textures::Textures;
+use crate::control::CancelToken;
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{Lowered, Object, Shape};
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -27,15 +31,37 @@ pub struct Checked {
     pub warnings: Vec<Diagnostic>,
 }
 
-/// Check a scene with all files that it names, used or not.
+/// Checks a scene with all files that it names, used or not.
 ///
 /// # Errors
 /// All errors and warnings of the scene and its files.
 pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
-    let (events, _) = mpsc::channel();
-    let sink = Sink { generation: 0, events, previews: PreviewSlot::default(), within: None };
-    let (parsed, meshes, textures, warnings) =
-        Engine::new(Means::default(), Arc::default()).read_all(path, sets, &sink)?;
+    Checker::default().check(path, sets, &CancelToken::new())
+}
+
+/// Checks scenes, one after the other. Files that have not changed since are not read again.
+pub struct Checker(Engine);
+
+impl Default for Checker {
+    fn default() -> Self {
+        Self(Engine::new(Means::default(), Arc::default()))
+    }
+}
+
+impl Checker {
+    /// Checks a scene with all files that it names, used or not.
+    ///
+    /// # Errors
+    /// All errors and warnings of the scene and its files; a failure of the work if the token is cancelled.
+    pub fn check(&mut self, path: &Path, sets: &[String], token: &CancelToken) -> Result<Checked, Failure> {
+        let (events, _) = mpsc::channel();
+        let sink = Sink { generation: 0, events, previews: PreviewSlot::default(), within: None };
+        let (parsed, meshes, textures, warnings) = self.0.read_all(path, sets, &sink, token)?;
+        Ok(checked(&parsed, &meshes, &textures, warnings))
+    }
+}
+
+fn checked(parsed: &Parsed, meshes: &Meshes, textures: &Textures, mut warnings: Vec<Diagnostic>) -> Checked {
     let scene = &parsed.loaded.scene;
     let triangles = |shape: &Shape| match shape.lowered(DVec3::ZERO) {
         Lowered::Shape(shape) => shape.triangle_count(),
@@ -47,7 +73,6 @@ pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
         (None, None) => false,
     };
     let lights = scene.lights.iter().filter(|light| light.sends()).count();
-    let mut warnings = warnings;
     let environment = scene.environment.iter().filter(|environment| environment.sends()).count();
     let count = lights + environment + scene.objects.iter().filter(emits).count();
     // Whether meshes have lights of their own is known only now.
@@ -57,11 +82,11 @@ pub fn check(path: &Path, sets: &[String]) -> Result<Checked, Failure> {
         let help = "the mesh's own materials emit nothing; add a [[light]] or an [environment]".to_owned();
         warnings.push(parsed.loaded.diagnostic_at(0..0, severity, message, Some(help)));
     }
-    Ok(Checked {
+    Checked {
         objects: scene.objects.len() as u64,
         triangles: scene.objects.iter().map(|object| triangles(&object.shape)).sum(),
         textures: textures.images.len() as u64,
         lights: count as u64,
         warnings,
-    })
+    }
 }

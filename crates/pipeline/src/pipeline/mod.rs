@@ -37,7 +37,7 @@ mod worker;
 #[cfg(test)]
 mod tests;
 
-pub use check::{Checked, check};
+pub use check::{Checked, Checker, check};
 pub use model::import::{Imported, import};
 pub use watch::content::{Content, FileRead};
 pub use worker::{Handle, Remote, start};

@@ -5,7 +5,8 @@ use std::path::Path;
 use lsp_types::{Diagnostic, DiagnosticSeverity, Range};
 
 use super::document::Document;
-use crate::pipeline::check;
+use crate::control::CancelToken;
+use crate::pipeline::Checker;
 use crate::pipeline::protocol::Failure;
 use crate::scene::diagnostic::{self, Severity};
 use crate::scene::parse;
@@ -16,12 +17,17 @@ pub(super) fn of_text(document: &Document) -> Vec<Diagnostic> {
     found.iter().map(|one| diagnostic(document, one)).collect()
 }
 
-/// Mistakes in the file and in all that it names, as `glimt check` has them. `None` if the file has another text, or cannot be read.
-pub(super) fn of_files(document: &Document) -> Option<Vec<Diagnostic>> {
+/// Mistakes in the file and in all that it names, as `glimt check` has them. `None` if the file has another text, if it cannot be
+/// read, or if the token is cancelled.
+pub(super) fn of_files(
+    document: &Document,
+    checker: &mut Checker,
+    token: &CancelToken,
+) -> Option<Vec<Diagnostic>> {
     if std::fs::read_to_string(&document.path).ok()? != document.text {
         return None;
     }
-    let found = match check(&document.path, &[]) {
+    let found = match checker.check(&document.path, &[], token) {
         Ok(checked) => checked.warnings,
         Err(Failure::Scene(diagnostics)) => diagnostics,
         Err(Failure::Work(_)) => return None,

@@ -1,12 +1,13 @@
 //! `glimt lsp`: a language server for scenes, over stdin and stdout.
 //!
 //! The client sends a whole text with every change. Each text is parsed at once, which finds what stands in it; the files that it
-//! names are read when it is opened and saved, on a thread of their own.
+//! names are read when it is opened and saved, on one thread for all texts.
 
 mod colors;
 mod complete;
 mod diagnostics;
 mod document;
+mod files;
 mod look;
 mod place;
 
@@ -30,6 +31,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use self::document::Document;
+use self::files::FileThread;
 use super::console::Console;
 use super::exit::Exit;
 
@@ -61,7 +63,14 @@ fn capabilities() -> Value {
 fn serve(connection: Connection) -> Result<(), String> {
     let (id, _) = connection.initialize_start().map_err(|error| error.to_string())?;
     connection.initialize_finish(id, capabilities()).map_err(|error| error.to_string())?;
-    let mut server = Server { connection: &connection, documents: Arc::default() };
+    let documents = Documents::default();
+    let (open, sender) = (Arc::clone(&documents), connection.sender.clone());
+    let publish = move |uri, document: &Document, found| {
+        // A client that is gone hears nothing.
+        publish_if_current(&open, |message| drop(sender.send(message)), uri, document, found);
+    };
+    let files = FileThread::start(publish);
+    let mut server = Server { connection: &connection, documents, files };
     for message in &connection.receiver {
         match message {
             Message::Request(request) => {
@@ -85,6 +94,8 @@ type Documents = Arc<Mutex<HashMap<String, Document>>>;
 struct Server<'c> {
     connection: &'c Connection,
     documents: Documents,
+    /// Reads files. `None` without a thread for it: then the mistakes of the texts alone are shown.
+    files: Option<FileThread>,
 }
 
 impl Server<'_> {
@@ -169,21 +180,26 @@ impl Server<'_> {
         self.send(published(uri.clone(), Some(version), found));
     }
 
-    /// Reads what the file names, and says what is wrong with all of it, unless the text is another by then.
+    /// Has the files be read that a text names.
     fn read_files(&self, uri: &Uri) {
-        let (documents, sender, uri) =
-            (Arc::clone(&self.documents), self.connection.sender.clone(), uri.clone());
-        let Some(document) = self.documents().get(uri.as_str()).cloned() else { return };
-        let read = move || {
-            let Some(found) = diagnostics::of_files(&document) else { return };
-            let documents = documents.lock().unwrap_or_else(PoisonError::into_inner);
-            if documents.get(uri.as_str()).is_some_and(|now| now.version == document.version) {
-                // A client that is gone hears nothing.
-                let _ = sender.send(published(uri, Some(document.version), found));
-            }
-        };
-        // Without a thread, what the text says stays.
-        let _ = std::thread::Builder::new().name("read-files".to_owned()).spawn(read);
+        let document = self.documents().get(uri.as_str()).cloned();
+        if let (Some(files), Some(document)) = (&self.files, document) {
+            files.read(uri.clone(), document);
+        }
+    }
+}
+
+/// Says what is wrong with a text and its files, unless the text is another by now.
+fn publish_if_current(
+    documents: &Documents,
+    send: impl FnOnce(Message),
+    uri: Uri,
+    document: &Document,
+    found: Vec<Diagnostic>,
+) {
+    let documents = documents.lock().unwrap_or_else(PoisonError::into_inner);
+    if documents.get(uri.as_str()).is_some_and(|now| now.version == document.version) {
+        send(published(uri, Some(document.version), found));
     }
 }
 

@@ -36,19 +36,19 @@ impl Section {
     }
 }
 
-/// The place of a byte. `None` in comments, and in tables that scenes do not have.
+/// The place of a byte. `None` in comments, in arrays, and in tables that scenes do not have.
 pub(super) fn place(text: &str, offset: usize) -> Option<Place> {
     let before = text.get(..offset)?;
-    let start = before.rfind('\n').map_or(0, |at| at + 1);
-    let line = &before[start..];
+    let line = &before[before.rfind('\n').map_or(0, |at| at + 1)..];
     let trimmed = line.trim_start();
-    if is_comment(line) {
+    let around = Around::of(text, offset);
+    if Scan::of(line).is_comment || around.is_in_array {
         return None;
     }
     if trimmed.starts_with('[') && !trimmed.contains(']') {
         return Some(Place::Header);
     }
-    let Some((header, body)) = section(text, start) else {
+    let Some((header, body)) = around.table else {
         return (!trimmed.contains('=')).then_some(Place::Header);
     };
     let after = text[offset..].split('\n').next().unwrap_or_default();
@@ -113,51 +113,94 @@ fn last_item(typed: &str) -> &str {
 }
 
 fn is_in_quotes(value: &str) -> bool {
-    value.matches('"').count() % 2 == 1
+    Scan::of(value).quote.is_some()
 }
 
-/// Whether the end of a line is in a comment.
-fn is_comment(line: &str) -> bool {
-    let mut is_quoted = false;
-    line.chars().any(|character| {
-        is_quoted ^= character == '"';
-        character == '#' && !is_quoted
-    })
+/// State at the end of a line: open string, comment, open brackets.
+#[derive(Clone, Copy, Debug, Default)]
+struct Scan {
+    /// The quote of a string that is open.
+    quote: Option<char>,
+    is_comment: bool,
+    /// Opened brackets, less the closed ones.
+    brackets: i32,
 }
 
-/// A line up to its comment.
-fn without_comment(line: &str) -> &str {
-    let ends = line.match_indices('#').map(|(at, _)| &line[..at]);
-    ends.into_iter().find(|text| !is_in_quotes(text)).unwrap_or(line)
-}
-
-/// The header above a line, without its brackets, and the lines of its table.
-fn section(text: &str, line_start: usize) -> Option<(&str, &str)> {
-    let is_header = |line: &str| line.trim_start().starts_with('[') && !line.trim_start().starts_with("[ ");
-    let mut at = line_start;
-    let header_at = loop {
-        let line = text[at..].split('\n').next().unwrap_or_default();
-        if at < line_start
-            && is_header(line)
-            && line.contains(']')
-            && !without_comment(line).contains(['=', ','])
-        {
-            break at;
+impl Scan {
+    fn of(line: &str) -> Self {
+        let mut scan = Self::default();
+        let mut is_escaped = false;
+        for character in line.chars() {
+            match (scan.quote, character) {
+                (Some('"'), '\\') if !is_escaped => {
+                    is_escaped = true;
+                    continue;
+                }
+                (Some(quote), _) if character == quote && !is_escaped => scan.quote = None,
+                (Some(_), _) => {}
+                (None, '"' | '\'') => scan.quote = Some(character),
+                (None, '#') => return Self { is_comment: true, ..scan },
+                (None, '[') => scan.brackets += 1,
+                (None, ']') => scan.brackets -= 1,
+                (None, _) => {}
+            }
+            is_escaped = false;
         }
-        if at == 0 {
-            return None;
+        scan
+    }
+}
+
+/// Surroundings of a byte of a text: its table, and whether it is in an array.
+#[derive(Debug, Default)]
+struct Around<'t> {
+    /// The header above, without its brackets, and the lines of its table. `None` above the first header.
+    table: Option<(&'t str, &'t str)>,
+    /// Whether the line goes on with an array that begins above it.
+    is_in_array: bool,
+}
+
+impl<'t> Around<'t> {
+    fn of(text: &'t str, offset: usize) -> Self {
+        let (mut around, mut header) = (Self::default(), None);
+        let (mut at, mut open) = (0, 0);
+        for line in text.split_inclusive('\n') {
+            // A line that cannot be a part of an array ends one that nobody has closed.
+            if is_key(line) || header_name(line).is_some() {
+                open = 0;
+            }
+            let (start, end) = (at, at + line.len());
+            let is_here = start <= offset && (offset < end || end == text.len() && !line.ends_with('\n'));
+            around.is_in_array |= is_here && open > 0;
+            match header_name(line).filter(|_| open == 0 && !is_here) {
+                // The next table begins.
+                Some(_) if offset < start => break,
+                Some(name) => header = Some((name, end)),
+                None => open = (open + Scan::of(line).brackets).max(0),
+            }
+            at = end;
         }
-        at = text[..at - 1].rfind('\n').map_or(0, |end| end + 1);
-    };
-    let header = text[header_at..].split('\n').next().unwrap_or_default();
-    let name = header.trim_start().trim_start_matches('[').split(']').next().unwrap_or_default();
-    let body_at = header_at + header.len();
-    let rest = &text[body_at..];
-    let end = rest
-        .match_indices('\n')
-        .find(|(at, _)| rest[at + 1..].starts_with('['))
-        .map_or(rest.len(), |(at, _)| at);
-    Some((name.trim(), &rest[..end]))
+        // A text that ends with a line end has one more line.
+        around.is_in_array |= offset == text.len() && (text.is_empty() || text.ends_with('\n')) && open > 0;
+        around.table = header.map(|(name, end)| (name, &text[end..at]));
+        around
+    }
+}
+
+/// Whether a line begins with a key and its `=`.
+fn is_key(line: &str) -> bool {
+    let is_bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
+    let rest = line.trim_start().trim_start_matches(is_bare);
+    rest.trim_start().starts_with('=')
+}
+
+/// The name in the brackets of a header. `None` for a line that is none, such as `[1, 0],` in an array.
+fn header_name(line: &str) -> Option<&str> {
+    let (name, rest) = line.trim_start().strip_prefix('[')?.trim_start_matches('[').split_once(']')?;
+    let is_part = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.' | '"' | '\'' | ' ');
+    let rest = rest.trim_start_matches(']').trim();
+    let is_name =
+        name.trim_start().starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(is_part);
+    (is_name && (rest.is_empty() || rest.starts_with('#'))).then(|| name.trim())
 }
 
 /// The type of a table by its `type`, or the default.
@@ -260,8 +303,25 @@ mod tests {
     }
 
     #[test]
-    fn arrays_over_lines_are_no_headers() {
-        let Some(Place::Key { of, .. }) = at("[[mesh]]\nmatrix = [\n[1, 0],\n]\nsmo|") else { panic!() };
+    fn arrays_over_lines_have_no_keys_and_are_no_headers() {
+        let Some(Place::Key { of, given, .. }) =
+            at("[[mesh]]\nmatrix = [\n[1, 0],\n]\nsmo|\nmaterial = [\n[2],\n]\nscale = 1\n[camera]\nfov = 4")
+        else {
+            panic!()
+        };
         assert_eq!(of.info.name, "mesh");
+        assert_eq!(given, ["matrix", "material", "scale"]);
+        for text in [
+            "[[mesh]]\nmatrix = [\n1, 0,\n|",
+            "[[mesh]]\nmatrix = [\n  1, 0, |\n]\nsmooth = true",
+            "[[mesh]]\nmatrix = [ # ]\n|",
+            "[[mesh]]\nmatrix = [\n[1, 0],\n[|",
+        ] {
+            assert!(at(text).is_none(), "{text}");
+        }
+        // An array that is not closed ends with the next key or header.
+        for text in ["[camera]\nup = [0, 1\nfov = 40\nap|", "[render]\nbackground = [0, 1\n[camera]\nap|"] {
+            assert!(matches!(at(text), Some(Place::Key { of, .. }) if of.info.name == "camera"), "{text}");
+        }
     }
 }

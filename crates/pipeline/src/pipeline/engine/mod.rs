@@ -606,23 +606,23 @@ impl Engine {
         path: &Path,
         sets: &[String],
         sink: &Sink,
+        token: &CancelToken,
     ) -> Result<(Arc<Parsed>, Meshes, Textures, Vec<Diagnostic>), Failure> {
-        let token = CancelToken::new();
         let mut findings = Findings::default();
         let mut all = || {
             let contents = &Snapshot::of(Arc::clone(&self.contents));
             let containers = Containers::default();
             let origin = Origin { path, sets, show: Show::default() };
             let parsed =
-                parse(origin, (contents, &containers), &mut self.parsed, &mut findings, &token)?.value;
+                parse(origin, (contents, &containers), &mut self.parsed, &mut findings, token)?.value;
             let pool = self.pool(cores())?;
-            let reading = Reading { sink, token: &token, contents, pool: &pool, containers: &containers };
+            let reading = Reading { sink, token, contents, pool: &pool, containers: &containers };
             let loaded = &parsed.loaded;
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
             let mut wanted = needed(loaded, &found, Lookups::ALL, &self.textures);
             add_declared(loaded, &mut wanted.textures);
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
-            glass(loaded, &found, &mut self.bodies, &mut findings, &token)?;
+            glass(loaded, &found, &mut self.bodies, &mut findings, token)?;
             let overrides = Overrides::default();
             let plan = plan(&loaded.scene, path, &overrides)
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
@@ -633,7 +633,9 @@ impl Engine {
             }
             Ok((parsed, found, texels))
         };
-        match all() {
+        let all = all();
+        self.end(all.is_ok());
+        match all {
             Ok((parsed, found, texels)) if findings.errors.is_empty() => {
                 Ok((parsed, found, texels, findings.warnings))
             }
