@@ -6,6 +6,7 @@ use crate::scene::keys::key::{Default, KeyInfo, Kind, TableInfo, TypeInfo};
 use crate::scene::keys::{paths, table, tables};
 use crate::scene::nearest::{meant, nearest};
 use crate::scene::sanitize::shortened;
+use crate::tui::wrapped;
 
 /// Prints what is known by a path of a key, of a type, of a table; without one, all tables.
 pub(super) fn run(path: Option<&str>, console: &Console) -> Exit {
@@ -15,12 +16,33 @@ pub(super) fn run(path: Option<&str>, console: &Console) -> Exit {
     };
     match text {
         Some(text) => {
-            console.text(&text);
+            console.text(&fitted(&text, console.answer_columns()));
             Exit::DONE
         }
         None => console.fail(Exit::WRONG, &unknown(path.unwrap_or_default())),
     }
 }
+
+/// The text in lines of at most so many columns; what goes on stands under the column where it begins.
+fn fitted(text: &str, columns: Option<usize>) -> String {
+    let Some(columns) = columns else { return text.to_owned() };
+    let mut fitted = String::new();
+    for line in text.lines() {
+        // A name and its description have two spaces or more between them.
+        let indent = line.len() - line.trim_start().len();
+        let gap = line[indent..].find("  ").map(|at| &line[indent + at..]);
+        let begin = gap.map_or(indent, |gap| line.len() - gap.trim_start().len());
+        let (name, rest) = line.split_at(begin);
+        let room = columns.saturating_sub(name.chars().count());
+        let lines = if room < LEAST_COLUMNS { vec![rest.to_owned()] } else { wrapped(rest, room) };
+        let between = format!("\n{}", " ".repeat(name.chars().count()));
+        fitted.push_str(&format!("{name}{}\n", lines.join(&between)));
+    }
+    fitted
+}
+
+/// Texts are not broken into lines shorter than this.
+const LEAST_COLUMNS: usize = 16;
 
 /// Whether tables may be of a type.
 fn has_type(table: &TableInfo, name: &str) -> bool {
@@ -35,9 +57,13 @@ fn overview() -> String {
 /// The text about a path. `None` if nothing has it.
 fn explained(path: &str) -> Option<String> {
     let parts: Vec<&str> = path.split('.').collect();
-    let found = |all: Vec<(String, &KeyInfo)>| {
-        let texts: Vec<String> = all.iter().map(|(path, key)| one(path, key)).collect();
-        (!texts.is_empty()).then(|| texts.join("\n"))
+    let found = |all: Vec<(String, &KeyInfo)>| match all.as_slice() {
+        [] => None,
+        [(path, key)] => Some(one(path, key)),
+        [(first, _), ..] => {
+            let texts: String = all.iter().map(|(path, key)| short(path, key)).collect();
+            Some(format!("{texts}\nMore about one of them: glimt explain {first}\n"))
+        }
     };
     match parts.as_slice() {
         [name] => match table(name) {
@@ -118,6 +144,18 @@ fn one(path: &str, key: &KeyInfo) -> String {
     text
 }
 
+/// The text about one of several keys: kind, unit, range and default in a line, and the description.
+fn short(path: &str, key: &KeyInfo) -> String {
+    let default = match key.default {
+        Default::Required(_) => "required".to_owned(),
+        Default::Is(_) | Default::By(_) => format!("default {}", plain(&key.default_words())),
+        Default::Absent => String::new(),
+    };
+    let facts = [plain(&key.kind()), key.unit.to_owned(), key.range(), default];
+    let facts: Vec<String> = facts.into_iter().filter(|fact| !fact.is_empty()).collect();
+    format!("{path}: {}\n    {}\n", facts.join("; "), sentence(key.doc))
+}
+
 /// A table with a line for each of its types and keys.
 fn whole_table(table: &'static TableInfo) -> String {
     let head = format!("{}\n    {}\n\n", table.head(), sentence(table.doc));
@@ -196,6 +234,32 @@ mod tests {
         assert!(explained("materials.metal.emission").is_some_and(|text| text.contains("radiance")));
         assert!(explained("render.integrator").is_some_and(|text| text.contains("\"path\"")));
         assert!(explained("materials.type").is_some_and(|text| text.contains("type = \"glass\"")));
+    }
+
+    #[test]
+    fn several_keys_have_two_lines_each() {
+        let text = explained("radius").expect("keys");
+        assert!(
+            text.starts_with("photons.radius: number; length; 0 …; default 0.0\n    Radius of"),
+            "{text}"
+        );
+        assert!(text.contains("\nsphere.radius: number; length; > 0; required\n"), "{text}");
+        assert!(text.lines().count() < 20 && text.ends_with(": glimt explain photons.radius\n"), "{text}");
+    }
+
+    #[test]
+    fn lines_fit_the_terminal() {
+        let text = "[mesh]\n    A mesh from a file.\n\n    matrix    One two three four five six.\n";
+        let expected =
+            "[mesh]\n    A mesh from a file.\n\n    matrix    One two three four\n              five six.\n";
+        assert_eq!(fitted(text, Some(34)), expected);
+        assert_eq!(fitted(text, None), text);
+        assert_eq!(fitted(text, Some(10)), text, "too narrow to be broken");
+        for (path, _) in paths() {
+            let text = fitted(&explained(&path).unwrap_or_default(), Some(80));
+            let broken: Vec<&str> = text.lines().filter(|line| line.chars().count() > 80).collect();
+            assert!(broken.is_empty(), "{broken:?}");
+        }
     }
 
     #[test]
