@@ -17,7 +17,7 @@ fn in_bash(desk: &Desk, line: &str) -> Vec<String> {
         COMP_LINE=$1 COMP_TYPE=9 COMP_WORDBREAKS=$' \t\n"\'><=;|&(:'
         COMP_WORDS=($1); [[ $1 == *' ' ]] && COMP_WORDS+=("")
         COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
-        _clap_complete_glimt glimt "${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD - 1]}"
+        _glimt_complete glimt "${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD - 1]}"
         printf '%s\n' "${COMPREPLY[@]}"
     "#;
     let program = desk.glimt("").get_program().to_owned();
@@ -51,6 +51,16 @@ fn bash_completes_commands_scenes_models_and_keys_of_the_scene() {
     assert_eq!(in_bash(&desk, "glimt ball.toml --set materials.ball.d"), ["materials.ball.diffuse="]);
     assert_eq!(in_bash(&desk, "glimt check ball.toml --set light.1.f"), ["light.1.falloff="]);
     assert_eq!(in_bash(&desk, "glimt ball.toml --set photons.e"), ["photons.enabled="]);
+}
+
+#[test]
+fn real_shells_complete_what_is_typed() {
+    let script = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(".ci/shells.py");
+    let output = Command::new("python3").arg(script).arg(Desk::new().glimt("").get_program()).output();
+    let output = output.expect("python3");
+    let said = String::from_utf8(output.stdout).expect("UTF-8");
+    println!("{said}");
+    assert!(output.status.success() && said.contains("bash: 13 of 13 lines complete"), "{said}");
 }
 
 #[test]

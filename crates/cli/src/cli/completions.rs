@@ -6,7 +6,7 @@ use std::ffi::OsString;
 
 use clap::CommandFactory;
 use clap_complete::CompleteEnv;
-use clap_complete::env::{Bash, Elvish, EnvCompleter, Fish, Powershell, Zsh};
+use clap_complete::env::{Elvish, EnvCompleter, Fish, Powershell};
 
 use super::args::{Args, Shell};
 use super::console::Console;
@@ -15,11 +15,95 @@ use super::exit::Exit;
 /// The variable that a script sets to the name of its shell.
 const VARIABLE: &str = "GLIMT_COMPLETE";
 
+/// The script for bash, in place of `clap_complete`'s: bash takes words apart at `=` and `:`, and this one joins them for the program,
+/// so that it completes the values of `--set KEY=VALUE` and `--option=VALUE`. The variables are those of `clap_complete`.
+const BASH: &str = r#"_glimt_complete() {
+    local word rest=$COMP_LINE words=() at=-1 index=0 begun= i
+    # Join what has no space between.
+    for ((i = 0; i < ${#COMP_WORDS[@]}; i++)); do
+        word=${COMP_WORDS[i]}
+        if ((at < 0)) || [[ $rest == [[:space:]]* ]]; then
+            words[++at]=
+            rest=${rest#"${rest%%[![:space:]]*}"}
+        fi
+        rest=${rest#"$word"}
+        if ((i == COMP_CWORD)); then
+            # Bash completes what stands behind the last = or :.
+            if [[ $word == [=:]* ]]; then
+                begun=${words[at]}$word word=
+            else
+                begun=${words[at]} word=$2
+            fi
+            words[at]=$begun$word index=$at
+            break
+        fi
+        words[at]+=$word
+    done
+    local IFS=$'\013' space=true
+    compopt +o nospace 2> /dev/null && space=false
+    COMPREPLY=($(
+        _CLAP_IFS="$IFS" \
+        _CLAP_COMPLETE_INDEX="$index" \
+        _CLAP_COMPLETE_COMP_TYPE="$COMP_TYPE" \
+        _CLAP_COMPLETE_SPACE="$space" \
+        GLIMT_COMPLETE="bash" \
+        "glimt" -- "${words[@]}"
+    ))
+    if [[ $? != 0 ]]; then
+        unset COMPREPLY
+        return
+    fi
+    COMPREPLY=("${COMPREPLY[@]#"$begun"}")
+    if [[ $space == false && "${COMPREPLY-}" =~ [=/:]$ ]]; then
+        compopt -o nospace
+    fi
+}
+if [[ "${BASH_VERSINFO[0]}" -eq 4 && "${BASH_VERSINFO[1]}" -ge 4 || "${BASH_VERSINFO[0]}" -gt 4 ]]; then
+    complete -o nospace -o bashdefault -o nosort -F _glimt_complete glimt
+else
+    complete -o nospace -o bashdefault -F _glimt_complete glimt
+fi
+"#;
+
+/// The script for zsh, in place of `clap_complete`'s, which puts a space behind `KEY=`.
+const ZSH: &str = r#"#compdef glimt
+_glimt_complete() {
+    local answer=("${(@f)$(
+        _CLAP_IFS=$'\n' _CLAP_COMPLETE_INDEX=$((CURRENT - 1)) GLIMT_COMPLETE=zsh glimt -- "${words[@]}" 2> /dev/null
+    )}")
+    local -a folders=() begun=() whole=()
+    local line value
+    # A description stands behind the first colon.
+    for line in $answer; do
+        value=${line%%:*}
+        case $value in
+            */) folders+=("${value%/}${line#"$value"}") ;;
+            *=) begun+=("$line") ;;
+            *) whole+=("$line") ;;
+        esac
+    done
+    (($#folders)) && _describe -V values folders -S / -r /
+    (($#begun)) && _describe -V values begun -S ''
+    (($#whole)) && _describe -V values whole
+}
+compdef _glimt_complete glimt
+# In a folder of `fpath`, zsh reads this when the key is pressed first, as a function of the file's name.
+if [[ $funcstack[1] == _glimt ]]; then
+    _glimt_complete "$@"
+fi
+"#;
+
 /// Prints the script of a shell.
 pub(super) fn run(shell: Shell, console: &Console) -> Exit {
     let completer: &dyn EnvCompleter = match shell {
-        Shell::Bash => &Bash,
-        Shell::Zsh => &Zsh,
+        Shell::Bash => {
+            console.text(BASH);
+            return Exit::DONE;
+        }
+        Shell::Zsh => {
+            console.text(ZSH);
+            return Exit::DONE;
+        }
         Shell::Fish => &Fish,
         Shell::Powershell => &Powershell,
         Shell::Elvish => &Elvish,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter};
 
 use crate::scene::keys::key::{Form, KeyInfo, Kind};
-use crate::scene::keys::{paths, tables};
+use crate::scene::keys::{color_names, paths, tables};
 use crate::scene::outline::{OutlineTable, outline};
 use crate::scene::{is_mesh, text_now};
 
@@ -64,44 +64,64 @@ fn candidates(text: &str, typed: &str) -> Vec<CompletionCandidate> {
         paths.into_iter().flat_map(move |path| known.clone().into_iter().map(move |key| (path.clone(), key)))
     };
     let keys = outline.iter().flat_map(of).chain(of_absent);
-    keys.flat_map(|(path, key)| of_key(&format!("{path}.{}=", key.name), key, typed)).take(MOST).collect()
+    let of_key = |(path, key): (String, &'static KeyInfo)| {
+        of_path(&format!("{path}.{}=", key.name), key.doc, typed, || values(key.kind, &outline))
+    };
+    let of_type = |table: &OutlineTable| {
+        let types = table.info.types.iter().map(|kind| (kind.name.to_owned(), kind.doc));
+        let types: Vec<Value> = types.collect();
+        let paths = if types.is_empty() { Vec::new() } else { table.paths() };
+        let of_path = |path: String| of_path(&format!("{path}.type="), "The type", typed, || types.clone());
+        paths.into_iter().flat_map(of_path).collect::<Vec<_>>()
+    };
+    keys.flat_map(of_key).chain(outline.iter().flat_map(of_type)).take(MOST).collect()
 }
 
-/// The candidates for one key: itself, or once its `=` is there, its values as far as they are few.
-fn of_key(path: &str, key: &KeyInfo, typed: &str) -> Vec<CompletionCandidate> {
+/// A value and its description.
+type Value = (String, &'static str);
+
+/// The candidates for one path with its `=`: itself, or once it is typed, its values.
+fn of_path(
+    path: &str,
+    doc: &str,
+    typed: &str,
+    values: impl FnOnce() -> Vec<Value>,
+) -> Vec<CompletionCandidate> {
     let help = |text: &str| Some(text.replace('`', "").into());
     if path.starts_with(typed) && path != typed {
-        return vec![CompletionCandidate::new(path).help(help(key.doc))];
+        return vec![CompletionCandidate::new(path).help(help(doc))];
     }
     let Some(begun) = typed.strip_prefix(path) else { return Vec::new() };
-    let values: Vec<(String, String)> = match key.kind {
-        Kind::Words(list) => {
-            list().iter().map(|word| (word.name.to_owned(), word.meaning.to_owned())).collect()
+    let fitting = values().into_iter().filter(|(value, _)| value.starts_with(begun));
+    fitting.map(|(value, doc)| CompletionCandidate::new(format!("{path}{value}")).help(help(doc))).collect()
+}
+
+/// The values of a kind that have names, in a scene of these tables.
+fn values(kind: Kind, outline: &[OutlineTable]) -> Vec<Value> {
+    let plain = |value: &str| (value.to_owned(), "");
+    match kind {
+        Kind::Words(list) => list().iter().map(|word| (word.name.to_owned(), word.meaning)).collect(),
+        Kind::Flag => ["true", "false"].map(plain).to_vec(),
+        Kind::Color(_) | Kind::ColorOrTexture(_) | Kind::Emission(_) => color_names().map(plain).collect(),
+        Kind::Texture | Kind::Heights | Kind::Material => {
+            let named = outline.iter().filter(|table| Some(table.info.name) == kind.named_in());
+            named.filter_map(|table| table.name.as_ref()).map(|name| plain(&name.text)).collect()
         }
-        Kind::Flag => ["true", "false"].map(|flag| (flag.to_owned(), String::new())).to_vec(),
         Kind::Whole(..)
         | Kind::Number(_)
         | Kind::Text
         | Kind::File(_)
-        | Kind::Color(_)
-        | Kind::ColorOrTexture(_)
-        | Kind::Emission(_)
         | Kind::NumberOrTexture(_)
         | Kind::Numbers(..)
-        | Kind::Scale(_)
-        | Kind::Texture
-        | Kind::Heights
-        | Kind::Material => Vec::new(),
-    };
-    let fitting = values.into_iter().filter(|(value, _)| value.starts_with(begun));
-    fitting.map(|(value, doc)| CompletionCandidate::new(format!("{path}{value}")).help(help(&doc))).collect()
+        | Kind::Scale(_) => Vec::new(),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn values(text: &str, typed: &str) -> Vec<String> {
+    fn offered(text: &str, typed: &str) -> Vec<String> {
         let all = candidates(text, typed);
         all.iter().map(|one| one.get_value().to_string_lossy().into_owned()).collect()
     }
@@ -109,22 +129,30 @@ mod tests {
     #[test]
     fn keys_are_those_of_the_scene() {
         let text = "[materials.wall]\ntype = \"mirror\"\n[[sphere]]\nname = \"ball\"\n";
-        let mirror = values(text, "materials.wall.ref");
+        let mirror = offered(text, "materials.wall.ref");
         assert_eq!(mirror, ["materials.wall.reflectance="]);
-        assert_eq!(values(text, "materials.wall.diff"), [""; 0]);
-        assert_eq!(values(text, "sphere.1.r"), ["sphere.1.radius="]);
+        assert_eq!(offered(text, "materials.wall.diff"), [""; 0]);
+        assert_eq!(offered(text, "sphere.1.r"), ["sphere.1.radius="]);
         assert_eq!(
-            values(text, "sphere.b"),
+            offered(text, "sphere.b"),
             ["center", "radius", "material", "name"].map(|key| format!("sphere.ball.{key}="))
         );
-        assert_eq!(values("", "render.sam"), ["render.samples="]);
-        assert_eq!(values("", "sphere"), [""; 0]);
+        assert_eq!(offered("", "render.sam"), ["render.samples="]);
+        assert_eq!(offered("", "sphere"), [""; 0]);
     }
 
     #[test]
     fn values_are_offered_once_the_key_is_there() {
-        assert_eq!(values("", "render.integrator="), ["render.integrator=whitted", "render.integrator=path"]);
-        assert_eq!(values("", "photons.enabled=t"), ["photons.enabled=true"]);
-        assert_eq!(values("", "render.width="), [""; 0]);
+        assert_eq!(
+            offered("", "render.integrator="),
+            ["render.integrator=whitted", "render.integrator=path"]
+        );
+        assert_eq!(offered("", "photons.enabled=t"), ["photons.enabled=true"]);
+        assert_eq!(offered("", "render.width="), [""; 0]);
+        let text = "[materials.wall]\n[materials.floor]\n[[sphere]]\n";
+        assert_eq!(offered(text, "sphere.1.material=w"), ["sphere.1.material=wall"]);
+        assert_eq!(offered(text, "materials.wall.diffuse=tom"), ["materials.wall.diffuse=tomato"]);
+        assert_eq!(offered(text, "materials.wall.t"), ["materials.wall.type="]);
+        assert_eq!(offered(text, "materials.wall.type=mi"), ["materials.wall.type=mirror"]);
     }
 }
