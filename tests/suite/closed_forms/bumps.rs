@@ -10,9 +10,10 @@ use glimt::scene::description::{
 };
 
 use super::scenes::{
-    AS_IT_IS, Build, glass, lat_long_sphere, matte, metal, mirror, phong, plastic, principled, scene,
+    AS_IT_IS, Build, frosted, glass, lat_long_sphere, matte, metal, mirror, phong, plastic, principled,
+    scene, translucent,
 };
-use super::v;
+use super::{mean_and_error, v};
 
 /// A texture of heights by their place in the image, from (0, 0) at the bottom left to (1, 1).
 fn heights(build: &mut Build, size: usize, height: impl Fn(DVec2) -> f64) -> usize {
@@ -241,4 +242,60 @@ fn bumpy_balls_have_no_black_edge() {
         darkest.push((name, least));
     }
     assert!(darkest.iter().all(|(_, least)| *least > 0.2), "{darkest:?}");
+}
+
+#[test]
+fn light_behind_a_bent_normal_is_none() {
+    // Slopes of 60° towards light that comes in from behind them, at 3° to 20° above the surface.
+    let slope = 3.0_f64.sqrt();
+    for (name, material) in materials().into_iter().filter(|(name, _)| !["glass", "mirror"].contains(name)) {
+        for (degrees, shadows) in [
+            (3.0, Shadows::Soft),
+            (5.0, Shadows::Hard),
+            (8.0, Shadows::Off),
+            (12.0, Shadows::Soft),
+            (20.0, Shadows::Hard),
+        ] {
+            let (sine, cosine) = f64::to_radians(degrees).sin_cos();
+            let mut build = scene()
+                .point_light(v(10.0 * cosine, 10.0 * sine, 0.0), 100.0, Falloff::Square)
+                .shadows(shadows, 1)
+                .seen(v(-1.0, 1.0, 0.3), DVec3::ZERO);
+            let texture = heights(&mut build, 8, |at| at.x);
+            let (u, w) = (v(2.0, 0.0, 0.0), v(0.0, 0.0, -2.0));
+            let value =
+                build.quad(-(u + w) / 2.0, u, w, bumped(texture, 2.0 * slope, material.clone())).depth(1);
+            assert_eq!(value.value(), 0.0, "{name}, {degrees}°");
+        }
+    }
+}
+
+#[test]
+fn hard_shadows_of_a_point_are_those_of_soft_ones_on_a_relief() {
+    // Samples of lobes that lead behind a bent normal have no density.
+    for (name, material) in [
+        ("translucent", translucent(0.8, 0.3, 0.5)),
+        ("plastic", plastic(0.7, 0.3)),
+        ("frosted", frosted(1.5, 0.3)),
+    ] {
+        let means = [Shadows::Soft, Shadows::Hard].map(|shadows| {
+            let mut build =
+                scene().point_light(v(1.0, 3.0, 2.0), 10.0, Falloff::Square).shadows(shadows, 1).depth(1);
+            let texture = heights(&mut build, 16, |at| 0.5 + 0.5 * (TAU * (2.0 * at.x + at.y)).sin());
+            let build = build.sphere(DVec3::ZERO, 1.0, bumped(texture, 0.3, material.clone()));
+            let build = build.pictured(v(0.0, 0.0, 4.0), DVec3::ZERO, 30.0, 12, 12);
+            let values: Vec<f64> = (0..8)
+                .map(|seed| {
+                    let picture = build.picture(64, seed);
+                    assert!(picture.iter().all(|pixel| pixel.is_finite()), "{name}: {shadows:?}");
+                    picture.iter().map(|pixel| pixel.element_sum()).sum()
+                })
+                .collect();
+            mean_and_error(&values)
+        });
+        let [(soft, own), (hard, other)] = means;
+        let error = own.hypot(other);
+        assert!(error < 2e-3 * soft, "{name}: {means:?}");
+        assert!((soft - hard).abs() < 4.0 * error + 1e-6 * soft, "{name}: {means:?}");
+    }
 }

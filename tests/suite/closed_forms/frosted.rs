@@ -8,7 +8,9 @@ use glimt::scene::description::{
 
 use super::global::by_paths;
 use super::photons::{assert_same_light, both};
-use super::scenes::{Build, emitter, frosted, glass, matte, metal, mirror, plastic, scene, translucent};
+use super::scenes::{
+    Build, emitter, frosted, glass, matte, metal, mirror, plastic, scene, tinted, translucent,
+};
 use super::{assert_close, mean_and_error, v};
 
 /// Half a world of a material below y = 0, or a sheet there, seen from a side: above or below it, towards the middle.
@@ -349,4 +351,64 @@ fn a_lamp_in_rough_glass_lights_its_inside() {
     let error = whitted.1.hypot(path.1);
     assert!(error < 0.02 * path.0, "{whitted:?}, {path:?}");
     assert!((whitted.0 - path.0).abs() < 4.0 * error, "{whitted:?}, {path:?}");
+}
+
+#[test]
+fn light_through_a_sheet_on_glass_goes_on_in_the_glass() {
+    // A label on a block of black glass shows its own reflection alone, as above one of matte black.
+    let label = |build: Build, height: f64| {
+        let material = translucent(1.0, 0.5, 1.0);
+        build.quad(v(-0.4, height, 0.4), v(0.8, 0.0, 0.0), v(0.0, 0.0, -0.8), material)
+    };
+    let seen = |build: Build| {
+        let build = build.background(1.0).environment(1.0).depth(8);
+        build.pictured(v(0.0, 2.4, 1.5), v(0.0, 0.0, 0.0), 8.0, 4, 4)
+    };
+    let block =
+        |material: Material| scene().cuboid(v(0.0, -0.3, 0.0), v(1.0, 0.6, 1.0), DVec3::ZERO, material);
+    let black = seen(label(block(matte(0.0)), 0.01));
+    let (exact, _) = mean_and_error(&by_paths(black, 8).values(256, 16));
+    for (what, build) in [
+        ("after", seen(label(block(tinted(1.5, DVec3::ZERO)), 0.0))),
+        (
+            "before",
+            seen(label(scene(), 0.0).cuboid(
+                v(0.0, -0.3, 0.0),
+                v(1.0, 0.6, 1.0),
+                DVec3::ZERO,
+                tinted(1.5, DVec3::ZERO),
+            )),
+        ),
+    ] {
+        let means = both(&build, 8, [256, 64], (20_000, 0.05));
+        assert!(
+            means.iter().all(|(mean, _)| (mean - exact).abs() < 0.02 * exact),
+            "{what}: {means:?}, {exact}"
+        );
+    }
+    // Clear glass brings light: all techniques find the same, from above and through the block from below. It gains none.
+    for from in [v(0.0, 2.4, 1.5), v(0.2, -2.4, 1.0)] {
+        let clear = label(block(glass(1.5)), 0.0).environment(1.0).depth(8);
+        let clear = clear.pictured(from, DVec3::ZERO, 8.0, 4, 4);
+        let means = both(&clear, 8, [256, 64], (40_000, 0.03));
+        assert_same_light(&format!("from {from}"), means, 1e-2, 6e-3);
+        assert!(means.iter().all(|(mean, error)| *mean < 1.0 + 4.0 * error), "{means:?}");
+    }
+}
+
+#[test]
+fn photons_pass_rough_glass_that_does_not_refract() {
+    // A ball with the index of air, and a lamp in one of two blocks of one glass with a ball in the other.
+    let floor = |build: Build| build.quad(v(-2.0, 0.0, 2.0), v(4.0, 0.0, 0.0), v(0.0, 0.0, -4.0), matte(0.7));
+    let lamp = |build: Build| build.sphere(v(0.4, 1.9, 0.0), 0.3, emitter(6.0));
+    let air = lamp(floor(scene()).sphere(v(0.0, 0.7, 0.0), 0.5, frosted(1.0, 0.3)));
+    let block =
+        |build: Build, x: f64| build.cuboid(v(x, 1.0, 0.0), v(1.0, 1.0, 1.0), DVec3::ZERO, frosted(1.5, 0.4));
+    let two = block(block(floor(scene()), -0.5), 0.5);
+    let two = two.sphere(v(-0.5, 1.0, 0.0), 0.2, matte(0.8)).sphere(v(0.5, 1.0, 0.0), 0.2, emitter(6.0));
+    for (what, build) in [("index of air", air), ("two blocks", two)] {
+        let build = build.pictured(v(0.0, 1.6, 4.0), v(0.0, 0.5, 0.0), 24.0, 8, 8).depth(6);
+        let means = both(&build, 6, [1024, 64], (20_000, 0.05));
+        assert_same_light(what, means, 1.5e-2, 4e-3);
+    }
 }

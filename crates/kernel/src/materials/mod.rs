@@ -171,6 +171,15 @@ impl Bsdf {
         }
     }
 
+    /// Whether it is a sheet that scatters light to its other side.
+    pub fn lets_through(&self) -> bool {
+        match self {
+            Self::Rough(rough) => rough.lets_through(),
+            Self::Coated(coated) => coated.base.lets_through(),
+            Self::Mirror(_) | Self::Glass(_) | Self::Pane(_) => false,
+        }
+    }
+
     /// Its main colour, and the number of texture look-ups for it.
     #[inline]
     pub fn albedo(&self, at: &TexturePoint, lookups: &mut u64) -> Vec3 {

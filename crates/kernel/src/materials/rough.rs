@@ -391,6 +391,16 @@ kinds! {
     }
 }
 
+impl Rough {
+    /// Whether it may scatter light to its other side.
+    pub fn lets_through(&self) -> bool {
+        match self {
+            Self::Principled(principled) => principled.lets_through(),
+            Self::Phong(_) | Self::Metal(_) | Self::BrushedMetal(_) | Self::Plastic(_) => false,
+        }
+    }
+}
+
 impl RoughBsdf {
     /// The BSDF for light that comes through the surface, which is of another kind. `None` if none comes.
     #[inline(always)]

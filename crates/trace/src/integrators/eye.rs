@@ -16,7 +16,7 @@ use super::transport::accumulator::{Accumulator, Part};
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
 use super::transport::crossing::CrossingMemory;
-use super::transport::interface::{Interface, interface, reflected};
+use super::transport::interface::{Interface, interface, reflected, through_sheet};
 use super::transport::medium::Medium;
 use super::transport::packet::{PacketHits, PacketSource};
 use super::transport::ray::PathRay;
@@ -156,12 +156,12 @@ impl<'a> Walker<'a> for Wavefront<'a, '_> {
     #[inline(always)]
     fn reach(&mut self, path: &PathRay, reached: Reached<'_, 'a>, _has_passed: bool) {
         match reached {
-            Reached::Opaque(vertex, hit) => {
+            Reached::Opaque(vertex, hit, far) => {
                 if self.arrive(path, vertex, hit) {
                     match &vertex.material.bsdf {
-                        Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough),
+                        Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
-                        Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated),
+                        Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, far),
                         Bsdf::Glass(_) | Bsdf::Pane(_) => {}
                     }
                 }
@@ -399,7 +399,8 @@ impl Wavefront<'_, '_> {
         self.goes_on()
     }
 
-    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough) {
+    /// Shades a rough surface before a medium.
+    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, far: Medium) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.tile.settings.render.ambient;
         let takes_ambient = ambient != Vec3::ZERO && self.accumulator.takes_ambient(path);
@@ -422,7 +423,7 @@ impl Wavefront<'_, '_> {
         if bsdf.is_black() {
             return;
         }
-        self.light_rough(path, vertex, &bsdf, path.medium);
+        self.light_rough(path, vertex, &bsdf, far);
     }
 
     /// Queues the vertices of a rough surface for direct light, with the medium behind it.
@@ -447,7 +448,10 @@ impl Wavefront<'_, '_> {
         );
         // Light that comes through has a vertex of its own; a share of the light that arrives is that of the viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| measure != Measure::ArrivingShare) {
-            let (path, vertex) = (&PathRay { medium: far, ..*path }, &vertex.behind());
+            let is_glass = vertex.material.bsdf.glass().is_some();
+            let part = if is_glass { 1.0 } else { through_sheet(tile.world, path.medium, far) };
+            let throughput = path.throughput * part;
+            let (path, vertex) = (&PathRay { medium: far, throughput, ..*path }, &vertex.behind());
             let lit = ShadingVertex { path, place, vertex, shading, bsdf: &bsdf };
             self.direct.push(tile, &lit, measure, is_dark(far));
         }
@@ -467,7 +471,7 @@ impl Wavefront<'_, '_> {
     }
 
     /// Splits a path at a smooth coat, or chooses between the coat and its base as often as the coat reflects.
-    fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated) {
+    fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, far: Medium) {
         let shading = vertex.shading(self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
@@ -487,7 +491,7 @@ impl Wavefront<'_, '_> {
             let mut state = path.state;
             state.roulette_throughput *= by_chance;
             let path = PathRay { throughput: path.throughput * by_chance, state, ..*path };
-            self.shade_rough(&path, vertex, &coated.base);
+            self.shade_rough(&path, vertex, &coated.base, far);
         }
     }
 

@@ -20,6 +20,7 @@ impl World {
         let is_mipmapped = materials.iter().any(Material::is_mipmapped);
         let is_rough = |material: &Material| material.bsdf.glass().is_some_and(|glass| !glass.is_smooth());
         let has_rough_glass = materials.iter().any(is_rough);
+        let has_glass = materials.iter().any(|material| material.bsdf.glass().is_some());
         let bodies = parts.bodies.clone().unwrap_or_else(|| Arc::new(bodies_of(scene, parts)));
         let world = Self {
             camera,
@@ -31,6 +32,7 @@ impl World {
             object_materials,
             lights,
             has_open_glass: bodies.has_open(),
+            has_glass,
             has_rough_glass,
             bodies,
             dark_bodies: Box::default(),

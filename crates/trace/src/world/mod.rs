@@ -103,6 +103,8 @@ pub struct World {
     bodies: Arc<Bodies>,
     /// Whether any body of glass is open.
     has_open_glass: bool,
+    /// Whether any material is glass.
+    has_glass: bool,
     /// Whether the surface of any glass is rough.
     has_rough_glass: bool,
     /// Whether each object is the place of a body of glass without a lamp in it; empty without rough glass.
@@ -204,6 +206,11 @@ impl World {
         }
         let mesh = self.geometry.objects()[object as usize].mesh();
         mesh.is_none_or(|mesh| !mesh.tree.loaded().mesh.uvs.is_empty())
+    }
+
+    /// Whether any material is glass.
+    pub fn has_glass(&self) -> bool {
+        self.has_glass
     }
 
     /// Whether the surface of any glass is rough.

@@ -13,16 +13,37 @@ use ::exr::prelude::{Vec2, f16};
 use ::image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-/// Bytes of a pixel: three floats.
-const PIXEL_BYTES: usize = 12;
+/// Bytes of a sample.
+const SAMPLE_BYTES: usize = 4;
 
-/// Decoder of a colour or grey from one part of the file: its display window, black outside of the data, in the largest
+/// Decoder of a colour or grey, with its alpha, from one part of the file: its display window, black outside of the data, in the largest
 /// resolution.
 pub(super) struct ExrDecoder<R> {
     reader: Reader<R>,
     part: usize,
-    /// Indices of red, green and blue among the channels; all the same for grey.
-    channels: [usize; 3],
+    channels: Chosen,
+}
+
+/// Indices among the channels of a part.
+#[derive(Clone, Copy)]
+struct Chosen {
+    /// Red, green and blue; all the same for grey.
+    color: [usize; 3],
+    /// Alpha.
+    alpha: Option<usize>,
+}
+
+impl Chosen {
+    /// Samples of a pixel.
+    fn count(self) -> usize {
+        if self.alpha.is_some() { 4 } else { 3 }
+    }
+
+    /// The places of a channel among the samples of a pixel.
+    fn slots(self, channel: usize) -> impl Iterator<Item = usize> {
+        let all = [Some(self.color[0]), Some(self.color[1]), Some(self.color[2]), self.alpha];
+        (0..4).filter(move |&slot| all[slot] == Some(channel))
+    }
 }
 
 impl<R: BufRead + Seek> ExrDecoder<R> {
@@ -61,32 +82,35 @@ fn block_bytes(header: &Header) -> u64 {
 struct Layer {
     rgb: [Option<usize>; 3],
     luminance: Option<usize>,
+    alpha: Option<usize>,
     has_chroma: bool,
 }
 
 impl Layer {
-    fn color(&self) -> Option<[usize; 3]> {
+    fn color(&self) -> Option<Chosen> {
         let [red, green, blue] = self.rgb;
-        Some([red?, green?, blue?])
+        Some(Chosen { color: [red?, green?, blue?], alpha: self.alpha })
     }
 
-    fn grey(&self) -> Option<[usize; 3]> {
-        self.luminance.filter(|_| !self.has_chroma).map(|luminance| [luminance; 3])
+    fn grey(&self) -> Option<Chosen> {
+        let luminance = self.luminance.filter(|_| !self.has_chroma)?;
+        Some(Chosen { color: [luminance; 3], alpha: self.alpha })
     }
 }
 
 /// The part and its channels to read. Colour comes before grey, channels without a layer's name before those with one,
 /// then the first; otherwise the only channel of a part, whatever its name.
-fn choose(headers: &[Header]) -> Option<(usize, [usize; 3])> {
+fn choose(headers: &[Header]) -> Option<(usize, Chosen)> {
     let flat = || headers.iter().enumerate().filter(|(_, header)| !header.deep);
     let parts: Vec<_> = flat().map(|(part, header)| (part, layers(header))).collect();
-    let find = |is_named: bool, channels: fn(&Layer) -> Option<[usize; 3]>| {
+    let find = |is_named: bool, channels: fn(&Layer) -> Option<Chosen>| {
         parts.iter().find_map(|(part, layers)| {
             let mut layers = layers.iter().filter(|(name, _)| name.is_empty() != is_named);
             Some((*part, layers.find_map(|(_, layer)| channels(layer))?))
         })
     };
-    let alone = || flat().find(|(_, header)| header.channels.list.len() == 1).map(|(part, _)| (part, [0; 3]));
+    let only = Chosen { color: [0; 3], alpha: None };
+    let alone = || flat().find(|(_, header)| header.channels.list.len() == 1).map(|(part, _)| (part, only));
     let unnamed = find(false, Layer::color).or_else(|| find(false, Layer::grey));
     unnamed.or_else(|| find(true, Layer::color)).or_else(|| find(true, Layer::grey)).or_else(alone)
 }
@@ -102,6 +126,7 @@ fn layers(header: &Header) -> BTreeMap<String, Layer> {
             "R" => layer.rgb[0] = Some(index),
             "G" => layer.rgb[1] = Some(index),
             "B" => layer.rgb[2] = Some(index),
+            "A" => layer.alpha = Some(index),
             "Y" => layer.luminance = Some(index),
             "RY" | "BY" => layer.has_chroma = true,
             _ => {}
@@ -130,7 +155,7 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
     }
 
     fn color_type(&self) -> ColorType {
-        ColorType::Rgb32F
+        if self.channels.alpha.is_some() { ColorType::Rgba32F } else { ColorType::Rgb32F }
     }
 
     fn read_image(self, samples: &mut [u8]) -> ImageResult<()> {
@@ -152,40 +177,40 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
 }
 
 /// Copies the block's part of the picture.
-fn copy(block: &UncompressedBlock, header: &Header, channels: [usize; 3], samples: &mut [u8]) {
+fn copy(block: &UncompressedBlock, header: &Header, channels: Chosen, samples: &mut [u8]) {
     let window = header.shared_attributes.display_window;
     let offset = header.own_attributes.layer_position - window.position;
-    let width = window.size.width();
+    let (width, size) = (window.size.width(), channels.count() * SAMPLE_BYTES);
     for line in block.lines(&header.channels) {
-        let slots = (0..3).filter(|&slot| channels[slot] == line.location.channel);
+        let slots = channels.slots(line.location.channel);
         let (column, row) = (line.location.position.x() as i64, line.location.position.y() as i64);
         let Ok(row) = usize::try_from(row + i64::from(offset.y())) else { continue };
-        let Some(row) = samples.chunks_exact_mut(width * PIXEL_BYTES).nth(row) else { continue };
+        let Some(row) = samples.chunks_exact_mut(width * size).nth(row) else { continue };
         let start = column + i64::from(offset.x());
         for slot in slots {
             match header.channels.list[line.location.channel].sample_type {
-                SampleType::F32 => place(row, slot, start, line.value, f32::from_ne_bytes),
+                SampleType::F32 => place((row, size), slot, start, line.value, f32::from_ne_bytes),
                 SampleType::F16 => {
-                    place(row, slot, start, line.value, |bytes| f16::from_ne_bytes(bytes).to_f32());
+                    place((row, size), slot, start, line.value, |bytes| f16::from_ne_bytes(bytes).to_f32());
                 }
                 SampleType::U32 => {
-                    place(row, slot, start, line.value, |bytes| u32::from_ne_bytes(bytes) as f32);
+                    place((row, size), slot, start, line.value, |bytes| u32::from_ne_bytes(bytes) as f32);
                 }
             }
         }
     }
 }
 
-/// Copies samples of one channel, from a column on that may lie outside of the row.
+/// Copies samples of one channel to a row with pixels of `size` bytes, from a column on that may lie outside of the row.
 fn place<const N: usize>(
-    row: &mut [u8],
+    (row, size): (&mut [u8], usize),
     slot: usize,
     start: i64,
     samples: &[u8],
     value: impl Fn([u8; N]) -> f32,
 ) {
     let (skipped, start) = if start < 0 { (start.unsigned_abs() as usize, 0) } else { (0, start as usize) };
-    let pixels = row.as_chunks_mut::<PIXEL_BYTES>().0.iter_mut().skip(start);
+    let pixels = row.chunks_exact_mut(size).skip(start);
     for (pixel, &sample) in pixels.zip(samples.as_chunks().0.iter().skip(skipped)) {
         pixel[4 * slot..4 * slot + 4].copy_from_slice(&value(sample).to_ne_bytes());
     }

@@ -96,6 +96,20 @@ fn floats_are_linear_and_cleaned() {
 }
 
 #[test]
+fn the_alpha_of_an_exr_is_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.exr");
+    let values = [1.0_f32, 0.5, 0.25, 0.125, 0.0, 3.0, 2.0, 0.75];
+    let raw: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
+    save_buffer(&path, &raw, 2, 1, ExtendedColorType::Rgba32F).expect("written");
+    let color = load_with(&path, ImageEncoding::Color).expect("an EXR").data;
+    assert_eq!(color, TexelData::Float(vec![Vec3::new(1.0, 0.5, 0.25), Vec3::new(0.0, 3.0, 2.0)]));
+    let alpha = ImageEncoding::Number { of: PixelNumber::Opacity, is_srgb: false };
+    let opacity = load_with(&path, alpha).expect("an EXR");
+    assert_eq!([opacity.get(0, 0).x, opacity.get(1, 0).x], [0.125, 0.75]);
+}
+
+#[test]
 fn grey_and_alpha_become_rgb() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.png");

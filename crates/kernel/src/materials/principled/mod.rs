@@ -189,6 +189,11 @@ struct Inputs {
 }
 
 impl Principled {
+    /// Whether it may let light through.
+    pub fn lets_through(&self) -> bool {
+        self.inputs.transmission.constant() != Some(0.0)
+    }
+
     /// The material of these inputs.
     pub fn new(inputs: PrincipledInputs) -> Self {
         let has_coat = inputs.clearcoat.constant() != Some(0.0);
@@ -298,7 +303,7 @@ impl RoughMaterial for Principled {
     #[inline]
     fn fills_rows(&self) -> bool {
         // A row has the light of one side.
-        self.inputs.transmission.constant() == Some(0.0) && self.textures().next().is_none()
+        !self.lets_through() && self.textures().next().is_none()
     }
 
     #[inline]

@@ -54,7 +54,7 @@ impl Loops for LobeRays<'_> {
             let mut ends = [-1.0; LANES];
             for i in 0..LANES {
                 let bit = 1 << i;
-                sent &= if cosines[i] > 0.0 { !0 } else { !bit };
+                sent &= if (cosines[i] > 0.0) & (densities[i] > 0.0) { !0 } else { !bit };
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
             let rays = RayRows::of(row.from, directions).leaving(row.starts(&directions));

@@ -13,7 +13,7 @@ use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::transport::batch::{ALL, UNBENT, VertexBatch};
 use crate::integrators::transport::cone::Cone;
 use crate::integrators::transport::crossing::CrossingMemory;
-use crate::integrators::transport::interface::{Interface, interface, reflected};
+use crate::integrators::transport::interface::{Interface, interface, reflected, through_sheet};
 use crate::integrators::transport::medium::{Inside, Media, Medium, ior};
 use crate::integrators::transport::packet::PacketSource;
 use crate::integrators::transport::ray::{PathRay, PathState};
@@ -162,9 +162,9 @@ impl<'a> Walker<'a> for PhotonWavefront<'a> {
     #[inline(always)]
     fn reach(&mut self, path: &PathRay, reached: Reached<'_, 'a>, has_passed: bool) {
         match reached {
-            Reached::Opaque(vertex, _) => {
+            Reached::Opaque(vertex, _, far) => {
                 let lacks_photons = self.depth == 0 && !has_passed;
-                self.shade_surface(path, vertex, lacks_photons);
+                self.shade_surface(path, vertex, (far, lacks_photons));
             }
             Reached::Glass(vertex, _, Change { far, rough: None }) => self.shade_glass(path, vertex, far),
             // Light samples find direct light.
@@ -268,12 +268,12 @@ impl PhotonWavefront<'_> {
         kept.push(photon);
     }
 
-    fn shade_surface(&mut self, path: &PathRay, vertex: &Vertex<'_>, lacks_photons: bool) {
+    fn shade_surface(&mut self, path: &PathRay, vertex: &Vertex<'_>, (far, lacks_photons): (Medium, bool)) {
         match &vertex.material.bsdf {
             // Light samples find direct light.
             Bsdf::Rough(_) if lacks_photons => {}
-            Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough, Some(1.0)),
-            Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, lacks_photons),
+            Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough, (far, Some(1.0))),
+            Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, (far, lacks_photons)),
             Bsdf::Mirror(mirror) if self.goes_on() => {
                 let shading = vertex.shading(&mut self.counters);
                 let reflectance = vertex.mirror_reflectance(mirror, &shading, true, &mut self.counters);
@@ -287,14 +287,20 @@ impl PhotonWavefront<'_> {
     /// Stores a photon at a surface under a smooth coat, and lets the coat reflect it. One that came by mirrors and glass alone is
     /// reflected as often as the coat reflects, and else scattered at the base. Others are scattered nowhere else, so that all of
     /// them are reflected.
-    fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, lacks_photons: bool) {
+    fn shade_coated(
+        &mut self,
+        path: &PathRay,
+        vertex: &Vertex<'_>,
+        coated: &Coated,
+        (far, lacks_photons): (Medium, bool),
+    ) {
         let shading = vertex.shading(&mut self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let chooses = path.state.only_specular_before && !lacks_photons;
         let is_reflected = !chooses || self.tracing.tile.chooses_reflection(path, fresnel);
         if !lacks_photons {
             let by_chance = (!is_reflected).then(|| 1.0 / (1.0 - fresnel));
-            self.shade_rough(path, vertex, &coated.base, by_chance);
+            self.shade_rough(path, vertex, &coated.base, (far, by_chance));
         }
         if is_reflected && self.goes_on() {
             let specular = coated.specular(&vertex.texture_point, &mut self.counters.texture_lookups);
@@ -303,13 +309,19 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon at a rough surface. If there is a factor on its flux, and it came by mirrors and glass alone, it is scattered with
-    /// that factor.
-    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, scattered: Option<f32>) {
+    /// Stores a photon at a rough surface before a medium. If there is a factor on its flux, and it came by mirrors and glass alone,
+    /// it is scattered with that factor.
+    fn shade_rough(
+        &mut self,
+        path: &PathRay,
+        vertex: &Vertex<'_>,
+        rough: &Rough,
+        (far, scattered): (Medium, Option<f32>),
+    ) {
         let mut bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
         vertex.tint(&mut bsdf);
         if !bsdf.is_black() {
-            self.leave_photon(path, vertex, bsdf, (path.medium, scattered));
+            self.leave_photon(path, vertex, bsdf, (far, scattered));
         }
     }
 
@@ -344,7 +356,13 @@ impl PhotonWavefront<'_> {
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
         // It may go on behind the surface, where another medium changes its basic flux.
         let Some((bsdf, shading)) = behind else { return };
-        let eta = ior(tile.world, far) / ior(tile.world, path.medium);
+        let part = if vertex.material.bsdf.glass().is_some() {
+            let eta = ior(tile.world, far) / ior(tile.world, path.medium);
+            1.0 / (eta * eta)
+        } else {
+            // To the viewer's path, this is the way from the other side.
+            through_sheet(tile.world, far, path.medium)
+        };
         let medium = self.media.number(far);
         if self.open_behind.used == ALL || self.open_behind.bsdf.kind() != bsdf.kind() {
             self.scatter_open();
@@ -353,7 +371,7 @@ impl PhotonWavefront<'_> {
         let i = self.open_behind.used.trailing_ones() as usize;
         let lit = ShadingVertex { path, place: 0, vertex: &vertex.behind(), shading, bsdf: &bsdf };
         self.open_behind.put(i, tile, &lit, Measure::ALL, medium);
-        set_lane(&mut self.open_behind.throughput, i, path.throughput * (counts / (eta * eta)));
+        set_lane(&mut self.open_behind.throughput, i, path.throughput * (counts * part));
     }
 
     fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: Medium) {

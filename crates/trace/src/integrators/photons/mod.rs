@@ -54,7 +54,7 @@ use crate::integrators::transport::medium::Inside;
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::tree::bounds::Space;
 use crate::lights::{Ball, LightBounds, PhotonSource};
-use crate::materials::Material;
+use crate::materials::{Glass, Material};
 use crate::scene::description::{Render, Shadows};
 use crate::world::{Hit, World, photon_source};
 use emit::{EmittedPhotons, PhotonTracing};
@@ -350,6 +350,33 @@ fn place(of: LightBounds) -> Option<Aabb> {
     }
 }
 
+/// Objects of glass with their boxes, and their indices of refraction.
+struct Glasses(Vec<(u32, Option<Aabb>, f32)>);
+
+impl Glasses {
+    fn of(world: &World) -> Self {
+        let each = (0..).zip(world.geometry.objects()).flat_map(|(id, object)| {
+            let glasses = world.materials_of(id).filter_map(|material| material.bsdf.glass());
+            glasses.map(move |glass| (id, object.bounds(), glass.ior))
+        });
+        Self(each.collect())
+    }
+
+    /// Whether the surface of an object may be no boundary: its glass has the index of air, or may touch or overlap glass of the same
+    /// index.
+    fn may_vanish(&self, id: u32, ior: f32) -> bool {
+        let own = self.0.iter().find(|(other, ..)| *other == id).and_then(|(_, bounds, _)| *bounds);
+        let meets = |other: &Aabb| own.is_none_or(|own| own.grown(own.extent() * NEAR).meets(other));
+        let is_met = |(other, bounds, index): &(u32, Option<Aabb>, f32)| {
+            *other != id && *index == ior && bounds.as_ref().is_none_or(meets)
+        };
+        ior == 1.0 || self.0.iter().any(is_met)
+    }
+}
+
+/// Distance between boxes whose shapes may touch, by the size of one.
+const NEAR: f32 = 1e-3;
+
 /// Mirrors and glass.
 struct Specular {
     /// Balls around those that have bounds.
@@ -361,8 +388,13 @@ struct Specular {
 impl Specular {
     fn of(world: &World) -> Self {
         let mut own = Self { balls: Vec::new(), is_unbounded: false };
+        let glasses = Glasses::of(world);
         for (id, object) in (0..).zip(world.geometry.objects()) {
-            let is_specular = |material: &Material| material.bsdf.has_delta();
+            // Where indices are equal, light goes through rough glass as if there were nothing, but not on the way of a light sample.
+            let is_specular = |material: &Material| {
+                let is_passed = |glass: &Glass| glasses.may_vanish(id, glass.ior);
+                material.bsdf.has_delta() || material.bsdf.glass().is_some_and(is_passed)
+            };
             if world.materials_of(id).any(is_specular) {
                 own.balls.extend(object.ball());
                 own.is_unbounded |= object.ball().is_none();

@@ -352,6 +352,8 @@ pub const ALL: u32 = ((1_u64 << LANES) - 1) as u32;
 fn terminator(cosine: f32, smooth: f32, bend: f32) -> f32 {
     let g = smooth / (cosine * bend);
     let g = if g < 1.0 { g } else { 1.0 };
+    // Light behind the bent normal is none: of a lesser g, the polynomial would be negative too, and the product not.
+    let g = if g > 0.0 { g } else { 0.0 };
     let soft = if bend > 0.0 { -g * g * g + g * g + g } else { 1.0 };
     if (smooth > 0.0) | (bend == UNBENT) { soft } else { 0.0 }
 }

@@ -35,6 +35,14 @@ pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflect
     }
 }
 
+/// The part of basic radiance that comes through a sheet without thickness from another medium. Light that enters the denser medium
+/// spreads over fewer directions, or it would gain energy; the way back is as bright as without a change (Veach, *Robust Monte Carlo
+/// Methods for Light Transport Simulation*, 1997, section 5.2).
+pub fn through_sheet(world: &World, near: Medium, far: Medium) -> f32 {
+    let eta = ior(world, far) / ior(world, near);
+    (eta * eta).min(1.0)
+}
+
 /// Interaction of a ray with the surface of a glass.
 pub struct Interface {
     /// Reflectance.

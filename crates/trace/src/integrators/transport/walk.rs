@@ -22,8 +22,8 @@ pub const MOST_HIDDEN: usize = 64;
 
 /// Surface at which a walk ends.
 pub enum Reached<'v, 'a> {
-    /// An opaque surface.
-    Opaque(&'v Vertex<'a>, OpaqueHit),
+    /// An opaque surface, and the medium beyond it.
+    Opaque(&'v Vertex<'a>, OpaqueHit, Medium),
     /// A change of glass at a hit.
     Glass(&'v Vertex<'a>, Hit, Change),
     /// None: the ray leaves the scene.
@@ -152,8 +152,16 @@ pub fn walk<'a, W: Walker<'a>>(
                 }
             }
             path.medium = tile.without_open(path.medium);
+            let mut far = path.medium;
+            if vertex.material.bsdf.lets_through() && tile.world.has_glass() {
+                // Light may come out of glass that touches it.
+                let Crossing { sides, near, far: beyond, .. } =
+                    tile.crossing(&path, &vertex, &hit, walker.crossing());
+                (path.medium, far) = (near, beyond);
+                vertex.start_between(sides);
+            }
             let hit = way.straighten(&mut path, hit);
-            return walker.reach(&path, Reached::Opaque(&vertex, OpaqueHit::Own(hit)), has_passed);
+            return walker.reach(&path, Reached::Opaque(&vertex, OpaqueHit::Own(hit), far), has_passed);
         }
         // At glass, find all surfaces that touch here.
         let Crossing { sides, arrived, near, far, opaque } =
@@ -165,7 +173,7 @@ pub fn walk<'a, W: Walker<'a>>(
             if !vertex.material.lets_pass() || is_touched(walker, &path, &vertex) {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.straighten(&mut path, touched);
-                let reached = Reached::Opaque(&vertex, OpaqueHit::Touching(touched));
+                let reached = Reached::Opaque(&vertex, OpaqueHit::Touching(touched), far);
                 return walker.reach(&path, reached, has_passed);
             }
             path.path = path.next_path(STRAIGHT);
