@@ -4,6 +4,7 @@ use std::sync::Mutex;
 use ::image::{ExtendedColorType, save_buffer};
 
 use super::*;
+use crate::materials::number::PixelNumber;
 use crate::materials::texels::TexelData;
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
