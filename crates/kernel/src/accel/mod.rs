@@ -8,6 +8,8 @@ mod reference;
 pub mod wide_bvh;
 
 #[cfg(test)]
+mod facets_tests;
+#[cfg(test)]
 mod pathological;
 #[cfg(test)]
 mod tests;

@@ -9,6 +9,7 @@ pub mod cone;
 pub mod cuboid;
 pub mod cylinder;
 pub mod disk;
+pub mod facets;
 pub mod mesh;
 pub mod parallelogram;
 pub mod plane;

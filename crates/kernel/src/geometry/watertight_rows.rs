@@ -18,14 +18,34 @@ pub struct ShearedRows<'a> {
     shear: Lanes3,
 }
 
-/// Hits of the rays of a packet on one triangle.
-struct Hits {
-    hit: Truths,
+/// Hits of the rays of a packet, each on one triangle.
+pub(super) struct Hits {
+    pub(super) hit: Truths,
     /// Lanes that the scalar test has to decide.
-    doubtful: Truths,
-    t: Lanes,
-    u: Lanes,
-    v: Lanes,
+    pub(super) doubtful: Truths,
+    pub(super) t: Lanes,
+    pub(super) u: Lanes,
+    pub(super) v: Lanes,
+}
+
+/// Corner of a triangle: one for all rays, or one for each.
+pub(super) trait Corner: Copy {
+    /// A coordinate of the corner for the ray in a lane.
+    fn along(self, axis: usize, lane: usize) -> f32;
+}
+
+impl Corner for Vec3 {
+    #[inline(always)]
+    fn along(self, axis: usize, _: usize) -> f32 {
+        self[axis]
+    }
+}
+
+impl Corner for &Lanes3 {
+    #[inline(always)]
+    fn along(self, axis: usize, lane: usize) -> f32 {
+        self[axis][lane]
+    }
 }
 
 impl<'a> ShearedRows<'a> {
@@ -81,7 +101,7 @@ impl<'a> ShearedRows<'a> {
         found: &mut HitRows,
         folds: impl Folds,
     ) {
-        let hits = self.hits(number, corners, ends);
+        let hits = self.hits(&[number; PACKET], *corners, ends);
         let mut is_nearer = [0; PACKET];
         for i in 0..PACKET {
             // A hit at the end of a ray counts; a hit as far as one on an earlier triangle does not.
@@ -102,7 +122,7 @@ impl<'a> ShearedRows<'a> {
     /// A bit for each ray in `met` that hits a triangle; the others end below 0.
     #[inline(always)]
     pub fn any(&self, (number, corners): (u32, &[Vec3; 3]), met: u32, ends: &Ends, folds: impl Folds) -> u32 {
-        let hits = self.hits(number, corners, ends);
+        let hits = self.hits(&[number; PACKET], *corners, ends);
         let doubtful = folds.bits(&hits.doubtful) & met;
         let hit = folds.bits(&hits.hit) & met;
         if doubtful == 0 { hit } else { hit | self.decided(doubtful, corners, ends) }
@@ -135,10 +155,10 @@ impl<'a> ShearedRows<'a> {
 
     /// A corner in each ray's sheared coordinates.
     #[inline(always)]
-    fn sheared(&self, corner: Vec3) -> Lanes3 {
+    fn sheared(&self, corner: impl Corner) -> Lanes3 {
         let mut seen = [[0.0; PACKET]; 3];
         for i in 0..PACKET {
-            let [x, y, z] = [0, 1, 2].map(|axis| corner[axis] - self.rays.origin[axis][i]);
+            let [x, y, z] = [0, 1, 2].map(|axis| corner.along(axis, i) - self.rays.origin[axis][i]);
             let (is_x, is_y) = (self.longest[0][i] != 0, self.longest[1][i] != 0);
             let along = if is_x {
                 x
@@ -168,9 +188,9 @@ impl<'a> ShearedRows<'a> {
         seen
     }
 
-    /// [`ShearedRay::intersect`] side by side, for the rays that do not start on the triangle.
+    /// [`ShearedRay::intersect`] side by side, each ray with its triangle, for the rays that do not start on it.
     #[inline(always)]
-    fn hits(&self, number: u32, corners: &[Vec3; 3], ends: &Ends) -> Hits {
+    pub(super) fn hits(&self, numbers: &[u32; PACKET], corners: [impl Corner; 3], ends: &Ends) -> Hits {
         let [a, b, c] = [self.sheared(corners[0]), self.sheared(corners[1]), self.sheared(corners[2])];
         let mut hits = Hits {
             hit: [0; PACKET],
@@ -202,7 +222,7 @@ impl<'a> ShearedRows<'a> {
             let edge = 2.0 * x * y;
             let error = 3.0 * (gamma(3) * edge * z + error_edge * z + error_z * edge) * inverse.abs();
             let is_doubtful = (error > z * ILL_CONDITIONED) | (t.abs() <= error) | is_on_edge;
-            let is_inside = !(is_left & is_right) & (self.rays.start[i] != number);
+            let is_inside = !(is_left & is_right) & (self.rays.start[i] != numbers[i]);
             let is_hit = is_inside & !is_doubtful & (t > 0.0) & (t <= ends[i]);
             hits.doubtful[i] = if is_inside & is_doubtful { TRUE } else { 0 };
             hits.hit[i] = if is_hit { TRUE } else { 0 };

@@ -1,12 +1,14 @@
-//! Small meshes under one tree: a ray that passes many of them visits one set of boxes in place of a tree of each.
+//! Small meshes under one tree: a ray that passes many of them visits one set of boxes in place of a tree of each. Packets meet few
+//! triangles without a tree, as [`Facets`].
 //!
 //! The triangles are those of the instances in the scene's coordinates, rounded there; `contact` and `along` use the trees of the
 //! meshes themselves. Hits of instances that stand as in their files keep their bits.
 
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
-use crate::accel::{Ends, PACKET};
+use crate::accel::{Ends, Instructions, PACKET};
 use crate::control::{CancelToken, Cancelled};
+use crate::geometry::facets::{self, Facets};
 use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -18,8 +20,11 @@ const MOST_EACH: usize = 1 << 14;
 /// Most triangles in all: building a tree over so many takes some 10 ms.
 const MOST_IN_ALL: usize = 1 << 17;
 
-/// Least triangles in all: fewer are as fast in rows of rays, mesh by mesh.
-const LEAST_IN_ALL: usize = 64;
+/// Most triangles that rays side by side meet without a tree.
+const MOST_FACETS: usize = facets::MOST;
+
+/// Least triangles that are worth being merged: fewer are as fast in rows of rays, mesh by mesh.
+const LEAST_FACETS: usize = 8;
 
 /// Largest coordinate of a merged mesh, in units of its size: further off, rounding would bend it.
 const FARTHEST: f32 = 1024.0;
@@ -37,6 +42,8 @@ pub struct MergedTriangle {
 #[derive(Debug)]
 pub struct MergedMeshes {
     tree: TriangleTree,
+    /// What packets meet in place of the tree, if there are few triangles.
+    facets: Option<Facets>,
     /// Triangles in the order of objects, so that of hits at one distance the lowest object counts.
     triangles: Vec<MergedTriangle>,
     /// The number of the first triangle of each object; [`MergedMeshes::NOT_HERE`] of the others.
@@ -66,11 +73,22 @@ impl MergedMeshes {
         let Some(accel) = chosen.first().and_then(|&id| Some(objects[id].mesh()?.tree.accel())) else {
             return Ok(None);
         };
-        if chosen.len() < 2 || total < LEAST_IN_ALL {
+        if total < LEAST_FACETS || chosen.len() < 2 && total > MOST_FACETS {
+            return Ok(None);
+        }
+        // Few triangles are worth it only without a tree.
+        let rounded = |&id: &usize| {
+            let mesh = objects[id].mesh();
+            mesh.into_iter()
+                .flat_map(|mesh| (0..mesh.triangle_count() as u32).map(|own| mesh.rounded_corners(own)))
+        };
+        chosen.sort_unstable();
+        let facets =
+            if total > MOST_FACETS { None } else { Facets::new(chosen.iter().flat_map(rounded).collect()) };
+        if total <= MOST_FACETS && facets.is_none() {
             return Ok(None);
         }
         // Number their triangles by object.
-        chosen.sort_unstable();
         let mut triangles = Vec::with_capacity(total);
         let mut first = vec![Self::NOT_HERE; objects.len()];
         for &id in &chosen {
@@ -90,7 +108,7 @@ impl MergedMeshes {
         };
         let number = triangles.len() as u32;
         let tree = TriangleTree::build(accel, number, corners, token)?;
-        Ok(Some(Self { tree, triangles, first }))
+        Ok(Some(Self { tree, facets, triangles, first }))
     }
 
     /// The box around all.
@@ -135,8 +153,33 @@ impl MergedMeshes {
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
     /// The nearest hits of the rays in `met`, with the numbers of triangles; the others end below 0.
+    pub fn closest_rows(
+        &self,
+        by: Instructions,
+        rows: &RayRows,
+        (met, ends): (u32, &Ends),
+        found: &mut HitRows,
+    ) {
+        let Some(facets) = &self.facets else { return self.closest_by_tree(rows, met, ends, found) };
+        let undecided = facets.closest(by, rows, (met, ends), found);
+        if undecided != 0 {
+            self.closest_of_each(rows, undecided, ends, found);
+        }
+    }
+
+    /// The nearest hits of these rays, one by one.
+    #[cold]
     #[inline(never)]
-    pub fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
+    fn closest_of_each(&self, rows: &RayRows, these: u32, ends: &Ends, found: &mut HitRows) {
+        for lane in lanes(these) {
+            if let Some(hit) = self.tree.closest(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
+                found.put(lane, &hit);
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn closest_by_tree(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
         let mut hits = [None; PACKET];
         self.tree.closest_packet(&rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
@@ -148,8 +191,32 @@ impl MergedMeshes {
 
     /// A bit for each ray in `met` that hits any triangle but its own of `except`; this holds a triangle's number for each
     /// ray, or [`MergedMeshes::NO_TRIANGLE`].
+    pub fn any_rows(
+        &self,
+        by: Instructions,
+        rows: &RayRows,
+        (met, ends): (u32, &Ends),
+        except: Option<&[u32; PACKET]>,
+    ) -> u32 {
+        let Some(facets) = &self.facets else { return self.any_by_tree(rows, met, ends, except) };
+        let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET]);
+        let [hit, undecided] = facets.any(by, rows, (met, ends), own);
+        if undecided == 0 { hit } else { hit | self.any_of_each(rows, undecided, ends, own) }
+    }
+
+    /// A bit for each of these rays that hits any triangle but its own of `except`, one by one.
+    #[cold]
     #[inline(never)]
-    pub fn any_rows(&self, rows: &RayRows, met: u32, ends: &Ends, except: Option<&[u32; PACKET]>) -> u32 {
+    fn any_of_each(&self, rows: &RayRows, these: u32, ends: &Ends, except: &[u32; PACKET]) -> u32 {
+        let is_hit = |&lane: &usize| {
+            let own = (except[lane] != Self::NO_TRIANGLE).then_some(except[lane]);
+            self.tree.any(&Ray { t_max: ends[lane], ..rows.ray(lane) }, own)
+        };
+        lanes(these).filter(is_hit).fold(0, |bits, lane| bits | 1 << lane)
+    }
+
+    #[inline(never)]
+    fn any_by_tree(&self, rows: &RayRows, met: u32, ends: &Ends, except: Option<&[u32; PACKET]>) -> u32 {
         let rays = rays(rows, met);
         let Some(numbers) = except else { return self.tree.any_packet(&rays, ends, &[]) };
         let own = numbers.map(|number| (number != Self::NO_TRIANGLE).then_some(number));
@@ -158,7 +225,8 @@ impl MergedMeshes {
 
     /// Bytes that the tree takes.
     pub fn memory_bytes(&self) -> usize {
-        self.tree.memory_bytes() + size_of_val(&*self.triangles) + size_of_val(&*self.first)
+        let facets = self.facets.as_ref().map_or(0, Facets::memory_bytes);
+        self.tree.memory_bytes() + facets + size_of_val(&*self.triangles) + size_of_val(&*self.first)
     }
 }
 

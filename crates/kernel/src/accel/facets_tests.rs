@@ -1,0 +1,162 @@
+//! Few triangles against packets of rays: what is decided is what each ray finds alone, by every instruction set.
+
+use super::Instructions;
+use crate::geometry::facets::Facets;
+use crate::geometry::rows::{HitRows, PACKET, RayRows};
+use crate::geometry::watertight::ShearedRay;
+use crate::geometry::{Ray, ShapeHit};
+use crate::math::Vec3;
+use crate::math::random::signed;
+
+/// Hits of rays, the undecided, what hits any but its own, and the undecided of those.
+fn asked(by: Instructions, facets: &Facets, rays: &[Ray], except: &[u32; PACKET]) -> (HitRows, [u32; 3]) {
+    let (rows, ends) = RayRows::new(rays);
+    let (met, mut found) = (((1_u64 << rays.len()) - 1) as u32, HitRows::none());
+    let open = facets.closest(by, &rows, (met, &ends), &mut found);
+    let [any, open_any] = facets.any(by, &rows, (met, &ends), except);
+    (found, [open, any, open_any])
+}
+
+/// A box's six walls, two triangles each.
+fn walls(low: Vec3, high: Vec3) -> Vec<[Vec3; 3]> {
+    let corner =
+        |i: usize| Vec3::from([0, 1, 2].map(|axis| if i >> axis & 1 == 0 { low[axis] } else { high[axis] }));
+    let quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+    let each = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]].map(|three| three.map(corner));
+    quads.into_iter().flat_map(each).collect()
+}
+
+/// Rooms of walls with bodies in them, turned, askew, far off, or small.
+fn room(round: usize, next: &mut dyn FnMut() -> f32) -> Vec<[Vec3; 3]> {
+    let mut triangles = walls(Vec3::splat(-1.0), Vec3::ONE);
+    for _ in 0..round % 3 {
+        let at = Vec3::new(next(), next(), next()) * 0.6;
+        triangles.extend(walls(at, at + Vec3::new(next(), next(), next()).abs() * 0.4 + 0.02));
+    }
+    for _ in 0..round % 4 {
+        let at = Vec3::new(next(), next(), next()) * 0.8;
+        triangles.push([at, at + Vec3::new(next(), next(), next()), at + Vec3::new(next(), next(), next())]);
+    }
+    let angle = [0.0, 0.7, 1e-4][round / 2 % 3];
+    let (sine, cosine) = f32::sin_cos(angle);
+    let (scale, shift) = ([1.0, 300.0, 1e-3][round % 3], [0.0, 5.0, 100.0][round / 3 % 3]);
+    let uneven = if round % 5 == 0 { 0.01 } else { 0.0 };
+    triangles
+        .iter()
+        .map(|corners| {
+            corners.map(|p| {
+                let bent = Vec3::new(p.x + uneven * p.y * p.z, p.y, p.z + uneven * p.x);
+                let turned =
+                    Vec3::new(cosine * bent.x - sine * bent.y, sine * bent.x + cosine * bent.y, bent.z);
+                (turned + Vec3::splat(shift)) * scale
+            })
+        })
+        .collect()
+}
+
+fn alone(triangles: &[[Vec3; 3]], ray: &Ray, except: u32) -> Option<ShapeHit> {
+    let (sheared, mut best) = (ShearedRay::new(ray.origin, ray.direction), None);
+    for (number, corners) in
+        (0..).zip(triangles).filter(|&(number, _)| number != ray.start && number != except)
+    {
+        let end = best.map_or(ray.t_max, |best: ShapeHit| best.t);
+        let Some(hit) = sheared.intersect(corners, end) else { continue };
+        if best.is_none_or(|best| hit.t < best.t) {
+            best = Some(ShapeHit { primitive: number, ..hit });
+        }
+    }
+    best
+}
+
+#[test]
+fn what_is_decided_is_what_each_ray_finds_alone() {
+    let mut next = signed(11);
+    // Rays of each kind: all, hits, and undecided ones.
+    // Of those from surfaces near the origin, all and the undecided.
+    let (mut bounces, mut left) = (0, 0);
+    let mut counts = [[0_u32; 3]; 6];
+    for round in 0..6000 {
+        let triangles = room(round / 6, &mut next);
+        let Some(facets) = Facets::new(triangles.clone()) else { continue };
+        let kind = round % 6;
+        let any = |next: &mut dyn FnMut() -> f32| (next().abs() * (triangles.len() as f32 - 0.01)) as usize;
+        let on = |of: &[Vec3; 3], next: &mut dyn FnMut() -> f32| {
+            let (u, v) = (next().abs(), next().abs());
+            let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+            of[0] + (of[1] - of[0]) * u + (of[2] - of[0]) * v
+        };
+        let ray = |next: &mut dyn FnMut() -> f32| {
+            let (from, to) = (any(next), any(next));
+            let (start, target) = (on(&triangles[from], next), on(&triangles[to], next));
+            let own = Ray::new(start, target - start).leaving(from as u32);
+            match kind {
+                // From surfaces in any direction and to others, as bounces and shadow rays.
+                0 => Ray { direction: Vec3::new(next(), next(), next()), ..own },
+                1 => Ray { t_max: 1.0 - 1e-5, ..own },
+                // At corners, along edges and along axes.
+                2 => Ray { direction: triangles[to][0] - start, ..own },
+                3 => Ray::new(triangles[from][0], triangles[from][1] - triangles[from][0]),
+                4 => Ray::new(start, [Vec3::X, Vec3::NEG_Y, Vec3::Z][to % 3]).leaving(from as u32),
+                // From afar, and within planes.
+                _ if to % 2 == 0 => Ray::new(start * 50.0 - target * 49.0, target - start),
+                _ => Ray::new(start, on(&triangles[from], next) - start),
+            }
+        };
+        let rays: Vec<Ray> = (0..=round / 7 % PACKET).map(|_| ray(&mut next)).collect();
+        let except: [u32; PACKET] =
+            std::array::from_fn(|i| if i % 3 == 0 { any(&mut next) as u32 } else { u32::MAX });
+        for instructions in Instructions::ALL {
+            let (found, [open, hits_any, open_any]) = asked(instructions, &facets, &rays, &except);
+            for (i, ray) in rays.iter().enumerate() {
+                let (own, other) = (alone(&triangles, ray, u32::MAX), alone(&triangles, ray, except[i]));
+                let is = |bits: u32| bits & 1 << i != 0;
+                let what = || format!("round {round}, {instructions:?}, {ray:?}, except {}", except[i]);
+                if is(open) {
+                    assert_eq!(found.get(i), None, "{}", what());
+                } else {
+                    assert_eq!(found.get(i), own, "{}", what());
+                }
+                assert!(is(open_any) || is(hits_any) == other.is_some(), "{}", what());
+                let count = &mut counts[kind];
+                count[0] += 1;
+                count[1] += u32::from(own.is_some());
+                count[2] += u32::from(is(open));
+                let is_near = kind == 0 && round / 18 % 3 == 0;
+                (bounces, left) = (bounces + u32::from(is_near), left + u32::from(is_near && is(open)));
+            }
+        }
+    }
+    assert!(counts.iter().all(|[all, hits, _]| *all > 5000 && hits * 4 > *all), "{counts:?}");
+    assert!(left * 20 < bounces, "{left} of {bounces} are left undecided");
+}
+
+#[test]
+fn no_ray_is_lost_for_numbers_that_are_none() {
+    let facets = Facets::new(walls(Vec3::splat(-1.0), Vec3::ONE)).expect("a room");
+    let bad = [f32::NAN, f32::INFINITY, 0.0, -0.0, 1e38, 1e-40];
+    for (a, b) in bad.into_iter().flat_map(|a| bad.map(|b| (a, b))) {
+        for ray in [
+            Ray::new(Vec3::new(a, 0.1, 0.0), Vec3::new(0.3, b, 0.2)),
+            Ray::new(Vec3::splat(0.1), Vec3::new(a, b, a)),
+        ] {
+            for instructions in Instructions::ALL {
+                let (found, [open, any, open_any]) =
+                    asked(instructions, &facets, &[ray], &[u32::MAX; PACKET]);
+                let own = alone(&walls(Vec3::splat(-1.0), Vec3::ONE), &ray, u32::MAX);
+                assert!(open & 1 == 1 || found.get(0) == own, "{ray:?}");
+                assert!(open_any & 1 == 1 || (any & 1 == 1) == own.is_some(), "{ray:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn needles_and_crowds_are_left_to_others() {
+    let needle = [Vec3::ZERO, Vec3::X, Vec3::new(0.5, 1e-5, 0.0)];
+    assert!(Facets::new(vec![needle]).is_none());
+    let wall = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    assert!(Facets::new(vec![wall; 64]).is_some());
+    assert!(Facets::new(vec![wall; 65]).is_none());
+    assert!(Facets::new(vec![]).is_none());
+    assert!(Facets::new(vec![[Vec3::NAN; 3], wall]).is_none());
+}
