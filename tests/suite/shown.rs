@@ -126,6 +126,61 @@ fn an_import_is_the_picture_of_the_model() {
     assert!(desk.expect("import cubes.glb -o b.png", 2).contains("must end in .toml"));
 }
 
+/// A cube with an image that is a file of this name.
+fn with_image(uri: &str) -> Vec<u8> {
+    let mut glb = Glb::default();
+    let mut cube = cube(&mut glb);
+    cube["material"] = json!(0);
+    glb.finish(json!({
+        "nodes": [{"mesh": 0, "name": "../cube"}], "meshes": [{"primitives": [cube]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"source": 0}], "images": [{"uri": uri}]
+    }))
+}
+
+/// A file that somebody else made must not carry others of this machine into the folder of a scene.
+#[test]
+fn an_import_copies_images_alone() {
+    let desk = Desk::new();
+    desk.write("secret", "root:x:0:0\n");
+    desk.write("secret.png", "root:x:0:0\n");
+    for name in ["secret", "secret.png"] {
+        desk.write("a.glb", with_image(name));
+        let said = desk.expect("import a.glb", 2);
+        assert!(said.contains(name) && said.contains("images[0]"), "{said}");
+        assert!(!desk.path("a.toml").exists() && !desk.path("a_files").exists());
+    }
+    // An image without an ending gets that of its content; no name leads out of the folder.
+    desk.write("picture", checker());
+    desk.write("a.glb", with_image("picture"));
+    desk.expect("import a.glb", 0);
+    assert_eq!(desk.bytes("a_files/picture.png"), checker());
+    assert!(desk.path("a_files/_cube.ply").exists());
+}
+
+/// What could not be written whole is not left half.
+#[test]
+fn an_import_that_fails_leaves_nothing() {
+    let desk = Desk::new();
+    desk.write("cubes.glb", cubes(&checker()));
+    // The scene's name is taken by a folder that nobody looked for: a link to nowhere is one too.
+    std::os::unix::fs::symlink("nowhere", desk.path("taken.toml")).expect("a link");
+    assert!(desk.expect("import cubes.glb -o taken.toml", 2).contains("taken.toml exists already"));
+    assert!(!desk.path("taken_files").exists());
+    // No file may grow beyond a block of 512 bytes.
+    let glimt = env!("CARGO_BIN_EXE_glimt");
+    let shell = std::process::Command::new("sh")
+        .args(["-c", &format!("ulimit -f 1; exec {glimt} import cubes.glb -o full.toml")])
+        .current_dir(desk.path("."))
+        .output()
+        .expect("it runs");
+    let said = String::from_utf8_lossy(&shell.stderr).into_owned();
+    assert_eq!(shell.status.code(), Some(1), "{said}");
+    assert!(said.contains("cannot write full_files/") && said.contains("file too large"), "{said}");
+    assert!(!desk.path("full.toml").exists() && !desk.path("full_files").exists());
+    desk.expect("import cubes.glb -o full.toml", 0);
+}
+
 #[test]
 fn approximations_are_named_counted_and_refused_if_strict() {
     let desk = Desk::new();

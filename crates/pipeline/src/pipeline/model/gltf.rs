@@ -1,6 +1,7 @@
 //! Scenes of glTF files.
 
 use std::collections::HashMap;
+use std::io::Read;
 use std::path::Path;
 
 use super::frame::{framed, tidied};
@@ -16,6 +17,7 @@ use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
 use crate::pipeline::settings::Side;
 use crate::pipeline::stages::containers::Containers;
+use crate::scene::keys::endings::MAPS;
 use crate::scene::quoted;
 
 /// The files in which the text finds parts and images.
@@ -260,7 +262,9 @@ impl super::materials::Files for Writer<'_> {
                 let ending = match &bytes {
                     Ok(ImageBytes::Inside(bytes)) => ending(bytes).to_owned(),
                     Ok(ImageBytes::File(path)) => {
-                        path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+                        let own = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+                        let start = || first_bytes(path).unwrap_or_default();
+                        if MAPS.contains(&own.as_str()) { own } else { ending(&start()).to_owned() }
                     }
                     Err(_) => "png".to_owned(),
                 };
@@ -287,6 +291,13 @@ fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
         }
     };
     lights.iter().map(of_light).sum()
+}
+
+/// The first bytes of a file. `None` if it cannot be read.
+fn first_bytes(path: &Path) -> Option<[u8; 4]> {
+    let (mut file, _) = crate::system::file::open(path).ok()?.ok()?;
+    let mut start = [0; 4];
+    file.read_exact(&mut start).ok().map(|()| start)
 }
 
 /// The ending of an image by its first bytes.
