@@ -23,8 +23,10 @@ pub(super) fn run(args: &ImportArgs, console: &Console) -> Exit {
     let folder = format!("{}_files", name.to_string_lossy());
     let beside = scene.with_file_name(&folder);
     if let Some(there) = [&scene, &beside].into_iter().find(|path| path.symlink_metadata().is_ok()) {
-        return console
-            .fail(Exit::WRONG, &format!("{} exists already, and is left as it is; name another scene with -o", there.display()));
+        return console.fail(
+            Exit::WRONG,
+            &format!("{} exists already, and is left as it is; name another scene with -o", there.display()),
+        );
     }
     let imported = match import(&args.file, &folder) {
         Ok(imported) => imported,

@@ -103,7 +103,9 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
     }
     if let Some(twin) = turntable::twin(&args.outputs, args.turntable.unwrap_or(1)) {
         let name = twin.display();
-        return Err(format!("{name} would hold two pictures of the turntable: name the files more differently"));
+        return Err(format!(
+            "{name} would hold two pictures of the turntable: name the files more differently"
+        ));
     }
     match &args.report {
         Some(path) if path != Path::new(STANDARD) && !turntable::has_number(path) => {

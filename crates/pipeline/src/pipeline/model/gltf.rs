@@ -7,10 +7,13 @@ use std::path::Path;
 use super::frame::{framed, tidied};
 use super::materials::{Materials, TextureFile};
 use super::toml::{Toml, color, list, number, vector};
-use super::{Eye, FOV, Lighting, ModelText, SIZE, Show, Unique, camera, file_name, ground, light, render};
+use super::{
+    Eye, FOV, Lighting, ModelText, ROUGH, SIZE, Show, Unique, camera, file_name, ground, light, render,
+};
 use crate::assets::AssetError;
 use crate::assets::gltf::{
-    Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelScene,
+    Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelScene,
+    Slot,
 };
 use crate::control::{CancelToken, unwatched};
 use crate::math::color::luminance;
@@ -102,7 +105,7 @@ impl Writer<'_> {
             .and_then(|camera| camera.aspect)
             .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
         let lighting = match scene.lights.is_empty() {
-            true => Lighting::Ours,
+            true => Lighting::Ours { is_polished: scene.materials.iter().any(is_polished) },
             false => Lighting::own(irradiance(&scene.lights, bounds)),
         };
         render(&mut self.toml, size, lighting);
@@ -274,6 +277,14 @@ impl super::materials::Files for Writer<'_> {
             }
         }
     }
+}
+
+/// Whether a material may throw light on others as a mirror does. A texture may have any number up to its factor.
+fn is_polished(material: &ModelMaterial) -> bool {
+    let is_smooth = |roughness: &Slot| roughness.texture.is_some() || roughness.factor.x < ROUGH;
+    let reflects = material.metallic.factor.x > 0.0 || material.specular.factor.x > 0.0;
+    let is_coated = material.clearcoat.factor.x > 0.0 && is_smooth(&material.clearcoat_roughness);
+    is_coated || is_smooth(&material.roughness) && (reflects || material.transmission.factor.x > 0.0)
 }
 
 /// Irradiance at normal incidence that lights may bring to the middle of a box, all of them together. Lights inside it count from
