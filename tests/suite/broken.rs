@@ -364,7 +364,7 @@ const BROKEN: &[(&str, &[Said])] = &[
         &[
             (8, 10, r#"`rotate` must be a number; found the string "half""#),
             (9, 10, "`offset` must be two numbers, [u, v]; found an array of 1 value"),
-            (10, 6, "`uv` must be 0: the mesh files of this version have one set of texture coordinates"),
+            (10, 6, "`uv` must be a whole number between 0 and 1; found 2"),
             (17, 18, r#"`emission_sides` cannot be "back""#),
             (18, 11, r#"`opacity` must be a number, or { texture = "name" }; found the name of a texture"#),
             (19, 18, "`opacity_cutoff` must be between 0 and 1; found 2"),
@@ -378,6 +378,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (52, 41, "`matrix` must be a finite number; found nan"),
             (57, 10, "`matrix` must be 16 numbers, row by row; found an array of 9 values"),
             (58, 17, r#"`vertex_colors` must be true or false; found the string "red""#),
+            (65, 7, "`ior` must be a number; found a table"),
         ],
     ),
     (

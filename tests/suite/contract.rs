@@ -473,7 +473,7 @@ fn the_ends_of_the_promised_ranges_are_in_them() {
         "[materials.a]\ntype = \"glass\"\nthin = true\nopacity = 0.5",
         "[materials.a]\nopacity = 0\nopacity_cutoff = 1",
         "[materials.a]\nopacity = { texture = \"b\", channel = \"a\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
-        "[textures.b]\nfile = \"textures/bumps.png\"\noffset = [-0.5, 7]\nrotate = -720\nuv = 0",
+        "[textures.b]\nfile = \"textures/bumps.png\"\noffset = [-0.5, 7]\nrotate = -720\nuv = 1",
         "[materials.a]\ntype = \"metal\"\neta = [0, 0, 0]\nk = [9, 9, 9]\nroughness = 0\nanisotropy = -1",
         "[materials.a]\ntype = \"metal\"\ncolor = 1\nroughness = { texture = \"b\" }\n[textures.b]\nfile = \"textures/bumps.png\"",
         "[materials.a]\ntype = \"plastic\"\nior = 1\nroughness = 1",
@@ -509,7 +509,7 @@ fn the_ends_of_the_promised_ranges_are_in_them() {
         "[materials.a]\nopacity = 1.1",
         "[materials.a]\nopacity_cutoff = -0.1",
         "[materials.a]\ntype = \"glass\"\nopacity = 0.5",
-        "[textures.b]\nfile = \"textures/bumps.png\"\nuv = 1",
+        "[textures.b]\nfile = \"textures/bumps.png\"\nuv = 2",
     ] {
         assert_eq!(said(wrong), 1, "{wrong}");
     }

@@ -3,6 +3,7 @@
 mod bench;
 mod bias;
 mod broken;
+mod broken_models;
 mod bytes;
 mod checkpoints;
 mod closed_forms;

@@ -126,6 +126,100 @@ fn an_import_is_the_picture_of_the_model() {
     assert!(desk.expect("import cubes.glb -o b.png", 2).contains("must end in .toml"));
 }
 
+/// The colour by the first set of coordinates, the emission by the second, as programs with light maps write it.
+#[test]
+fn both_sets_of_coordinates_are_shown_and_imported() {
+    let desk = Desk::new();
+    let write = |emission_set: u32| {
+        let mut glb = Glb::default();
+        let mut cube = cube(&mut glb);
+        let second: Vec<[f32; 2]> = (0..24).map(|i| [(i / 4) as f32 / 6.0, (i % 4) as f32 / 4.0]).collect();
+        cube["attributes"]["TEXCOORD_1"] = json!(glb.vectors(&second));
+        cube["material"] = json!(0);
+        let view = glb.view(&checker());
+        let file = glb.finish(json!({
+            "nodes": [{"mesh": 0, "name": "cube"}], "meshes": [{"primitives": [cube]}],
+            "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}},
+                "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0, "texCoord": emission_set}}],
+            "textures": [{"source": 0}],
+            "images": [{"bufferView": view, "mimeType": "image/png", "name": "checks"}]
+        }));
+        desk.write("a.glb", file);
+    };
+    write(0);
+    let of_one = picture(&desk, "a.glb");
+    write(1);
+    let of_both = picture(&desk, "a.glb");
+    assert_ne!(of_one, of_both);
+    let said = desk.expect("import a.glb", 0);
+    assert!(!said.contains("approximation"), "{said}");
+    assert_eq!(picture(&desk, "a.toml"), of_both);
+    let text = fs::read_to_string(desk.path("a.toml")).expect("a scene");
+    assert!(text.contains("[textures.checks_2]\nfile = \"a_files/checks.png\"\nuv = 1\n"), "{text}");
+    // A mesh without a second set says so, and shows the first.
+    desk.write("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n");
+    desk.write("b.toml", text.replace("a_files/cube.ply", "b.obj"));
+    let said = desk.expect(&format!("b.toml {SMALL} -o b.exr"), 0);
+    let words =
+        "b.obj has no second set of texture coordinates: \"checks_2\" of \"material\" takes the first";
+    assert!(said.contains(words), "{said}");
+}
+
+/// A cube with an image that is a file of this name.
+fn with_image(uri: &str) -> Vec<u8> {
+    let mut glb = Glb::default();
+    let mut cube = cube(&mut glb);
+    cube["material"] = json!(0);
+    glb.finish(json!({
+        "nodes": [{"mesh": 0, "name": "../cube"}], "meshes": [{"primitives": [cube]}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"source": 0}], "images": [{"uri": uri}]
+    }))
+}
+
+/// A file that somebody else made must not carry others of this machine into the folder of a scene.
+#[test]
+fn an_import_copies_images_alone() {
+    let desk = Desk::new();
+    desk.write("secret", "root:x:0:0\n");
+    desk.write("secret.png", "root:x:0:0\n");
+    for name in ["secret", "secret.png"] {
+        desk.write("a.glb", with_image(name));
+        let said = desk.expect("import a.glb", 2);
+        assert!(said.contains(name) && said.contains("images[0]"), "{said}");
+        assert!(!desk.path("a.toml").exists() && !desk.path("a_files").exists());
+    }
+    // An image without an ending gets that of its content; no name leads out of the folder.
+    desk.write("picture", checker());
+    desk.write("a.glb", with_image("picture"));
+    desk.expect("import a.glb", 0);
+    assert_eq!(desk.bytes("a_files/picture.png"), checker());
+    assert!(desk.path("a_files/_cube.ply").exists());
+}
+
+/// Files that could not all be written are removed.
+#[test]
+fn an_import_that_fails_leaves_nothing() {
+    let desk = Desk::new();
+    desk.write("cubes.glb", cubes(&checker()));
+    // The scene's name is taken by a folder that nobody looked for: a link to nowhere is one too.
+    std::os::unix::fs::symlink("nowhere", desk.path("taken.toml")).expect("a link");
+    assert!(desk.expect("import cubes.glb -o taken.toml", 2).contains("taken.toml exists already"));
+    assert!(!desk.path("taken_files").exists());
+    // No file may grow beyond a block of 512 bytes.
+    let glimt = env!("CARGO_BIN_EXE_glimt");
+    let shell = std::process::Command::new("sh")
+        .args(["-c", &format!("ulimit -f 1; exec {glimt} import cubes.glb -o full.toml")])
+        .current_dir(desk.path("."))
+        .output()
+        .expect("it runs");
+    let said = String::from_utf8_lossy(&shell.stderr).into_owned();
+    assert_eq!(shell.status.code(), Some(1), "{said}");
+    assert!(said.contains("cannot write full_files/") && said.contains("file too large"), "{said}");
+    assert!(!desk.path("full.toml").exists() && !desk.path("full_files").exists());
+    desk.expect("import cubes.glb -o full.toml", 0);
+}
+
 #[test]
 fn approximations_are_named_counted_and_refused_if_strict() {
     let desk = Desk::new();
@@ -178,6 +272,34 @@ fn a_model_s_own_cameras_and_lights_count() {
         assert!(text.contains(words), "{words}\nin\n{text}");
     }
     assert!(!text.contains("directional"), "{text}");
+}
+
+/// Light by way of polished surfaces is cut, and that is said. Other models show all of it.
+#[test]
+fn only_polished_models_are_clamped_and_say_so() {
+    let desk = Desk::new();
+    for (roughness, is_polished) in [(0.1, true), (0.5, false)] {
+        let mut glb = Glb::default();
+        let mut cube = cube(&mut glb);
+        cube["material"] = json!(0);
+        desk.write(
+            "a.glb",
+            glb.finish(json!({
+                "nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}],
+                "materials": [{"pbrMetallicRoughness": {"roughnessFactor": roughness}}]
+            })),
+        );
+        let said = desk.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
+        assert_eq!(
+            said.contains("the light that its polished surfaces throw on others is cut"),
+            is_polished,
+            "{said}"
+        );
+        assert_eq!(said.contains("--clamp 0 shows all of it"), is_polished, "{said}");
+        assert!(!desk.expect(&format!("a.glb {SMALL} -o a.exr --clamp 0"), 0).contains("cut"));
+    }
+    desk.write("box.obj", box_of([1, 1, 1]));
+    assert!(!desk.expect(&format!("box.obj {SMALL} -o a.exr"), 0).contains("clamp"));
 }
 
 /// A part of a scene's own, and a whole file with its materials.

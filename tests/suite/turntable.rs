@@ -134,6 +134,7 @@ fn what_a_turntable_cannot_be_is_refused_before_the_work() {
     says("--once --turntable 4 -o a.gif --bit-depth 16", "8 bits a channel");
     says("--once --turntable 4 -o a_#.gif -o a_#.xyz", ".xyz is not a format");
     says("--once --turntable 4 -o a_#.png -o a_#.png", "given twice");
+    says("--once --turntable 11 -o a_#.png -o a_1#.png", "a_11.png would hold two pictures");
     // A later picture would replace an input: nothing is rendered.
     desk.write("a3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
     let scene = format!("{}[textures.t]\nfile = \"a3.png\"\n", super::desk::SCENE);
@@ -141,9 +142,21 @@ fn what_a_turntable_cannot_be_is_refused_before_the_work() {
     let stderr = desk.expect("uses.toml --once --turntable 4 -o a#.png", 2);
     assert!(stderr.contains("cannot write a3.png"), "{stderr}");
     assert!(!desk.path("a1.png").exists());
+    let stderr = desk.expect("ball.toml --once --turntable 10000 -o a.gif --width 1000 --height 1000", 1);
+    assert!(stderr.contains("27.94 GiB of memory until it is written"), "{stderr}");
     let stderr =
         desk.expect("ball.toml --once --turntable 10000 -o a.gif --width 64 --height 64 --memory 30MiB", 1);
     assert!(stderr.contains("the frames") && stderr.contains("render fewer or smaller frames"), "{stderr}");
+}
+
+#[test]
+fn pictures_that_are_one_file_by_a_link_are_found_before_the_work() {
+    let desk = around();
+    std::os::unix::fs::symlink("a_3.png", desk.path("a_1.png")).expect("a link");
+    desk.write("a_3.png", std::fs::read("assets/textures/checker.png").expect("an image"));
+    let stderr = desk.expect(&format!("around.toml {SMALL} --turntable 4 -o a_#.png"), 2);
+    assert!(stderr.contains("the outputs a_1.png and a_3.png are one file"), "{stderr}");
+    assert!(!desk.path("a_2.png").exists());
 }
 
 /// Without a name they are those of the scene, and replace only what glimt wrote.

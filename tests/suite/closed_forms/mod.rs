@@ -32,6 +32,7 @@ mod speckle;
 mod straight;
 mod touching;
 mod two_sided;
+mod uv_sets;
 mod views;
 
 use glimt::math::DVec3;

@@ -14,7 +14,8 @@ use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::{
     Accel, Camera, ColorSource, EmissionSource, Encoding, Environment, Falloff, FresnelSource, Integrator,
     Light, Located, Material, MaterialKind, Mesh, MeshFile, NumberSource, Object, OpacitySource, Photons,
-    PixelFilter, Placement, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, Wrap,
+    PixelFilter, Placement, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap,
+    UvSet, Wrap,
 };
 use glimt::world::{Geometry, Image, Lookups, MeshTree, Parts, World, lights, origin, sky, textures_needed};
 
@@ -199,6 +200,7 @@ impl Build {
             repeat,
             rotate: 0.0,
             offset: Vec2::ZERO,
+            uv: UvSet::First,
             encoding: Encoding::Linear,
             image: None,
             factor: Vec3::ONE,

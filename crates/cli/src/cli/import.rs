@@ -1,6 +1,5 @@
 //! `glimt import`: a scene of a file of another program.
 
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::args::ImportArgs;
@@ -24,8 +23,10 @@ pub(super) fn run(args: &ImportArgs, console: &Console) -> Exit {
     let folder = format!("{}_files", name.to_string_lossy());
     let beside = scene.with_file_name(&folder);
     if let Some(there) = [&scene, &beside].into_iter().find(|path| path.symlink_metadata().is_ok()) {
-        return console
-            .fail(Exit::WRONG, &format!("{} exists already, and is left as it is", there.display()));
+        return console.fail(
+            Exit::WRONG,
+            &format!("{} exists already, and is left as it is; name another scene with -o", there.display()),
+        );
     }
     let imported = match import(&args.file, &folder) {
         Ok(imported) => imported,
@@ -66,20 +67,35 @@ fn tell_notes(file: &Path, notes: &[String], console: &Console) {
     }
 }
 
-/// Writes the other files, then the scene, none of them over a file.
+/// Writes the other files, then the scene, none of them over a file. After an error, nothing of this is left.
 fn write_all(scene: &Path, imported: &Imported) -> Result<(), OutputError> {
-    let folder = scene.parent().unwrap_or(Path::new(""));
-    let at = |path: PathBuf| move |source| OutputError::File { path, source };
-    for (name, bytes) in &imported.files {
-        let path = folder.join(name);
-        let inside = path.parent().unwrap_or(folder);
-        match std::fs::create_dir(inside) {
-            Err(error) if error.kind() != ErrorKind::AlreadyExists => {
-                return Err(at(inside.to_owned())(error));
-            }
-            Ok(()) | Err(_) => {}
+    let mut made = Vec::new();
+    let written = write_each(scene, imported, &mut made);
+    if written.is_err() {
+        // Folders stay if somebody else has put a file there. The caller reports the error in any case.
+        for path in made.iter().rev() {
+            let _ = if path.is_dir() { std::fs::remove_dir(path) } else { std::fs::remove_file(path) };
         }
-        write::new_file(&path, bytes).map_err(at(path.clone()))?;
     }
-    write::new_file(scene, imported.text.as_bytes()).map_err(at(scene.to_owned()))
+    written
+}
+
+/// Writes the files; adds to `made` what is new, folders before their files.
+fn write_each(scene: &Path, imported: &Imported, made: &mut Vec<PathBuf>) -> Result<(), OutputError> {
+    let folder = scene.parent().unwrap_or(Path::new(""));
+    let at = |path: &Path| {
+        let path = path.to_owned();
+        move |source| OutputError::File { path, source }
+    };
+    let files = imported.files.iter().map(|(name, bytes)| (folder.join(name), bytes.as_slice()));
+    for (path, bytes) in files.chain([(scene.to_owned(), imported.text.as_bytes())]) {
+        let inside = path.parent().unwrap_or(folder);
+        if inside != folder && !made.iter().any(|known| known == inside) {
+            std::fs::create_dir(inside).map_err(at(inside))?;
+            made.push(inside.to_owned());
+        }
+        write::new_file(&path, bytes).map_err(at(&path))?;
+        made.push(path);
+    }
+    Ok(())
 }

@@ -101,6 +101,12 @@ fn check_turntable(args: &RenderArgs) -> Result<(), String> {
         turntable::check_name(path)?;
         check_once(&args.outputs, index)?;
     }
+    if let Some(twin) = turntable::twin(&args.outputs, args.turntable.unwrap_or(1)) {
+        let name = twin.display();
+        return Err(format!(
+            "{name} would hold two pictures of the turntable: name the files more differently"
+        ));
+    }
     match &args.report {
         Some(path) if path != Path::new(STANDARD) && !turntable::has_number(path) => {
             let name = turntable::suggested(path);

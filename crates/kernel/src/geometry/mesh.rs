@@ -14,6 +14,8 @@ pub struct TriangleMesh {
     pub normals: Vec<Vec3>,
     /// Vertex texture coordinates, or empty; v = 0 is the bottom row of an image.
     pub uvs: Vec<Vec2>,
+    /// Second set of vertex texture coordinates, or empty.
+    pub second_uvs: Vec<Vec2>,
     /// Vertex colours in sRGB, or empty.
     pub colors: Vec<[u8; 3]>,
     /// Corners of each triangle; front along (b − a) × (c − a).
@@ -61,6 +63,7 @@ impl TriangleMesh {
         size_of_val(self.positions.as_slice())
             + size_of_val(self.normals.as_slice())
             + size_of_val(self.uvs.as_slice())
+            + size_of_val(self.second_uvs.as_slice())
             + size_of_val(self.colors.as_slice())
             + size_of_val(self.triangles.as_slice())
             + size_of_val(self.materials.as_slice())

@@ -2,19 +2,49 @@
 
 use crate::math::{DVec2, Vec2, Vec3};
 
+/// A set of texture coordinates of a mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum UvSet {
+    /// The first, which shapes have as well.
+    #[default]
+    First,
+    /// The second, or the first if the mesh has one alone.
+    Second,
+}
+
 /// A place in a texture, with the footprint of the look-up.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TexturePoint {
     /// Texture coordinates.
     pub uv: DVec2,
     /// Footprint around them; filters without mip levels ignore it.
     pub footprint: Footprint,
+    /// The place by the second set of coordinates. `None` if the object has none, or no texture asks for it. In a box, so that
+    /// points without it stay small.
+    pub second: Option<Box<SecondPoint>>,
+}
+
+/// A place by the second set of texture coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SecondPoint {
+    /// Texture coordinates.
+    pub uv: DVec2,
+    /// Footprint around them.
+    pub footprint: Footprint,
+    /// Changes of the point with u and v.
+    pub tangents: [Vec3; 2],
 }
 
 impl TexturePoint {
     /// A point without extent.
     pub fn sharp(uv: DVec2) -> Self {
-        Self { uv, footprint: Footprint::POINT }
+        Self { uv, footprint: Footprint::POINT, second: None }
+    }
+
+    /// The same point without extent.
+    pub fn without_extent(&self) -> Self {
+        let sharp = |second: &SecondPoint| Box::new(SecondPoint { footprint: Footprint::POINT, ..*second });
+        Self { uv: self.uv, footprint: Footprint::POINT, second: self.second.as_deref().map(sharp) }
     }
 }
 

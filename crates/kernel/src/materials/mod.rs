@@ -29,7 +29,7 @@ pub mod texture;
 
 pub use coated::Coated;
 pub use emission::{Emission, EmissionSides};
-pub use footprint::{Footprint, TexturePoint};
+pub use footprint::{Footprint, SecondPoint, TexturePoint, UvSet};
 pub use frosted::GlassPoint;
 pub use glass::Glass;
 pub use metal::{Metal, MetalFresnel};

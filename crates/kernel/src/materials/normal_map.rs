@@ -22,7 +22,8 @@ impl NormalMap {
     #[inline]
     pub fn bend(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
         let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
-        let slope = self.texture.direction_before(at.uv, mapped.truncate() * self.strength);
+        let slope = self.texture.direction_before(at, mapped.truncate() * self.strength);
+        let [dpdu, dpdv] = self.texture.tangents(at, [dpdu, dpdv]);
         let (tangent, bitangent) = tangents(normal, dpdu, dpdv);
         let bent = tangent * slope.x + bitangent * slope.y + normal * mapped.z.abs();
         bent.try_normalize().unwrap_or(normal)
@@ -43,6 +44,7 @@ fn tangents(normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> (Vec3, Vec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::materials::footprint::UvSet;
     use crate::materials::texels::{TexelData, Texels};
     use crate::materials::texture::{Moved, TextureFilter, Wrap};
     use crate::math::{DVec2, Vec2};
@@ -70,7 +72,7 @@ mod tests {
     fn slopes_turn_with_their_texture() {
         let mut turned = map(Vec3::new(0.6, 0.0, 0.8));
         let texture = Arc::make_mut(&mut turned.texture);
-        texture.moved = Moved::new(90.0, DVec2::ZERO).map(Box::new);
+        texture.moved = Moved::new(UvSet::First, 90.0, DVec2::ZERO).map(Box::new);
         // The texture's first coordinate is −v.
         let bent = turned.bend(&middle(), Vec3::Z, Vec3::X, Vec3::Y);
         assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6, "{bent}");

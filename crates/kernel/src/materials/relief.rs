@@ -64,7 +64,8 @@ impl Bump {
     /// The surface gradient ∇h is that of Mikkelsen (*Surface Gradient-Based Bump Mapping Framework*, JCGT 2020, section 2):
     /// ∇h = (h_u (p_v × n) + h_v (n × p_u)) / (n · (p_u × p_v)). The slopes of both are added: with the normal m of a normal map, the
     /// bent normal is along m / (m · n) − ∇h.
-    fn bend(&self, at: &TexturePoint, normal: Vec3, bent: Vec3, [dpdu, dpdv]: [Vec3; 2]) -> Vec3 {
+    fn bend(&self, at: &TexturePoint, normal: Vec3, bent: Vec3, tangents: [Vec3; 2]) -> Vec3 {
+        let [dpdu, dpdv] = self.texture.tangents(at, tangents);
         let slopes = self.texture.slopes(at) * self.scale;
         let volume = normal.dot(dpdu.cross(dpdv));
         let gradient = (dpdv.cross(normal) * slopes.x + normal.cross(dpdu) * slopes.y) / volume;

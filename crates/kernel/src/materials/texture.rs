@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::footprint::{Footprint, TexturePoint};
+use super::footprint::{SecondPoint, TexturePoint, UvSet};
 use super::mipmaps::Mipmaps;
 use super::texels::Texels;
 use crate::choice;
@@ -48,26 +48,37 @@ pub struct Texture {
     pub wrap: Wrap,
     /// Number of repetitions in u and v.
     pub repeat: Vec2,
-    /// Motion of the repeated coordinates. `None` if they stay.
+    /// Motion of the repeated coordinates. `None` if those of the first set stay.
     pub moved: Option<Box<Moved>>,
     /// Factor on what is looked up. `None` for 1; heights and their slopes have none.
     pub factor: Option<Vec3>,
 }
 
-/// Motion of texture coordinates: a rotation, then a translation.
+/// Choice and motion of texture coordinates: of a set, a rotation, then a translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moved {
     /// Sine and cosine of the angle, from u to v.
     turn: (f64, f64),
     /// Translation.
     offset: DVec2,
+    /// The coordinates that are moved.
+    of: UvSet,
 }
 
 impl Moved {
-    /// The motion by an angle in degrees about the origin, then by an offset. `None` if it changes nothing.
-    pub fn new(degrees: f64, offset: DVec2) -> Option<Self> {
-        let is_moved = degrees != 0.0 || offset != DVec2::ZERO;
-        is_moved.then(|| Self { turn: sin_cos_degrees(degrees), offset })
+    /// The motion of coordinates by an angle in degrees about the origin, then by an offset. `None` if it changes nothing.
+    pub fn new(of: UvSet, degrees: f64, offset: DVec2) -> Option<Self> {
+        let is_moved = of != UvSet::First || degrees != 0.0 || offset != DVec2::ZERO;
+        is_moved.then(|| Self { turn: sin_cos_degrees(degrees), offset, of })
+    }
+
+    /// The second coordinates at a place, if they are the ones that are moved.
+    #[inline]
+    fn second<'a>(&self, at: &'a TexturePoint) -> Option<&'a SecondPoint> {
+        match self.of {
+            UvSet::First => None,
+            UvSet::Second => at.second.as_deref(),
+        }
     }
 
     /// The moved coordinates.
@@ -142,8 +153,8 @@ impl Color {
 impl Texture {
     /// The linear value at texture coordinates, v = 0 at the bottom row; coordinates that are not finite count as 0.
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
-        let tiles = self.tiles(at.uv);
-        let value = self.in_tiles(tiles, || self.level(&at.footprint));
+        let tiles = self.tiles(at);
+        let value = self.in_tiles(tiles, || self.level(at));
         self.factor.map_or(value, |factor| value * factor)
     }
 
@@ -160,17 +171,31 @@ impl Texture {
 
     /// Coordinates that are repeated and moved: 1 is the width of the image.
     #[inline]
-    fn tiles(&self, uv: DVec2) -> DVec2 {
-        let tiles = uv * self.repeat.as_dvec2();
-        self.moved.as_ref().map_or(tiles, |moved| moved.point(tiles))
+    fn tiles(&self, at: &TexturePoint) -> DVec2 {
+        let repeat = self.repeat.as_dvec2();
+        let Some(moved) = &self.moved else { return at.uv * repeat };
+        moved.point(moved.second(at).map_or(at.uv, |second| second.uv) * repeat)
+    }
+
+    /// The set of coordinates that it is looked up by.
+    #[inline]
+    pub fn uv_set(&self) -> UvSet {
+        self.moved.as_ref().map_or(UvSet::First, |moved| moved.of)
+    }
+
+    /// Changes of the point with the coordinates that it is looked up by; `first` are those with the first set.
+    #[inline]
+    pub fn tangents(&self, at: &TexturePoint, first: [Vec3; 2]) -> [Vec3; 2] {
+        let second = self.moved.as_ref().and_then(|moved| moved.second(at));
+        second.map_or(first, |second| second.tangents)
     }
 
     /// Changes of the red channel with u and v, by central differences: over a texel, or over one of the level that the footprint
     /// chooses.
     pub fn slopes(&self, at: &TexturePoint) -> Vec2 {
-        let tiles = self.tiles(at.uv);
+        let tiles = self.tiles(at);
         let level = match (self.filter, &self.mipmaps) {
-            (TextureFilter::Mipmap, Some(mipmaps)) => self.level(&at.footprint).min(mipmaps.count() as f32),
+            (TextureFilter::Mipmap, Some(mipmaps)) => self.level(at).min(mipmaps.count() as f32),
             (TextureFilter::Mipmap | TextureFilter::Nearest | TextureFilter::Bilinear, _) => 0.0,
         };
         // Look up on both sides, along the axes of the image.
@@ -187,10 +212,10 @@ impl Texture {
 
     /// A direction in the image at texture coordinates, as one of the surface there: turned back as the image is, and mirrored where
     /// the repetition or the wrap mirrors it. Its length stays.
-    pub fn direction_before(&self, uv: DVec2, direction: Vec2) -> Vec2 {
+    pub fn direction_before(&self, at: &TexturePoint, direction: Vec2) -> Vec2 {
         let mut direction = direction.as_dvec2();
         if self.wrap == Wrap::Mirror {
-            let tiles = self.tiles(uv);
+            let tiles = self.tiles(at);
             direction *= DVec2::from([tiles.x, tiles.y].map(mirrored_tile));
         }
         let direction = self.moved.as_ref().map_or(direction, |moved| moved.vector_before(direction));
@@ -276,11 +301,12 @@ impl Texture {
     }
 
     /// The level at which the footprint is one texel, from 0 on; with a fraction between two levels.
-    fn level(&self, footprint: &Footprint) -> f32 {
+    fn level(&self, at: &TexturePoint) -> f32 {
         let texels = match &self.moved {
-            None => footprint.texels(size(&self.texels) * self.repeat),
+            None => at.footprint.texels(size(&self.texels) * self.repeat),
             Some(moved) => {
                 let size = size(&self.texels);
+                let footprint = moved.second(at).map_or(&at.footprint, |second| &second.footprint);
                 footprint.longest(|axis| moved.vector((axis * self.repeat).as_dvec2()).as_vec2() * size)
             }
         };
@@ -418,6 +444,7 @@ fn finite(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::materials::footprint::Footprint;
     use crate::materials::texels::TexelData;
 
     /// A texture of [[0, 1], [2, 3]], bottom row first.
@@ -460,15 +487,37 @@ mod tests {
         let at = |texture: &Texture, u: f64, v: f64| texture.lookup(&TexturePoint::sharp(DVec2::new(u, v))).x;
         let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
         texture.repeat = Vec2::new(2.0, 1.0);
-        texture.moved = Moved::new(90.0, DVec2::new(0.0, 0.5)).map(Box::new);
+        texture.moved = Moved::new(UvSet::First, 90.0, DVec2::new(0.0, 0.5)).map(Box::new);
         // (u, v) becomes (−v, 2u + ½): (.1, .3) is looked up at (−.3, .7), which is (.7, .7).
         assert_eq!(at(&texture, 0.1, 0.3), 3.0);
         assert_eq!(at(&texture, 0.1, 0.7), 2.0);
         assert_eq!(at(&texture, 0.3, 0.3), 1.0);
         assert_eq!(texture.texels_across(), [4.0, 2.0]);
-        assert_eq!(Moved::new(0.0, DVec2::ZERO), None);
-        let (sin, cos) = Moved::new(-270.0, DVec2::ZERO).expect("it turns").turn;
+        assert_eq!(Moved::new(UvSet::First, 0.0, DVec2::ZERO), None);
+        let (sin, cos) = Moved::new(UvSet::First, -270.0, DVec2::ZERO).expect("it turns").turn;
         assert_eq!((sin, cos), (1.0, 0.0));
+    }
+
+    #[test]
+    fn the_second_set_counts_where_the_texture_asks_for_it_and_the_object_has_it() {
+        let second = SecondPoint {
+            uv: DVec2::new(0.9, 0.9),
+            footprint: Footprint::POINT,
+            tangents: [Vec3::Y * 2.0, Vec3::NEG_X],
+        };
+        let at = TexturePoint { second: Some(Box::new(second)), ..TexturePoint::sharp(DVec2::new(0.1, 0.1)) };
+        let mut texture = numbered(TextureFilter::Nearest, Wrap::Repeat);
+        let first = [Vec3::X, Vec3::Y];
+        assert_eq!((texture.lookup(&at).x, texture.tangents(&at, first)), (0.0, first));
+        texture.moved = Moved::new(UvSet::Second, 0.0, DVec2::ZERO).map(Box::new);
+        assert_eq!((texture.lookup(&at).x, texture.tangents(&at, first)), (3.0, second.tangents));
+        assert_eq!(texture.lookup(&at.without_extent()).x, 3.0);
+        let alone = TexturePoint { second: None, ..at };
+        assert_eq!((texture.lookup(&alone).x, texture.tangents(&alone, first)), (0.0, first));
+        // It is repeated, turned and moved as the first is.
+        texture.repeat = Vec2::new(1.0, 0.5);
+        texture.moved = Moved::new(UvSet::Second, 90.0, DVec2::new(0.5, 0.0)).map(Box::new);
+        assert_eq!(texture.lookup(&at).x, 2.0);
     }
 
     #[test]
@@ -494,7 +543,7 @@ mod tests {
         assert_eq!(at(&texture, 0.25, -0.5), Vec2::new(4.0, -12.0));
         // (u, v) becomes (−v, 2u): the change with u is that up the image.
         (texture.repeat, texture.moved) =
-            (Vec2::new(2.0, 1.0), Moved::new(90.0, DVec2::new(1.0, 0.0)).map(Box::new));
+            (Vec2::new(2.0, 1.0), Moved::new(UvSet::First, 90.0, DVec2::new(1.0, 0.0)).map(Box::new));
         assert_eq!(at(&texture, 0.25, 0.5), Vec2::new(8.0, -2.0));
         // Nothing is found beyond a border that goes on, and nothing in what is not finite.
         let clamped = numbered(TextureFilter::Bilinear, Wrap::Clamp);
@@ -544,7 +593,8 @@ mod tests {
                         [(Vec2::ONE, 0.0), (Vec2::new(2.5, -3.0), 0.0), (Vec2::new(2.0, 3.0), 25.0)]
                     {
                         let texels = Arc::clone(&texels);
-                        let moved = Moved::new(degrees, DVec2::new(degrees, 0.25)).filter(|_| degrees != 0.0);
+                        let moved = Moved::new(UvSet::First, degrees, DVec2::new(degrees, 0.25))
+                            .filter(|_| degrees != 0.0);
                         let moved = moved.map(Box::new);
                         let texture =
                             Texture { texels, mipmaps: None, filter, wrap, repeat, moved, factor: None };

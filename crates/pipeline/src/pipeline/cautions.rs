@@ -28,14 +28,7 @@ pub(super) fn cautions(
     overrides: &Overrides,
 ) -> Vec<Diagnostic> {
     let place = |(cause, message)| placed(cause, message, loaded, overrides);
-    // The scene of a model is ours: nobody has asked for its clamp.
-    let is_asked_for = |cause: Cause| {
-        cause != Cause::Clamp
-            || !is_model(&loaded.path)
-            || overrides.clamp.is_some()
-            || overrides.sets.iter().any(|set| set.starts_with("render.clamp"))
-    };
-    found(scene, settings).into_iter().filter(|(cause, _)| is_asked_for(*cause)).map(place).collect()
+    found(scene, settings).into_iter().map(place).collect()
 }
 
 /// Where the setting gets its value.
@@ -44,6 +37,11 @@ fn placed(cause: Cause, message: String, loaded: &Loaded, overrides: &Overrides)
     if let Some(option) = cause.option(overrides) {
         let help = Some(format!("this comes of the setting `{option}`, not of the scene"));
         return Diagnostic { severity, message, path: PathBuf::new(), place: None, help };
+    }
+    if cause == Cause::Clamp && is_model(&loaded.path) {
+        let message = format!("the light that its polished surfaces throw on others is cut: {message}");
+        let help = Some("--clamp 0 shows all of it, with bright dots until many samples".to_owned());
+        return Diagnostic { severity, message, path: loaded.path.clone(), place: None, help };
     }
     match cause.key().and_then(|(table, key)| loaded.setting(table, key)) {
         Some(span) => loaded.diagnostic_at(span, severity, message, None),

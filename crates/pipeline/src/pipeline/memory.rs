@@ -20,6 +20,11 @@ const PHOTON: u64 = 220;
 /// Bytes of maps that are kept from pass to pass.
 const KEPT_MAPS: u64 = 128 << 20;
 
+/// Most bytes of the frames of a moving picture, if the call says nothing about memory.
+const MOST_FRAMES: u64 = 4 << 30;
+/// Name of the frames among the parts.
+const FRAMES: &str = "the frames";
+
 /// A part of the memory, by its name.
 type Item = (&'static str, u64);
 
@@ -40,7 +45,7 @@ impl Foretold {
         }
         if let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) {
             let frame = u64::from(render.width) * u64::from(render.height) * 3;
-            items.push(("the frames", frame * u64::from(turn.of)));
+            items.push((FRAMES, frame * u64::from(turn.of)));
         }
         Self(items)
     }
@@ -72,6 +77,15 @@ impl Foretold {
     /// The work would need more, with the numbers and a way out.
     pub(super) fn check(&self, plan: &Plan) -> Result<(), Stop> {
         let all: u64 = self.0.iter().map(|(_, bytes)| bytes).sum();
+        let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MOST_FRAMES);
+        if let (Some((_, bytes)), None) = (frames, plan.memory) {
+            return Err(Stop::work(format!(
+                "the frames of the moving picture would take {} of memory until it is written; render fewer or smaller \
+                 frames, or a file each, as in a_####.png; --memory {} allows it",
+                words(*bytes),
+                allowance(all)
+            )));
+        }
         let Some(most) = plan.memory.filter(|most| all > *most) else { return Ok(()) };
         let mut largest = self.0.clone();
         largest.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
@@ -80,7 +94,7 @@ impl Foretold {
         let way_out = match largest.first() {
             Some(("the film" | "the picture", _)) => "render a smaller picture, or parts of it by --crop",
             Some(("the layers", _)) => "ask for fewer layers or a smaller picture",
-            Some(("the frames", _)) => "render fewer or smaller frames, or a file each, as in a_####.png",
+            Some((FRAMES, _)) => "render fewer or smaller frames, or a file each, as in a_####.png",
             Some(("meshes" | "trees", _)) => "use --accel bvh or smaller meshes",
             Some(("textures", _)) => "use smaller textures",
             Some(("photons", _)) => "give [photons] a smaller `count`",
@@ -107,6 +121,11 @@ fn blocks(plan: &Plan) -> Blocks {
         None if gathers => Blocks::Added,
         None => Blocks::Whole,
     }
+}
+
+/// A size for `--memory` that is enough for so many bytes.
+fn allowance(bytes: u64) -> String {
+    format!("{}GiB", bytes.div_ceil(1 << 30))
 }
 
 /// `1.25 GiB`, `300 MiB`; below that `12 KiB`, `1 byte`

@@ -2,6 +2,7 @@
 //! did not mean to lose.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 
 use super::inputs::{Input, Inputs};
@@ -30,7 +31,25 @@ enum Kind {
 /// and files may change.
 pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
     let inputs = inputs.identities();
-    targets(plan).filter_map(|target| conflict(plan, target, target.path, &inputs)).collect()
+    let each = targets(plan).filter_map(|target| conflict(plan, target, target.path, &inputs));
+    each.chain(linked(plan)).collect()
+}
+
+/// Pictures of a turntable that are one file by links: the later one would replace the earlier one.
+fn linked(plan: &Plan) -> Vec<Diagnostic> {
+    let (mut seen, mut found) = (HashMap::new(), Vec::new());
+    for path in plan.outputs.iter().chain(&plan.to_come).filter(|_| !plan.to_come.is_empty()) {
+        let Some(identity) = FileIdentity::of(path) else { continue };
+        match seen.entry(identity) {
+            Entry::Vacant(new) => drop(new.insert(path)),
+            Entry::Occupied(twin) if *twin.get() != path => {
+                let target = Target { path, kind: Kind::Picture(plan.named_by) };
+                found.push(is_twin(target, twin.get()));
+            }
+            Entry::Occupied(_) => {}
+        }
+    }
+    found
 }
 
 /// Writes a file of the plan, and says what of the one that was there could not be kept; unless it is found at the last moment that it must not be.

@@ -1,5 +1,6 @@
 //! Turntables: pictures all around `look_at`, as files with numbers or as one moving picture.
 
+use std::collections::HashSet;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
@@ -89,6 +90,13 @@ pub(super) fn numbered(path: &Path, turn: Turn) -> Option<PathBuf> {
     Some(path.with_file_name(OsString::from(format!("{before}{number}{after}"))))
 }
 
+/// The first file that would hold two pictures of a turntable of so many. `None` if each has a file of its own.
+pub fn twin(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
+    let mut seen = HashSet::new();
+    let all = |number| outputs.iter().filter_map(move |path| numbered(path, Turn { number, of }));
+    (0..of).flat_map(all).find(|path| !seen.insert(path.clone()))
+}
+
 /// Text before the last run of `#` in a file's name, the length of the run, and the text behind it.
 fn numbers(path: &Path) -> Option<(&str, usize, &str)> {
     let name = path.file_name()?.to_str()?;
@@ -125,6 +133,16 @@ mod tests {
         assert_eq!(name("#1_##_b.png", 0), Some("#1_01_b.png".into()));
         assert_eq!(name("##/a.png", 0), None, "folders are not counted");
         assert_eq!(suggested(Path::new("x/a.b.png")), Path::new("x/a.b_####.png"));
+    }
+
+    #[test]
+    fn names_that_meet_are_found() {
+        let twin = |names: [&str; 2], of| twin(&names.map(PathBuf::from), of);
+        assert_eq!(twin(["a_#.png", "a_1#.png"], 10), None);
+        assert_eq!(twin(["a_#.png", "a_1#.png"], 11), Some("a_11.png".into()));
+        assert_eq!(twin(["a_#.png", "a_##.png"], 9), None);
+        assert_eq!(twin(["a_#.png", "a_##.png"], 10), Some("a_10.png".into()));
+        assert_eq!(twin(["a.gif", "a.apng"], 100), None, "these have no numbers");
     }
 
     #[test]

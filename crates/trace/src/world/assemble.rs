@@ -8,7 +8,7 @@ use super::{Bodies, Camera, Geometry, ObjectMaterial, Parts, World, lower};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::lights::Lights;
-use crate::materials::Material;
+use crate::materials::{Material, UvSet};
 use crate::scene::description::{self, Scene};
 
 impl World {
@@ -38,6 +38,7 @@ impl World {
             dark_bodies: Box::default(),
             glass_at_eye: Vec::new(),
             is_mipmapped,
+            has_second_uvs: has_second_uvs(scene, parts),
             colored: colored(scene),
             passable: None,
         };
@@ -48,6 +49,12 @@ impl World {
             ..world
         }
     }
+}
+
+/// Whether a texture asks for the second set of coordinates, and a mesh has one.
+fn has_second_uvs(scene: &Scene, parts: &Parts) -> bool {
+    let asks = scene.textures.iter().any(|texture| texture.uv == UvSet::Second);
+    asks && parts.meshes.iter().any(|mesh| !mesh.loaded().mesh.second_uvs.is_empty())
 }
 
 fn bodies_of(scene: &Scene, parts: &Parts) -> Bodies {

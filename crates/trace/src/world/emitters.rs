@@ -202,8 +202,12 @@ fn mesh_lights(
             let radiance = shining.emission.scale;
             let bounds = shining.mean_of(emitter.bounds().times(radiance));
             let patches = || {
-                let patch =
-                    |id| Patch { primitive: id, corners: mesh.world_corners(id), uvs: mesh.corner_uvs(id) };
+                let patch = |id| Patch {
+                    primitive: id,
+                    corners: mesh.world_corners(id),
+                    uvs: mesh.corner_uvs(id),
+                    second_uvs: mesh.second_corner_uvs(id),
+                };
                 Chart::Triangles(triangles_of(mesh, own).map(patch).collect())
             };
             let texture = if shining.is_textured() { shining.texture(patches()).map(Box::new) } else { None };

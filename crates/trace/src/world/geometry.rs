@@ -7,7 +7,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Asked, Ray, ShapeHit, SurfacePoint};
 use crate::lights::Source;
 use crate::math::color::srgb8_to_linear;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, Lowered, Scene};
 
 use super::isolated::Isolated;
@@ -281,6 +281,11 @@ impl Geometry {
         let [a, b, c] = corners.map(color);
         let (u, v) = (hit.shape.u, hit.shape.v);
         Some(a? * (1.0 - u - v) + b? * u + c? * v)
+    }
+
+    /// Texture coordinates of the second set at a hit, and the changes of the point with them. `None` without such a set.
+    pub fn second_uv(&self, hit: &Hit) -> Option<(Vec2, [Vec3; 2])> {
+        self.objects[hit.object as usize].mesh()?.second_parametrisation(&hit.shape)
     }
 
     /// Bytes of the objects and of the tree over them, without those of meshes.

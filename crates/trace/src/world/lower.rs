@@ -283,13 +283,13 @@ fn declared_number(scene: &Scene, images: &Images, source: &NumberSource, usual:
 
 fn declared_texture(scene: &Scene, images: &Images, index: usize, used: TextureUse) -> Arc<Texture> {
     let declared = &scene.textures[index];
-    let &description::Texture { filter, wrap, repeat, rotate, offset, factor, .. } = declared;
+    let &description::Texture { filter, wrap, repeat, rotate, offset, uv, factor, .. } = declared;
     let Image { texels, mipmaps } = image(images, &declared_source(scene, index, used));
     let mipmaps = match filter {
         TextureFilter::Nearest | TextureFilter::Bilinear => None,
         TextureFilter::Mipmap => mipmaps,
     };
-    let moved = Moved::new(rotate, offset.as_dvec2()).map(Box::new);
+    let moved = Moved::new(uv, rotate, offset.as_dvec2()).map(Box::new);
     let factor = match used {
         TextureUse::Color | TextureUse::Number(_) => Some(factor).filter(|factor| *factor != Vec3::ONE),
         TextureUse::Normal => None,

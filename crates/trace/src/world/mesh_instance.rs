@@ -8,6 +8,7 @@ use crate::accel::{Ends, PACKET};
 use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::surface::double_error;
 use crate::geometry::{Aabb, Asked, Ray, RayF64, ShapeHit, SurfacePoint};
+use crate::materials::UvSet;
 use crate::math::transform::Transform;
 use crate::math::{DVec3, Vec2, Vec3};
 
@@ -124,15 +125,45 @@ impl MeshInstance {
         corners.map(|corner| self.transform.point(corner.as_dvec3()).as_vec3())
     }
 
+    /// Texture coordinates of the vertices by a set; those of the first if there is no second.
+    #[inline(always)]
+    pub(super) fn uvs(&self, set: UvSet) -> &[Vec2] {
+        let mesh = &self.tree.loaded().mesh;
+        match set {
+            UvSet::Second if !mesh.second_uvs.is_empty() => &mesh.second_uvs,
+            UvSet::Second | UvSet::First => &mesh.uvs,
+        }
+    }
+
     /// Texture coordinates of the corners of a triangle, in the order of [`MeshInstance::world_corners`].
     pub fn corner_uvs(&self, triangle: u32) -> [Vec2; 3] {
+        self.ordered(triangle, self.uvs(UvSet::First)).unwrap_or([Vec2::ZERO, Vec2::X, Vec2::Y])
+    }
+
+    /// The same of the second set. `None` without one.
+    pub fn second_corner_uvs(&self, triangle: u32) -> Option<[Vec2; 3]> {
+        self.ordered(triangle, &self.tree.loaded().mesh.second_uvs)
+    }
+
+    /// Values of the corners of a triangle, in the order of [`MeshInstance::world_corners`]. `None` if vertices have no values.
+    fn ordered(&self, triangle: u32, values: &[Vec2]) -> Option<[Vec2; 3]> {
+        let corners = self.tree.loaded().mesh.triangles[triangle as usize];
+        let [a, b, c] = corners.map(|vertex| values.get(vertex as usize).copied());
+        let (a, b, c) = (a?, b?, c?);
+        Some(if self.transform.mirrors() { [a, c, b] } else { [a, b, c] })
+    }
+
+    /// The point at a hit by the second set of texture coordinates, with its tangents. `None` without one.
+    pub(super) fn second_parametrisation(&self, hit: &ShapeHit) -> Option<(Vec2, [Vec3; 2])> {
         let mesh = &self.tree.loaded().mesh;
-        let [a, b, c] = if mesh.uvs.is_empty() {
-            [Vec2::ZERO, Vec2::X, Vec2::Y]
-        } else {
-            mesh.triangles[triangle as usize].map(|vertex| mesh.uvs[vertex as usize])
-        };
-        if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
+        if mesh.second_uvs.is_empty() {
+            return None;
+        }
+        let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
+        let [a, b, c] = vertices.map(|vertex| mesh.positions[vertex].as_dvec3());
+        let barycentric = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v);
+        let (uv, dpdu, dpdv) = self.parametrisation(&mesh.second_uvs, vertices, barycentric, [b - a, c - a]);
+        Some((uv, [dpdu, dpdv]))
     }
 
     /// Mean curvature of the surface that a triangle approximates, by its vertices' normals (Akenine-Möller et al. 2021, section
@@ -162,7 +193,7 @@ impl MeshInstance {
         let facet = self.facet(vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
         let Facet { corners: [a, b, c], local: _, point, error, normal, barycentric } = facet;
         let (uv, dpdu, dpdv) = if asked.uv {
-            self.parametrisation(vertices, barycentric, b - a, c - a)
+            self.parametrisation(&mesh.uvs, vertices, barycentric, [b - a, c - a])
         } else {
             (Vec2::ZERO, Vec3::ZERO, Vec3::ZERO)
         };
@@ -268,12 +299,11 @@ impl MeshInstance {
     /// Texture coordinates and their tangents; without texture coordinates, the barycentric ones.
     fn parametrisation(
         &self,
+        uvs: &[Vec2],
         vertices: [usize; 3],
         barycentric: Vec3,
-        ab: DVec3,
-        ac: DVec3,
+        [ab, ac]: [DVec3; 2],
     ) -> (Vec2, Vec3, Vec3) {
-        let uvs = &self.tree.loaded().mesh.uvs;
         let world = |v: DVec3| self.transform.vector(v).as_vec3();
         if uvs.is_empty() {
             return (Vec2::new(barycentric.y, barycentric.z), world(ab), world(ac));

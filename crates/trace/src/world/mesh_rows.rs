@@ -4,12 +4,13 @@ use super::MeshInstance;
 use crate::accel::PACKET;
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
+use crate::materials::UvSet;
 use crate::math::lanes::{Lanes3, lane, set_lane};
 use crate::math::{Vec2, Vec3};
 
 impl MeshInstance {
     /// Computes the surfaces of the hits of a packet whose bits are set, all of this instance; with their texture
-    /// coordinates if requested.
+    /// coordinates of a set if requested.
     #[inline(always)]
     pub fn fill_surfaces(
         &self,
@@ -17,7 +18,7 @@ impl MeshInstance {
         rays: &RayRows,
         hits: &HitRows,
         of: u32,
-        asks_uv: bool,
+        asked_uvs: Option<UvSet>,
     ) {
         let mesh = &self.tree.loaded().mesh;
         // The other lanes get a triangle as well, without effect.
@@ -51,9 +52,10 @@ impl MeshInstance {
             }
             surface.take_smooth(of, &found);
         }
-        if asks_uv {
+        if let Some(set) = asked_uvs {
+            let all = self.uvs(set);
             for i in 0..PACKET {
-                let uvs = match mesh.uvs.as_slice() {
+                let uvs = match all {
                     [] => [Vec2::ZERO, Vec2::X, Vec2::Y],
                     uvs => vertices[i].map(|vertex| uvs[vertex as usize]),
                 };
@@ -106,6 +108,7 @@ mod tests {
         rays: &'a [Ray],
         hits: &'a HitRows,
         of: u32,
+        set: UvSet,
     }
 
     impl Loops for Filling<'_> {
@@ -115,7 +118,7 @@ mod tests {
         fn run(self, _: impl Folds) -> SurfaceRow {
             let mut surface = SurfaceRow::EMPTY;
             let (rows, _) = RayRows::new(self.rays);
-            self.mesh.fill_surfaces(&mut surface, &rows, self.hits, self.of, true);
+            self.mesh.fill_surfaces(&mut surface, &rows, self.hits, self.of, Some(self.set));
             surface
         }
     }
@@ -136,6 +139,10 @@ mod tests {
             uvs: (0..60).map(|i| Vec2::new(i as f32 * 0.3, -(i as f32))).collect(),
             ..mesh.clone()
         };
+        let with_both = TriangleMesh {
+            second_uvs: (0..60).map(|i| Vec2::new(-(i as f32), i as f32 * 0.7)).collect(),
+            ..with_uvs.clone()
+        };
         let placed = |scale: DVec3| {
             Transform::scale_rotate_translate(
                 scale,
@@ -144,7 +151,7 @@ mod tests {
             )
         };
         let mut instances = Vec::new();
-        for mesh in [mesh, with_uvs] {
+        for mesh in [mesh, with_uvs, with_both] {
             let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
             let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
             let tree = Arc::new(tree);
@@ -176,8 +183,11 @@ mod tests {
                     hits.put(i, &ShapeHit { t: 1.0, primitive, u, v });
                 }
                 let of = round.wrapping_mul(0x9e37_79b9) >> 16 | 1 << (round % 16);
-                for instructions in Instructions::ALL {
-                    let row = instructions.run(Filling { mesh: &mesh, rays: &rays, hits: &hits, of });
+                for (instructions, set) in Instructions::ALL
+                    .into_iter()
+                    .flat_map(|one| [UvSet::First, UvSet::Second].map(|set| (one, set)))
+                {
+                    let row = instructions.run(Filling { mesh: &mesh, rays: &rays, hits: &hits, of, set });
                     assert_eq!(row.smooth, if mesh.smooth { of } else { 0 });
                     for i in (0..PACKET).filter(|i| of & 1 << i != 0) {
                         let hit = hits.get(i).expect("a hit");
@@ -187,7 +197,9 @@ mod tests {
                         assert_eq!(bits(lane(&row.point, i)), bits(alone.point), "{}", what());
                         assert_eq!(bits(lane(&row.error, i)), bits(alone.error), "{}", what());
                         assert_eq!(bits(lane(&row.normal, i)), bits(alone.normal), "{}", what());
-                        assert_eq!([row.uv[0][i], row.uv[1][i]], alone.uv.to_array(), "{}", what());
+                        let second = mesh.second_parametrisation(&hit).filter(|_| set == UvSet::Second);
+                        let uv = second.map_or(alone.uv, |(uv, _)| uv.as_dvec2());
+                        assert_eq!([row.uv[0][i], row.uv[1][i]], uv.to_array(), "{}", what());
                         if mesh.smooth {
                             let (normal, shadow) = (lane(&row.shading_normal, i), lane(&row.shadow_point, i));
                             assert_eq!(bits(normal), bits(alone.shading_normal), "{}", what());

@@ -46,10 +46,11 @@ pub use textures::{
 };
 
 use crate::assets::OrbiterCamera;
+use crate::geometry::SurfacePoint;
 use crate::geometry::rows::lanes;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
-use crate::materials::{Material, Mipmaps};
+use crate::materials::{Footprint, Material, Mipmaps, SecondPoint, TexturePoint};
 use crate::math::Vec3;
 use crate::scene::description;
 
@@ -113,6 +114,8 @@ pub struct World {
     glass_at_eye: Vec<(u32, u32)>,
     /// Whether any material has a texture with mip levels.
     is_mipmapped: bool,
+    /// Whether any texture is looked up by a mesh's second set of coordinates.
+    has_second_uvs: bool,
     /// Whether the vertex colours of each object count. `None` if those of none do.
     colored: Option<Box<[bool]>>,
     /// Objects that light may pass straight on. `None` if there are none.
@@ -196,6 +199,31 @@ impl World {
     #[inline]
     pub fn vertex_color(&self, hit: &Hit) -> Option<Vec3> {
         self.is_colored(hit.object).then(|| self.geometry.vertex_color(hit)).flatten()
+    }
+
+    /// The place in textures of a surface at a hit, whose footprint is that of a point or of a beam by the tangents of the
+    /// coordinates.
+    #[inline]
+    pub fn texture_point(
+        &self,
+        hit: &Hit,
+        surface: &SurfacePoint,
+        footprint: impl Fn([Vec3; 2]) -> Footprint,
+    ) -> TexturePoint {
+        let second = if self.has_second_uvs { self.second_point(hit, &footprint) } else { None };
+        TexturePoint { uv: surface.uv, footprint: footprint([surface.dpdu, surface.dpdv]), second }
+    }
+
+    /// The same by the second set of coordinates. `None` without one.
+    #[cold]
+    #[inline(never)]
+    fn second_point(
+        &self,
+        hit: &Hit,
+        footprint: impl Fn([Vec3; 2]) -> Footprint,
+    ) -> Option<Box<SecondPoint>> {
+        let (uv, tangents) = self.geometry.second_uv(hit)?;
+        Some(Box::new(SecondPoint { uv: uv.as_dvec2(), footprint: footprint(tangents), tangents }))
     }
 
     /// Whether an object has texture coordinates of its own, in place of barycentric ones, or no material asks for their direction.

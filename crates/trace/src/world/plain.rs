@@ -1,7 +1,8 @@
 //! Plain materials, whose surfaces are shaded in rows without a look at each of them.
 
 use super::World;
-use crate::materials::{Bsdf, Material, Rough, RoughKind};
+use crate::materials::texture::Texture;
+use crate::materials::{Bsdf, Material, Rough, RoughKind, UvSet};
 use crate::math::Vec3;
 
 /// What rows need to know of a plain material.
@@ -9,8 +10,8 @@ use crate::math::Vec3;
 pub struct PlainMaterial {
     /// Kind of its BSDF.
     pub kind: RoughKind,
-    /// Whether rows look a texture up for its BSDF.
-    pub has_row_texture: bool,
+    /// The coordinates by which rows look a texture up for its BSDF. `None` if they look up none.
+    pub row_texture: Option<UvSet>,
     /// Its ambient reflectance, if its BSDF is the same everywhere.
     pub ambient: Option<Vec3>,
     /// Its emission.
@@ -28,7 +29,7 @@ impl PlainMaterial {
         let rough = rough_of(bsdf).filter(|rough| rough.fills_rows())?;
         (is_even && relief.is_none() && opacity.is_none()).then(|| Self {
             kind: rough.kind(),
-            has_row_texture: rough.row_texture().is_some(),
+            row_texture: rough.row_texture().map(Texture::uv_set),
             ambient: rough.constant().map(|bsdf| bsdf.ambient()),
             emission: emission.scale,
             is_two_sided: emission.is_two_sided(),

@@ -10,7 +10,7 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::geometry::{Asked, Ray};
 use crate::lights::{Source, SourceRow};
-use crate::materials::{Material, TexturePoint};
+use crate::materials::{Footprint, Material};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, Lanes3, set_lane};
 
@@ -98,7 +98,8 @@ impl World {
         let surface = self.geometry.asked_surface(ray, hit, asked);
         let cosine = surface.shading_normal.dot(ray.direction.normalize_or_zero());
         let color = self.vertex_color(hit).unwrap_or(Vec3::ONE);
-        let left = material.passing(&TexturePoint::sharp(surface.uv), color, cosine, lookups);
+        let at = self.texture_point(hit, &surface, |_| Footprint::POINT);
+        let left = material.passing(&at, color, cosine, lookups);
         let origin = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
         let start = self.geometry.triangle_number(hit);
         let beyond = Ray::new(origin, ray.direction).leaving(start);

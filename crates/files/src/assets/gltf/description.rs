@@ -99,6 +99,8 @@ pub struct TextureRef {
     pub is_nearest: bool,
     /// Continuation outside [0, 1].
     pub wrap: TextureWrap,
+    /// Whether it has the second set of coordinates of a part.
+    pub is_second: bool,
     /// Repetitions; not 0.
     pub repeat: Vec2,
     /// Angle in degrees from u to v.

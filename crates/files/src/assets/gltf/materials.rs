@@ -53,19 +53,19 @@ const LEFT_OUT: [(&str, &str); 6] = [
 pub(super) fn material(
     container: &Container,
     number: usize,
-    set: usize,
+    sets: [usize; 2],
     notes: &mut Notes,
 ) -> Result<ModelMaterial, Wrong> {
     let json = &container.root.materials[number];
-    let mut reader = Reader { container, place: format!("materials[{number}]"), set, notes };
+    let mut reader = Reader { container, place: format!("materials[{number}]"), sets, notes };
     reader.material(json).map_err(|wrong| wrong.inside(format!("materials[{number}]")))
 }
 
 struct Reader<'a> {
     container: &'a Container,
     place: String,
-    /// Set of texture coordinates that the mesh has.
-    set: usize,
+    /// Sets of texture coordinates that the mesh has.
+    sets: [usize; 2],
     notes: &'a mut Notes,
 }
 
@@ -224,8 +224,9 @@ impl Reader<'_> {
                 Wrong::index("images", image, root.images.len()).inside(format!("textures[{}]", info.index))
             );
         }
-        if info.set() != self.set {
-            self.note("a texture has the coordinates of another one: a mesh has one set of them here");
+        let place = self.sets.iter().position(|set| *set == info.set());
+        if place.is_none() {
+            self.note("a texture has the coordinates of another one: a mesh has two sets of them here");
         }
         let sampler = match texture.sampler {
             Some(sampler) => root.samplers.get(sampler),
@@ -247,6 +248,7 @@ impl Reader<'_> {
             image,
             is_nearest,
             wrap,
+            is_second: place == Some(1),
             repeat: moved.repeat,
             rotate: moved.degrees,
             offset: moved.offset,

@@ -39,17 +39,20 @@ impl Container {
         Ok(scene)
     }
 
-    /// Finds bounds and outline of the instances. Parts that are wrong are left to whoever loads them.
+    /// Finds bounds and outline of the instances. Parts that are wrong are left to whoever loads them, unless all are.
     fn measure(&self, scene: &mut ModelScene, token: &CancelToken) -> Result<(), AssetError> {
         let mut parts: HashMap<usize, (TriangleMesh, Vec<DVec3>)> = HashMap::new();
-        let mut vertices = 0;
+        let (mut vertices, mut first_wrong) = (0, None);
         for instance in &scene.instances {
             let (mesh, extremes) = match parts.entry(instance.part) {
                 Entry::Occupied(known) => &*known.into_mut(),
                 Entry::Vacant(new) => match self.part(instance.part, &unwatched, token) {
                     Err(AssetError::Cancelled(cancelled)) => return Err(cancelled.into()),
                     loaded => {
-                        let mesh = loaded.map(|loaded| loaded.mesh).unwrap_or_default();
+                        let mesh = loaded.map(|loaded| loaded.mesh).unwrap_or_else(|wrong| {
+                            first_wrong.get_or_insert(wrong);
+                            TriangleMesh::default()
+                        });
                         let extremes = mesh.extremes();
                         new.insert((mesh, extremes))
                     }
@@ -69,7 +72,10 @@ impl Container {
             }
             token.check()?;
         }
-        Ok(())
+        match (scene.bounds, first_wrong) {
+            (None, Some(wrong)) => Err(wrong),
+            (None, None) | (Some(_), _) => Ok(()),
+        }
     }
 }
 
@@ -78,8 +84,8 @@ struct Walk<'a> {
     container: &'a Container,
     scene: ModelScene,
     notes: Notes,
-    /// Index of each of the file's materials, or of the one for primitives without any, by the set of coordinates.
-    materials: HashMap<(Option<usize>, usize), usize>,
+    /// Index of each of the file's materials, or of the one for primitives without any, by the sets of coordinates.
+    materials: HashMap<(Option<usize>, [usize; 2]), usize>,
 }
 
 impl Walk<'_> {
@@ -96,6 +102,9 @@ impl Walk<'_> {
             }
             None => return Err(Wrong::index("scenes", number, root.scenes.len())),
         };
+        if roots.is_empty() && !root.nodes.is_empty() && root.scenes.is_empty() {
+            return Err(Wrong::new("nodes: each is a child of another, so that there is none to begin with"));
+        }
         if root.scenes.len() > 1 {
             let others = root.scenes.len() - 1;
             self.notes.add("scenes", &format!("{others} other than scenes[{number}] are left out"));
@@ -179,7 +188,7 @@ impl Walk<'_> {
             if self.scene.instances.len() >= MOST_INSTANCES {
                 return Err(Wrong::new(format!("more than {MOST_INSTANCES} placed primitives")));
             }
-            let material = self.material(primitive.material, container.coordinate_set(primitive))?;
+            let material = self.material(primitive.material, container.coordinate_sets(primitive))?;
             let colors = container.attribute(primitive, "COLOR_0")?;
             self.scene.instances.push(ModelInstance {
                 name: name.clone(),
@@ -194,21 +203,21 @@ impl Walk<'_> {
     }
 
     /// Index of a material, which is read when it is met first.
-    fn material(&mut self, number: Option<usize>, set: usize) -> Result<usize, Wrong> {
-        if let Some(known) = self.materials.get(&(number, set)) {
+    fn material(&mut self, number: Option<usize>, sets: [usize; 2]) -> Result<usize, Wrong> {
+        if let Some(known) = self.materials.get(&(number, sets)) {
             return Ok(*known);
         }
         let materials = &self.container.root.materials;
         let read = match number {
             Some(number) if number < materials.len() => {
-                material(self.container, number, set, &mut self.notes)?
+                material(self.container, number, sets, &mut self.notes)?
             }
             Some(number) => return Err(Wrong::index("materials", number, materials.len())),
             None => ModelMaterial::named("default"),
         };
         self.scene.materials.push(read);
         let index = self.scene.materials.len() - 1;
-        self.materials.insert((number, set), index);
+        self.materials.insert((number, sets), index);
         Ok(index)
     }
 

@@ -79,8 +79,10 @@ impl Container {
         // Read what the vertices have.
         let is_whole = |numbers: &Numbers<'_>| numbers.count >= positions.count;
         let normals = self.attribute(primitive, "NORMAL")?.filter(is_whole);
-        let set = self.coordinate_set(primitive);
-        let uvs = self.attribute(primitive, &format!("TEXCOORD_{set}"))?.filter(is_whole);
+        let mut sets = Vec::with_capacity(2);
+        for set in self.coordinate_sets(primitive) {
+            sets.push(self.attribute(primitive, &format!("TEXCOORD_{set}"))?.filter(is_whole));
+        }
         let colors = self.attribute(primitive, "COLOR_0")?.filter(is_whole);
         let each = || vertices.iter().map(|vertex| *vertex as usize);
         let mut parsed = Parsed { faces: faces(primitive.mode, &corners), ..Parsed::default() };
@@ -90,10 +92,12 @@ impl Container {
             let finite = |normal: Vec3| if normal.is_finite() { normal } else { Vec3::ZERO };
             parsed.normals = each().map(|vertex| finite(Vec3::from(normals.floats(vertex, 0.0)))).collect();
         }
-        if let Some(uvs) = uvs {
-            // glTF counts v from the top.
-            parsed.uvs =
-                each().map(|vertex| uvs.floats(vertex, 0.0)).map(|[u, v]| Vec2::new(u, 1.0 - v)).collect();
+        // glTF counts v from the top.
+        let upright = |[u, v]: [f32; 2]| Vec2::new(u, 1.0 - v);
+        for (uvs, all) in sets.iter().zip([&mut parsed.uvs, &mut parsed.second_uvs]) {
+            if let Some(uvs) = uvs {
+                *all = each().map(|vertex| upright(uvs.floats(vertex, 0.0))).collect();
+            }
         }
         if let Some(colors) = colors {
             parsed.colors =
@@ -108,13 +112,16 @@ impl Container {
         Numbers::of(self, number).map(Some).map_err(|wrong| wrong.inside(name))
     }
 
-    /// The set of texture coordinates that most textures of the primitive's material use; the first of them in a tie.
-    pub(super) fn coordinate_set(&self, primitive: &Primitive) -> usize {
+    /// The two sets of texture coordinates of a primitive's mesh: those that the textures of its material use, the lower one
+    /// first. The first two of more; the only one is the first.
+    pub(super) fn coordinate_sets(&self, primitive: &Primitive) -> [usize; 2] {
         let material = primitive.material.and_then(|material| self.root.materials.get(material));
-        let sets = material.map(|material| material.coordinate_sets()).unwrap_or_default();
-        let count = |set: &usize| sets.iter().filter(|other| *other == set).count();
-        let most = sets.iter().map(count).max().unwrap_or_default();
-        sets.iter().copied().find(|set| count(set) == most).unwrap_or_default()
+        let used = material.map(|material| material.coordinate_sets()).unwrap_or_default();
+        let first = used.first().copied().unwrap_or_default();
+        match used.iter().find(|set| **set != first) {
+            Some(&second) => [first.min(second), first.max(second)],
+            None => [first, usize::from(first == 0)],
+        }
     }
 
     /// The vertex of each corner as an index into the list of vertices that is returned too: all, or those that are used if

@@ -250,21 +250,46 @@ fn materials_are_those_of_the_extensions() {
     assert_eq!(scene.images, ["paint"]);
 }
 
-/// A mesh has one set of coordinates: the one that most textures of its material use.
+/// A mesh has two sets of coordinates: those that its material uses, the lower one first.
 #[test]
-fn the_set_of_most_textures_counts() {
+fn the_sets_that_textures_use_count() {
     let mut json = square();
-    json["meshes"][0]["primitives"][0] =
-        json!({"attributes": {"POSITION": 0, "TEXCOORD_1": 2}, "indices": 1, "material": 0});
     json["textures"] = json!([{"source": 0}]);
     json["images"] = json!([{"uri": "a.png"}]);
-    let of = |set: u32| json!({"index": 0, "texCoord": set});
-    json["materials"] = json!([{"pbrMetallicRoughness": {"baseColorTexture": of(1), "metallicRoughnessTexture": of(1)},
-        "normalTexture": of(0)}]);
-    let container = open_json(&json).expect("read");
-    assert_eq!(part(&container, 0).expect("a mesh").mesh.uvs.len(), 4);
-    let notes = scene(&container).expect("a scene").notes;
-    assert!(notes.len() == 1 && notes[0].contains("has the coordinates of another one"), "{notes:?}");
+    // Sets 0, 1 and 2 are the same numbers in another order.
+    let primitive = json!({"attributes": {"POSITION": 0, "TEXCOORD_0": 2, "TEXCOORD_1": 3, "TEXCOORD_2": 4}, "indices": 1, "material": 0});
+    json["meshes"][0]["primitives"][0] = primitive;
+    for turned in [8, 16] {
+        let accessor =
+            json!({"bufferView": 2, "byteOffset": turned, "componentType": 5126, "count": 4, "type": "VEC2"});
+        json["accessors"].as_array_mut().expect("a list").push(accessor);
+    }
+    json["bufferViews"][2]["byteLength"] = json!(48);
+    json["buffers"][0]["byteLength"] = json!(108);
+    let more: Vec<u8> = [0.5_f32, 0.5, 0.25, 0.5].iter().flat_map(|number| number.to_le_bytes()).collect();
+    json["buffers"][0]["uri"] = json!(coded(&[bytes(), more].concat()));
+    let mut read = |sets: [u32; 3]| {
+        let of = |set: u32| json!({"index": 0, "texCoord": set});
+        json["materials"] = json!([{"pbrMetallicRoughness": {"baseColorTexture": of(sets[0]), "metallicRoughnessTexture": of(sets[1])},
+            "normalTexture": of(sets[2])}]);
+        let container = open_json(&json).expect("read");
+        let mesh = part(&container, 0).expect("a mesh").mesh;
+        let scene = scene(&container).expect("a scene");
+        let material = &scene.materials[0];
+        let textures = [&material.color.texture, &material.roughness.texture, &material.normal];
+        let second = textures.map(|texture| texture.as_ref().expect("a texture").is_second);
+        (mesh.uvs, mesh.second_uvs, second, scene.notes.len())
+    };
+    let (zero, one, second, notes) = read([0, 0, 0]);
+    assert_eq!((zero.len(), one.len(), second, notes), (4, 4, [false; 3], 0));
+    assert_ne!(zero, one);
+    assert_eq!(read([0, 1, 1]), (zero.clone(), one.clone(), [false, true, true], 0));
+    assert_eq!(read([1, 0, 1]), (zero.clone(), one.clone(), [true, false, true], 0));
+    assert_eq!(read([1, 1, 1]), (one.clone(), zero.clone(), [false; 3], 0), "the only one is the first");
+    let (first, two, second, notes) = read([2, 0, 2]);
+    assert_eq!((&first, second, notes), (&zero, [true, false, true], 0));
+    assert!(two != zero && two != one);
+    assert_eq!(read([0, 1, 2]), (zero, one, [false, true, false], 1), "three are too many");
 }
 
 #[test]

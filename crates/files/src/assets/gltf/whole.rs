@@ -75,6 +75,8 @@ fn append(whole: &mut TriangleMesh, part: &TriangleMesh, placed: &Placed, materi
         turned.normalize_or_zero().as_vec3()
     });
     fill(&mut whole.uvs, first, &part.uvs, part.positions.len(), crate::math::Vec2::ZERO, |uv| uv);
+    let second = &part.second_uvs;
+    fill(&mut whole.second_uvs, first, second, part.positions.len(), crate::math::Vec2::ZERO, |uv| uv);
     fill(&mut whole.colors, first, &part.colors, part.positions.len(), [255; 3], |color| color);
     // A mirrored part keeps its front.
     let is_mirrored = placed.linear.determinant() < 0.0;

@@ -283,9 +283,10 @@ impl Source {
         {
             hdr::check_header(header, &self.token)?;
         }
+        let growth = most_growth(reader.format());
         let decoder = choose(reader, self.limits.memory_bytes).map_err(|error| reason(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
-        let texel_bytes = check_size(&*decoder, (self.length, held_bytes), self.limits)?;
+        let texel_bytes = check_size(&*decoder, (self.length, held_bytes), self.limits, growth)?;
         if is_jpeg {
             let (width, height) = decoder.dimensions();
             jpeg::check_plausible(width, height, self.length)?;
@@ -314,8 +315,19 @@ fn choose<R: BufRead + Seek + 'static>(
 
 /// Bytes of memory that an image may take however short its file is.
 const SMALL_BYTES: u64 = 256 << 20;
-/// Bytes of memory that a byte of a file may become: what an EXR of one colour takes, which deflate packs best.
-const MOST_GROWTH: u64 = 4200;
+/// Bytes of memory that a byte of a file may become, by how the format packs: the image as it is decoded, and its texels.
+fn most_growth(format: Option<ImageFormat>) -> u64 {
+    match format {
+        // Eight pixels of a bitmap.
+        Some(ImageFormat::Pnm) => 64,
+        // Runs of 128 pixels in two bytes.
+        Some(ImageFormat::Tga) => 512,
+        // Runs of 255 pixels in two bytes.
+        Some(ImageFormat::Bmp) => 1024,
+        // An EXR of one colour, which deflate packs best.
+        _ => 4200,
+    }
+}
 
 /// Refuses an image before memory of its size is allocated; returns the bytes of the texels. Bytes of the file that the
 /// decoder holds count too.
@@ -323,6 +335,7 @@ fn check_size(
     decoder: &dyn ImageDecoder,
     (length, held_bytes): (u64, u64),
     limits: ImageLimits,
+    most_growth: u64,
 ) -> Result<u64, String> {
     let (width, height) = decoder.dimensions();
     let size = format!("it has {width} × {height} pixels");
@@ -344,7 +357,7 @@ fn check_size(
         ));
     }
     // Runs may leave out most of an image, so that a few bytes are a whole one.
-    if needed > SMALL_BYTES.saturating_add(length.saturating_mul(MOST_GROWTH)) {
+    if needed > SMALL_BYTES.saturating_add(length.saturating_mul(most_growth)) {
         let needed = needed.div_ceil(1 << 20);
         return Err(format!(
             "it claims {width} × {height} pixels, which take {needed} MiB of memory, more than a file of {length} bytes \

@@ -66,13 +66,14 @@ impl Faces {
     }
 }
 
-/// A mesh file's numbers. `normals`, `uvs` and `colors` are empty or one for each position; a normal of zero is missing.
+/// A mesh file's numbers. `normals`, `uvs`, `second_uvs` and `colors` are empty or one for each position; a normal of zero is missing.
 /// `face_materials` is empty or one for each face.
 #[derive(Debug, Default)]
 pub(in crate::assets) struct Parsed {
     pub(in crate::assets) positions: Vec<DVec3>,
     pub(in crate::assets) normals: Vec<Vec3>,
     pub(in crate::assets) uvs: Vec<Vec2>,
+    pub(in crate::assets) second_uvs: Vec<Vec2>,
     /// In sRGB.
     pub(in crate::assets) colors: Vec<[u8; 3]>,
     pub(in crate::assets) faces: Faces,
@@ -97,6 +98,7 @@ pub(in crate::assets) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result
         positions,
         normals,
         uvs,
+        second_uvs,
         colors,
         mut faces,
         has_corners_apart,
@@ -119,10 +121,18 @@ pub(in crate::assets) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result
         return Err(source.wrong(no_usable_face(faces.len(), dropped)));
     }
     let materials_of = triangle_materials;
-    let mut mesh =
-        TriangleMesh { origin, positions, normals, uvs, colors, triangles, materials: materials_of };
+    let mut mesh = TriangleMesh {
+        origin,
+        positions,
+        normals,
+        uvs,
+        second_uvs,
+        colors,
+        triangles,
+        materials: materials_of,
+    };
     drop_unused_vertices(&mut mesh);
-    for uv in mesh.uvs.iter_mut().filter(|uv| !uv.is_finite()) {
+    for uv in mesh.uvs.iter_mut().chain(&mut mesh.second_uvs).filter(|uv| !uv.is_finite()) {
         *uv = Vec2::ZERO;
     }
     complete_normals(&mut mesh, source.watch.token)?;
@@ -283,6 +293,7 @@ fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     retain_used(&mut mesh.positions, &new_index);
     retain_used(&mut mesh.normals, &new_index);
     retain_used(&mut mesh.uvs, &new_index);
+    retain_used(&mut mesh.second_uvs, &new_index);
     retain_used(&mut mesh.colors, &new_index);
     for corner in mesh.triangles.as_flattened_mut() {
         *corner = new_index[*corner as usize];

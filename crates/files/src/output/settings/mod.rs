@@ -111,7 +111,7 @@ fn start(file: &File) -> std::io::Result<Vec<u8>> {
 
 /// The same by the first bytes of a picture.
 fn of_bytes(bytes: &[u8]) -> Result<Made, String> {
-    let wrong = |format: &str| format!("its {format} header makes no sense");
+    let wrong = |format: &str| format!("its {format} header is damaged or cut short");
     match bytes {
         [0x89, b'P', b'N', b'G', ..] => of_png(bytes).ok_or_else(|| wrong("PNG")),
         [0x76, 0x2f, 0x31, 0x01, ..] => of_exr(bytes).ok_or_else(|| wrong("EXR")),

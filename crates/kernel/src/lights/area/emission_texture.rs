@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::geometry::triangle::weights;
 use crate::geometry::{RayF64, Shape};
 use crate::materials::texture::Texture;
-use crate::materials::{EmissionCoat, Opacity, TexturePoint};
+use crate::materials::{EmissionCoat, Footprint, Opacity, SecondPoint, TexturePoint};
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
 /// Factor on the radiance of a lamp, from point to point and from direction to direction.
@@ -39,6 +39,8 @@ pub struct Patch {
     pub corners: [DVec3; 3],
     /// Their texture coordinates.
     pub uvs: [Vec2; 3],
+    /// Their second set of these. `None` if the mesh has none.
+    pub second_uvs: Option<[Vec2; 3]>,
 }
 
 impl EmissionTexture {
@@ -68,10 +70,14 @@ impl EmissionTexture {
     /// Factor at texture coordinates.
     #[inline]
     pub fn lookup(&self, uv: DVec2) -> Vec3 {
-        let at = TexturePoint::sharp(uv);
-        let color = self.texture.as_ref().map_or(Vec3::ONE, |texture| texture.lookup(&at));
+        self.lookup_at(&TexturePoint::sharp(uv))
+    }
+
+    #[inline]
+    fn lookup_at(&self, at: &TexturePoint) -> Vec3 {
+        let color = self.texture.as_ref().map_or(Vec3::ONE, |texture| texture.lookup(at));
         match &self.opacity {
-            Some(opacity) => color * opacity.at(&at, &mut 0),
+            Some(opacity) => color * opacity.at(at, &mut 0),
             None => color,
         }
     }
@@ -93,14 +99,14 @@ impl EmissionTexture {
 
     /// [`EmissionTexture::at`], without the coat.
     pub fn at_place(&self, point: Vec3, primitive: u32) -> Vec3 {
-        self.lookup(self.chart.uv(point.as_dvec3(), primitive))
+        self.lookup_at(&self.chart.texture_point(point.as_dvec3(), primitive))
     }
 
     /// Part of the light along a direction that the clear coat lets through.
     pub fn left_by_coat(&self, point: Vec3, primitive: u32, direction: Vec3) -> f32 {
         let Some(coat) = &self.coat else { return 1.0 };
         let (point, direction) = (point.as_dvec3(), direction.as_dvec3());
-        let at = TexturePoint::sharp(self.chart.uv(point, primitive));
+        let at = self.chart.texture_point(point, primitive);
         // At a rim, rounding may leave no normal.
         let normal = self.chart.normal(point, primitive, direction);
         coat.left(&at, normal.map_or(1.0, |normal| normal.dot(direction)) as f32, &mut 0)
@@ -130,15 +136,25 @@ impl Chart {
         }
     }
 
-    fn uv(&self, point: DVec3, primitive: u32) -> DVec2 {
+    fn texture_point(&self, point: DVec3, primitive: u32) -> TexturePoint {
         let patches = match self {
-            Self::Shape(shape) => return shape.uv_at(point),
+            Self::Shape(shape) => return TexturePoint::sharp(shape.uv_at(point)),
             Self::Triangles(patches) => patches,
         };
         let found = patches.binary_search_by_key(&primitive, |patch| patch.primitive);
-        let Ok(Patch { corners, uvs, .. }) = found.map(|index| patches[index]) else { return DVec2::ZERO };
-        let [a, b, c] = uvs.map(|uv| uv.as_dvec2());
+        let Ok(Patch { corners, uvs, second_uvs, .. }) = found.map(|index| patches[index]) else {
+            return TexturePoint::sharp(DVec2::ZERO);
+        };
         let weights = weights(corners, point);
-        a + (b - a) * weights.x + (c - a) * weights.y
+        let between = |uvs: [Vec2; 3]| {
+            let [a, b, c] = uvs.map(|uv| uv.as_dvec2());
+            a + (b - a) * weights.x + (c - a) * weights.y
+        };
+        // Colours and numbers have no tangents.
+        let second = |uvs| {
+            let (footprint, tangents) = (Footprint::POINT, [Vec3::ZERO; 2]);
+            Box::new(SecondPoint { uv: between(uvs), footprint, tangents })
+        };
+        TexturePoint { second: second_uvs.map(second), ..TexturePoint::sharp(between(uvs)) }
     }
 }

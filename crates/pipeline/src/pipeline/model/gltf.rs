@@ -1,21 +1,26 @@
 //! Scenes of glTF files.
 
 use std::collections::HashMap;
+use std::io::Read;
 use std::path::Path;
 
 use super::frame::{framed, tidied};
 use super::materials::{Materials, TextureFile};
 use super::toml::{Toml, color, list, number, vector};
-use super::{Eye, FOV, Lighting, ModelText, SIZE, Show, Unique, camera, file_name, ground, light, render};
+use super::{
+    Eye, FOV, Lighting, ModelText, ROUGH, SIZE, Show, Unique, camera, file_name, ground, light, render,
+};
 use crate::assets::AssetError;
 use crate::assets::gltf::{
-    Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelScene,
+    Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelScene,
+    Slot,
 };
 use crate::control::{CancelToken, unwatched};
 use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
 use crate::pipeline::settings::Side;
 use crate::pipeline::stages::containers::Containers;
+use crate::scene::keys::endings::MAPS;
 use crate::scene::quoted;
 
 /// The files in which the text finds parts and images.
@@ -100,7 +105,7 @@ impl Writer<'_> {
             .and_then(|camera| camera.aspect)
             .map(|aspect| [(SIZE[1] * aspect).round().max(1.0) as u32, SIZE[1] as u32]);
         let lighting = match scene.lights.is_empty() {
-            true => Lighting::Ours,
+            true => Lighting::Ours { is_polished: scene.materials.iter().any(is_polished) },
             false => Lighting::own(irradiance(&scene.lights, bounds)),
         };
         render(&mut self.toml, size, lighting);
@@ -260,7 +265,9 @@ impl super::materials::Files for Writer<'_> {
                 let ending = match &bytes {
                     Ok(ImageBytes::Inside(bytes)) => ending(bytes).to_owned(),
                     Ok(ImageBytes::File(path)) => {
-                        path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+                        let own = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+                        let start = || first_bytes(path).unwrap_or_default();
+                        if MAPS.contains(&own.as_str()) { own } else { ending(&start()).to_owned() }
                     }
                     Err(_) => "png".to_owned(),
                 };
@@ -270,6 +277,14 @@ impl super::materials::Files for Writer<'_> {
             }
         }
     }
+}
+
+/// Whether a material may throw light on others as a mirror does. A texture may have any number up to its factor.
+fn is_polished(material: &ModelMaterial) -> bool {
+    let is_smooth = |roughness: &Slot| roughness.texture.is_some() || roughness.factor.x < ROUGH;
+    let reflects = material.metallic.factor.x > 0.0 || material.specular.factor.x > 0.0;
+    let is_coated = material.clearcoat.factor.x > 0.0 && is_smooth(&material.clearcoat_roughness);
+    is_coated || is_smooth(&material.roughness) && (reflects || material.transmission.factor.x > 0.0)
 }
 
 /// Irradiance at normal incidence that lights may bring to the middle of a box, all of them together. Lights inside it count from
@@ -287,6 +302,13 @@ fn irradiance(lights: &[ModelLight], [least, greatest]: [DVec3; 2]) -> f64 {
         }
     };
     lights.iter().map(of_light).sum()
+}
+
+/// The first bytes of a file. `None` if it cannot be read.
+fn first_bytes(path: &Path) -> Option<[u8; 4]> {
+    let (mut file, _) = crate::system::file::open(path).ok()?.ok()?;
+    let mut start = [0; 4];
+    file.read_exact(&mut start).ok().map(|()| start)
 }
 
 /// The ending of an image by its first bytes.

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use super::gltf::{Content, Naming};
 use super::{ModelText, Show};
 use crate::assets::AssetError;
-use crate::assets::gltf::is_gltf;
+use crate::assets::gltf::{Container, ImageBytes, is_gltf};
+use crate::assets::image::{ImageLimits, ImageWithin, size, size_within};
 use crate::assets::mesh::ply::write;
 use crate::control::{CancelToken, unwatched};
 use crate::pipeline::stages::containers::Containers;
@@ -39,11 +40,31 @@ pub fn import(path: &Path, folder: &str) -> Result<Imported, String> {
         for asset in assets {
             let bytes = match asset.content {
                 Content::Part(part) => write::bytes(&container.part(part, &unwatched, &token)?.mesh),
-                Content::Image(image) => container.image_content(image, &token)?,
+                Content::Image(image) => {
+                    check_image(&container, image, &token)?;
+                    container.image_content(image, &token)?
+                }
             };
             files.push((PathBuf::from(asset.name), bytes));
         }
         Ok(Imported { text, files, notes })
     };
     read().map_err(|error: AssetError| error.to_string())
+}
+
+/// Refuses what is no image: files from anywhere could be copied under the name of one.
+fn check_image(container: &Container, image: usize, token: &CancelToken) -> Result<(), AssetError> {
+    let limits = ImageLimits::default();
+    let size = match container.image(image)? {
+        ImageBytes::File(file) => size(&file, limits, token),
+        ImageBytes::Inside(bytes) => {
+            size_within(ImageWithin { path: container.path(), bytes: bytes.into() }, limits, token)
+        }
+    };
+    size.map(drop).map_err(|error| match error {
+        AssetError::Malformed { path, line, reason } => {
+            AssetError::Malformed { path, line, reason: format!("{reason} (images[{image}])") }
+        }
+        other => other,
+    })
 }

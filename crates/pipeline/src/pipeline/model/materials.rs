@@ -195,6 +195,9 @@ impl<F: Files> Materials<'_, F> {
             TextureWrap::Clamp => keys.push(("wrap", "\"clamp\"".to_owned())),
             TextureWrap::Mirror => keys.push(("wrap", "\"mirror\"".to_owned())),
         }
+        if texture.is_second {
+            keys.push(("uv", "1".to_owned()));
+        }
         if texture.repeat != Vec2::ONE {
             keys.push(("repeat", pair(texture.repeat)));
         }

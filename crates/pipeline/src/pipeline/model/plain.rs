@@ -6,8 +6,10 @@ use std::path::Path;
 
 use super::frame::framed;
 use super::toml::Toml;
-use super::{FOV, Lighting, ModelText, SIZE, Show, Unique, camera, file_name, ground, light, render};
-use crate::assets::AssetError;
+use super::{
+    FOV, Lighting, ModelText, NARROW, ROUGH, SIZE, Show, Unique, camera, file_name, ground, light, render,
+};
+use crate::assets::{AssetError, FileMaterial};
 use crate::control::{CancelToken, unwatched};
 use crate::math::DVec3;
 use crate::pipeline::settings::{Side, UpAxis};
@@ -52,6 +54,22 @@ impl UpAxis {
     }
 }
 
+/// Whether a material of a mesh file may throw light on others as a mirror does.
+fn is_polished(material: &FileMaterial) -> bool {
+    let is_mirror_or_glass = matches!(material.illumination_model, Some(3..=9));
+    match &material.physical {
+        Some(own) => {
+            let is_smooth = own.roughness_texture.is_some() || f64::from(own.roughness) < ROUGH;
+            let is_coated = own.clearcoat > 0.0 && f64::from(own.clearcoat_roughness) < ROUGH;
+            is_mirror_or_glass || is_smooth || is_coated
+        }
+        None => {
+            let reflects = material.specular_texture.is_some() || material.specular.max_element() > 0.0;
+            is_mirror_or_glass || reflects && material.shininess > NARROW
+        }
+    }
+}
+
 /// The scene of a mesh file.
 pub(super) fn text(
     path: &Path,
@@ -80,9 +98,10 @@ pub(super) fn text(
     );
     let (mut toml, mut names) = (Toml::default(), Unique::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
-    render(&mut toml, None, Lighting::Ours);
+    let lighting = Lighting::Ours { is_polished: loaded.materials.iter().any(is_polished) };
+    render(&mut toml, None, lighting);
     camera(&mut toml, &eye, FOV);
-    light(&mut toml, &eye, Lighting::Ours);
+    light(&mut toml, &eye, lighting);
     let is_colored = !loaded.mesh.colors.is_empty();
     let needs_material = loaded.lacks_materials();
     let name = names.name("model", "model");

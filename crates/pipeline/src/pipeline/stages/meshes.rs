@@ -12,7 +12,7 @@ use super::containers::canonical;
 use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::{AssetError, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
-use crate::scene::description::{MeshFile, Scene};
+use crate::scene::description::{MeshFile, Scene, UvSet};
 use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::{Loaded, MeshBounds};
 
@@ -146,8 +146,21 @@ fn warn_about_missing_parts(
             let name = &material.name;
             warn(format!("`vertex_colors` changes nothing: \"{name}\" has no colour that they multiply"));
         }
-        let Some(material) = material.filter(|_| read.uvs.is_empty()) else { continue };
+        let Some(material) = material else { continue };
         let name = &material.name;
+        let textures = &loaded.scene.textures;
+        let is_second = |(texture, _): &(usize, _)| textures[*texture].uv == UvSet::Second;
+        if let Some((texture, _)) = material.textures().into_iter().find(is_second)
+            && read.second_uvs.is_empty()
+        {
+            let texture = &textures[texture].name;
+            warn(format!(
+                "{file} has no second set of texture coordinates: \"{texture}\" of \"{name}\" takes the first"
+            ));
+        }
+        if !read.uvs.is_empty() {
+            continue;
+        }
         if material.kind.has_direction() {
             warn(format!(
                 "{file} has no texture coordinates: the `anisotropy` of \"{name}\" has no direction there"

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use super::Located;
 use crate::choice;
+pub use crate::materials::UvSet;
 pub use crate::materials::texture::{TextureFilter, Wrap};
 pub use crate::materials::{Channel, EmissionSides, PixelNumber};
 use crate::math::{DVec3, Vec2, Vec3};
@@ -28,6 +29,8 @@ pub struct Texture {
     pub rotate: f64,
     /// Offset of the coordinates after that.
     pub offset: Vec2,
+    /// Coordinates by which it is looked up.
+    pub uv: UvSet,
     /// Meaning of its numbers.
     pub encoding: Encoding,
     /// Factor on the linear colours and numbers that are looked up, not on normals and heights.
@@ -490,9 +493,9 @@ impl Material {
 /// Key of the look-up; the texels have keys of their own.
 impl Fingerprinted for Texture {
     fn add_to(&self, key: &mut Fingerprint, _: &Referents<'_>) {
-        let Self { name: _, file, image, filter, wrap, repeat, rotate, offset, encoding, factor } = self;
+        let Self { name: _, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor } = self;
         key.path(&file.value).choice(*filter).choice(*wrap).choice(*encoding).f32(repeat.x).f32(repeat.y);
-        key.f64(*rotate).f32(offset.x).f32(offset.y).vec3(*factor);
+        key.f64(*rotate).f32(offset.x).f32(offset.y).vec3(*factor).flag(*uv == UvSet::Second);
         key.index(image.map_or(0, |image| image as usize + 1));
     }
 }

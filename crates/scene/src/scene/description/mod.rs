@@ -18,7 +18,7 @@ pub use light::{DirectionalLight, Environment, Falloff, Light, PointLight, SpotL
 pub use material::{
     Bump, Channel, ColorSource, EmissionSides, EmissionSource, Encoding, FresnelSource, Material,
     MaterialKind, NormalMap, NumberSource, OpacitySource, PixelNumber, Texture, TextureFilter, TextureRole,
-    TextureUse, Wrap,
+    TextureUse, UvSet, Wrap,
 };
 pub use method::{Integrator, Method};
 pub use render::{

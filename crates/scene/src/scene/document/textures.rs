@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 
 use super::super::description::{
-    Channel, Encoding, Located, Material, PixelNumber, Texture, TextureFilter, TextureUse, Wrap,
+    Channel, Encoding, Located, Material, PixelNumber, Texture, TextureFilter, TextureUse, UvSet, Wrap,
 };
 use super::super::keys::endings::{GLTF, MAPS};
 use super::super::sanitize::shortened;
 use super::context::{Context, Issue};
-use super::key::Key;
 use super::limits::Limits;
 use super::names::Names;
 use super::table::Table;
@@ -38,12 +37,13 @@ fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
     let rotate = table.optional("rotate").number(Limits::Any).unwrap_or(0.0);
     let offset = table.optional("offset").pair(Limits::Any).unwrap_or(Vec2::ZERO);
     let encoding = table.optional("encoding").choice().unwrap_or(Encoding::Auto);
-    first_coordinates(&table.optional("uv"));
+    let uv = table.optional("uv").whole(table.range("uv"));
+    let uv = if uv == Some(1) { UvSet::Second } else { UvSet::First };
     let factor = table.optional("factor");
     let factor = if factor.is_given() { factor.color() } else { Some(Vec3::ONE) };
     table.finish();
     let (file, image, factor) = (file?, image?, factor?);
-    Some(Texture { name, file, image, filter, wrap, repeat, rotate, offset, encoding, factor })
+    Some(Texture { name, file, image, filter, wrap, repeat, rotate, offset, uv, encoding, factor })
 }
 
 /// The file, and the number of the image if it is one of glTF.
@@ -53,15 +53,6 @@ fn image(table: &Table<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
         return (key.file(MAPS, &[]), Some(None));
     }
     (key.file(GLTF, &[]), number.whole(table.range("image")).map(Some))
-}
-
-/// Reports a set of texture coordinates other than the first: no mesh file has more.
-fn first_coordinates(key: &Key<'_>) {
-    let set: Option<u32> = key.whole(0..=i128::from(u32::MAX));
-    if let Some(span) = key.span().filter(|_| set.is_some_and(|set| set > 0)) {
-        let message = "`uv` must be 0: the mesh files of this version have one set of texture coordinates";
-        key.context.report(Issue::error(span, message));
-    }
 }
 
 /// Reports textures without an encoding that materials use for colours and for numbers. Alpha has no encoding.

@@ -66,5 +66,11 @@ pub(super) fn limited(
 /// Reports that a value is not of the kind that is expected.
 pub(super) fn wrong_type(context: &Context<'_>, name: &str, value: Value<'_>, expected: &str) {
     let label = format!("found {}", found(context, value));
-    context.report(Issue::error(value.span(), format!("`{name}` must be {expected}")).label(label));
+    let issue = Issue::error(value.span(), format!("`{name}` must be {expected}")).label(label);
+    // Whoever wrote a texture wants to know whether it is spelled wrongly or not possible.
+    let is_texture = matches!(value.item(), Item::Table(table) if table.get("texture").is_some());
+    context.report(match is_texture && !expected.contains("texture") {
+        true => issue.help(format!("`{name}` is the same everywhere: it takes no texture")),
+        false => issue,
+    });
 }

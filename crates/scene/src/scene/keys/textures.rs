@@ -62,7 +62,13 @@ pub(super) const TEXTURES: TableInfo = TableInfo {
             Is("[1, 1, 1]"),
             "Multiplies the linear colours that are looked up; a number takes its red, normal maps and heights do not take it",
         ),
-        key("uv", Whole(0, 0), "", Is("0"), "The set of texture coordinates; mesh files have one"),
+        key(
+            "uv",
+            Whole(0, 1),
+            "",
+            Is("0"),
+            "The set of texture coordinates: 1 is the second one of a mesh, as glTF files have it (`TEXCOORD_1`), and PLY files with `u1` and `v1`",
+        ),
         key(
             "encoding",
             Words(words::<Encoding>),

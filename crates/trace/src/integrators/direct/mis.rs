@@ -1,12 +1,12 @@
 //! Techniques that find the light of lamps beside light samples, and the MIS weights of light samples and of these against each other
 //! (multiple importance sampling: Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 9.2).
 
-use crate::geometry::{Ray, ShapeHit, SurfacePoint};
+use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::tile::TileContext;
 use crate::lights::{LightHit, LightRow, Side, Source};
-use crate::materials::TexturePoint;
+use crate::materials::Footprint;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
@@ -203,11 +203,12 @@ impl TileContext<'_> {
         if !emission.shines() {
             return Vec3::ZERO;
         }
-        let SurfacePoint { normal, uv, .. } = world.geometry.surface(ray, hit);
+        let surface = world.geometry.surface(ray, hit);
+        let normal = surface.normal;
         if !emission.shines_from(normal.dot(ray.direction) < 0.0) {
             return Vec3::ZERO;
         }
-        let at = TexturePoint::sharp(uv);
+        let at = world.texture_point(hit, &surface, |_| Footprint::POINT);
         let mut radiance = emission.at(&at, normal.dot(ray.direction), lookups);
         if let Some(opacity) = &material.opacity {
             radiance *= opacity.at(&at, lookups);

@@ -286,7 +286,7 @@ impl PacketIntersection<'_> {
             }
             // Leave out materials that are not plain. The first plain one decides the kind of all BSDFs.
             let materials = tile.world.row_of_materials(id, of_object, &hits.primitive);
-            let (mut of, mut has_uv) = (0, false);
+            let (mut of, mut asked_uvs) = (0, None);
             let mut groups = ArrayVec::<(&Rough, bool, u32), PACKET>::new();
             let mut waiting = of_object;
             while waiting != 0 {
@@ -298,12 +298,16 @@ impl PacketIntersection<'_> {
                 } else if row.bsdf.kind() != material.kind {
                     continue;
                 }
+                let own_uvs = material.row_texture.filter(|_| *are_lit && measure.is_colored());
+                // Rows have room for one set of coordinates.
+                if own_uvs.is_some() && asked_uvs.is_some() && own_uvs != asked_uvs {
+                    continue;
+                }
+                asked_uvs = asked_uvs.or(own_uvs);
                 of |= alike;
-                let is_textured = material.has_row_texture && *are_lit && measure.is_colored();
-                has_uv |= is_textured;
                 plain.shining |= if material.shines() { alike } else { 0 };
                 plain.two_sided |= if material.is_two_sided { alike } else { 0 };
-                groups.push((rough, is_textured, alike));
+                groups.push((rough, own_uvs.is_some(), alike));
             }
             if of == 0 {
                 continue;
@@ -316,13 +320,13 @@ impl PacketIntersection<'_> {
                         (plain.shining, plain.two_sided) = (plain.shining & !of, plain.two_sided & !of);
                         continue;
                     }
-                    if has_uv {
+                    if asked_uvs.is_some() {
                         surface.fill_uv(shape, rows, hits, of);
                     }
                 }
                 Object::Mesh(mesh) => {
                     row.set_starts(of, &mesh.scene_numbers(&hits.primitive));
-                    mesh.fill_surfaces(surface, rows, hits, of, has_uv);
+                    mesh.fill_surfaces(surface, rows, hits, of, asked_uvs);
                 }
             }
             plain.all |= of;
@@ -387,7 +391,7 @@ impl TileContext<'_> {
                 of |= if self.is_held_by_rows(material as usize) { alike } else { 0 };
             }
             if of != 0 {
-                mesh.fill_surfaces(surface, rows, hits, of, false);
+                mesh.fill_surfaces(surface, rows, hits, of, None);
                 found |= of;
             }
         }

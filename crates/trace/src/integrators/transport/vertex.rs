@@ -1,5 +1,7 @@
 //! All data of a hit for shading, prepared once: the geometry, the shading normal, its bounds, and the BSDF.
 
+use std::borrow::Cow;
+
 use super::cone::{Bend, Cone};
 use super::ray::PathRay;
 use super::tile::TileContext;
@@ -92,16 +94,17 @@ impl<'a> Vertex<'a> {
         let side = if surface.normal.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
         let cone = path.cone.after(distance);
         // Compute what beams need, if there are any.
-        let (mut footprint, mut curvature) = (Footprint::POINT, 0.0);
-        if tile.pixel_spread > 0.0 {
-            let tangents = [surface.dpdu, surface.dpdv];
-            footprint = Footprint::of_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents);
-            if material.bsdf.has_delta() {
-                curvature = side * tile.world.geometry.curvature(hit, &surface);
-            }
-        }
+        let has_extent = tile.pixel_spread > 0.0;
+        let footprint = |tangents| match has_extent {
+            true => Footprint::of_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents),
+            false => Footprint::POINT,
+        };
+        let curvature = match has_extent && material.bsdf.has_delta() {
+            true => side * tile.world.geometry.curvature(hit, &surface),
+            false => 0.0,
+        };
         Self {
-            texture_point: TexturePoint { uv: surface.uv, footprint },
+            texture_point: tile.world.texture_point(hit, &surface, footprint),
             cone,
             color: tile.world.vertex_color(hit),
             curvature,
@@ -126,8 +129,16 @@ impl<'a> Vertex<'a> {
     /// point.
     pub fn emitted(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.state.density > 0.0;
-        let at = if is_shared { TexturePoint::sharp(self.surface.uv) } else { self.texture_point };
+        let at = self.place(is_shared);
         self.material.emission.at(&at, self.normal.dot(self.to_eye), &mut counters.texture_lookups)
+    }
+
+    /// The point of the texture look-ups, without its extent for paths that share their lamps with light samples.
+    pub fn place(&self, is_shared: bool) -> Cow<'_, TexturePoint> {
+        match is_shared {
+            true => Cow::Owned(self.texture_point.without_extent()),
+            false => Cow::Borrowed(&self.texture_point),
+        }
     }
 
     /// A colour of the material, multiplied by the vertex colour.
@@ -140,7 +151,7 @@ impl<'a> Vertex<'a> {
     /// point.
     pub fn pane_tint(&self, path: &PathRay, pane: &Pane, lookups: &mut u64) -> Vec3 {
         let is_shared = path.state.density > 0.0;
-        let at = if is_shared { TexturePoint::sharp(self.surface.uv) } else { self.texture_point };
+        let at = self.place(is_shared);
         self.tinted(pane.tint.at(&at, lookups).min(Vec3::ONE))
     }
 
@@ -160,7 +171,13 @@ impl<'a> Vertex<'a> {
     /// The vertex for light that comes through the surface: on the side that the viewer does not see.
     pub fn behind(&self) -> Self {
         let turned = |Sides { before, beyond }: Sides| Sides { before: beyond, beyond: before };
-        Self { normal: -self.normal, side: -self.side, sides: self.sides.map(turned), ..*self }
+        Self {
+            normal: -self.normal,
+            side: -self.side,
+            sides: self.sides.map(turned),
+            texture_point: self.texture_point.clone(),
+            ..*self
+        }
     }
 
     /// The interpolated normal, bent by the relief, on the front side.

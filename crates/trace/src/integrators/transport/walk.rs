@@ -12,7 +12,7 @@ use super::tile::TileContext;
 use super::vertex::Vertex;
 use crate::geometry::{Ray, ShapeHit, SurfacePoint};
 use crate::integrators::RayCounters;
-use crate::materials::{Bsdf, GlassPoint, Pane, TexturePoint};
+use crate::materials::{Bsdf, GlassPoint, Pane};
 use crate::math::Vec3;
 use crate::sampling::Decision;
 use crate::world::{Hit, MOST_STRAIGHT, Sides};
@@ -220,7 +220,7 @@ fn rough<'a, W: Walker<'a>>(
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
     let at = match touching {
         Some(other) => Vertex::touching(tile, path, (sides, &other), hit.shape.t).texture_point,
-        None => vertex.texture_point,
+        None => vertex.texture_point.clone(),
     };
     let alpha = glass.alpha(&at, walker.lookups())?;
     Some(GlassPoint { near: indices[0], far: indices[1], alpha })
@@ -266,7 +266,7 @@ fn is_touched<'a, W: Walker<'a>>(walker: &mut W, path: &PathRay, vertex: &Vertex
 pub fn chance(path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> f32 {
     let Some(opacity) = &vertex.material.opacity else { return 1.0 };
     let is_shared = path.state.density > 0.0;
-    let at = if is_shared { TexturePoint::sharp(vertex.surface.uv) } else { vertex.texture_point };
+    let at = vertex.place(is_shared);
     opacity.at(&at, lookups)
 }
 

@@ -122,7 +122,7 @@ fn list_length(numbers: &mut impl Numbers, count: Scalar, item: Scalar) -> Resul
     }
 }
 
-/// Slot of a vertex value: position, normal, texture coordinates, colour. `None` for other properties.
+/// Slot of a vertex value: position, normal, texture coordinates, colour, second set of coordinates. `None` for other properties.
 fn slot(name: &str) -> Option<usize> {
     Some(match name {
         "x" => 0,
@@ -136,6 +136,8 @@ fn slot(name: &str) -> Option<usize> {
         "red" | "diffuse_red" | "r" => 8,
         "green" | "diffuse_green" | "g" => 9,
         "blue" | "diffuse_blue" | "b" => 10,
+        "u1" | "s1" => 11,
+        "v1" | "t1" => 12,
         _ => return None,
     })
 }
@@ -157,6 +159,7 @@ fn read_vertices(
         return Err(place.source.wrong("the vertices have no x, y and z"));
     }
     let (has_normals, has_uvs, has_colors) = (has(&[3, 4, 5]), has(&[6, 7]), has(&[8, 9, 10]));
+    let has_second_uvs = has(&[11, 12]);
     // Whole numbers are parts of the greatest.
     let greatest = |slot: usize| {
         let kind = layout.iter().find(|(_, to)| *to == Some(slot)).map(|(kind, _)| *kind);
@@ -167,22 +170,26 @@ fn read_vertices(
     parsed.positions.reserve(count);
     parsed.normals.reserve(if has_normals { count } else { 0 });
     parsed.uvs.reserve(if has_uvs { count } else { 0 });
+    parsed.second_uvs.reserve(if has_second_uvs { count } else { 0 });
     parsed.colors.reserve(if has_colors { count } else { 0 });
     each(place, element, numbers, |numbers| {
-        let mut values = [0.0; 11];
+        let mut values = [0.0; 13];
         for &(kind, slot) in &layout {
             match (kind, slot) {
                 (Kind::One(scalar), Some(slot)) => values[slot] = numbers.float(scalar)?,
                 _ => skip(numbers, kind)?,
             }
         }
-        let [x, y, z, nx, ny, nz, u, v, red, green, blue] = values;
+        let [x, y, z, nx, ny, nz, u, v, red, green, blue, second_u, second_v] = values;
         parsed.positions.push(DVec3::new(x, y, z));
         if has_normals {
             parsed.normals.push(DVec3::new(nx, ny, nz).as_vec3());
         }
         if has_uvs {
             parsed.uvs.push(DVec2::new(u, v).as_vec2());
+        }
+        if has_second_uvs {
+            parsed.second_uvs.push(DVec2::new(second_u, second_v).as_vec2());
         }
         if has_colors {
             parsed.colors.push(color_bytes([red / full[0], green / full[1], blue / full[2]]));

@@ -8,6 +8,7 @@ pub fn bytes(mesh: &TriangleMesh) -> Vec<u8> {
     let is_far = mesh.origin != DVec3::ZERO;
     let place = if is_far { "double" } else { "float" };
     let (normals, uvs, colors) = (!mesh.normals.is_empty(), !mesh.uvs.is_empty(), !mesh.colors.is_empty());
+    let second_uvs = !mesh.second_uvs.is_empty();
     // Write the header.
     let mut header =
         format!("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", mesh.positions.len());
@@ -20,6 +21,9 @@ pub fn bytes(mesh: &TriangleMesh) -> Vec<u8> {
     }
     if uvs {
         add("float", &["u", "v"]);
+    }
+    if second_uvs {
+        add("float", &["u1", "v1"]);
     }
     if colors {
         add("uchar", &["red", "green", "blue"]);
@@ -44,6 +48,9 @@ pub fn bytes(mesh: &TriangleMesh) -> Vec<u8> {
         }
         if uvs {
             floats(&mesh.uvs[index].to_array());
+        }
+        if second_uvs {
+            floats(&mesh.second_uvs[index].to_array());
         }
         if colors {
             bytes.extend(mesh.colors[index]);

@@ -79,6 +79,7 @@ fn sheet(side: u32) -> Vec<Patch> {
         primitive: number * 2 + 1,
         corners: corners.map(|(point, _)| point),
         uvs: corners.map(|(_, uv)| uv),
+        second_uvs: None,
     };
     (0..).zip(corners).map(patch).collect()
 }

@@ -1,0 +1,247 @@
+//! Broken and hostile models, some twenty of each format: each is an error that names the file and the place, or it is read. None
+//! takes more memory than its length allows.
+
+mod cases;
+
+use std::fs;
+use std::path::Path;
+
+use glimt::assets::gltf::Container;
+use glimt::assets::mesh::load;
+use glimt::control::{CancelToken, unwatched};
+use serde_json::{Value, json};
+
+use self::cases::{every_byte, mtl, obj, off, ply, stl};
+
+/// A place in the JSON, what stands there then, and words of the message.
+const EDITS: &[(&str, &str, &str)] = &[
+    ("/asset/version", r#""1.0""#, r#"it is glTF 1.0; version 2 is read"#),
+    ("/nodes/0/mesh", r#"7"#, r#"nodes[0]: meshes[7] does not exist: there are 1"#),
+    ("/nodes/0/mesh", r#"-1"#, r#"invalid value: integer `-1`"#),
+    ("/nodes/0/children", r#"[0]"#, r#"nodes: each is a child of another"#),
+    ("/nodes/0/children", r#"[9]"#, r#"nodes[9] does not exist: there are 1"#),
+    (
+        "/meshes/0/primitives/0/attributes/POSITION",
+        r#"9"#,
+        r#"meshes[0].primitives[0]: POSITION: accessors[9] does not exist: there are 2"#,
+    ),
+    (
+        "/meshes/0/primitives/0/indices",
+        r#"9"#,
+        r#"meshes[0].primitives[0]: indices: accessors[9] does not exist: there are 2"#,
+    ),
+    (
+        "/meshes/0/primitives/0/indices",
+        r#"0"#,
+        r#"meshes[0].primitives[0]: indices: its indices are not whole numbers"#,
+    ),
+    (
+        "/meshes/0/primitives/0/attributes",
+        r#"{"NORMAL": 0}"#,
+        r#"meshes[0].primitives[0]: it has no positions"#,
+    ),
+    ("/accessors/0/componentType", r#"5124"#, r#"accessors[0]: there is no component type 5124"#),
+    ("/accessors/0/type", r#""VEC9""#, r#"accessors[0]: there is no type "VEC9""#),
+    ("/accessors/0/count", r#"4000000000"#, r#"accessors[0]: 4000000000 elements from byte 0 need"#),
+    ("/accessors/0/bufferView", r#"9"#, r#"accessors[0]: bufferViews[9] does not exist: there are 2"#),
+    (
+        "/accessors/0/byteOffset",
+        r#"1000000000000"#,
+        r#"accessors[0]: 3 elements from byte 1000000000000 need 36 bytes of bufferViews[0], which has 36"#,
+    ),
+    ("/bufferViews/0/buffer", r#"9"#, r#"bufferViews[0]: buffers[9] does not exist: there are 1"#),
+    (
+        "/bufferViews/0/byteLength",
+        r#"4000000000"#,
+        r#"bufferViews[0]: bytes 0 + 4000000000 of buffers[0], which has 44"#,
+    ),
+    ("/bufferViews/0/byteStride", r#"4"#, r#"bufferViews[0]: a stride of 4 bytes for elements of 12"#),
+    ("/buffers/0/byteLength", r#"4000000000"#, r#"buffers[0]: it claims 4000000000 bytes, and there are 44"#),
+    ("/buffers/0/uri", r#""/etc/passwd""#, r#"buffers[0]: "/etc/passwd" is no file beside it"#),
+    ("/buffers/0/uri", r#""data:;base64,%%%%""#, r#"is no digit of base64"#),
+    ("/scene", r#"3"#, r#""#),
+    ("/meshes/0/primitives/0/material", r#"4"#, r#"nodes[0]: materials[4] does not exist: there are 0"#),
+    (
+        "/extensionsRequired",
+        r#"["KHR_draco_mesh_compression"]"#,
+        r#"it needs KHR_draco_mesh_compression, which this version does not read; export it without Draco compression"#,
+    ),
+];
+
+/// A triangle as glTF.
+fn triangle() -> Value {
+    let numbers = "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIAAAA=";
+    json!({
+        "asset": {"version": "2.0"},
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 6}],
+        "buffers": [{"byteLength": 44, "uri": format!("data:;base64,{numbers}")}]
+    })
+}
+
+/// The message about a file in a folder, with the file's name alone; empty if it is read.
+fn said(folder: &Path, name: &str, content: &[u8]) -> String {
+    let (path, token) = (folder.join(name), CancelToken::new());
+    fs::write(&path, content).expect("written");
+    let read = match name.ends_with("gltf") || name.ends_with("glb") {
+        true => Container::open(&path, &unwatched, &token).and_then(|file| file.scene(&token)).map(drop),
+        false => load(&path, &unwatched, &token).map(drop),
+    };
+    let message = read.map_or_else(|error| error.to_string(), |()| String::new());
+    message.replace(&format!("{}/", folder.display()), "")
+}
+
+#[test]
+fn mesh_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, cases) in [("a.obj", obj()), ("a.off", off()), ("a.ply", ply()), ("a.stl", stl())] {
+        assert!(cases.len() >= 20, "{name}");
+        for (what, content, expected) in cases {
+            assert_eq!(said(folder.path(), name, &content), expected, "{name}: {what}");
+        }
+    }
+}
+
+#[test]
+fn material_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let obj = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n";
+    let cases = mtl();
+    assert!(cases.len() >= 16);
+    for (what, content, expected) in cases {
+        fs::write(folder.path().join("a.mtl"), content).expect("written");
+        assert_eq!(said(folder.path(), "a.obj", obj), expected, "{what}");
+    }
+}
+
+#[test]
+fn gltf_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    assert_eq!(said(folder.path(), "a.gltf", triangle().to_string().as_bytes()), "");
+    for &(place, value, expected) in EDITS {
+        let mut json = triangle();
+        let value: Value = serde_json::from_str(value).expect("JSON");
+        match json.pointer_mut(place) {
+            Some(there) => *there = value,
+            None => {
+                let (list, key) = place.rsplit_once('/').expect("a place");
+                json.pointer_mut(list).expect("a list")[key] = value;
+            }
+        }
+        let message = said(folder.path(), "a.gltf", json.to_string().as_bytes());
+        let names_both = message.starts_with("a.gltf:") && message.contains(expected);
+        assert!(
+            names_both || expected.is_empty() && message.is_empty(),
+            "{place} = {value:?}: {message}",
+            value = json.pointer(place)
+        );
+    }
+    for (text, expected) in [
+        ("{", "a.gltf:1: column 1: EOF while parsing an object"),
+        ("{\"a\": 1}", "a.gltf: it is no glTF: asset.version is missing"),
+        ("[]", "a.gltf: it is no glTF: asset.version is missing"),
+        ("{\"asset\": {\"version\": \"2.0\"}} x", "a.gltf:1: column 31: trailing characters"),
+    ] {
+        assert_eq!(said(folder.path(), "a.gltf", text.as_bytes()), expected);
+    }
+}
+
+/// Chunks of GLB files: header, JSON and binary chunk with what they claim.
+#[test]
+fn glb_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut json = triangle();
+    json["buffers"][0] = json!({"byteLength": 44});
+    let mut text = json.to_string().into_bytes();
+    text.resize(text.len().next_multiple_of(4), b' ');
+    let numbers = [0, 0, 0, 0x3f80_0000, 0, 0, 0, 0x3f80_0000, 0, 0x0001_0000, 2_u32];
+    let binary: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+    let chunk = |kind: &[u8; 4], claimed: usize, bytes: &[u8]| {
+        [&(claimed as u32).to_le_bytes()[..], kind, bytes].concat()
+    };
+    let file = |head: &[u8], chunks: &[Vec<u8>]| [head, &chunks.concat()].concat();
+    let head = b"glTF\x02\0\0\0\0\0\0\0";
+    let (own, rest) = (chunk(b"JSON", text.len(), &text), chunk(b"BIN\0", 44, &binary));
+    let short = chunk(b"BIN\0", 44, &binary[..40]);
+    let (long_text, long_rest) = (chunk(b"JSON", 1 << 31, &text), chunk(b"BIN\0", 1 << 31, &binary));
+    let broken = chunk(b"JSON", 8, b"{\"a\": 1]");
+    let empty = chunk(b"JSON", 0, b"");
+    let all = file(head, &[own.clone(), rest.clone()]);
+    let has = text.len() + 44 + 8;
+    let claims = |at: usize, has: usize| {
+        format!("a.glb: the chunk at byte {at} claims 2147483648 bytes, and the file has {has} more")
+    };
+    let place = 12 + own.len();
+    let cases: Vec<(&str, Vec<u8>, String)> = vec![
+        ("whole", all.clone(), String::new()),
+        (
+            "an unknown chunk before",
+            file(head, &[own.clone(), chunk(b"MINE", 4, b"abcd"), rest.clone()]),
+            String::new(),
+        ),
+        ("two of each", file(head, &[own.clone(), rest.clone(), own.clone(), rest.clone()]), String::new()),
+        ("only the first word", b"glTF".to_vec(), "a.glb: the file ends in its header".to_owned()),
+        ("half a version", b"glTF\x02\0".to_vec(), "a.glb: the file ends in its header".to_owned()),
+        (
+            "version 1",
+            file(b"glTF\x01\0\0\0\0\0\0\0", std::slice::from_ref(&own)),
+            "a.glb: it is GLB of version 1; version 2 is read".to_owned(),
+        ),
+        (
+            "version 4294967295",
+            file(b"glTF\xff\xff\xff\xff\0\0\0\0", &[]),
+            "a.glb: it is GLB of version 4294967295; version 2 is read".to_owned(),
+        ),
+        ("no chunk", head.to_vec(), "a.glb: it has no JSON".to_owned()),
+        ("half a header of a chunk", file(head, &[own[..6].to_vec()]), "a.glb: it has no JSON".to_owned()),
+        ("no JSON", file(head, std::slice::from_ref(&rest)), "a.glb: it has no JSON".to_owned()),
+        (
+            "an unknown chunk alone",
+            file(head, &[chunk(b"MINE", 4, b"abcd")]),
+            "a.glb: it has no JSON".to_owned(),
+        ),
+        ("2 GiB of JSON", file(head, &[long_text, rest.clone()]), claims(12, has)),
+        ("2 GiB of numbers", file(head, &[own.clone(), long_rest]), claims(place, 44)),
+        (
+            "numbers that are cut short",
+            file(head, &[own.clone(), short]),
+            format!("a.glb: the chunk at byte {place} claims 44 bytes, and the file has 40 more"),
+        ),
+        (
+            "JSON that is cut short",
+            all[..200].to_vec(),
+            format!("a.glb: the chunk at byte 12 claims {} bytes, and the file has 180 more", text.len()),
+        ),
+        (
+            "no numbers",
+            file(head, std::slice::from_ref(&own)),
+            "a.glb: buffers[0]: it has neither a URI nor a binary chunk".to_owned(),
+        ),
+        (
+            "fewer numbers",
+            file(head, &[own, chunk(b"BIN\0", 40, &binary[..40])]),
+            "a.glb: buffers[0]: it claims 44 bytes, and there are 40".to_owned(),
+        ),
+        (
+            "broken JSON",
+            file(head, &[broken, rest.clone()]),
+            "a.glb:1: column 8: expected `,` or `}`".to_owned(),
+        ),
+        (
+            "JSON of no bytes",
+            file(head, &[empty, rest]),
+            "a.glb:1: column 0: EOF while parsing a value".to_owned(),
+        ),
+        ("every byte", every_byte(), "a.glb:1: column 1: expected value".to_owned()),
+        ("nothing", Vec::new(), "a.glb:1: column 0: EOF while parsing a value".to_owned()),
+    ];
+    assert!(cases.len() >= 20);
+    for (what, content, expected) in cases {
+        assert_eq!(said(folder.path(), "a.glb", &content), expected, "{what}");
+    }
+}
