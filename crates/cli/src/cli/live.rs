@@ -62,6 +62,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
                 Command::Render(_)
                 | Command::Preview(_)
                 | Command::KeepCamera(_)
+                | Command::UndoCamera(_)
                 | Command::Pick(_)
                 | Command::Cancel
                 | Command::Suspend
@@ -190,6 +191,7 @@ impl Writes {
             | Event::Checkpoint { .. }
             | Event::Edited { .. }
             | Event::CameraKept { .. }
+            | Event::CameraUndone { .. }
             | Event::Picked { .. }
             | Event::Files { .. } => {}
         }

@@ -18,6 +18,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     let event = match event {
         // Whatever is rendered meanwhile, these answer a person.
         Event::CameraKept { outcome, .. } => return camera::kept(state, outcome),
+        Event::CameraUndone { outcome, .. } => return camera::undone(state, outcome),
         Event::Picked { picked, .. } => return pointer::picked(state, &picked),
         // Files of pictures of before are there all the same.
         Event::Written { path, bytes, generation } if generation != state.request.generation => {
@@ -53,7 +54,11 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         }
         Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => state.work.progress = Some(progress),
-        Event::Preview { .. } | Event::Files { .. } | Event::CameraKept { .. } | Event::Picked { .. } => {}
+        Event::Preview { .. }
+        | Event::Files { .. }
+        | Event::CameraKept { .. }
+        | Event::CameraUndone { .. }
+        | Event::Picked { .. } => {}
         Event::Written { path, bytes, generation } => wrote(state, path, bytes, generation),
         Event::WriteFailed { message, .. } => {
             let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
@@ -119,6 +124,7 @@ fn generation(event: &Event) -> u64 {
         | Event::Edited { generation, .. }
         | Event::Files { generation, .. }
         | Event::CameraKept { generation, .. }
+        | Event::CameraUndone { generation, .. }
         | Event::Picked { generation, .. }
         | Event::Done { generation, .. }
         | Event::Failed { generation, .. }
