@@ -55,6 +55,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         color: order.color,
         preview: order.preview,
         cell_aspect: None,
+        notify_after: Duration::try_from_secs_f64(order.notify_after).ok().filter(|time| !time.is_zero()),
         commands: Box::new(move |command| {
             match command {
                 Command::Write => asked.order(),

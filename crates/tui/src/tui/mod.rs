@@ -6,6 +6,7 @@
 
 mod action;
 mod camera;
+mod chrome;
 mod color;
 mod display;
 mod editor;
@@ -30,6 +31,7 @@ mod run;
 mod signals;
 mod state;
 mod terminal;
+mod terminals;
 mod update;
 mod view;
 mod writer;

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
+use super::chrome::Chrome;
 use super::display::Display;
 use super::event::Event;
 use super::paint::{Advice, Fidelity, Moment, advise};
@@ -137,6 +138,9 @@ impl Presenter {
         let window = state.display.window;
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         view::draw(state, &mut buffer);
+        if let Some(chrome) = Chrome::of(state, self.display.bytes_per_second().is_some()) {
+            self.display.dress(chrome);
+        }
         let is_new = self.note_picture(state, now);
         // It is all there, and no better one has come since.
         self.drawn.is_first &= is_new || !self.display.is_complete();

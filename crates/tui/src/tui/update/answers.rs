@@ -7,12 +7,14 @@ use crate::tui::known::Answer;
 use crate::tui::known::Blocks;
 use crate::tui::preview_kind::PreviewKind;
 use crate::tui::state::State;
+use crate::tui::terminals::Terminal;
 use crate::tui::view::ramp;
 
 /// Shows everything as well as the terminal can from now on, if the answer belongs to a question.
 pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
     match answer {
-        Answer::Blocks(blocks) if state.display.ask.blocks => return draw_in(state, blocks),
+        Answer::Name(terminal) => return name(state, terminal),
+        Answer::Focus { is_here } => state.display.has_focus = is_here,
         Answer::TrueColor if state.display.ask.true_color => show(state, ColorDepth::TrueColor),
         Answer::Ink { index, rgb } if state.display.ask.palette => {
             if let Some(ink) = state.display.ansi.get_mut(usize::from(index)).filter(|ink| **ink != rgb) {
@@ -24,8 +26,7 @@ pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
             let is_light = ramp::is_light(rgb);
             state.dirty |= std::mem::replace(&mut state.display.is_light, is_light) != is_light;
         }
-        Answer::Blocks(_)
-        | Answer::TrueColor
+        Answer::TrueColor
         | Answer::Ink { .. }
         | Answer::Background(_)
         | Answer::Ready
@@ -40,6 +41,21 @@ fn show(state: &mut State, depth: ColorDepth) {
     state.display.depth = depth;
     state.display.shades = Shades::new(depth, &state.display.ansi);
     state.dirty = true;
+}
+
+/// The terminal's name, if it was asked for: what it draws, and what it can do besides.
+fn name(state: &mut State, terminal: Terminal) -> Vec<Effect> {
+    let ask = state.display.ask;
+    let mut effects = Vec::new();
+    if ask.name {
+        let had_focus = std::mem::replace(&mut state.display.abilities, terminal.abilities()).focus;
+        effects.extend((state.display.abilities.focus && !had_focus).then_some(Effect::ReportFocus));
+        state.dirty = true;
+    }
+    if ask.blocks {
+        effects.extend(draw_in(state, Blocks::of(terminal)));
+    }
+    effects
 }
 
 fn draw_in(state: &mut State, blocks: Blocks) -> Vec<Effect> {

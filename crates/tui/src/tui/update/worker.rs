@@ -1,6 +1,7 @@
 //! Effects of the worker's events on the state. Events of older generations do nothing, except for those about files.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use super::request::resized_preview;
 use super::say::say;
@@ -10,6 +11,7 @@ use crate::pipeline::protocol::{
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
+use crate::tui::chrome;
 use crate::tui::event::{Effect, Unwritten, Written};
 use crate::tui::exit_summary;
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
@@ -95,8 +97,16 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::WritePostponed { .. } => {
             say(state, "the image is written as soon as every pixel has a sample");
         }
-        Event::Done { report, warnings, unchanged, .. } => done(state, report, warnings, unchanged),
-        Event::Failed { failure, .. } => failed(state, failure),
+        Event::Done { report, warnings, unchanged, .. } => {
+            let time = state.work.running_for(state.now);
+            done(state, report, warnings, unchanged);
+            return notice(state, time);
+        }
+        Event::Failed { failure, .. } => {
+            let time = state.work.running_for(state.now);
+            failed(state, failure);
+            return notice(state, time);
+        }
         Event::Cancelled { .. } => {
             state.work.activity = Activity::Cancelled;
             state.set_paused(false);
@@ -104,6 +114,15 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         }
     }
     Vec::new()
+}
+
+/// Tells a person who is looking elsewhere that a long render has ended, if the terminal has a way.
+fn notice(state: &State, time: Option<Duration>) -> Vec<Effect> {
+    let is_over = matches!(state.work.activity, Activity::Done | Activity::Broken);
+    let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
+    let time = time.filter(is_long).filter(|_| is_over && !state.display.has_focus);
+    let notice = time.zip(state.display.abilities.notice);
+    notice.map(|(time, way)| Effect::Aside(chrome::notice(state, way, time))).into_iter().collect()
 }
 
 fn generation(event: &Event) -> u64 {

@@ -20,6 +20,11 @@ use ratatui::buffer::Buffer;
 use self::layout::Layout;
 use super::state::State;
 
+/// The state in one word.
+pub(super) fn state_word(state: &State) -> &'static str {
+    header::word(state)
+}
+
 /// The whole screen, into a buffer of the window's size.
 pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let layout = Layout::of(state);

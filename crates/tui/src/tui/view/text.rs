@@ -150,7 +150,7 @@ pub fn wrapped(text: &str, width: usize) -> Vec<String> {
 }
 
 /// A duration in a few characters.
-pub(super) fn duration(time: Duration) -> String {
+pub(in crate::tui) fn duration(time: Duration) -> String {
     seconds(time.as_secs_f64())
 }
 
@@ -199,7 +199,7 @@ pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String
 }
 
 /// Whole percent; 100 only when everything is done.
-pub(super) fn percent(fraction: f64) -> u32 {
+pub(in crate::tui) fn percent(fraction: f64) -> u32 {
     (fraction.clamp(0.0, 1.0) * 100.0).floor() as u32
 }
 
