@@ -12,7 +12,7 @@ use super::graphics::{Images, Placement};
 use super::known::Answer;
 use super::known::Ask;
 use super::line::{Line, Question};
-use super::paint::{Fidelity, Painter};
+use super::paint::{Besides, Fidelity, Painter};
 use super::terminal;
 
 /// Whether the terminal draws what lies between two marks at once (mode 2026).
@@ -126,8 +126,17 @@ impl Display {
     }
 
     /// Leads to this from now on. `is_new`: with a picture that was not wanted before.
-    pub(super) fn aim(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity, is_new: bool) {
-        self.painter.aim(wanted, picture, fidelity);
+    pub(super) fn aim(
+        &mut self,
+        wanted: &Buffer,
+        picture: Rect,
+        fidelity: Fidelity,
+        (is_new, besides): (bool, &Besides),
+    ) {
+        if !besides.links.is_empty() {
+            terminal::will_have_links();
+        }
+        self.painter.aim_with(wanted, picture, fidelity, besides);
         self.is_complete = false;
         if is_new {
             self.frame = Some(0);

@@ -1,7 +1,7 @@
 //! The mouse on the picture, and questions about a place there.
 
 use super::say::{notify, say};
-use super::{camera, overlay, rectangle};
+use super::{camera, history, overlay, rectangle};
 use crate::math::decimal::{rounded, step_at};
 use crate::pipeline::protocol::{Command, Picked, Thing};
 use crate::scene::sanitize::visible;
@@ -10,6 +10,7 @@ use crate::tui::event::FilePlace;
 use crate::tui::event::{Effect, Mouse, MouseKind};
 use crate::tui::keymap::Overlay;
 use crate::tui::state::{PickPurpose, Press, State};
+use crate::tui::view;
 use crate::tui::view::layout::Layout;
 use crate::tui::view::preview::spot_at;
 
@@ -24,6 +25,9 @@ pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
         MouseKind::Press => {
             let is_on_picture = Layout::of(state).preview.contains((mouse.column, mouse.row).into());
             let Mouse { column, row, .. } = mouse;
+            if let Some(at) = view::picture_at(state, column, row) {
+                return history::open_at(state, at);
+            }
             let from = spot_at(state, column, row);
             state.selection.press = is_on_picture.then_some(Press { column, row, has_moved: false, from });
             Vec::new()

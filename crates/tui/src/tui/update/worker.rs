@@ -55,7 +55,12 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             return resized_preview(state);
         }
         Event::Warnings { warnings, .. } => warn(state, warnings),
-        Event::Progress { progress, .. } => state.work.progress = Some(progress),
+        Event::Progress { progress, .. } => {
+            if let Some(noise) = progress.noise {
+                state.work.curve.note(progress.elapsed_seconds, noise.now);
+            }
+            state.work.progress = Some(progress);
+        }
         Event::Preview { .. }
         | Event::Files { .. }
         | Event::CameraKept { .. }
@@ -159,6 +164,7 @@ fn started(state: &mut State) {
     state.work.stages = Default::default();
     state.work.assets.clear();
     state.work.progress = None;
+    state.work.last_curve = std::mem::take(&mut state.work.curve);
     state.work.report = None;
     state.saving.unwritten = None;
     state.work.unchanged = false;
@@ -248,6 +254,7 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     if state.request.is_written() && is_on_disk && state.saving.unwritten.is_none() {
         state.saving.write_failed = None;
     }
+    note_noise(state, &report, unchanged);
     describe(state, state.request.generation, &report);
     state.work.report = Some(report);
     state.work.unchanged = unchanged;
@@ -263,6 +270,22 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     if unchanged && state.saving.change.is_some_and(|change| change.generation == state.request.generation) {
         state.saving.change = None;
         state.saving.first_change = None;
+    }
+}
+
+/// Ends the curve of noise with what was measured. The same picture, or that picture brighter, has the curve that it had.
+fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
+    let render = &report.stages[Stage::Render as usize];
+    match render.status {
+        Status::Done => {
+            if let Some(error) = report.image.error {
+                state.work.curve.end(render.seconds, error);
+            }
+        }
+        Status::Reused if unchanged || state.request.is_exposure_only => {
+            state.work.curve = std::mem::take(&mut state.work.last_curve);
+        }
+        Status::Running | Status::Reused | Status::Skipped => {}
     }
 }
 

@@ -22,6 +22,8 @@ pub(super) enum Tone {
     Good,
     Warning,
     Error,
+    /// The name of a written file: a link, where the terminal has them.
+    File,
     /// The line that is chosen of a list.
     Chosen,
 }
@@ -30,7 +32,7 @@ impl Tone {
     /// Its style; without colours, modifiers alone.
     pub(super) fn style(self, depth: ColorDepth) -> Style {
         let (color, modifier) = match self {
-            Self::Plain => (Color::Reset, Modifier::empty()),
+            Self::Plain | Self::File => (Color::Reset, Modifier::empty()),
             Self::Faint => (Color::Reset, Modifier::DIM),
             Self::Strong => (Color::Reset, Modifier::BOLD),
             // The plain blue of many palettes cannot be read on black.
@@ -52,7 +54,7 @@ impl Tone {
             Self::Good => (Color::Black, Color::Green),
             Self::Warning => (Color::Black, Color::Yellow),
             Self::Error => (Color::White, Color::Red),
-            Self::Plain | Self::Faint | Self::Strong | Self::Chosen => (Color::Reset, Color::Reset),
+            Self::Plain | Self::Faint | Self::Strong | Self::File | Self::Chosen => (Color::Reset, Color::Reset),
         };
         // Bold black is grey in xterm and others, which draw bold by the brighter half of the palette.
         let reversed = Modifier::REVERSED.union(Modifier::BOLD);
