@@ -11,6 +11,7 @@ use super::color::{self, ColorChoice, ColorDepth};
 use super::environment::way;
 use super::known::Blocks;
 use super::terminal;
+use super::terminals::Terminal;
 
 /// Answers of a terminal, and what its environment says.
 #[derive(Clone, Debug)]
@@ -52,7 +53,8 @@ impl Probe {
     /// The parts of a cell that a preview without a choice draws, in words.
     pub fn preview(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
-        match (self.depth, name.filter(|_| !self.is_multiplexed).map_or(Blocks::Unknown, Blocks::of)) {
+        let terminal = name.filter(|_| !self.is_multiplexed).and_then(Terminal::of_report);
+        match (self.depth, terminal.map_or(Blocks::Unknown, Blocks::of)) {
             (ColorDepth::None, _) => "characters",
             (_, Blocks::Octants) => "octants",
             (_, Blocks::Sextants) => "sextants",

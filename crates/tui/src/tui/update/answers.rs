@@ -78,6 +78,7 @@ mod tests {
     use crate::tui::color::XTERM;
     use crate::tui::fixtures::{state, state_with};
     use crate::tui::known::Ask;
+    use crate::tui::terminals::{Abilities, Brand};
     use crate::tui::update::start;
 
     #[test]
@@ -85,12 +86,24 @@ mod tests {
         let mut state = state(80, 24);
         start(&mut state);
         let before = state.request.preview_size.expect("a size");
-        assert!(learn(&mut state, Answer::Blocks(Blocks::Octants)).is_empty(), "nobody asked");
+        let foot = Answer::Name(Terminal { brand: Brand::Foot, version: [1, 20] });
+        assert!(learn(&mut state, foot).is_empty(), "nobody asked");
+        assert_eq!(state.display.abilities, Abilities::default());
         state.display.ask = Ask { blocks: true, ..Ask::default() };
-        let effects = learn(&mut state, Answer::Blocks(Blocks::Octants));
+        let effects = learn(&mut state, foot);
         let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };
         assert_eq!((size.width, size.height), (2 * before.width, 2 * before.height));
         assert_eq!(state.display.kind, PreviewKind::Octant);
+    }
+
+    #[test]
+    fn a_terminal_that_says_its_name_can_what_it_is_known_for() {
+        let mut state = state(80, 24);
+        state.display.ask = Ask { name: true, ..Ask::default() };
+        let ghostty = Terminal { brand: Brand::Ghostty, version: [1, 2] };
+        assert!(matches!(learn(&mut state, Answer::Name(ghostty))[..], [Effect::ReportFocus]));
+        assert_eq!(state.display.abilities, ghostty.abilities());
+        assert!(learn(&mut state, Answer::Name(ghostty)).is_empty(), "it reports the focus already");
     }
 
     #[test]
