@@ -7,17 +7,20 @@ use super::relay::Answers;
 
 /// Terminals by their variables, with what each has: a title, progress, a protocol of notifications, links, a clipboard.
 const KNOWN: [(&[(&str, &str)], Has); 5] = [
-    (&[("TERM", "xterm-kitty")], Has { progress: false, notice: b"\x1b]99;;glimt: scene.toml: done after ", ..ALL }),
-    (&[("TERM", "foot")], Has { progress: false, notice: b"\x1b]777;notify;glimt;scene.toml: done after ", ..ALL }),
+    (
+        &[("TERM", "xterm-kitty")],
+        Has { progress: false, notice: b"\x1b]99;;glimt: scene.toml: done after ", ..ALL },
+    ),
+    (
+        &[("TERM", "foot")],
+        Has { progress: false, notice: b"\x1b]777;notify;glimt;scene.toml: done after ", ..ALL },
+    ),
     (
         &[("TERM_PROGRAM", "ghostty"), ("TERM_PROGRAM_VERSION", "1.2.3")],
         Has { notice: b"\x1b]777;notify;glimt;scene.toml: done after ", ..ALL },
     ),
     (&[("WT_SESSION", "1-2-3")], Has { notice: b"\x07", ..ALL }),
-    (
-        &[("VTE_VERSION", "7600")],
-        Has { progress: false, notice: b"\x07", clipboard: false, ..ALL },
-    ),
+    (&[("VTE_VERSION", "7600")], Has { progress: false, notice: b"\x07", clipboard: false, ..ALL }),
 ];
 
 /// Terminals that are not known to have any of it.
@@ -170,7 +173,9 @@ fn signals_in_the_middle_of_a_render_leave_no_title_and_no_bar() {
 /// Whoever looks at the window needs no notification, nor is a short render worth one.
 #[test]
 fn a_notification_is_for_a_long_render_that_nobody_looks_at() {
-    for (focus, after) in [("\x1b[I", "0.001"), ("\x1b[O\x1b[I", "0.001"), ("\x1b[O", "3600"), ("\x1b[O", "0")] {
+    for (focus, after) in
+        [("\x1b[I", "0.001"), ("\x1b[O\x1b[I", "0.001"), ("\x1b[O", "3600"), ("\x1b[O", "0")]
+    {
         let folder = Folder::new();
         folder.write("scene.toml", &endless());
         let command = [folder.program(), "scene.toml", "--notify-after", after];
@@ -213,5 +218,8 @@ fn a_terminal_that_says_its_name_later_gets_what_it_has() {
     terminal.press("q");
     terminal.code();
     let bytes = terminal.bytes();
-    assert!(is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t") && is_last(&bytes, b"\x1b[?1004h", b"\x1b[?1004l"));
+    assert!(
+        is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t")
+            && is_last(&bytes, b"\x1b[?1004h", b"\x1b[?1004l")
+    );
 }

@@ -166,7 +166,9 @@ impl Terminal {
         let mut builder = CommandBuilder::new(command[0]);
         builder.args(&command[1..]);
         builder.cwd(folder);
-        for name in ["NO_COLOR", "SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY", "ENV"].into_iter().chain(OF_TERMINALS) {
+        for name in
+            ["NO_COLOR", "SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY", "ENV"].into_iter().chain(OF_TERMINALS)
+        {
             builder.env_remove(name);
         }
         builder.env("TERM", "xterm-256color");

@@ -10,10 +10,11 @@ fn words(screen: &vt100::Screen) -> String {
     screen.contents().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Words beside the picture, in one line.
+/// Words beside the picture, in one line, without the blocks of small pictures.
 fn beside(screen: &vt100::Screen, column: usize) -> String {
     let text = screen.contents();
-    let rows = text.lines().map(|line| line.chars().skip(column).collect::<String>());
+    let is_word = |c: &char| !('▀'..='▟').contains(c);
+    let rows = text.lines().map(|line| line.chars().skip(column).filter(is_word).collect::<String>());
     rows.collect::<Vec<_>>().join(" ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
@@ -59,7 +60,7 @@ fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
     terminal.wait("a strip", |screen| {
         let beside = beside(screen, PANEL.into());
         beside.contains("the last pictures n N")
-            && beside.contains("3 materials.board.diffuse")
+            && beside.contains("▸3 materials. board.diffuse [0.02, 0.8,")
             && beside.contains("1 the first that is kept")
     });
     // A picture of each colour, the newest at the top.
@@ -67,10 +68,12 @@ fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
     assert!(colors.iter().all(|count| *count >= 5), "{colors:?}");
     let row_of = |text: &str| {
         let screen = terminal.text();
-        let row = screen.lines().position(|line| line.chars().skip(PANEL.into()).collect::<String>().contains(text));
+        let row = screen
+            .lines()
+            .position(|line| line.chars().skip(PANEL.into()).collect::<String>().contains(text));
         row.unwrap_or_else(|| panic!("no {text}\n{screen}"))
     };
-    let (newest, oldest) = (row_of("3 mat"), row_of("1 the"));
+    let (newest, oldest) = (row_of("▸3 mat"), row_of("1 the"));
     assert!(newest < oldest);
     // A click shows it, and `n` what it shows.
     let click = |row: usize| format!("\x1b[<0;{0};{1}M\x1b[<0;{0};{1}m", PANEL + 4, row + 1);
@@ -117,7 +120,8 @@ fn noise_against_time_is_a_curve_with_its_target() {
     folder.write("scene.toml", &noisy);
     let mut terminal = folder.terminal_of(120, 40);
     terminal.wait_for_render(1);
-    let is_braille = |cell: &vt100::Cell| cell.contents().chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c));
+    let is_braille =
+        |cell: &vt100::Cell| cell.contents().chars().any(|c| ('\u{2801}'..='\u{28ff}').contains(&c));
     terminal.wait("a curve", |screen| {
         let beside = beside(screen, PANEL.into());
         beside.contains("noise while it rendered")
@@ -131,7 +135,8 @@ fn noise_against_time_is_a_curve_with_its_target() {
     terminal.wait_for("noise while it rendered");
     terminal.press("r");
     terminal.wait_for("ETA");
-    terminal.wait("no curve while it renders", |screen| !screen.contents().contains("noise while it rendered"));
+    terminal
+        .wait("no curve while it renders", |screen| !screen.contents().contains("noise while it rendered"));
 }
 
 #[test]
@@ -155,7 +160,8 @@ fn u_takes_back_what_c_wrote_and_no_edit_of_a_person() {
     terminal.wait("the edit", |screen| Colors::of(screen).is_most("green"));
     terminal.wait_for("done");
     terminal.press("u");
-    terminal.wait("a refusal", |screen| words(screen).contains("error: scene.toml has changed since c wrote it"));
+    terminal
+        .wait("a refusal", |screen| words(screen).contains("error: scene.toml has changed since c wrote it"));
     assert_eq!(text(), edited);
     // The edit is taken back by hand; then `u` has something to take back.
     folder.write("scene.toml", &kept);
@@ -164,7 +170,8 @@ fn u_takes_back_what_c_wrote_and_no_edit_of_a_person() {
     terminal.press("u");
     terminal.wait_for("scene.toml is as it was before c");
     assert_eq!(text(), SCENE);
-    terminal.wait("the picture on disk", |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own));
+    terminal
+        .wait("the picture on disk", |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own));
     terminal.press("u");
     terminal.wait_for("there is nothing to undo");
     assert_eq!(text(), SCENE);

@@ -182,7 +182,8 @@ impl History {
             return "the first that is kept".to_owned();
         };
         let edits = before.edits + 1..=past.edits;
-        let edits = edits.map(|edit| self.texts.get(&edit).map_or("a file that the scene names", String::as_str));
+        let edits =
+            edits.map(|edit| self.texts.get(&edit).map_or("a file that the scene names", String::as_str));
         let keys = past.toggles.differences(&before.toggles);
         let all: Vec<String> = edits.map(str::to_owned).chain(keys).collect();
         if all.is_empty() { "rendered again".to_owned() } else { all.join("; ") }

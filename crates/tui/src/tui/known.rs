@@ -102,7 +102,9 @@ mod tests {
     #[test]
     fn only_what_is_of_use_is_asked() {
         assert!(Ask::default().questions().is_empty());
-        for ask in [Ask { blocks: true, ..Ask::default() }, Ask { name: true, blocks: true, ..Ask::default() }] {
+        for ask in
+            [Ask { blocks: true, ..Ask::default() }, Ask { name: true, blocks: true, ..Ask::default() }]
+        {
             assert_eq!(ask.questions(), b"\x1b[>q");
         }
         let palette = Ask { palette: true, ..Ask::default() }.questions();

@@ -44,7 +44,9 @@ mod tests {
     #[test]
     fn only_what_can_be_drawn_is_kept_and_the_end_is_what_was_measured() {
         let mut curve = NoiseCurve::default();
-        for (seconds, noise) in [(0.0, 0.1), (0.5, f64::NAN), (0.5, 0.1), (0.505, 0.09), (1.0, 0.0), (2.0, 0.05)] {
+        for (seconds, noise) in
+            [(0.0, 0.1), (0.5, f64::NAN), (0.5, 0.1), (0.505, 0.09), (1.0, 0.0), (2.0, 0.05)]
+        {
             curve.note(seconds, noise);
         }
         assert_eq!(curve.points(), [(0.5, 0.1), (2.0, 0.05)]);

@@ -143,7 +143,9 @@ impl Terminal {
             Brand::Foot | Brand::Contour => Abilities { notice: Some(Notice::Osc777), ..all },
             Brand::Ghostty => Abilities { notice: Some(Notice::Osc777), progress: since([1, 2]), ..all },
             // Before, it took such a sequence for a notification.
-            Brand::WezTerm => Abilities { notice: Some(Notice::Osc777), progress: since([20_250_301, 0]), ..all },
+            Brand::WezTerm => {
+                Abilities { notice: Some(Notice::Osc777), progress: since([20_250_301, 0]), ..all }
+            }
             Brand::Iterm2 => Abilities { notice: Some(Notice::Osc9), progress: since([3, 7]), ..all },
             Brand::WindowsTerminal => Abilities { progress: true, ..all },
             Brand::VsCode => Abilities { progress: since([1, 97]), ..all },
@@ -156,7 +158,9 @@ impl Terminal {
             // It takes text for the clipboard only if it was told to.
             Brand::Xterm => Abilities { links: false, clipboard: false, ..all },
             Brand::ConEmu => Abilities { title: true, progress: true, ..Abilities::default() },
-            Brand::AppleTerminal => Abilities { links: false, clipboard: false, focus: false, notice: None, ..all },
+            Brand::AppleTerminal => {
+                Abilities { links: false, clipboard: false, focus: false, notice: None, ..all }
+            }
         }
     }
 }
@@ -189,7 +193,11 @@ mod tests {
         for (pairs, brand, version) in [
             (&[("TERM", "xterm-kitty")][..], Brand::Kitty, [0, 0]),
             (&[("TERM", "foot-extra")], Brand::Foot, [0, 0]),
-            (&[xterm, ("TERM_PROGRAM", "iTerm.app"), ("TERM_PROGRAM_VERSION", "3.6.6")], Brand::Iterm2, [3, 6]),
+            (
+                &[xterm, ("TERM_PROGRAM", "iTerm.app"), ("TERM_PROGRAM_VERSION", "3.6.6")],
+                Brand::Iterm2,
+                [3, 6],
+            ),
             (&[xterm, ("LC_TERMINAL", "iTerm2"), ("LC_TERMINAL_VERSION", "3.5.1")], Brand::Iterm2, [3, 5]),
             (&[xterm, ("WT_SESSION", "1-2-3")], Brand::WindowsTerminal, [0, 0]),
             (&[xterm, ("VTE_VERSION", "8002")], Brand::Vte, [8002, 0]),

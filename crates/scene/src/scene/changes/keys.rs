@@ -101,7 +101,9 @@ impl Found<'_> {
         let is_short = match value.item() {
             Item::Table(_) => false,
             Item::Array(array) => !array.is_of_tables(),
-            Item::String(_) | Item::Integer { .. } | Item::Float(_) | Item::Boolean(_) | Item::Datetime => true,
+            Item::String(_) | Item::Integer { .. } | Item::Float(_) | Item::Boolean(_) | Item::Datetime => {
+                true
+            }
         };
         let shown = if is_short { format!(" = {}", self.text(text, value)) } else { String::new() };
         self.tell(|| format!("{sign} {}{shown}", shortened(name, NAME)));
@@ -137,7 +139,8 @@ fn is_same(a: &Value<'_>, b: &Value<'_>) -> bool {
     match (a.item(), b.item()) {
         (Item::Table(a), Item::Table(b)) => {
             let has = |a: Entries<'_>, b: Entries<'_>| {
-                a.iter().all(|entry| b.get(entry.key).is_some_and(|other| is_same(&entry.value, &other.value)))
+                a.iter()
+                    .all(|entry| b.get(entry.key).is_some_and(|other| is_same(&entry.value, &other.value)))
             };
             has(a, b) && has(b, a)
         }
@@ -195,7 +198,9 @@ mod tests {
 
     #[test]
     fn other_words_for_the_same_scene_are_no_change() {
-        for (from, to) in [("fov = 40.0", "fov = 40.0 # wide"), ("[0, 1, 4]", "[ 0, 1, 4 ]"), ("\nname", "\n\nname")] {
+        for (from, to) in
+            [("fov = 40.0", "fov = 40.0 # wide"), ("[0, 1, 4]", "[ 0, 1, 4 ]"), ("\nname", "\n\nname")]
+        {
             assert_eq!(changes(SCENE, &SCENE.replace(from, to)), None, "{to}");
         }
         assert_eq!(changes(SCENE, "[render"), None);

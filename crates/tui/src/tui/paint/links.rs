@@ -61,7 +61,10 @@ mod tests {
     #[test]
     fn an_address_keeps_its_number_and_a_bad_one_has_none() {
         let mut links = Links::default();
-        assert_eq!([links.number("file:///a"), links.number("file:///b"), links.number("file:///a")], [1, 2, 1]);
+        assert_eq!(
+            [links.number("file:///a"), links.number("file:///b"), links.number("file:///a")],
+            [1, 2, 1]
+        );
         assert_eq!([links.number("a b"), links.number("\x1b]"), links.number("ä")], [0; 3]);
         let mut out = Vec::new();
         links.open(2, &mut out);

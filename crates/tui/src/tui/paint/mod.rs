@@ -39,8 +39,8 @@ pub use self::abilities::can_repeat;
 pub use self::fidelity::Fidelity;
 pub use self::frame_pacing::{Advice, Moment, advise};
 pub use self::lines::in_lines;
-pub use self::links::{LINK_OFF, Link};
 use self::links::Links;
+pub use self::links::{LINK_OFF, Link};
 use self::memory::Memory;
 use self::picture::Budget;
 use self::screen::{Screen, Slice, Stroke};
@@ -161,7 +161,8 @@ impl Painter {
         let mut rows: Vec<u16> = self.wanted.rows_from_the_middle().collect();
         rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
         let words = (0..self.wanted.rows).map(Part::Words);
-        let later = (self.wanted.later.top()..self.wanted.later.bottom().min(self.wanted.rows)).map(Part::Later);
+        let later =
+            (self.wanted.later.top()..self.wanted.later.bottom().min(self.wanted.rows)).map(Part::Later);
         let picture = rows.into_iter().map(Part::Picture);
         self.parts = words.chain(picture).chain(later).collect::<Vec<_>>().into_iter();
         self.part = None;

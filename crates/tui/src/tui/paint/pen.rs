@@ -44,11 +44,18 @@ const MODIFIERS: [(Modifier, u16, u16); 9] = [
 
 impl Pen {
     /// After SGR 0.
-    pub(super) const RESET: Self = Self { fg: Shade::Ink, bg: Shade::Ground, modifier: Modifier::empty(), link: 0 };
+    pub(super) const RESET: Self =
+        Self { fg: Shade::Ink, bg: Shade::Ground, modifier: Modifier::empty(), link: 0 };
 
     /// This pen and nothing else.
     pub(super) fn exactly(self) -> Wish {
-        Wish { fg: Some(self.fg), bg: Some(self.bg), modifier: self.modifier, matters: Modifier::all(), link: self.link }
+        Wish {
+            fg: Some(self.fg),
+            bg: Some(self.bg),
+            modifier: self.modifier,
+            matters: Modifier::all(),
+            link: self.link,
+        }
     }
 
     /// Appends the shortest SGR that turns the pen into one that fulfils the wish; appends nothing if the pen does already. Links

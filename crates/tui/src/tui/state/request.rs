@@ -31,7 +31,11 @@ impl Toggles {
         let camera = self.camera.is_any().then(|| "moved".to_owned());
         [
             said("shadows", self.shadows != before.shadows, self.shadows.map(|it| it.name().to_owned())),
-            said("integrator", self.integrator != before.integrator, self.integrator.map(|it| it.name().to_owned())),
+            said(
+                "integrator",
+                self.integrator != before.integrator,
+                self.integrator.map(|it| it.name().to_owned()),
+            ),
             said("dof", self.dof != before.dof, self.dof.map(on_off)),
             said("photons", self.photons != before.photons, self.photons.map(on_off)),
             said("view", self.view != before.view, self.view.map(|it| it.name().to_owned())),

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use crate::tui::noise_curve::NoiseCurve;
 use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, StageReport};
+use crate::tui::noise_curve::NoiseCurve;
 
 /// Activity of the worker for the current generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -119,7 +119,9 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             assert!(desk.key(key).is_empty(), "c has written nothing");
             let edit = CameraEdit { path: "a.toml".into(), before: "".into(), after: "a".into() };
             desk.state.saving.camera_edits.push(edit.clone());
-            assert!(matches!(&desk.key(key)[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit));
+            assert!(
+                matches!(&desk.key(key)[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit)
+            );
         }
         Action::Copy => {
             assert!(desk.key(key).is_empty(), "nothing was clicked");

@@ -136,7 +136,8 @@ fn a_click_after_f_focuses_there() {
 }
 
 fn kept(desk: &mut Desk, is_new: bool, is_own: bool) -> Vec<Effect> {
-    let outcome = Ok(Kept { path: "scenes/cornell.toml".into(), is_new, is_own, of_model: false, edit: None });
+    let outcome =
+        Ok(Kept { path: "scenes/cornell.toml".into(), is_new, is_own, of_model: false, edit: None });
     desk.worker(protocol::Event::CameraKept { generation: 0, outcome })
 }
 
@@ -179,16 +180,19 @@ fn u_asks_for_what_c_wrote_until_there_is_nothing_left() {
     assert!(desk.text().contains("there is nothing to undo"), "{}", desk.text());
     let edit = |after: &str| CameraEdit { path: "a.toml".into(), before: "".into(), after: after.into() };
     for after in ["one", "two"] {
-        let kept =
-            Kept { path: "a.toml".into(), is_new: true, is_own: true, of_model: false, edit: Some(edit(after)) };
+        let kept = Kept {
+            path: "a.toml".into(),
+            is_new: true,
+            is_own: true,
+            of_model: false,
+            edit: Some(edit(after)),
+        };
         desk.worker(protocol::Event::CameraKept { generation: 0, outcome: Ok(kept) });
     }
     let undone = |desk: &mut Desk, outcome: Result<std::path::PathBuf, String>| {
         desk.worker(protocol::Event::CameraUndone { generation: 0, outcome })
     };
-    let asks = |desk: &mut Desk, after| {
-        matches!(&desk.press('u')[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit(after))
-    };
+    let asks = |desk: &mut Desk, after| matches!(&desk.press('u')[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit(after));
     assert!(asks(&mut desk, "two"));
     assert!(undone(&mut desk, Err("a.toml has changed".to_owned())).is_empty());
     assert!(desk.text().contains("error: a.toml has changed"), "{}", desk.text());

@@ -60,7 +60,10 @@ fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
     let fell = format!("{} after {}, {} after {}", share(*from), seconds(*first), share(*to), seconds(*last));
     let line = match target(state) {
-        Some(target) => format!("; the line is the {} asked of each tile", share(f64::from((target * 1e6).round() as f32) / 1e6)),
+        Some(target) => format!(
+            "; the line is the {} asked of each tile",
+            share(f64::from((target * 1e6).round() as f32) / 1e6)
+        ),
         None => String::new(),
     };
     wrapped(&(fell + &line), usize::from(width))

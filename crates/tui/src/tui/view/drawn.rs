@@ -20,7 +20,13 @@ pub(in crate::tui) struct Drawn {
 
 impl Drawn {
     /// Writes the pieces of a line, and notes where names of written files are. Returns the columns used.
-    pub(super) fn put(&mut self, state: &State, area: Rect, line: &[(String, Tone)], buffer: &mut Buffer) -> u16 {
+    pub(super) fn put(
+        &mut self,
+        state: &State,
+        area: Rect,
+        line: &[(String, Tone)],
+        buffer: &mut Buffer,
+    ) -> u16 {
         let mut x = area.x;
         for (text, tone) in line {
             let end = x.saturating_add(columns(text)).min(area.right());

@@ -57,6 +57,11 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) -> Drawn {
         help::draw(state, buffer);
     }
     // Text that lies over the rest waits for nothing, and is no link.
-    let is_covered = state.overlays.help.open || state.overlays.views.is_some() || message::is_over_picture(state);
-    if is_covered || state.overlays.diagnostics.open && layout.pane == layout.panel { Drawn::default() } else { drawn }
+    let is_covered =
+        state.overlays.help.open || state.overlays.views.is_some() || message::is_over_picture(state);
+    if is_covered || state.overlays.diagnostics.open && layout.pane == layout.panel {
+        Drawn::default()
+    } else {
+        drawn
+    }
 }

@@ -3,8 +3,8 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::layout::{ENTRY_WIDTH, Layout};
 use super::drawn::Drawn;
+use super::layout::{ENTRY_WIDTH, Layout};
 use super::message;
 use super::spare;
 use super::stages::{self, Line};

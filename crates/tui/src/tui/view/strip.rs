@@ -2,17 +2,26 @@
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
+use unicode_width::UnicodeWidthStr;
 
 use super::preview;
-use super::text::{Tone, put, row, wrapped};
+use super::text::{Tone, put, row};
 use crate::film::Picture;
 use crate::tui::action::Action;
 use crate::tui::keymap;
 use crate::tui::state::State;
 
-/// Rows of a picture in a narrow strip, and in a wide one.
-const ROWS: u16 = 3;
-const WIDE_ROWS: u16 = 5;
+/// Rows of an entry: of its picture, of all of it, and up to the next one.
+#[derive(Clone, Copy)]
+struct Rows {
+    picture: u16,
+    entry: u16,
+    pitch: u16,
+}
+
+/// In a narrow strip, words go on below the picture.
+const NARROW_ROWS: Rows = Rows { picture: 3, entry: 4, pitch: 4 };
+const WIDE_ROWS: Rows = Rows { picture: 5, entry: 5, pitch: 6 };
 /// A strip of so many columns is wide.
 const WIDE: u16 = 40;
 /// Columns of the words beside a picture.
@@ -25,6 +34,7 @@ struct Item {
     /// Index among the pictures that are kept.
     index: usize,
     cells: Rect,
+    rows: Rows,
 }
 
 /// Draws it at the bottom of an area.
@@ -34,26 +44,56 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let depth = state.display.depth;
     let keys = keymap::of(Action::OlderPicture).map_or("", |binding| binding.label);
     let title = Rect { y: top - 1, height: 1, ..area };
-    put(buffer, title, &[("the last pictures", Tone::Strong), ("  ", Tone::Plain), (keys, Tone::Faint)], depth);
+    put(
+        buffer,
+        title,
+        &[("the last pictures", Tone::Strong), ("  ", Tone::Plain), (keys, Tone::Faint)],
+        depth,
+    );
     for item in items {
         draw_item(state, &item, buffer);
     }
 }
 
-fn draw_item(state: &State, Item { index, cells }: &Item, buffer: &mut Buffer) {
+fn draw_item(state: &State, Item { index, cells, rows }: &Item, buffer: &mut Buffer) {
     let history = &state.picture.history;
     let Some(picture) = history.small(*index) else { return };
-    let width = width(state, picture, *cells);
-    preview::draw_small(state, picture, Rect { width, ..*cells }, buffer);
-    let beside = super::text::rest(*cells, width + 1);
-    let (mark, tone) = if history.looked_at() == Some(*index) { ("▸", Tone::Chosen) } else { ("", Tone::Plain) };
+    let place = Rect { height: rows.picture, ..*cells };
+    let place = Rect { width: width(state, picture, place), ..place };
+    preview::draw_small(state, picture, place, buffer);
+    let (mark, tone) =
+        if history.looked_at() == Some(*index) { ("▸", Tone::Strong) } else { ("", Tone::Plain) };
     let words = format!("{mark}{} {}", index + 1, history.change(*index));
-    let lines = wrapped(&words, usize::from(beside.width));
-    for (y, line) in (0..beside.height).zip(&lines) {
-        let is_cut = y + 1 == beside.height && lines.len() > usize::from(beside.height);
-        let rest = if is_cut { lines[usize::from(y)..].join(" ") } else { line.clone() };
-        put(buffer, row(beside, y), &[(&rest, tone)], state.display.depth);
+    let beside = super::text::rest(*cells, place.width + 1);
+    let room = |y: u16| row(if y < rows.picture { beside } else { *cells }, y);
+    let lines = filled(&words, rows.entry, |y| usize::from(room(y).width));
+    for (y, line) in (0..).zip(&lines) {
+        put(buffer, room(y), &[(line, tone)], state.display.depth);
     }
+}
+
+/// Words in so many lines, each of its own width, broken between words, and in long names behind a point. The last line has
+/// the rest, however long.
+fn filled(words: &str, count: u16, width: impl Fn(u16) -> usize) -> Vec<String> {
+    let narrow = (0..count).map(&width).min().unwrap_or(0);
+    let mut lines = vec![String::new()];
+    for word in words.split(' ') {
+        let parts: Vec<&str> =
+            if word.width() > narrow { word.split_inclusive('.').collect() } else { vec![word] };
+        for (number, part) in parts.into_iter().enumerate() {
+            let is_last = lines.len() == usize::from(count);
+            let room = width(lines.len() as u16 - 1);
+            let Some(line) = lines.last_mut() else { return lines };
+            let space = if number == 0 && !line.is_empty() { " " } else { "" };
+            if is_last || line.is_empty() || line.width() + space.len() + part.width() <= room {
+                *line += space;
+                *line += part;
+            } else {
+                lines.push(part.to_owned());
+            }
+        }
+    }
+    lines
 }
 
 /// Columns of a picture of this height, so that words have room beside it.
@@ -73,9 +113,11 @@ pub(super) fn rows(state: &State, area: Rect) -> u16 {
 /// The pictures that have room, at the bottom of an area: the newest at the top, and of older ones the one that is looked at.
 fn items(state: &State, area: Rect) -> Vec<Item> {
     let count = state.picture.history.len();
-    let rows = if area.width >= WIDE { WIDE_ROWS } else { ROWS };
+    let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
     let columns = (area.width / COLUMN).max(1);
-    let most = area.height / (rows + 1);
+    let gap = rows.pitch - rows.entry;
+    // The title has a row.
+    let most = (area.height + gap).saturating_sub(1) / rows.pitch;
     let room = usize::from(most) * usize::from(columns);
     if count < 2 || room < 2 || area.width < LEAST_WORDS + 8 {
         return Vec::new();
@@ -88,15 +130,30 @@ fn items(state: &State, area: Rect) -> Vec<Item> {
     let width = area.width / columns;
     let place = |number: u16| {
         let (column, line) = (number / high, number % high);
-        let gap = u16::from(column + 1 < columns);
-        let y = area.bottom() - (high - line) * (rows + 1) + 1;
-        Rect { x: area.x + column * width, y, width: width - gap, height: rows }
+        let beside = u16::from(column + 1 < columns);
+        let y = area.bottom() + gap - (high - line) * rows.pitch;
+        Rect { x: area.x + column * width, y, width: width - beside, height: rows.entry }
     };
-    (0..shown).map(|number| Item { index: first + shown - 1 - number, cells: place(number as u16) }).collect()
+    let item = |number: usize| Item { index: first + shown - 1 - number, cells: place(number as u16), rows };
+    (0..shown).map(item).collect()
 }
 
 /// The picture of the strip in this area at a cell.
 pub(super) fn at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
     let is_there = |item: &Item| item.cells.contains((column, row).into());
     items(state, area).into_iter().find(is_there).map(|item| item.index)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_are_broken_behind_a_point_and_the_rest_is_in_the_last_line() {
+        let words = "3 materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]";
+        let lines = filled(words, 4, |y| if y < 3 { 14 } else { 23 });
+        assert_eq!(lines, ["3 materials.", "board.diffuse", "[0.8, 0.02,", "0.02] → [0.02, 0.8, 0.02]"]);
+        assert_eq!(filled("2 camera.fov 40 → 30", 4, |_| 14), ["2 camera.fov", "40 → 30"]);
+        assert_eq!(filled("2 a", 4, |_| 0), ["2", "a"]);
+    }
 }

@@ -54,7 +54,9 @@ impl Tone {
             Self::Good => (Color::Black, Color::Green),
             Self::Warning => (Color::Black, Color::Yellow),
             Self::Error => (Color::White, Color::Red),
-            Self::Plain | Self::Faint | Self::Strong | Self::File | Self::Chosen => (Color::Reset, Color::Reset),
+            Self::Plain | Self::Faint | Self::Strong | Self::File | Self::Chosen => {
+                (Color::Reset, Color::Reset)
+            }
         };
         // Bold black is grey in xterm and others, which draw bold by the brighter half of the palette.
         let reversed = Modifier::REVERSED.union(Modifier::BOLD);
