@@ -42,7 +42,8 @@ pub(super) fn draw(state: &State, panel: Rect, lines: u16, buffer: &mut Buffer) 
     let (curve, strip) = divided(state, panel, lines);
     curve::draw(state, curve, buffer);
     strip::draw(state, strip, buffer);
-    curve.union(strip)
+    // The union with an empty area would reach to its corner.
+    [curve, strip].into_iter().filter(|area| !area.is_empty()).reduce(Rect::union).unwrap_or_default()
 }
 
 /// The picture of the strip at a cell.
