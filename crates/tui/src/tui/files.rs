@@ -33,7 +33,7 @@ fn quoted(bytes: &[u8]) -> String {
     for byte in bytes {
         match byte {
             b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' | b'/' => {
-                text.push(char::from(*byte))
+                text.push(char::from(*byte));
             }
             other => {
                 // Writing to memory does not fail.
