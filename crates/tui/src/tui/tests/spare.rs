@@ -145,8 +145,8 @@ fn it_fits_into_every_window() {
         edited(&mut desk, &all);
         desk.event(Event::Changed(Changed { noticed: desk.now }));
         rendered(&mut desk, 0.01);
-        for columns in (100..=220).step_by(7).chain([119, 120]) {
-            for rows in (1..=90).step_by(3) {
+        for columns in [100, 119, 120, 140, 200] {
+            for rows in [1, 5, 12, 24, 40, 60, 90] {
                 desk.event(Event::Resize(window(columns, rows)));
                 for key in ['n', 'N', '?', '?'] {
                     desk.press(key);
