@@ -68,6 +68,7 @@ pub(crate) fn render(
             | Event::Warnings { .. }
             | Event::Refused { .. }
             | Event::CameraKept { .. }
+            | Event::CameraUndone { .. }
             | Event::Picked { .. }
             | Event::Cancelled { .. } => {}
         }

@@ -7,6 +7,7 @@ mod camera;
 mod edits;
 mod endings;
 mod eye;
+mod frame;
 mod hands;
 mod input;
 mod keys;
@@ -22,6 +23,7 @@ mod saving;
 mod screen;
 #[cfg(target_os = "linux")]
 mod soak;
+mod strip;
 mod switches;
 mod thin_line;
 

@@ -20,6 +20,21 @@ const LIMIT: Duration = Duration::from_secs(60);
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_glimt");
 
+/// Variables by which terminals are known.
+const OF_TERMINALS: [&str; 11] = [
+    "TMUX",
+    "STY",
+    "TERM_PROGRAM",
+    "TERM_PROGRAM_VERSION",
+    "WT_SESSION",
+    "ConEmuANSI",
+    "VTE_VERSION",
+    "KONSOLE_VERSION",
+    "XTERM_VERSION",
+    "LC_TERMINAL",
+    "LC_TERMINAL_VERSION",
+];
+
 /// A picture of a red board with a ball in front of it, under a lamp.
 pub const SCENE: &str = r#"[render]
 width = 64
@@ -107,7 +122,17 @@ impl Folder {
         } else {
             &[]
         };
-        Terminal::open(&[PROGRAM, "scene.toml"], tmux, self.0.path(), size(120, 40), Some(answers))
+        self.thin_line_in(answers, tmux)
+    }
+
+    /// The same with these variables.
+    pub fn thin_line_in(&self, answers: Answers, variables: &[(&str, &str)]) -> Terminal {
+        Terminal::open(&[PROGRAM, "scene.toml"], variables, self.0.path(), size(120, 40), Some(answers))
+    }
+
+    /// The program at work on the scene in a terminal of this size.
+    pub fn terminal_of(&self, columns: u16, rows: u16) -> Terminal {
+        Terminal::open(&[PROGRAM, "scene.toml"], &[], self.0.path(), size(columns, rows), None)
     }
 
     pub fn program(&self) -> &'static str {
@@ -123,6 +148,8 @@ pub struct Terminal {
     child: Box<dyn Child + Send + Sync>,
     keys: Arc<Mutex<Box<dyn Write + Send>>>,
     screen: Arc<Mutex<vt100::Parser>>,
+    /// All that the program has sent.
+    bytes: Arc<Mutex<Vec<u8>>>,
     relay: Option<Relay>,
     is_reading: Arc<AtomicBool>,
 }
@@ -139,7 +166,9 @@ impl Terminal {
         let mut builder = CommandBuilder::new(command[0]);
         builder.args(&command[1..]);
         builder.cwd(folder);
-        for name in ["NO_COLOR", "TMUX", "SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY", "TERM_PROGRAM", "ENV"] {
+        for name in
+            ["NO_COLOR", "SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY", "ENV"].into_iter().chain(OF_TERMINALS)
+        {
             builder.env_remove(name);
         }
         builder.env("TERM", "xterm-256color");
@@ -151,15 +180,17 @@ impl Terminal {
         let mut output = pair.master.try_clone_reader().expect("a reader");
         let screen = Arc::new(Mutex::new(vt100::Parser::new(side(size.rows), side(size.cols), 0)));
         let keys = Arc::new(Mutex::new(pair.master.take_writer().expect("a writer")));
-        let shared = screen.clone();
+        let (shared, bytes) = (screen.clone(), Arc::new(Mutex::new(Vec::new())));
+        let kept = bytes.clone();
         let is_reading = Arc::new(AtomicBool::new(true));
         let reads = is_reading.clone();
         let relay = match line {
-            Some(answers) => Some(Relay::start(output, keys.clone(), shared, answers)),
+            Some(answers) => Some(Relay::start(output, keys.clone(), (shared, kept), answers)),
             None => {
                 std::thread::spawn(move || {
                     let mut bytes = [0; 1 << 16];
                     while let Ok(count @ 1..) = output.read(&mut bytes) {
+                        kept.lock().expect("a list does not panic").extend_from_slice(&bytes[..count]);
                         shared.lock().expect("a parser does not panic").process(&bytes[..count]);
                         while !reads.load(Ordering::Acquire) {
                             std::thread::sleep(Duration::from_millis(5));
@@ -169,7 +200,7 @@ impl Terminal {
                 None
             }
         };
-        Self { master: pair.master, _slave: pair.slave, child, keys, screen, relay, is_reading }
+        Self { master: pair.master, _slave: pair.slave, child, keys, screen, bytes, relay, is_reading }
     }
 
     /// The value of `look` once it stays the same: words come before the picture.
@@ -245,6 +276,11 @@ impl Terminal {
     pub fn line<T>(&self, what: impl FnOnce(&Seen) -> T) -> T {
         let relay = self.relay.as_ref().expect("a thin line");
         what(&relay.seen.lock().expect("no panic"))
+    }
+
+    /// All bytes so far.
+    pub fn bytes(&self) -> Vec<u8> {
+        self.bytes.lock().expect("a list does not panic").clone()
     }
 
     /// Text of the screen.

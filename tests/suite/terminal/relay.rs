@@ -66,7 +66,7 @@ impl Relay {
     pub fn start(
         mut output: Box<dyn Read + Send>,
         input: Arc<Mutex<Box<dyn Write + Send>>>,
-        screen: Arc<Mutex<vt100::Parser>>,
+        (screen, kept): (Arc<Mutex<vt100::Parser>>, Arc<Mutex<Vec<u8>>>),
         answers: Answers,
     ) -> Self {
         let seen = Arc::new(Mutex::new(Seen::default()));
@@ -80,6 +80,7 @@ impl Relay {
             while let Ok(count @ 1..) = output.read(&mut bytes) {
                 let now = Instant::now();
                 let bytes = &bytes[..count];
+                kept.lock().expect("no panic").extend_from_slice(bytes);
                 note_sent(&noted, count);
                 if answers == Answers::Multiplexer {
                     for answer in tail.answers(bytes) {

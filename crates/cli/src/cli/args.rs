@@ -472,6 +472,9 @@ pub struct RenderArgs {
     /// Colours of the preview and of messages; auto looks at the terminal and at NO_COLOR
     #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
+    /// Notify through the terminal when a render of more seconds than this ends while its window is not looked at; 0: never
+    #[arg(long, allow_negative_numbers = true, value_parser = notice, default_value = "30", value_name = "SECONDS", help_heading = "Terminal")]
+    pub notify_after: f64,
     /// Look at the files several times a second rather than rely on the system's notifications
     #[arg(long, help_heading = "Terminal")]
     pub poll: bool,
@@ -637,6 +640,14 @@ fn pause(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
         _ => Err("expected a number of seconds, or 0 for no checkpoints".to_owned()),
+    }
+}
+
+/// Reads seconds, or 0 for never.
+fn notice(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds >= 0.0 && seconds.is_finite() => Ok(seconds),
+        _ => Err("expected a number of seconds, or 0 for no notifications".to_owned()),
     }
 }
 

@@ -55,6 +55,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         color: order.color,
         preview: order.preview,
         cell_aspect: None,
+        notify_after: Duration::try_from_secs_f64(order.notify_after).ok().filter(|time| !time.is_zero()),
         commands: Box::new(move |command| {
             match command {
                 Command::Write => asked.order(),
@@ -62,6 +63,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
                 Command::Render(_)
                 | Command::Preview(_)
                 | Command::KeepCamera(_)
+                | Command::UndoCamera(_)
                 | Command::Pick(_)
                 | Command::Cancel
                 | Command::Suspend
@@ -190,6 +192,7 @@ impl Writes {
             | Event::Checkpoint { .. }
             | Event::Edited { .. }
             | Event::CameraKept { .. }
+            | Event::CameraUndone { .. }
             | Event::Picked { .. }
             | Event::Files { .. } => {}
         }

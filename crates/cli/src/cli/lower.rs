@@ -26,6 +26,7 @@ pub(super) struct Order {
     pub(super) preview: PreviewChoice,
     pub(super) color: ColorChoice,
     pub(super) poll: bool,
+    pub(super) notify_after: f64,
     /// Increase of the nice value: with `is_once` that of the program, else that of the render threads.
     pub(super) nice: u8,
 }
@@ -80,6 +81,7 @@ pub(super) fn lower(args: RenderArgs) -> Result<Order, String> {
         preview: args.preview,
         color: args.color,
         poll: args.poll,
+        notify_after: args.notify_after,
         nice: args.nice.unwrap_or(if args.once { 0 } else { POLITE }),
     })
 }
@@ -177,7 +179,7 @@ mod tests {
             "a.toml --once --set a.b=1 --set a.c=x -o a.png --output b.exr --width 3 --height 4 --samples 5 --error 0.02 --time 0.5 --max-depth 0 \
              --integrator path --shadows hard --clamp 2.5 --photons on --dof off --accel bvh --view normal --seed 7 \
              --threads 2 --crop 1,2,3,4 --bit-depth 16 --report r.json --force --progress json --color 256 --poll \
-             --nice 3 --checkpoint 5 --resume --keep-checkpoint --memory 1.5GiB",
+             --nice 3 --notify-after 7 --checkpoint 5 --resume --keep-checkpoint --memory 1.5GiB",
         )
         .expect("right");
         let expected = Overrides {
@@ -208,7 +210,7 @@ mod tests {
         };
         assert_eq!(order.overrides, expected);
         assert!(order.is_once && order.poll);
-        assert_eq!(order.nice, 3);
+        assert_eq!((order.nice, order.notify_after), (3, 7.0));
         assert_eq!((order.progress, order.color), (Progress::Json, ColorChoice::Indexed256));
     }
 
@@ -236,6 +238,7 @@ mod tests {
             "a.toml --seed -1",
             "a.toml --nice 20",
             "a.toml --nice -1",
+            "a.toml --notify-after -1",
             "a.toml --checkpoint -1",
             "a.toml --memory 0",
             "a.toml --memory 5XB",

@@ -205,6 +205,7 @@ fn follow(
             | Event::Checkpoint { .. }
             | Event::Edited { .. }
             | Event::CameraKept { .. }
+            | Event::CameraUndone { .. }
             | Event::Picked { .. } => {}
         }
     }

@@ -1,6 +1,7 @@
 //! Answers of the worker to questions about the current picture.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use crate::film::Rect;
 
@@ -109,6 +110,19 @@ pub struct Kept {
     pub is_own: bool,
     /// Whether it is a new scene beside a model, which stays the file that is shown.
     pub of_model: bool,
+    /// How to take that back. `None` if nothing was written, or a new file.
+    pub edit: Option<CameraEdit>,
+}
+
+/// A camera that was written into a scene file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CameraEdit {
+    /// The scene file.
+    pub path: PathBuf,
+    /// Its text before that.
+    pub before: Arc<str>,
+    /// Its text with the camera.
+    pub after: Arc<str>,
 }
 
 #[cfg(test)]

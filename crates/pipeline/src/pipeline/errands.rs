@@ -1,10 +1,11 @@
-//! Errands: a question about a place of the current picture, and the order to write the camera into the scene file. They are
-//! carried out whatever else is going on.
+//! Errands: a question about a place of the current picture, and the orders to write the camera into the scene file and to take
+//! that back. They are carried out whatever else is going on.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::inputs::Inputs;
-use super::protocol::{Event, Kept, Picked, Spot, Thing, Viewpoint};
+use super::protocol::{CameraEdit, Event, Kept, Picked, Spot, Thing, Viewpoint};
 use super::render::film_state::FilmState;
 use super::sink::Sink;
 use super::stages::parse::Parsed;
@@ -21,6 +22,7 @@ use crate::world::World;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Errand {
     KeepCamera(Viewpoint),
+    UndoCamera(CameraEdit),
     Pick(Spot),
 }
 
@@ -31,6 +33,9 @@ impl Errand {
         match self {
             Self::KeepCamera(_) => {
                 sink.send(Event::CameraKept { generation, outcome: Err(why.to_owned()) });
+            }
+            Self::UndoCamera(_) => {
+                sink.send(Event::CameraUndone { generation, outcome: Err(why.to_owned()) });
             }
             Self::Pick(_) => {}
         }
@@ -55,6 +60,7 @@ impl AtHand {
             Errand::KeepCamera(camera) => {
                 Event::CameraKept { generation, outcome: self.keep_camera(camera, inputs) }
             }
+            Errand::UndoCamera(edit) => Event::CameraUndone { generation, outcome: undo(edit, inputs) },
         });
     }
 
@@ -104,33 +110,59 @@ impl AtHand {
         if is_model(&path) {
             return write_scene_of_model(loaded, camera);
         }
-        let is_as_read = || text_now(&path).is_ok_and(|now| *now == *loaded.source.text());
-        let changed =
-            || "the scene file has changed since it was read: the camera is not written into it".to_owned();
-        if !is_as_read() {
-            return Err(changed());
+        let read = loaded.source.text();
+        let changed = "the scene file has changed since it was read: the camera is not written into it";
+        if !has_text(&path, read) {
+            return Err(changed.to_owned());
         }
         let text = loaded.text_with_camera(camera)?;
-        let is_new = text != loaded.source.text();
-        if is_new {
-            let metadata =
-                file::kind(&path).map(|(_, metadata)| metadata).map_err(|error| in_words(&error))?;
-            if let Some(why) = file::why_keep(&metadata) {
-                return Err(format!("{} {why}: the camera is not written into it", path.display()));
-            }
-            let refused = || OutputError::Refused { reason: changed() };
-            let may_replace = |_: &std::path::Path| is_as_read().then_some(()).ok_or_else(refused);
-            let guard = write::Guard {
-                is_kept: &|path| inputs.contain(path),
-                may_replace: &may_replace,
-                losses: Losses::Refused,
-            };
-            write::atomic_until(&path, text.as_bytes(), &guard, &CancelToken::new())
-                .map_err(|error| error.to_string())?;
-        }
+        let edit = if text == read {
+            None
+        } else {
+            replace(&path, (read, &text), inputs, (changed, "the camera is not written into it"))?;
+            Some(CameraEdit { path: path.clone(), before: read.into(), after: text.as_str().into() })
+        };
         let is_own = Loaded::camera_of(&text, &self.sets).is_some_and(|own| own.is_nearly(camera));
-        Ok(Kept { path, is_new, is_own, of_model: false })
+        Ok(Kept { path, is_new: edit.is_some(), is_own, of_model: false, edit })
     }
+}
+
+/// Puts back the text from before a camera was written, if the file is still as that left it.
+fn undo(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
+    let CameraEdit { path, before, after } = edit;
+    let changed = format!("{} has changed since c wrote it: it is left as it is", path.display());
+    if !has_text(path, after) {
+        return Err(changed);
+    }
+    replace(path, (after, before), inputs, (&changed, "it is left as it is"))?;
+    Ok(path.clone())
+}
+
+/// Whether this is what the file holds.
+fn has_text(path: &Path, text: &str) -> bool {
+    text_now(path).is_ok_and(|now| *now == *text)
+}
+
+/// Writes another text in place of the one that a scene file has. `changed`: the words for a file with any other text.
+/// `outcome`: what does not happen if the file would lose something.
+fn replace(
+    path: &Path,
+    (old, new): (&str, &str),
+    inputs: &Inputs,
+    (changed, outcome): (&str, &str),
+) -> Result<(), String> {
+    let metadata = file::kind(path).map(|(_, metadata)| metadata).map_err(|error| in_words(&error))?;
+    if let Some(why) = file::why_keep(&metadata) {
+        return Err(format!("{} {why}: {outcome}", path.display()));
+    }
+    let refused = || OutputError::Refused { reason: changed.to_owned() };
+    let may_replace = |_: &Path| has_text(path, old).then_some(()).ok_or_else(refused);
+    let guard = write::Guard {
+        is_kept: &|path| inputs.contain(path),
+        may_replace: &may_replace,
+        losses: Losses::Refused,
+    };
+    write::atomic_until(path, new.as_bytes(), &guard, &CancelToken::new()).map_err(|error| error.to_string())
 }
 
 /// Writes the scene of a model, with this camera, beside the model; never over a file.
@@ -142,5 +174,5 @@ fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<Kept, Str
     }
     let text = loaded.text_with_camera(camera)?;
     write::new_file(&path, text.as_bytes()).map_err(|error| format!("{shown}: {}", in_words(&error)))?;
-    Ok(Kept { path, is_new: true, is_own: false, of_model: true })
+    Ok(Kept { path, is_new: true, is_own: false, of_model: true, edit: None })
 }

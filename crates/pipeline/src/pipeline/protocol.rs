@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
-pub use super::answers::{Kept, Picked, Section, Spot, Thing};
+pub use super::answers::{CameraEdit, Kept, Picked, Section, Spot, Thing};
 pub use super::report::{
     Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts,
 };
@@ -33,6 +33,9 @@ pub enum Command {
     Preview(Option<PreviewSize>),
     /// Put this camera into the scene file; [`Event::CameraKept`] says what came of it. What is rendered goes on.
     KeepCamera(Viewpoint),
+    /// Put the scene file back as it was before this edit, if nobody changed it since; [`Event::CameraUndone`] says what came of
+    /// it. What is rendered goes on.
+    UndoCamera(CameraEdit),
     /// Say what is at a place of the picture; [`Event::Picked`] does. What is rendered goes on.
     Pick(Spot),
     /// Stop the render under way.
@@ -208,6 +211,13 @@ pub enum Event {
         generation: u64,
         /// The file with the camera, or the reason why glimt wrote nothing.
         outcome: Result<Kept, String>,
+    },
+    /// Answer to [`Command::UndoCamera`].
+    CameraUndone {
+        /// Number of the request.
+        generation: u64,
+        /// The file that is as before, or the reason why glimt wrote nothing.
+        outcome: Result<PathBuf, String>,
     },
     /// Answer to [`Command::Pick`].
     Picked {

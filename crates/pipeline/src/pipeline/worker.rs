@@ -163,6 +163,7 @@ impl Remote {
             }
             Command::Preview(size) => mailbox.preview = Some(size),
             Command::KeepCamera(camera) => mailbox.errands.push_back(Errand::KeepCamera(camera)),
+            Command::UndoCamera(edit) => mailbox.errands.push_back(Errand::UndoCamera(edit)),
             Command::Pick(spot) => {
                 mailbox.errands.retain(|errand| !matches!(errand, Errand::Pick(_)));
                 mailbox.errands.push_back(Errand::Pick(spot));

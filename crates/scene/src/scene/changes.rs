@@ -1,4 +1,6 @@
-//! Changes of an edit in the text of a scene, in a few words.
+//! Changes of an edit in the text of a scene, in a few words: keys with their values before and after, else lines.
+
+mod keys;
 
 use super::sanitize::shortened;
 
@@ -8,11 +10,17 @@ const MOST_BYTES: usize = 4 << 20;
 /// Characters of a line that are shown at most.
 const MOST: usize = 40;
 
-/// The difference of two texts, such as ``line 12: radius 0.5 → 0.7``; `None` if they are the same or too long.
+/// The difference of two texts, such as `sphere.ball.radius 0.5 → 0.7`. Keys are called as in `--set`. A difference in no key,
+/// or in text that is no TOML, is told by its lines. `None` if the texts are the same or too long.
 pub fn changes(before: &str, after: &str) -> Option<String> {
-    if before.len().max(after.len()) > MOST_BYTES {
+    if before == after || before.len().max(after.len()) > MOST_BYTES {
         return None;
     }
+    keys::changes(before, after).or_else(|| lines(before, after))
+}
+
+/// The difference in lines.
+fn lines(before: &str, after: &str) -> Option<String> {
     let (before, after): (Vec<&str>, Vec<&str>) = (before.lines().collect(), after.lines().collect());
     // Leave out what both begin and end with.
     let same = |a: &[&str], b: &[&str]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
@@ -53,18 +61,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_edit_is_said_in_a_few_words() {
-        let text = "[sphere]\nradius = 0.5\ncolor = 1\nlast = 2\n";
+    fn an_edit_outside_of_keys_is_said_by_its_lines() {
+        let text = "[sphere]\nradius = 0.5 # half\n# one\ncolor = 1\nlast = 2\n";
         let said = |from: &str, to: &str| changes(text, &text.replace(from, to));
         assert_eq!(said("x", "y"), None);
-        assert_eq!(said("0.5", "0.75").as_deref(), Some("line 2: radius 0.5 → 0.75"));
-        assert_eq!(said("color", "colour").as_deref(), Some("line 3: color = 1 → colour = 1"));
-        assert_eq!(said("last", "new = 1\nlast").as_deref(), Some("line 4: + new = 1"));
-        assert_eq!(said("color = 1\n", "").as_deref(), Some("line 3: − color = 1"));
-        assert_eq!(said("color = 1\nlast = 2\n", "").as_deref(), Some("2 lines fewer from line 3 on"));
-        assert_eq!(said("last", "a\nb\nlast").as_deref(), Some("2 lines more from line 4 on"));
-        assert_eq!(said("0.5\ncolor", "1\ncolour").as_deref(), Some("lines 2 to 3"));
-        let evil = said("0.5", "\u{1b}[2J\u{202e}").expect("a change");
+        assert_eq!(said("# one", "# two").as_deref(), Some("line 3: # one → # two"));
+        assert_eq!(said("# one\n", "").as_deref(), Some("line 3: − # one"));
+        assert_eq!(said("# one", "# one\n# new").as_deref(), Some("line 4: + # new"));
+        assert_eq!(said("# one", "# one\n#\n#").as_deref(), Some("2 lines more from line 4 on"));
+        assert_eq!(said("# half\n# one", "# 1\n# 2").as_deref(), Some("lines 2 to 3"));
+        assert_eq!(said("0.5", "").as_deref(), Some("line 2: radius 0.5 # half → # half"), "no TOML");
+        let evil = said("# one", "# \u{1b}[2J\u{202e}").expect("a change");
         assert!(!evil.chars().any(char::is_control) && !evil.contains('\u{202e}'), "{evil}");
     }
 }

@@ -34,6 +34,7 @@ fn by_hand() {
         color: ColorChoice::Auto,
         preview: PreviewChoice::Auto,
         cell_aspect: None,
+        notify_after: None,
         commands: Box::new(move |command| {
             assert!(!matches!(command, Command::Write), "w panics in the thread of the front end");
             commands.send(command).unwrap_or_default();

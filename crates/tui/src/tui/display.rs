@@ -5,13 +5,15 @@ use std::time::{Duration, Instant};
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
+use super::chrome::Chrome;
 use super::color::ColorDepth;
 use super::event::FrameReport;
 use super::graphics::{Images, Placement};
 use super::known::Answer;
 use super::known::Ask;
 use super::line::{Line, Question};
-use super::paint::{Fidelity, Painter};
+use super::paint::{Besides, Fidelity, Painter};
+use super::terminal;
 
 /// Whether the terminal draws what lies between two marks at once (mode 2026).
 pub(super) const SYNCHRONIZED: &[u8] = b"\x1b[?2026$p";
@@ -60,6 +62,10 @@ pub(super) struct Display {
     is_synchronized: bool,
     /// Whether all that is wanted has been sent.
     is_complete: bool,
+    /// The frame of the window as it is wanted, and as it was sent.
+    chrome: [Chrome; 2],
+    /// Notifications and texts for the clipboard, not sent yet.
+    asides: Vec<u8>,
     /// Bytes of the picture under way.
     frame: Option<usize>,
     /// Cost of the last picture.
@@ -79,6 +85,8 @@ impl Display {
             out,
             is_synchronized: false,
             is_complete: true,
+            chrome: Default::default(),
+            asides: Vec::new(),
             frame: None,
             report: None,
             is_reported: true,
@@ -90,6 +98,7 @@ impl Display {
     /// Somebody else used the terminal: its content is unknown, and so is the line.
     pub(super) fn restart(&mut self, now: Instant) {
         self.forget();
+        self.chrome[1] = Chrome::default();
         self.line = self.way.line(now);
         let questions = [SYNCHRONIZED, &self.way.ask.questions(), ATTRIBUTES].concat();
         self.send(questions, Some(Question::Attributes), now);
@@ -117,18 +126,65 @@ impl Display {
     }
 
     /// Leads to this from now on. `is_new`: with a picture that was not wanted before.
-    pub(super) fn aim(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity, is_new: bool) {
-        self.painter.aim(wanted, picture, fidelity);
+    pub(super) fn aim(
+        &mut self,
+        wanted: &Buffer,
+        picture: Rect,
+        fidelity: Fidelity,
+        (is_new, besides): (bool, &Besides),
+    ) {
+        if !besides.links.is_empty() {
+            terminal::will_have_links();
+        }
+        self.painter.aim_with(wanted, picture, fidelity, besides);
         self.is_complete = false;
         if is_new {
             self.frame = Some(0);
         }
     }
 
+    /// Gives the window this frame, behind the picture.
+    pub(super) fn dress(&mut self, chrome: Chrome) {
+        self.chrome[0] = chrome;
+    }
+
+    /// Sends these bytes behind the picture.
+    pub(super) fn send_aside(&mut self, bytes: Vec<u8>) {
+        self.asides.extend(bytes);
+    }
+
+    /// Whether there is anything to send when the picture is there.
+    fn has_more(&self) -> bool {
+        !self.asides.is_empty() || self.chrome[0] != self.chrome[1]
+    }
+
+    /// Sends what waits for the picture.
+    fn send_more(&mut self, now: Instant) {
+        let [wanted, sent] = &self.chrome;
+        let mut bytes = Vec::new();
+        if wanted.title != sent.title {
+            bytes.extend_from_slice(terminal::before_title());
+        }
+        if wanted.bar.is_some() {
+            terminal::will_have_progress();
+        }
+        bytes.extend(sent.changes(wanted));
+        bytes.append(&mut self.asides);
+        self.chrome[1] = self.chrome[0].clone();
+        if !bytes.is_empty() {
+            self.send_slice(bytes, now);
+        }
+    }
+
     /// Sends a slice of what the line has room for, and what there is of it once `is_late` says so; whether that was anything.
     pub(super) fn pump(&mut self, now: Instant, is_late: impl Fn() -> bool) -> bool {
-        let room = if self.is_complete { 0 } else { self.line.room(now) };
+        let is_idle = self.is_complete && !self.has_more();
+        let room = if is_idle { 0 } else { self.line.room(now) };
         if room == 0 {
+            return false;
+        }
+        if self.is_complete {
+            self.send_more(now);
             return false;
         }
         let room = room.saturating_sub(BEGIN.len() + END.len());
@@ -186,7 +242,8 @@ impl Display {
             Answer::Ready => self.line.answered(Question::Status, now),
             Answer::Attributes => self.line.answered(Question::Attributes, now),
             Answer::Synchronized { is_known } => self.is_synchronized = is_known,
-            Answer::Blocks(_)
+            Answer::Name(_)
+            | Answer::Focus { .. }
             | Answer::TrueColor
             | Answer::Background(_)
             | Answer::Ink { .. }
@@ -222,7 +279,7 @@ impl Display {
     /// When there may be room for what is left, without an answer.
     pub(super) fn wake(&mut self, now: Instant) -> Option<Instant> {
         match () {
-            () if self.is_complete => None,
+            () if self.is_complete && !self.has_more() => None,
             () if self.line.room(now) > 0 => Some(now),
             () => self.line.wake(now),
         }

@@ -44,6 +44,7 @@ pub(super) fn ask(
     let is_ramp = PreviewKind::of(preview, depth) == PreviewKind::Ascii;
     Ask {
         blocks: preview == PreviewChoice::Auto && depth != ColorDepth::None && is_outermost && !is_plain,
+        name: is_outermost && !is_plain && !term.is_empty(),
         true_color: color == ColorChoice::Auto && has_palette && is_outermost && !is_plain,
         background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
         palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
@@ -78,14 +79,15 @@ mod tests {
         let (auto, xterm) = (PreviewChoice::Auto, ("TERM", "xterm-256color"));
         let none = Ask::default();
         let found = ask(auto, ColorChoice::Auto, ColorDepth::Indexed256, &[xterm]);
-        assert_eq!(found, Ask { blocks: true, true_color: true, ..none });
+        assert_eq!(found, Ask { blocks: true, name: true, true_color: true, ..none });
         let found = ask(auto, ColorChoice::Ansi16, ColorDepth::Ansi16, &[xterm]);
-        assert_eq!(found, Ask { blocks: true, palette: true, ..none });
+        assert_eq!(found, Ask { blocks: true, name: true, palette: true, ..none });
         let tmux = ("TMUX", "/tmp/tmux-0/default,1,0");
         assert_eq!(ask(auto, ColorChoice::Auto, ColorDepth::Indexed256, &[xterm, tmux]), none);
-        assert_eq!(ask(PreviewChoice::HalfBlock, ColorChoice::Auto, ColorDepth::TrueColor, &[xterm]), none);
+        let found = ask(PreviewChoice::HalfBlock, ColorChoice::Auto, ColorDepth::TrueColor, &[xterm]);
+        assert_eq!(found, Ask { name: true, ..none });
         let found = ask(auto, ColorChoice::None, ColorDepth::None, &[xterm]);
-        assert_eq!(found, Ask { background: true, ..none });
+        assert_eq!(found, Ask { name: true, background: true, ..none });
         assert_eq!(ask(auto, ColorChoice::Auto, ColorDepth::Ansi16, &[("TERM", "linux")]), none);
     }
 }

@@ -176,6 +176,10 @@ pub(super) enum Effect {
     Edit(FilePlace),
     /// Ask how large the window is.
     Measure,
+    /// Send this behind the picture: a notification, a text for the clipboard.
+    Aside(Vec<u8>),
+    /// Have the terminal report the focus from now on.
+    ReportFocus,
 }
 
 /// A place in a file.

@@ -12,6 +12,7 @@ use super::event::{Effect, Event, KeyPress, Window};
 use super::known::Ask;
 use super::preview_kind::PreviewKind;
 use super::state::{Setup, State};
+use super::terminals::Abilities;
 use super::update::{start, update};
 use super::view;
 use crate::film::Picture;
@@ -50,6 +51,8 @@ pub(super) fn state_with(
         is_light: false,
         ansi: XTERM,
         ask: Ask::default(),
+        abilities: Abilities::default(),
+        notify_after: Some(Duration::from_secs(30)),
     };
     State::new(setup, Instant::now())
 }

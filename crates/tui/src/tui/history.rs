@@ -1,14 +1,19 @@
 //! The last pictures, within bounds.
 
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::film::Picture;
 use crate::pipeline::protocol::Section;
+use crate::tui::rescale::resized;
+use crate::tui::state::Toggles;
 
 /// Bytes that all of them take, at most.
 const MOST_BYTES: usize = 16 << 20;
+/// Columns and rows of a small picture.
+const SMALL: f32 = 64.0;
 
 /// A picture and the request that it shows.
 #[derive(Clone, Debug)]
@@ -41,6 +46,10 @@ struct Past {
     shown: Shown,
     time: Instant,
     edits: u64,
+    /// Settings that keys had changed.
+    toggles: Toggles,
+    /// The picture for the strip, once it is asked for.
+    small: OnceCell<Picture>,
 }
 
 impl History {
@@ -86,13 +95,22 @@ impl History {
     }
 
     /// Keeps a picture, in place of an earlier one of the same request.
-    pub(super) fn record(&mut self, shown: Shown, time: Instant) {
+    pub(super) fn record(&mut self, shown: Shown, time: Instant, toggles: Toggles) {
         let is_same = |past: &Past| past.shown.picture == shown.picture;
         let last = self.past.len().wrapping_sub(1);
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
         match known.or_else(|| self.past.get(last).is_some_and(is_same).then_some(last)) {
-            Some(at) => self.past[at].shown = shown,
-            None => self.past.push_back(Past { shown, time, edits: self.edits }),
+            Some(at) => {
+                let past = &mut self.past[at];
+                if past.shown.picture != shown.picture {
+                    past.small = OnceCell::new();
+                }
+                (past.shown, past.toggles) = (shown, toggles);
+            }
+            None => {
+                let small = OnceCell::new();
+                self.past.push_back(Past { shown, time, edits: self.edits, toggles, small });
+            }
         }
         while self.past.len() > 1 && self.past.iter().map(Past::bytes).sum::<usize>() > MOST_BYTES {
             self.past.pop_front();
@@ -141,6 +159,41 @@ impl History {
         self.look_at(at, newest)
     }
 
+    /// Number of pictures that are kept.
+    pub(super) fn len(&self) -> usize {
+        self.past.len()
+    }
+
+    /// Index of the picture that is looked at: the newest one, unless an older one is.
+    pub(super) fn looked_at(&self) -> Option<usize> {
+        self.open.as_ref().map(|(at, _)| *at).or_else(|| self.past.len().checked_sub(1))
+    }
+
+    /// A picture at a small size.
+    pub(super) fn small(&self, at: usize) -> Option<&Picture> {
+        let past = self.past.get(at)?;
+        Some(past.small.get_or_init(|| small(&past.shown.picture)))
+    }
+
+    /// Changes from the picture before to this one: by edits, by keys.
+    pub(super) fn change(&self, at: usize) -> String {
+        let Some(past) = self.past.get(at) else { return String::new() };
+        let Some(before) = at.checked_sub(1).and_then(|before| self.past.get(before)) else {
+            return "the first that is kept".to_owned();
+        };
+        let edits = before.edits + 1..=past.edits;
+        let edits =
+            edits.map(|edit| self.texts.get(&edit).map_or("a file that the scene names", String::as_str));
+        let keys = past.toggles.differences(&before.toggles);
+        let all: Vec<String> = edits.map(str::to_owned).chain(keys).collect();
+        if all.is_empty() { "rendered again".to_owned() } else { all.join("; ") }
+    }
+
+    /// One of the pictures that are kept.
+    pub(super) fn open_at(&mut self, at: usize, newest: Shown) -> Option<Shown> {
+        self.look_at(at, newest)
+    }
+
     fn look_at(&mut self, at: usize, newest: Shown) -> Option<Shown> {
         let shown = self.past.get(at)?.shown.clone();
         self.open = Some((at, newest));
@@ -165,6 +218,13 @@ impl Past {
     }
 }
 
+/// The same picture with at most [`SMALL`] columns and rows.
+fn small(picture: &Picture) -> Picture {
+    let scale = (SMALL / picture.width.max(picture.height).max(1) as f32).min(1.0);
+    let side = |length: u32| ((length as f32 * scale).round() as u32).max(1);
+    resized(picture, side(picture.width), side(picture.height))
+}
+
 /// Time that has passed, in words.
 pub(super) fn ago(time: Duration) -> String {
     match time.as_secs() {
@@ -177,6 +237,7 @@ pub(super) fn ago(time: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::settings::View;
     use crate::tui::fixtures::plain_picture;
 
     fn shown(generation: u64, side: u32) -> Shown {
@@ -194,10 +255,10 @@ mod tests {
         let mut history = History::default();
         for generation in 0..10 {
             let picture = plain_picture(1000, 1000, [generation as u8, 0, 0]);
-            history.record(Shown { picture, ..shown(generation, 1) }, Instant::now());
+            history.record(Shown { picture, ..shown(generation, 1) }, Instant::now(), Toggles::default());
         }
         assert_eq!(history.past.len(), 5, "3 MB each");
-        history.record(shown(10, 10_000), Instant::now());
+        history.record(shown(10, 10_000), Instant::now(), Toggles::default());
         assert_eq!(history.past.len(), 1, "the last one stays whatever it takes");
     }
 
@@ -206,7 +267,7 @@ mod tests {
         let mut history = History::default();
         for generation in 0..3 {
             history.edited();
-            history.record(shown(generation, 10), Instant::now());
+            history.record(shown(generation, 10), Instant::now(), Toggles::default());
         }
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
     }
@@ -214,9 +275,9 @@ mod tests {
     #[test]
     fn an_edit_that_changed_nothing_is_none_to_look_back_over() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now());
+        history.record(shown(1, 10), Instant::now(), Toggles::default());
         history.edited();
-        history.record(shown(2, 20), Instant::now());
+        history.record(shown(2, 20), Instant::now(), Toggles::default());
         history.edited();
         history.edited_nothing();
         let before = history.before_edit(shown(2, 20)).expect("a picture");
@@ -226,9 +287,9 @@ mod tests {
     #[test]
     fn a_camera_that_was_kept_is_an_edit() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now());
-        history.record(shown(2, 20), Instant::now());
-        history.record(shown(3, 30), Instant::now());
+        history.record(shown(1, 10), Instant::now(), Toggles::default());
+        history.record(shown(2, 20), Instant::now(), Toggles::default());
+        history.record(shown(3, 30), Instant::now(), Toggles::default());
         history.kept_camera(2);
         let before = history.before_edit(shown(3, 30)).expect("a picture");
         assert_eq!(before.generation, 1, "of the camera before");
@@ -237,9 +298,48 @@ mod tests {
     #[test]
     fn one_request_has_one_picture() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now());
-        history.record(shown(1, 20), Instant::now());
+        history.record(shown(1, 10), Instant::now(), Toggles::default());
+        history.record(shown(1, 20), Instant::now(), Toggles::default());
         assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
+    }
+
+    #[test]
+    fn each_picture_says_what_changed_since_the_one_before() {
+        let mut history = History::default();
+        let keys = |view| Toggles { view, ..Toggles::default() };
+        history.record(shown(1, 10), Instant::now(), keys(None));
+        history.edited();
+        history.describe_edit("camera.fov 40 → 30".to_owned());
+        history.edited();
+        history.record(shown(2, 20), Instant::now(), keys(None));
+        history.record(shown(3, 30), Instant::now(), keys(Some(View::Normal)));
+        history.edited();
+        history.describe_edit("render.seed 0 → 1".to_owned());
+        history.record(shown(4, 40), Instant::now(), keys(None));
+        history.record(shown(5, 50), Instant::now(), keys(None));
+        let changes: Vec<String> = (0..5).map(|at| history.change(at)).collect();
+        assert_eq!(
+            changes,
+            [
+                "the first that is kept",
+                "camera.fov 40 → 30; a file that the scene names",
+                "view normal",
+                "render.seed 0 → 1; view of the scene",
+                "rendered again",
+            ]
+        );
+        assert_eq!((history.len(), history.looked_at()), (5, Some(4)));
+    }
+
+    #[test]
+    fn small_pictures_are_made_anew_when_their_pictures_change() {
+        let mut history = History::default();
+        history.record(shown(1, 1000), Instant::now(), Toggles::default());
+        let size = |history: &History| history.small(0).map(|small| (small.width, small.pixels[0]));
+        assert_eq!(size(&history), Some((64, [1, 2, 3])));
+        let picture = plain_picture(10, 10, [9, 8, 7]);
+        history.record(Shown { picture, ..shown(1, 1) }, Instant::now(), Toggles::default());
+        assert_eq!(size(&history), Some((10, [9, 8, 7])));
     }
 
     #[test]

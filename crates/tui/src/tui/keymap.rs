@@ -83,12 +83,20 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain('f')], "f", Action::Focus, "click to focus there; f f: at the crosshair", ""),
     binding(&[KeyPress::plain('c')], "c", Action::KeepCamera, "write the camera into the scene file", ""),
     binding(
+        &[KeyPress::plain('u')],
+        "u",
+        Action::UndoCamera,
+        "undo c, if the file is still as c left it",
+        "",
+    ),
+    binding(
         &[KeyPress::special(KeyCode::Enter)],
         "Enter, click",
         Action::Inspect,
         "inspect the object there",
         "",
     ),
+    binding(&[KeyPress::plain('y')], "y", Action::Copy, "copy what was clicked, with the pixel's value", ""),
     binding(
         &[KeyPress::plain('o')],
         "o",
@@ -104,7 +112,13 @@ pub(super) const KEYMAP: &[Binding] = &[
         "switch between before and after the last edit",
         "",
     ),
-    binding(&[KeyPress::plain('n')], "n N", Action::OlderPicture, "older, newer pictures", ""),
+    binding(
+        &[KeyPress::plain('n')],
+        "n N",
+        Action::OlderPicture,
+        "older, newer pictures; a click in the strip too",
+        "",
+    ),
     binding(&[KeyPress::plain('N')], "", Action::NewerPicture, "", ""),
     binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause the render, or go on", "pause"),
     binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "again"),
@@ -209,12 +223,12 @@ mod tests {
         assert_eq!(action(shifted), Some(Action::ToggleHelp));
         assert_eq!(action(KeyPress::plain('V')), Some(Action::PreviousView));
         assert_eq!(action(KeyPress::ctrl('q')), None);
-        assert_eq!(action(KeyPress::plain('y')), None);
+        assert_eq!(action(KeyPress::plain('g')), None);
     }
 
     #[test]
     fn the_fixed_keys_are_there() {
-        for key in "?qsdpiv rw0hjkl+-<>[]fcombnNxze".chars() {
+        for key in "?qsdpiv rw0hjkl+-<>[]fcombnNxzeuy".chars() {
             assert!(action(KeyPress::plain(key)).is_some(), "{key:?}");
         }
     }

@@ -1,4 +1,6 @@
-//! Abilities of terminals by the names that they report, and questions to ask them.
+//! Answers of terminals, and questions to ask them.
+
+use super::terminals::{Brand, Terminal};
 
 /// The finest blocks that a terminal draws itself, whatever its font.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,16 +12,6 @@ pub(super) enum Blocks {
     /// Unicode 16.
     Octants,
 }
-
-/// Names as XTVERSION has them, with the first version that draws octants; all of them draw sextants since long.
-const KNOWN: [(&str, Option<[u32; 2]>); 6] = [
-    ("kitty", Some([0, 40])),
-    ("foot", Some([1, 20])),
-    ("ghostty", Some([1, 2])),
-    ("VTE", Some([7800, 0])),
-    ("WezTerm", None),
-    ("contour", None),
-];
 
 /// A terminal that has 24 bits of colour and repeats characters (REP).
 #[derive(Clone, Copy, Debug)]
@@ -45,16 +37,25 @@ impl Program {
 }
 
 impl Blocks {
-    /// Blocks by a terminal's name and version: `foot(1.20.2)`, `ghostty 1.2.0`.
-    pub(super) fn of(report: &str) -> Self {
-        let (name, version) = report.split_at(report.find(['(', ' ']).unwrap_or(report.len()));
-        let Some((_, octants)) = KNOWN.iter().find(|(known, _)| name.eq_ignore_ascii_case(known)) else {
-            return Self::Unknown;
+    /// Blocks of a terminal of this version; all those that are known draw sextants since long.
+    pub(super) fn of(terminal: Terminal) -> Self {
+        let octants_since = match terminal.brand {
+            Brand::Kitty => [0, 40],
+            Brand::Foot => [1, 20],
+            Brand::Ghostty => [1, 2],
+            Brand::Vte => [7800, 0],
+            Brand::WezTerm | Brand::Contour => return Self::Sextants,
+            Brand::Konsole
+            | Brand::Iterm2
+            | Brand::WindowsTerminal
+            | Brand::ConEmu
+            | Brand::Mintty
+            | Brand::Alacritty
+            | Brand::VsCode
+            | Brand::AppleTerminal
+            | Brand::Xterm => return Self::Unknown,
         };
-        let mut numbers = version[version.len().min(1)..].split(|c: char| !c.is_ascii_digit());
-        let mut number = || numbers.next().and_then(|digits| digits.parse().ok()).unwrap_or(0_u32);
-        let version = [number(), number()];
-        if octants.is_some_and(|least| version >= least) { Self::Octants } else { Self::Sextants }
+        if terminal.version >= octants_since { Self::Octants } else { Self::Sextants }
     }
 }
 
@@ -67,15 +68,17 @@ pub(super) enum Answer {
     Attributes,
     /// Whether mode 2026 is known, by which large changes appear at once.
     Synchronized { is_known: bool },
-    /// Its name (XTVERSION), as far as it says which blocks it draws.
-    Blocks(Blocks),
+    /// Its name and version (XTVERSION), if it is one of those that are told apart.
+    Name(Terminal),
+    /// Whether its window has the focus now (mode 1004).
+    Focus { is_here: bool },
     /// It has 24 bits of colour (XTGETTCAP).
     TrueColor,
     /// Its background, in sRGB (OSC 11).
     Background([u8; 3]),
     /// One of its palette, in sRGB (OSC 4).
     Ink { index: u8, rgb: [u8; 3] },
-    /// Any other report: the cursor's position, modes, colours, names, focus.
+    /// Any other report: the cursor's position, modes, colours, other names.
     Other,
 }
 
@@ -85,6 +88,8 @@ pub(super) enum Answer {
 pub(super) struct Ask {
     /// The blocks that it draws, by its name.
     pub(super) blocks: bool,
+    /// Its name, for what it can do besides.
+    pub(super) name: bool,
     /// Whether it has 24 bits of colour.
     pub(super) true_color: bool,
     /// Its background.
@@ -102,7 +107,7 @@ impl Ask {
                 questions.extend_from_slice(bytes);
             }
         };
-        ask(self.blocks, b"\x1b[>q");
+        ask(self.blocks || self.name, b"\x1b[>q");
         // `RGB` and `Tc`, in hexadecimal digits.
         ask(self.true_color, b"\x1bP+q524742\x1b\\\x1bP+q5463\x1b\\");
         ask(self.background, b"\x1b]11;?\x1b\\");
@@ -120,7 +125,11 @@ mod tests {
     #[test]
     fn only_what_is_of_use_is_asked() {
         assert!(Ask::default().questions().is_empty());
-        assert_eq!(Ask { blocks: true, ..Ask::default() }.questions(), b"\x1b[>q");
+        for ask in
+            [Ask { blocks: true, ..Ask::default() }, Ask { name: true, blocks: true, ..Ask::default() }]
+        {
+            assert_eq!(ask.questions(), b"\x1b[>q");
+        }
         let palette = Ask { palette: true, ..Ask::default() }.questions();
         assert!(palette.ends_with(b"\x1b]4;15;?\x1b\\"));
     }
@@ -142,7 +151,8 @@ mod tests {
             ("XTerm(390)", Blocks::Unknown),
             ("", Blocks::Unknown),
         ] {
-            assert_eq!(Blocks::of(report), blocks, "{report}");
+            let found = Terminal::of_report(report).map_or(Blocks::Unknown, Blocks::of);
+            assert_eq!(found, blocks, "{report}");
         }
     }
 }

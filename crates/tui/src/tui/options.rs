@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::mpsc::Receiver;
+use std::time::Duration;
 
 use super::color::ColorChoice;
 use crate::choice;
@@ -47,6 +48,8 @@ pub struct Options {
     pub preview: PreviewChoice,
     /// Height of a cell over its width. `None` to ask the terminal; if it does not answer, 2.
     pub cell_aspect: Option<f32>,
+    /// Time after which the end of a render is worth a notification, if the terminal has lost the focus. `None` for none.
+    pub notify_after: Option<Duration>,
     /// Sends orders to the worker. Must not block.
     pub commands: Box<dyn FnMut(Command)>,
     /// Events of the worker. Their end means that the worker is gone, which ends the front end.

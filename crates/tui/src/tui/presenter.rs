@@ -2,17 +2,21 @@
 //!
 //! The time comes with each call, so that a test can choose it.
 
+use std::path::PathBuf;
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
+use super::chrome::Chrome;
 use super::display::Display;
 use super::event::Event;
-use super::paint::{Advice, Fidelity, Moment, advise};
+use super::files::Files;
+use super::paint::{Advice, Besides, Fidelity, Link, Moment, advise};
 use super::state::State;
 use super::view;
+use super::view::Drawn;
 use super::view::layout::Layout;
 use crate::film::Picture;
 use crate::pipeline::protocol::{LatestPreview, PreviewSlot};
@@ -23,15 +27,17 @@ const FRAME: Duration = Duration::from_millis(50);
 /// Leads the terminal to the state.
 pub(super) struct Presenter {
     pub(super) display: Display,
-    drawn: Drawn,
+    drawn: Aimed,
     previews: PreviewSlot,
+    /// Addresses of written files.
+    files: Files,
     /// No frame before this.
     next_frame: Instant,
 }
 
 /// The picture that was drawn last.
 #[derive(Default)]
-struct Drawn {
+struct Aimed {
     picture: Option<Arc<Picture>>,
     generation: u64,
     /// Samples of a pixel, in the mean.
@@ -50,7 +56,7 @@ struct Drawn {
 
 impl Presenter {
     pub(super) fn new(display: Display, previews: PreviewSlot, now: Instant) -> Self {
-        Self { display, drawn: Drawn::default(), previews, next_frame: now }
+        Self { display, drawn: Aimed::default(), previews, files: Files::here(), next_frame: now }
     }
 
     /// Takes note of a newer picture and gives it if it is to be drawn. Until it is worth its bytes it stays in the slot,
@@ -136,13 +142,24 @@ impl Presenter {
         state.dirty = false;
         let window = state.display.window;
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
-        view::draw(state, &mut buffer);
+        let drawn = view::draw(state, &mut buffer);
+        if let Some(chrome) = Chrome::of(state, self.display.bytes_per_second().is_some()) {
+            self.display.dress(chrome);
+        }
         let is_new = self.note_picture(state, now);
         // It is all there, and no better one has come since.
         self.drawn.is_first &= is_new || !self.display.is_complete();
         let area = Layout::of(state).preview;
         self.display.place(view::preview::placement(state, area), is_still(state));
-        self.display.aim(&buffer, area, self.fidelity(state), is_new);
+        let besides = self.besides(state, drawn);
+        self.display.aim(&buffer, area, self.fidelity(state), (is_new, &besides));
+    }
+
+    /// Links, if the terminal has them, and what waits for the picture.
+    fn besides(&self, state: &State, drawn: Drawn) -> Besides {
+        let files = drawn.files.into_iter().filter(|_| state.display.abilities.links);
+        let link = |(cells, path): (Rect, PathBuf)| Link { cells, address: self.files.address(&path) };
+        Besides { later: drawn.later, links: files.map(link).collect() }
     }
 
     /// Whether the line stands idle while a key is held that moves the camera: the last picture is there as far as a moving one
@@ -161,7 +178,7 @@ impl Presenter {
         let is_first = self.drawn.generation != shown.generation;
         let (picture, samples, at) = (Some(shown.picture.clone()), samples(state), Some(now));
         let generation = shown.generation;
-        self.drawn = Drawn { picture, generation, samples, at, is_first, ..Drawn::default() };
+        self.drawn = Aimed { picture, generation, samples, at, is_first, ..Aimed::default() };
         true
     }
 
@@ -182,7 +199,7 @@ impl Presenter {
         if self.drawn.is_old && self.advice(state, now) != Advice::Wait {
             events.extend(self.take_preview());
         }
-        let is_new = |drawn: &mut Drawn| !std::mem::replace(&mut drawn.is_shown, true);
+        let is_new = |drawn: &mut Aimed| !std::mem::replace(&mut drawn.is_shown, true);
         if self.drawn.picture.is_some() && has_sent && is_new(&mut self.drawn) {
             events.push(Event::Shown { generation: self.drawn.generation });
         }

@@ -13,6 +13,7 @@ use super::environment::{is_plain, way};
 use super::input::{Decoder, Input};
 use super::known::{Answer, Ask, Blocks, Program};
 use super::terminal;
+use super::terminals::Terminal;
 
 /// Answers of a terminal, and what its environment says.
 #[derive(Clone, Debug)]
@@ -56,7 +57,8 @@ impl Probe {
     /// The parts of a cell that a preview without a choice draws, in words.
     pub fn preview(&self) -> &'static str {
         let name = self.answers.as_ref().and_then(|answers| answers.name.as_deref());
-        match (self.depth, name.filter(|_| !self.is_multiplexed).map_or(Blocks::Unknown, Blocks::of)) {
+        let terminal = name.filter(|_| !self.is_multiplexed).and_then(Terminal::of_report);
+        match (self.depth, terminal.map_or(Blocks::Unknown, Blocks::of)) {
             (ColorDepth::None, _) => "characters",
             (_, Blocks::Octants) => "octants",
             (_, Blocks::Sextants) => "sextants",

@@ -21,6 +21,7 @@ use super::preview_kind::PreviewKind;
 use super::signals::{self, Listener};
 use super::state::{Setup, State};
 use super::terminal::{self, Screen};
+use super::terminals::Terminal;
 use super::update::{start, update};
 use super::writer;
 use crate::pipeline::protocol::{self, Command};
@@ -41,8 +42,12 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
 
     let (sender, events) = mpsc::channel();
     let listener = Listener::start(&sender).map_err(failed("hear signals for"))?;
-    let screen = Screen::open()?;
     let variable = |name: &str| std::env::var(name).ok();
+    let abilities = Terminal::of_environment(variable).map(Terminal::abilities).unwrap_or_default();
+    if abilities.focus {
+        terminal::will_report_focus();
+    }
+    let screen = Screen::open()?;
     let way = Way { ask: ask(options.preview, options.color, depth, variable), ..way(variable) };
     let setup = Setup {
         scene: options.scene,
@@ -53,6 +58,8 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
         is_light: color::has_light_background(variable),
         ansi: *color::ansi(&variable("TERM").unwrap_or_default()),
         ask: way.ask,
+        abilities,
+        notify_after: options.notify_after,
     };
     forward("worker-events", options.events, &sender, Event::Worker, Source::Worker)?;
     forward("news", options.news, &sender, Event::of_watcher, Source::Watcher)?;
@@ -251,6 +258,8 @@ impl Ui {
             Effect::Suspend => {}
             Effect::Mouse(is_on) => self.screen.set_mouse(is_on),
             Effect::Edit(place) => return self.edit(&place),
+            Effect::Aside(bytes) => self.presenter.display.send_aside(bytes),
+            Effect::ReportFocus => self.screen.report_focus(),
             Effect::Redraw => return self.redraw(),
             Effect::Measure => {
                 // It may have shrunk and grown again, and cut what was shown.

@@ -22,9 +22,11 @@ use crossterm::{execute, terminal};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::termios::{FlushArg, SetArg, Termios, tcflush, tcgetattr, tcsetattr};
 
+use super::chrome::{KEEP_TITLE, PROGRESS_OFF, TITLE_BACK};
 use super::event::Window;
 use super::graphics;
 use super::options::TuiError;
+use super::paint::LINK_OFF;
 use super::writer;
 use crate::system::abort;
 
@@ -34,6 +36,14 @@ static TAKEN: AtomicBool = AtomicBool::new(false);
 static MOUSE: AtomicBool = AtomicBool::new(true);
 /// Whether keys come raw.
 static RAW: AtomicBool = AtomicBool::new(false);
+/// Whether the terminal is to report the focus.
+static FOCUS: AtomicBool = AtomicBool::new(false);
+/// Whether the window has a title of glimt's.
+static HAS_TITLE: AtomicBool = AtomicBool::new(false);
+/// Whether the window may have a bar of progress.
+static HAS_PROGRESS: AtomicBool = AtomicBool::new(false);
+/// Whether a link may be open in the text.
+static HAS_LINKS: AtomicBool = AtomicBool::new(false);
 /// Whether the terminal keeps images that have to be deleted.
 static HAS_IMAGES: AtomicBool = AtomicBool::new(false);
 /// The thread whose panic gives the terminal back; those of other threads are kept in [`PANIC`].
@@ -44,6 +54,20 @@ static PANIC: Mutex<Option<String>> = Mutex::new(None);
 /// Presses, movements with a button down, in SGR form. (crossterm's own command turns on all movements.)
 const MOUSE_ON: &str = "\x1b[?1000h\x1b[?1002h\x1b[?1006h";
 const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
+
+/// Reports of the focus (mode 1004).
+const FOCUS_ON: &str = "\x1b[?1004h";
+const FOCUS_OFF: &str = "\x1b[?1004l";
+
+/// What else glimt may have changed, with the bytes that take it back.
+static CHANGES: [(&AtomicBool, &[u8]); 4] = [
+    (&HAS_LINKS, LINK_OFF),
+    (&HAS_TITLE, TITLE_BACK),
+    (&HAS_PROGRESS, PROGRESS_OFF),
+    (&FOCUS, FOCUS_OFF.as_bytes()),
+];
+/// What ends a string that was cut: it would take what follows for its own.
+const STRING_END: &[u8] = b"\x1b\\";
 
 /// Half blocks are about square at this height over width of a cell.
 const DEFAULT_CELL_ASPECT: f32 = 2.0;
@@ -93,6 +117,12 @@ impl Screen {
     pub(super) fn set_mouse(&mut self, is_on: bool) {
         MOUSE.store(is_on, Ordering::Release);
         writer::send(if is_on { MOUSE_ON } else { MOUSE_OFF }.as_bytes().to_vec());
+    }
+
+    /// Has the terminal report the focus.
+    pub(super) fn report_focus(&mut self) {
+        will_report_focus();
+        writer::send(FOCUS_ON.as_bytes().to_vec());
     }
 
     /// The terminal is gone: nothing more is written to it.
@@ -211,6 +241,9 @@ fn give_back_at_once() {
             if HAS_IMAGES.load(Ordering::Acquire) {
                 let _ = nix::unistd::write(&out, &words.delete_images);
             }
+            for bytes in taken_back() {
+                let _ = nix::unistd::write(&out, bytes);
+            }
             let _ = nix::unistd::write(&out, &words.leave);
         }
     }
@@ -226,10 +259,50 @@ pub(super) fn will_have_images() {
     HAS_IMAGES.store(true, Ordering::Release);
 }
 
+/// The terminal is to report the focus whenever it is taken.
+pub(super) fn will_report_focus() {
+    FOCUS.store(true, Ordering::Release);
+}
+
+/// Bytes to send before the window gets a title: empty unless it has its own yet.
+pub(super) fn before_title() -> &'static [u8] {
+    if HAS_TITLE.swap(true, Ordering::AcqRel) { b"" } else { KEEP_TITLE }
+}
+
+/// From now on the window may have a bar of progress.
+pub(super) fn will_have_progress() {
+    HAS_PROGRESS.store(true, Ordering::Release);
+}
+
+/// From now on a link may be open.
+pub(super) fn will_have_links() {
+    HAS_LINKS.store(true, Ordering::Release);
+}
+
+/// Bytes that take back what else was changed. Each is given once, but for modes, which are set whenever the terminal is taken.
+fn taken_back() -> impl Iterator<Item = &'static [u8]> {
+    let mut is_first = true;
+    CHANGES.iter().flat_map(move |(flag, bytes)| {
+        let is_mode = std::ptr::eq(*flag, &FOCUS);
+        let is_due = if is_mode { flag.load(Ordering::Acquire) } else { flag.swap(false, Ordering::AcqRel) };
+        let end = (is_due && std::mem::replace(&mut is_first, false)).then_some(STRING_END);
+        end.into_iter().chain(is_due.then_some(*bytes))
+    })
+}
+
 /// The bytes that take the screen.
 fn enter(out: &mut impl Write) -> io::Result<()> {
     let mouse = if MOUSE.load(Ordering::Acquire) { MOUSE_ON } else { MOUSE_OFF };
-    execute!(out, EnterAlternateScreen, Hide, EnableBracketedPaste, Print(mouse), Clear(ClearType::All))
+    let focus = if FOCUS.load(Ordering::Acquire) { FOCUS_ON } else { "" };
+    execute!(
+        out,
+        EnterAlternateScreen,
+        Hide,
+        EnableBracketedPaste,
+        Print(mouse),
+        Print(focus),
+        Clear(ClearType::All)
+    )
 }
 
 /// The bytes that give it back, from any state that a frame can be cut in.
@@ -237,13 +310,13 @@ fn leave(out: &mut impl Write) -> io::Result<()> {
     if HAS_IMAGES.load(Ordering::Acquire) {
         leave_images(out)?;
     }
+    taken_back().try_for_each(|bytes| out.write_all(bytes))?;
     leave_text(out)
 }
 
 /// The bytes that delete the images that the terminal keeps.
 fn leave_images(out: &mut impl Write) -> io::Result<()> {
-    // A string that was cut would take what follows for its own.
-    out.write_all(b"\x1b\\")?;
+    out.write_all(STRING_END)?;
     out.write_all(&graphics::delete_all())
 }
 
@@ -341,6 +414,13 @@ fn cell_pixels(cells: (u16, u16), pixels: (u16, u16)) -> (u16, u16) {
 mod tests {
     use super::*;
 
+    /// What is to be taken back belongs to the process: one test at a time.
+    static ALONE: Mutex<()> = Mutex::new(());
+
+    fn alone() -> std::sync::MutexGuard<'static, ()> {
+        ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn bytes(write: impl Fn(&mut Vec<u8>) -> io::Result<()>) -> String {
         let mut out = Vec::new();
         write(&mut out).expect("a vector takes everything");
@@ -349,6 +429,7 @@ mod tests {
 
     #[test]
     fn leaving_undoes_entering() {
+        let _alone = alone();
         let enter = bytes(enter);
         let leave = bytes(leave);
         for mode in ["?1049", "?25", "?2004", "?1000", "?1002", "?1006"] {
@@ -360,7 +441,22 @@ mod tests {
     }
 
     #[test]
+    fn title_progress_and_links_are_taken_back_once() {
+        let _alone = alone();
+        let all = || taken_back().collect::<Vec<_>>();
+        assert!(all().is_empty());
+        assert_eq!((before_title(), before_title()), (KEEP_TITLE, &b""[..]));
+        will_have_progress();
+        will_have_links();
+        assert_eq!(all(), [STRING_END, LINK_OFF, TITLE_BACK, PROGRESS_OFF]);
+        assert!(all().is_empty());
+        assert_eq!(before_title(), KEEP_TITLE, "taken again, it is kept again");
+        assert_eq!(all(), [STRING_END, TITLE_BACK]);
+    }
+
+    #[test]
     fn the_screen_is_left_in_a_vt100() {
+        let _alone = alone();
         let side = |length| std::num::NonZero::new(length).expect("not zero");
         let mut screen = vt100::Parser::new(side(5), side(20), 0);
         screen.process(b"shell$ ");
@@ -390,6 +486,7 @@ mod tests {
 
     #[test]
     fn giving_back_what_was_not_taken_does_nothing() {
+        let _alone = alone();
         assert!(!TAKEN.load(Ordering::Acquire));
         give_back();
         rescue();

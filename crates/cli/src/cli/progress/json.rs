@@ -92,6 +92,7 @@ fn value(event: &Event) -> Option<Value> {
         | Event::WritePostponed { .. }
         | Event::Edited { .. }
         | Event::CameraKept { .. }
+        | Event::CameraUndone { .. }
         | Event::Picked { .. } => return None,
     })
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::math::DVec3;
-use crate::pipeline::protocol::{Kept, Picked, Spot};
+use crate::pipeline::protocol::{CameraEdit, Kept, Picked, Spot};
 use crate::scene::description::{CameraChange, Pose, Viewpoint};
 
 /// A mirror, and photons that it throws.
@@ -91,7 +91,7 @@ fn answer(bench: &mut Bench, command: Command) -> Event {
     bench.worker.send(command);
     loop {
         let event = bench.next();
-        if matches!(event, Event::Picked { .. } | Event::CameraKept { .. }) {
+        if matches!(event, Event::Picked { .. } | Event::CameraKept { .. } | Event::CameraUndone { .. }) {
             return event;
         }
     }
@@ -100,6 +100,13 @@ fn answer(bench: &mut Bench, command: Command) -> Event {
 fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<Kept, String> {
     match answer(bench, Command::KeepCamera(camera)) {
         Event::CameraKept { outcome, .. } => outcome,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn undo(bench: &mut Bench, edit: CameraEdit) -> Result<std::path::PathBuf, String> {
+    match answer(bench, Command::UndoCamera(edit)) {
+        Event::CameraUndone { outcome, .. } => outcome,
         other => panic!("{other:?}"),
     }
 }
@@ -142,6 +149,31 @@ fn a_file_that_changed_is_not_written_over() {
     assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), text);
     bench.done();
     assert!(keep(&mut bench, camera).expect("read again").is_new);
+}
+
+#[test]
+fn a_kept_camera_is_taken_back_to_the_byte() {
+    let mut bench = Bench::new(SCENE);
+    let text = |bench: &Bench| fs::read_to_string(bench.path("scene.toml")).expect("a scene");
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    let edit = keep(&mut bench, camera).expect("written").edit.expect("an edit");
+    let kept = text(&bench);
+    // What somebody wrote since is left alone, before and after glimt has read it.
+    bench.edit("[camera]", "# somebody else\n[camera]");
+    let edited = text(&bench);
+    for _ in 0..2 {
+        let why = undo(&mut bench, edit.clone()).expect_err("refused");
+        assert!(why.contains("has changed since c wrote it"), "{why}");
+        assert_eq!(text(&bench), edited);
+        bench.done();
+    }
+    // Once the file is again as it was left, it goes back.
+    fs::write(bench.path("scene.toml"), &kept).expect("written");
+    assert_eq!(undo(&mut bench, edit.clone()), Ok(bench.path("scene.toml")));
+    assert_eq!(text(&bench), SCENE);
+    assert!(undo(&mut bench, edit).is_err(), "there is nothing of it left");
+    assert_eq!(text(&bench), SCENE);
 }
 
 #[test]

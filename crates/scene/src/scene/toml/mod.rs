@@ -35,7 +35,7 @@ use expression::Expressions;
 pub(super) use brackets::{Bracket, brackets, last_open};
 pub(super) use error::SyntaxError;
 pub(super) use set::{Layout, NoPlace, Why};
-pub(super) use tree::{Document, Entries, Item, KeyValue, Value};
+pub(super) use tree::{Document, Elements, Entries, Item, KeyValue, Value};
 
 /// Arrays and tables may lie in each other this deep, and dotted keys have at most this many parts.
 const DEEPEST: u32 = 80;

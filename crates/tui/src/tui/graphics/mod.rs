@@ -3,7 +3,7 @@
 //! A picture is one large update: the next one is encoded when the one before has gone out, and then it is the newest.
 //! It goes out in pieces that other bytes may come between, through the flow control of all others.
 
-mod base64;
+pub(super) mod base64;
 mod iterm;
 mod kitty;
 mod palette;

@@ -154,8 +154,9 @@ impl Perform for Meaning {
             }
             // With two numbers it is where the cursor is, not F3.
             ([], 'R') if params.len() > 1 => self.answer(Answer::Other),
-            // The focus came or went; the window's size.
-            ([], 'I' | 'O' | 't') => self.answer(Answer::Other),
+            ([], 'I' | 'O') => self.answer(Answer::Focus { is_here: action == 'I' }),
+            // The window's size.
+            ([], 't') => self.answer(Answer::Other),
             ([], letter) => {
                 if let Some(code) = letter_key(letter) {
                     self.key(code, modifiers(second));

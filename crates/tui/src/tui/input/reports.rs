@@ -1,7 +1,7 @@
 //! Reports of a terminal in strings: its name, its colours, its abilities.
 
 use crate::tui::known::Answer;
-use crate::tui::known::Blocks;
+use crate::tui::terminals::Terminal;
 
 /// A report in a control string (DCS) as it comes.
 #[derive(Debug, Default)]
@@ -42,7 +42,9 @@ impl Report {
 
     pub(super) fn answer(&self) -> Answer {
         match self.kind {
-            Kind::Name => Answer::Blocks(Blocks::of(&String::from_utf8_lossy(&self.text))),
+            Kind::Name => {
+                Terminal::of_report(&String::from_utf8_lossy(&self.text)).map_or(Answer::Other, Answer::Name)
+            }
             Kind::Capability if has_true_color(&self.text) => Answer::TrueColor,
             Kind::Capability | Kind::Other => Answer::Other,
         }

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::tui::event::{Mouse, MouseKind};
 use crate::tui::known::Answer;
-use crate::tui::known::Blocks;
+use crate::tui::terminals::{Brand, Terminal};
 
 /// A decoder and its clock.
 struct Bench {
@@ -107,9 +107,10 @@ fn answers_are_told_from_keys() {
         (b"\x1b]4;12;rgb:5c5c/5c5c/ffff\x1b\\", Answer::Ink { index: 12, rgb: [92, 92, 255] }),
         (b"\x1bP1+r524742=38\x1b\\", Answer::TrueColor),
         (b"\x1bP0+r524742\x1b\\", Answer::Other),
-        (b"\x1bP>|foot(1.20.2)\x1b\\", Answer::Blocks(Blocks::Octants)),
-        (b"\x1bP>|tmux 3.4\x1b\\", Answer::Blocks(Blocks::Unknown)),
-        (b"\x1b[I", Answer::Other),
+        (b"\x1bP>|foot(1.20.2)\x1b\\", Answer::Name(Terminal { brand: Brand::Foot, version: [1, 20] })),
+        (b"\x1bP>|tmux 3.4\x1b\\", Answer::Other),
+        (b"\x1b[I", Answer::Focus { is_here: true }),
+        (b"\x1b[O", Answer::Focus { is_here: false }),
         (b"\x1b[<2;10;20M", Answer::Other),
         (b"\x1b[<35;10;20M", Answer::Other),
         (b"\x1b[?997;1n", Answer::Other),

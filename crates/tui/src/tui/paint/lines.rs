@@ -34,6 +34,7 @@ fn pen_of(cell: &Cell) -> Pen {
         fg: Shade::of(cell.fg, Layer::Foreground),
         bg: Shade::of(cell.bg, Layer::Background),
         modifier: cell.modifier,
+        link: 0,
     }
 }
 

@@ -132,6 +132,7 @@ impl Glyph {
             bg: color(Layer::Background),
             modifier: Modifier::empty(),
             matters,
+            link: 0,
         }
     }
 
@@ -161,7 +162,7 @@ impl Look {
                 Self::Text(Text {
                     symbol: symbol.into(),
                     columns,
-                    pen: Pen { fg, bg, modifier: cell.modifier },
+                    pen: Pen { fg, bg, modifier: cell.modifier, link: 0 },
                 })
             },
             Self::Mosaic,

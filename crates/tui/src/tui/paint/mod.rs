@@ -16,6 +16,7 @@ mod cost_model;
 mod fidelity;
 mod frame_pacing;
 mod lines;
+mod links;
 mod look;
 mod memory;
 mod moves;
@@ -38,10 +39,12 @@ pub use self::abilities::can_repeat;
 pub use self::fidelity::Fidelity;
 pub use self::frame_pacing::{Advice, Moment, advise};
 pub use self::lines::in_lines;
+use self::links::Links;
+pub use self::links::{LINK_OFF, Link};
 use self::memory::Memory;
 use self::picture::Budget;
 use self::screen::{Screen, Slice, Stroke};
-use self::wanted::Wanted;
+use self::wanted::{Region, Wanted};
 use super::color::ColorDepth;
 
 /// Leads the screen to what is wanted.
@@ -54,6 +57,7 @@ pub struct Painter {
     screen: Option<Screen>,
     memory: Memory,
     wanted: Wanted,
+    links: Links,
     budget: Budget,
     /// Parts still to be looked at, in order.
     parts: vec::IntoIter<Part>,
@@ -72,6 +76,17 @@ enum Part {
     Words(u16),
     /// The picture in a row.
     Picture(u16),
+    /// Words in a row that wait for the picture.
+    Later(u16),
+}
+
+/// Content of a screen besides its cells.
+#[derive(Clone, Debug, Default)]
+pub struct Besides {
+    /// Words in these cells come after the picture.
+    pub later: Rect,
+    /// Links in the text.
+    pub links: Vec<Link>,
 }
 
 /// Progress of the picture in a row.
@@ -92,6 +107,7 @@ impl Painter {
             screen: None,
             memory: Memory::default(),
             wanted: Wanted::nothing(depth),
+            links: Links::default(),
             budget: Budget::default(),
             parts: Vec::new().into_iter(),
             part: None,
@@ -113,7 +129,15 @@ impl Painter {
     /// The picture goes on with the rows that the aims before did not come to, so that aims that follow each other
     /// faster than they are drawn lead to the edge all the same.
     pub fn aim(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity) {
-        let wanted = Wanted::new(wanted, picture, fidelity, self.depth);
+        self.aim_with(wanted, picture, fidelity, &Besides::default());
+    }
+
+    /// The same with links, and with words that come after the picture.
+    pub fn aim_with(&mut self, wanted: &Buffer, picture: Rect, fidelity: Fidelity, besides: &Besides) {
+        let mut wanted = Wanted::new(wanted, picture, fidelity, self.depth).with_later(besides.later);
+        for Link { cells, address } in &besides.links {
+            wanted.link(*cells, self.links.number(address));
+        }
         let size = (wanted.columns, wanted.rows);
         if self.screen.as_ref().is_some_and(|screen| (screen.columns, screen.rows) != size) {
             self.screen = None;
@@ -137,7 +161,10 @@ impl Painter {
         let mut rows: Vec<u16> = self.wanted.rows_from_the_middle().collect();
         rows.sort_by_key(|y| self.rows[usize::from(*y)].aim);
         let words = (0..self.wanted.rows).map(Part::Words);
-        self.parts = words.chain(rows.into_iter().map(Part::Picture)).collect::<Vec<_>>().into_iter();
+        let later =
+            (self.wanted.later.top()..self.wanted.later.bottom().min(self.wanted.rows)).map(Part::Later);
+        let picture = rows.into_iter().map(Part::Picture);
+        self.parts = words.chain(picture).chain(later).collect::<Vec<_>>().into_iter();
         self.part = None;
         self.strokes = Vec::new().into_iter();
         self.budget = Budget::default();
@@ -159,12 +186,12 @@ impl Painter {
         }
         let (columns, rows) = (self.wanted.columns, self.wanted.rows);
         let screen = self.screen.get_or_insert_with(|| {
-            Screen::clear(&mut slice);
+            Screen::clear(&self.links, &mut slice);
             Screen::cleared(columns, rows)
         });
         loop {
             while let Some(stroke) = self.strokes.as_slice().first() {
-                if !screen.draw(stroke, &mut slice) {
+                if !screen.draw(stroke, &self.links, &mut slice) {
                     return slice.bytes;
                 }
                 if let (Some(Part::Picture(_)), Stroke::Mosaic { at, count, .. }) = (self.part, stroke) {
@@ -182,11 +209,14 @@ impl Painter {
             }
             self.part = self.parts.next();
             let strokes = match self.part {
-                Some(Part::Words(y)) => words::plan(screen, &self.wanted, y, false),
+                Some(Part::Words(y)) => words::plan(screen, &self.wanted, y, Region::Words),
+                Some(Part::Later(y)) => words::plan(screen, &self.wanted, y, Region::Later),
                 Some(Part::Picture(y)) if self.rows[usize::from(y)].is_done && !screen.is_damaged(y) => {
                     Vec::new()
                 }
-                Some(Part::Picture(y)) if self.wanted.is_ramp() => words::plan(screen, &self.wanted, y, true),
+                Some(Part::Picture(y)) if self.wanted.is_ramp() => {
+                    words::plan(screen, &self.wanted, y, Region::Picture)
+                }
                 Some(Part::Picture(y)) => {
                     picture::plan(screen, &self.wanted, &self.memory, y, self.can_repeat, &mut self.budget)
                 }

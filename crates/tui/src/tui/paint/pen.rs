@@ -10,6 +10,8 @@ pub(super) struct Pen {
     pub(super) fg: Shade,
     pub(super) bg: Shade,
     pub(super) modifier: Modifier,
+    /// Number of the link that the character belongs to; 0 for none.
+    pub(super) link: u16,
 }
 
 /// Requirements on a pen.
@@ -23,6 +25,8 @@ pub(super) struct Wish {
     pub(super) modifier: Modifier,
     /// The others may be on or off.
     pub(super) matters: Modifier,
+    /// Number of the link; 0 for none.
+    pub(super) link: u16,
 }
 
 /// Modifiers with the parameters of SGR that turn them on and off.
@@ -40,14 +44,22 @@ const MODIFIERS: [(Modifier, u16, u16); 9] = [
 
 impl Pen {
     /// After SGR 0.
-    pub(super) const RESET: Self = Self { fg: Shade::Ink, bg: Shade::Ground, modifier: Modifier::empty() };
+    pub(super) const RESET: Self =
+        Self { fg: Shade::Ink, bg: Shade::Ground, modifier: Modifier::empty(), link: 0 };
 
     /// This pen and nothing else.
     pub(super) fn exactly(self) -> Wish {
-        Wish { fg: Some(self.fg), bg: Some(self.bg), modifier: self.modifier, matters: Modifier::all() }
+        Wish {
+            fg: Some(self.fg),
+            bg: Some(self.bg),
+            modifier: self.modifier,
+            matters: Modifier::all(),
+            link: self.link,
+        }
     }
 
-    /// Appends the shortest SGR that turns the pen into one that fulfils the wish; appends nothing if the pen does already.
+    /// Appends the shortest SGR that turns the pen into one that fulfils the wish; appends nothing if the pen does already. Links
+    /// are the screen's.
     pub(super) fn turn(&mut self, wish: &Wish, out: &mut Vec<u8>) {
         let mut list = Vec::new();
         let changed = self.changed(wish, &mut list);
@@ -55,7 +67,7 @@ impl Pen {
             return;
         }
         let mut afresh = b"0".to_vec();
-        let reset = Self::RESET.changed(wish, &mut afresh);
+        let reset = Self { link: self.link, ..Self::RESET }.changed(wish, &mut afresh);
         let is_shorter = afresh.len() < list.len();
         out.extend_from_slice(b"\x1b[");
         out.extend_from_slice(if is_shorter { &afresh } else { &list });
@@ -146,6 +158,7 @@ mod tests {
             bg,
             // Some terminals cannot have both.
             modifier: Modifier::from_bits_truncate(if bits & 3 == 3 { bits & !1 } else { bits }),
+            link: 0,
         })
     }
 

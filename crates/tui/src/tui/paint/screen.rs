@@ -2,6 +2,7 @@
 
 use ratatui::layout::Rect;
 
+use super::links::{LINK_OFF, Links};
 use super::look::{Glyph, Look, Mosaic, Text};
 use super::moves::{self, Place};
 use super::pen::Pen;
@@ -88,7 +89,10 @@ impl Screen {
     }
 
     /// Appends what makes any screen one that is [`Screen::cleared`].
-    pub(super) fn clear(slice: &mut Slice) {
+    pub(super) fn clear(links: &Links, slice: &mut Slice) {
+        if !links.is_empty() {
+            slice.bytes.extend_from_slice(LINK_OFF);
+        }
         slice.bytes.extend_from_slice(b"\x1b[0m\x1b[2J\x1b[H");
     }
 
@@ -118,9 +122,9 @@ impl Screen {
     }
 
     /// False: there is no room for it, and nothing was done.
-    pub(super) fn draw(&mut self, stroke: &Stroke, slice: &mut Slice) -> bool {
+    pub(super) fn draw(&mut self, stroke: &Stroke, links: &Links, slice: &mut Slice) -> bool {
         let (start, pen) = (slice.bytes.len(), self.pen);
-        self.write(stroke, &mut slice.bytes);
+        self.write(stroke, links, &mut slice.bytes);
         if start > 0 && slice.bytes.len() > slice.most {
             slice.bytes.truncate(start);
             self.pen = pen;
@@ -130,13 +134,17 @@ impl Screen {
         true
     }
 
-    fn write(&mut self, stroke: &Stroke, bytes: &mut Vec<u8>) {
+    fn write(&mut self, stroke: &Stroke, links: &Links, bytes: &mut Vec<u8>) {
         let (at, wish) = match stroke {
             Stroke::Text { at, text } => (at, text.pen.exactly()),
             Stroke::Mosaic { at, glyph, mosaic, .. } => (at, glyph.wish(mosaic.pair)),
             Stroke::Erase { at, .. } => (at, Glyph::Blank.wish([Shade::Ground; 2])),
         };
         moves::go(self.cursor, *at, bytes);
+        if self.pen.link != wish.link {
+            links.open(wish.link, bytes);
+            self.pen.link = wish.link;
+        }
         self.pen.turn(&wish, bytes);
         match stroke {
             Stroke::Text { text, .. } => bytes.extend_from_slice(text.symbol.as_bytes()),

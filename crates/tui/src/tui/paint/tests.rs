@@ -330,3 +330,76 @@ fn blanks_of_words_are_erased_in_one_go() {
         assert_eq!(desk.difference(&buffer, ColorDepth::TrueColor), 0);
     }
 }
+
+/// A buffer with a picture in which each cell has its own colours, and words around it.
+fn with_words() -> Buffer {
+    let mut buffer = Buffer::empty(Rect::new(0, 0, COLUMNS, ROWS));
+    for place in PICTURE.positions() {
+        let color = |seed: u16| Color::Rgb((place.x * 9 + seed) as u8, (place.y * 30) as u8, seed as u8);
+        buffer[place].set_symbol("▀").set_fg(color(3)).set_bg(color(90));
+    }
+    buffer.set_string(0, 0, "now there", ratatui::style::Style::new());
+    buffer.set_string(0, 7, "later", ratatui::style::Style::new());
+    buffer
+}
+
+#[test]
+fn words_that_wait_come_after_the_picture() {
+    let buffer = with_words();
+    let later = Rect { x: 0, y: 7, width: COLUMNS, height: 1 };
+    for besides in [Besides { later, ..Besides::default() }, Besides::default()] {
+        let mut desk = Desk::new(COLUMNS, ROWS, ColorDepth::TrueColor);
+        desk.painter.aim_with(&buffer, PICTURE, Fidelity::Still, &besides);
+        let mut cells_before = None;
+        while desk.slice(60) {
+            let text = desk.terminal.screen().contents();
+            let is_drawn = |place: &ratatui::layout::Position| {
+                let cell = desk.terminal.screen().cell(place.y, place.x).expect("a cell");
+                cell.bgcolor() != vt100::Color::Default || cell.fgcolor() != vt100::Color::Default
+            };
+            if text.contains("later") && cells_before.is_none() {
+                cells_before = Some(PICTURE.positions().filter(is_drawn).count() as u32);
+            }
+        }
+        assert_eq!(desk.difference(&buffer, ColorDepth::TrueColor), 0);
+        let expected = if besides.later.is_empty() { 0 } else { PICTURE.area() };
+        assert_eq!(cells_before, Some(expected), "{besides:?}");
+    }
+}
+
+#[test]
+fn a_link_is_on_its_cells_alone_and_is_closed() {
+    let buffer = with_words();
+    let link = |address: &str| Besides {
+        links: vec![Link { cells: Rect { x: 4, y: 0, width: 5, height: 1 }, address: address.to_owned() }],
+        ..Besides::default()
+    };
+    let mut painter = Painter::new(ColorDepth::TrueColor);
+    let mut sent = |besides: &Besides| {
+        painter.aim_with(&buffer, PICTURE, Fidelity::Still, besides);
+        let mut bytes = Vec::new();
+        loop {
+            let slice = painter.slice(100);
+            if slice.is_empty() {
+                return String::from_utf8(bytes).expect("UTF-8");
+            }
+            bytes.extend(slice);
+        }
+    };
+    let first = sent(&link("file:///a"));
+    let rest = first.split("now \u{1b}]8;;file:///a\u{1b}\\there").nth(1).expect("a link on its word");
+    let (before, _) = rest.split_once("\u{1b}]8;;\u{1b}\\").expect("its end");
+    assert!(
+        before.chars().all(|c| c.is_ascii_digit() || "\u{1b}[;H".contains(c)),
+        "a move at most: {before:?}"
+    );
+    assert_eq!(first.matches("file:").count(), 1);
+    assert_eq!(sent(&link("file:///a")), "", "nothing when nothing changes");
+    let other = sent(&link("file:///b"));
+    assert!(
+        other.contains("file:///b\u{1b}\\") && other.contains("there") && !other.contains("now"),
+        "{other:?}"
+    );
+    let none = sent(&Besides::default());
+    assert!(none.contains("there") && !none.contains("file:"), "{none:?}");
+}

@@ -14,8 +14,19 @@ pub(super) struct Wanted {
     pub(super) rows: u16,
     looks: Vec<Look>,
     pub(super) picture: Rect,
+    /// Words in these cells come after the picture.
+    pub(super) later: Rect,
     pub(super) fidelity: Fidelity,
     depth: ColorDepth,
+}
+
+/// Parts of the screen, in the order in which they are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Region {
+    Words,
+    Picture,
+    /// Words that wait for the picture.
+    Later,
 }
 
 impl Wanted {
@@ -27,7 +38,7 @@ impl Wanted {
     pub(super) fn new(buffer: &Buffer, picture: Rect, fidelity: Fidelity, depth: ColorDepth) -> Self {
         let (columns, rows) = (buffer.area.width, buffer.area.height);
         let picture = picture.intersection(Rect::new(0, 0, columns, rows));
-        Self { columns, rows, looks: looks(buffer, depth), picture, fidelity, depth }
+        Self { columns, rows, looks: looks(buffer, depth), picture, later: Rect::ZERO, fidelity, depth }
     }
 
     pub(super) fn is_empty(&self) -> bool {
@@ -55,6 +66,32 @@ impl Wanted {
         match self.row(y)[usize::from(x)] {
             Look::Mosaic(mosaic) if self.picture.contains((x, y).into()) => Some(mosaic),
             Look::Mosaic(_) | Look::Text(_) | Look::Covered | Look::Unknown => None,
+        }
+    }
+
+    /// Words in these cells come after the picture; what is blank does not wait.
+    pub(super) fn with_later(self, later: Rect) -> Self {
+        Self { later, ..self }
+    }
+
+    /// The characters of these cells belong to a link.
+    pub(super) fn link(&mut self, cells: Rect, number: u16) {
+        let cells = cells.intersection(Rect::new(0, 0, self.columns, self.rows));
+        for place in cells.positions() {
+            let index = usize::from(place.y) * usize::from(self.columns) + usize::from(place.x);
+            if let Look::Text(text) = &mut self.looks[index] {
+                text.pen.link = number;
+            }
+        }
+    }
+
+    /// The part of the screen that a cell belongs to.
+    pub(super) fn region(&self, x: u16, y: u16) -> Region {
+        match () {
+            () if self.is_picture(x, y) => Region::Picture,
+            () if !self.later.contains((x, y).into()) => Region::Words,
+            () if self.row(y)[usize::from(x)] == Look::BLANK => Region::Words,
+            () => Region::Later,
         }
     }
 

@@ -3,20 +3,20 @@
 use super::look::{Glyph, Look};
 use super::moves::{self, Place};
 use super::screen::{Screen, Stroke};
-use super::wanted::Wanted;
+use super::wanted::{Region, Wanted};
 
 /// From so many blanks on, they are erased in one go.
 const ERASED: usize = 9;
 /// The same up to the end of a row.
 const ERASED_TO_END: usize = 4;
 
-/// Plans the strokes of the words in a row, or of a picture made of characters.
-pub(super) fn plan(screen: &Screen, wanted: &Wanted, y: u16, of_picture: bool) -> Vec<Stroke> {
+/// Plans the strokes of the words of a region in a row, or of a picture made of characters.
+pub(super) fn plan(screen: &Screen, wanted: &Wanted, y: u16, region: Region) -> Vec<Stroke> {
     let mut strokes = Vec::new();
     for x in 0..wanted.columns {
         let at = Place { x, y };
         let look = &wanted.row(y)[usize::from(x)];
-        if wanted.is_picture(x, y) != of_picture || screen.look(at) == look {
+        if screen.look(at) == look || wanted.region(x, y) != region {
             continue;
         }
         if let Some(stroke) = stroke(at, look) {

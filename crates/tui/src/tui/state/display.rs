@@ -1,5 +1,7 @@
 //! The terminal: its window, its colours, and the means by which pictures are shown.
 
+use std::time::Duration;
+
 use super::Setup;
 use crate::tui::color::{Ansi, ColorDepth, Shades};
 use crate::tui::event::{FrameReport, Window};
@@ -7,6 +9,7 @@ use crate::tui::graphics::Protocol;
 use crate::tui::known::Ask;
 use crate::tui::mosaic::Grid;
 use crate::tui::preview_kind::PreviewKind;
+use crate::tui::terminals::Abilities;
 
 /// The terminal as far as it is known.
 pub(in crate::tui) struct DisplayState {
@@ -18,6 +21,12 @@ pub(in crate::tui) struct DisplayState {
     pub ansi: Ansi,
     /// Questions to the terminal.
     pub ask: Ask,
+    /// What the terminal is known to do besides text.
+    pub abilities: Abilities,
+    /// Time after which the end of a render is worth a notification. `None` for none.
+    pub notify_after: Option<Duration>,
+    /// Whether its window has the focus, as far as it says.
+    pub has_focus: bool,
     /// Whether the terminal's background is light.
     pub is_light: bool,
     /// Cost of the last frame.
@@ -33,6 +42,9 @@ impl DisplayState {
             shades: Shades::new(setup.depth, &setup.ansi),
             ansi: setup.ansi,
             ask: setup.ask,
+            abilities: setup.abilities,
+            notify_after: setup.notify_after,
+            has_focus: true,
             is_light: setup.is_light,
             frame: None,
         }

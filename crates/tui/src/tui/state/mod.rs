@@ -22,6 +22,7 @@ use super::color::{Ansi, ColorDepth};
 use super::event::Window;
 use super::known::Ask;
 use super::preview_kind::PreviewKind;
+use super::terminals::Abilities;
 use crate::pipeline::settings::Overrides;
 
 /// Values that the front end starts with.
@@ -37,6 +38,10 @@ pub(super) struct Setup {
     pub ansi: Ansi,
     /// Questions to the terminal.
     pub ask: Ask,
+    /// What the environment says that the terminal can do besides text.
+    pub abilities: Abilities,
+    /// Time after which the end of a render is worth a notification. `None` for none.
+    pub notify_after: Option<Duration>,
 }
 
 /// The whole state.

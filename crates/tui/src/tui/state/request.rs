@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
+use crate::choice::Choice;
 use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
 use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
 use crate::scene::description::{Integrator, Shadows};
@@ -17,6 +18,34 @@ pub(in crate::tui) struct Toggles {
     pub view: Option<View>,
     pub camera: CameraChange,
     pub exposure: Option<f32>,
+}
+
+impl Toggles {
+    /// Settings that differ from those before, in words.
+    pub(in crate::tui) fn differences(&self, before: &Self) -> Vec<String> {
+        let said = |name: &str, differs: bool, now: Option<String>| {
+            let now = now.unwrap_or_else(|| "of the scene".to_owned());
+            differs.then(|| format!("{name} {now}"))
+        };
+        let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
+        let camera = self.camera.is_any().then(|| "moved".to_owned());
+        [
+            said("shadows", self.shadows != before.shadows, self.shadows.map(|it| it.name().to_owned())),
+            said(
+                "integrator",
+                self.integrator != before.integrator,
+                self.integrator.map(|it| it.name().to_owned()),
+            ),
+            said("dof", self.dof != before.dof, self.dof.map(on_off)),
+            said("photons", self.photons != before.photons, self.photons.map(on_off)),
+            said("view", self.view != before.view, self.view.map(|it| it.name().to_owned())),
+            said("camera", self.camera != before.camera, camera),
+            said("exposure", self.exposure != before.exposure, self.exposure.map(|it| format!("{it:+}"))),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
 }
 
 /// A step of the camera. Steps come faster than pictures: the newest step waits until the step before has its first picture.

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use crate::pipeline::protocol::CameraEdit;
 use crate::tui::event::{Unwritten, Written};
 
 /// A save on its way to the screen.
@@ -29,6 +30,8 @@ pub(in crate::tui) struct SavingState {
     pub first_change: Option<Duration>,
     /// Time at which glimt wrote the camera into the scene file.
     pub camera_kept: Option<Instant>,
+    /// Cameras that glimt wrote into the scene file and can take back, the last one at the end.
+    pub camera_edits: Vec<CameraEdit>,
     /// Time at which glimt refused to write the camera into the scene file.
     pub camera_refused: Option<Instant>,
 
@@ -52,6 +55,7 @@ impl SavingState {
             editor_closed: None,
             first_change: None,
             camera_kept: None,
+            camera_edits: Vec::new(),
             camera_refused: None,
             is_write_requested: false,
             unwritten: None,

@@ -37,6 +37,8 @@ pub(in crate::tui) struct SelectionState {
     pub purpose: PickPurpose,
     /// Facts about the picked object, until the next key.
     pub facts: Option<Vec<String>>,
+    /// What was clicked last, in one line.
+    pub clicked: Option<String>,
     /// Place of the picked object in the scene file.
     pub picked: Option<FilePlace>,
 }
@@ -51,6 +53,7 @@ impl SelectionState {
             crosshair: Spot { x: 0.5, y: 0.5 },
             purpose: PickPurpose::Inspect,
             facts: None,
+            clicked: None,
             picked: None,
         }
     }

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, StageReport};
+use crate::tui::noise_curve::NoiseCurve;
 
 /// Activity of the worker for the current generation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +49,9 @@ pub(in crate::tui) struct WorkState {
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
+    /// Noise against the time of this render, and of the one before.
+    pub curve: NoiseCurve,
+    pub last_curve: NoiseCurve,
     /// Whether the request changed nothing.
     pub unchanged: bool,
     /// Finished renders so far; another exposure is no render.
@@ -65,6 +69,8 @@ impl WorkState {
             assets: Vec::new(),
             progress: None,
             report: None,
+            curve: NoiseCurve::default(),
+            last_curve: NoiseCurve::default(),
             unchanged: false,
             renders: 0,
         }

@@ -94,7 +94,7 @@ fn nothing_is_drawn_when_nothing_changed() {
     let mut desk = Desk::new();
     desk.finish(RED);
     desk.screen();
-    desk.press('y');
+    desk.press('g');
     desk.wait(10_000);
     desk.event(Event::Shown { generation: 1 });
     desk.worker(protocol::Event::Preview { generation: 1 });

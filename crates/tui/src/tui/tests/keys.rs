@@ -3,7 +3,7 @@
 use super::{BLUE, RED, cells_of};
 use crate::choice::Choice;
 use crate::math::DVec3;
-use crate::pipeline::protocol::{self, Command, Spot, Writing};
+use crate::pipeline::protocol::{self, CameraEdit, Command, Spot, Writing};
 use crate::pipeline::settings::{Effective, Overrides, View};
 use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::diagnostic::Severity;
@@ -114,6 +114,21 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             assert!(
                 matches!(desk.key(key)[..], [Effect::Send(Command::Pick(spot))] if (spot.x, spot.y) == (0.5, 0.5))
             );
+        }
+        Action::UndoCamera => {
+            assert!(desk.key(key).is_empty(), "c has written nothing");
+            let edit = CameraEdit { path: "a.toml".into(), before: "".into(), after: "a".into() };
+            desk.state.saving.camera_edits.push(edit.clone());
+            assert!(
+                matches!(&desk.key(key)[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit)
+            );
+        }
+        Action::Copy => {
+            assert!(desk.key(key).is_empty(), "nothing was clicked");
+            desk.state.selection.clicked = Some("a ball".to_owned());
+            assert!(desk.key(key).is_empty() && desk.text().contains("not known to copy"), "{}", desk.text());
+            desk.state.display.abilities.clipboard = true;
+            assert!(matches!(desk.key(key)[..], [Effect::Aside(_)]));
         }
         Action::Focus => {
             assert!(desk.key(key).is_empty(), "a click is waited for");
@@ -227,7 +242,7 @@ fn toggles_stand_in_the_line_of_keys_with_their_values() {
     let long = "s shadows soft  p photons off  d dof on  v view beauty  i whitted  ";
     assert!(bottom(&mut desk).starts_with(long), "{}", bottom(&mut desk));
     desk.event(Event::Resize(window(40, 12)));
-    desk.press('y');
+    desk.press('g');
     desk.finish(RED);
     desk.press('0');
     desk.press('?');

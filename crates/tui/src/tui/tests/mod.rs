@@ -10,6 +10,7 @@ mod noise;
 mod overlay;
 mod pointer;
 mod screen;
+mod spare;
 mod warnings;
 
 use ratatui::style::Color;

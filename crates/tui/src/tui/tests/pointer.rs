@@ -3,7 +3,7 @@
 use crossterm::event::KeyCode;
 
 use super::{BLUE, RED};
-use crate::pipeline::protocol::{self, Command, Kept, Picked, Section, Spot, Thing, Writing};
+use crate::pipeline::protocol::{self, CameraEdit, Command, Kept, Picked, Section, Spot, Thing, Writing};
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
@@ -11,6 +11,7 @@ use crate::tui::color::ColorDepth;
 use crate::tui::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::tui::fixtures::*;
 use crate::tui::preview_kind::PreviewKind;
+use crate::tui::terminals::{Brand, Terminal};
 
 /// 80×24, with a picture in 55×21 cells from (0, 1) on.
 fn desk() -> Desk {
@@ -135,7 +136,8 @@ fn a_click_after_f_focuses_there() {
 }
 
 fn kept(desk: &mut Desk, is_new: bool, is_own: bool) -> Vec<Effect> {
-    let outcome = Ok(Kept { path: "scenes/cornell.toml".into(), is_new, is_own, of_model: false });
+    let outcome =
+        Ok(Kept { path: "scenes/cornell.toml".into(), is_new, is_own, of_model: false, edit: None });
     desk.worker(protocol::Event::CameraKept { generation: 0, outcome })
 }
 
@@ -169,6 +171,57 @@ fn a_camera_in_the_file_is_the_scene_s_own() {
     assert!(desk.text().contains("error: the scene file has changed"), "{}", desk.text());
     desk.event(Event::Changed(Changed { noticed: desk.now }));
     assert!(!desk.text().contains("error: the scene file has changed"), "{}", desk.text());
+}
+
+#[test]
+fn u_asks_for_what_c_wrote_until_there_is_nothing_left() {
+    let mut desk = desk();
+    assert!(desk.press('u').is_empty());
+    assert!(desk.text().contains("there is nothing to undo"), "{}", desk.text());
+    let edit = |after: &str| CameraEdit { path: "a.toml".into(), before: "".into(), after: after.into() };
+    for after in ["one", "two"] {
+        let kept = Kept {
+            path: "a.toml".into(),
+            is_new: true,
+            is_own: true,
+            of_model: false,
+            edit: Some(edit(after)),
+        };
+        desk.worker(protocol::Event::CameraKept { generation: 0, outcome: Ok(kept) });
+    }
+    let undone = |desk: &mut Desk, outcome: Result<std::path::PathBuf, String>| {
+        desk.worker(protocol::Event::CameraUndone { generation: 0, outcome })
+    };
+    let asks = |desk: &mut Desk, after| matches!(&desk.press('u')[..], [Effect::Send(Command::UndoCamera(asked))] if *asked == edit(after));
+    assert!(asks(&mut desk, "two"));
+    assert!(undone(&mut desk, Err("a.toml has changed".to_owned())).is_empty());
+    assert!(desk.text().contains("error: a.toml has changed"), "{}", desk.text());
+    assert!(asks(&mut desk, "two"), "it can be tried again");
+    assert!(request(&undone(&mut desk, Ok("a.toml".into()))).is_some(), "the picture is that of the file");
+    assert!(desk.text().contains("a.toml is as it was before c"), "{}", desk.text());
+    assert!(asks(&mut desk, "one"));
+    undone(&mut desk, Ok("a.toml".into()));
+    assert!(desk.press('u').is_empty());
+}
+
+#[test]
+fn y_copies_what_was_clicked_where_the_terminal_takes_it() {
+    let mut desk = desk();
+    assert!(desk.press('y').is_empty());
+    assert!(desk.text().contains("nothing was clicked yet"), "{}", desk.text());
+    click(&mut desk, 12, 10);
+    answer(&mut desk, Some(thing()));
+    assert!(desk.press('y').is_empty());
+    let text: String = desk.text().split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(text.contains("pixel 1, 2 · this terminal is not known to copy"), "{text}");
+    desk.state.display.abilities = Terminal { brand: Brand::Kitty, version: [0, 40] }.abilities();
+    let effects = desk.press('y');
+    let words = "sphere \"ball\" · cornell.toml:47 · glass crystal · 3.9 away · at (0.2, 0.5, -0.3) · \
+                 radiance (0.5, 0.5, 0.5) · normal (0, 1, 0) · pixel 1, 2";
+    assert!(matches!(&effects[..], [Effect::Aside(bytes)] if *bytes == crate::tui::chrome::copy(words)));
+    // What was clicked stays for a copy, whatever keys come between.
+    desk.press('s');
+    assert!(matches!(desk.press('y')[..], [Effect::Aside(_)]));
 }
 
 #[test]

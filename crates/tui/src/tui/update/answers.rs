@@ -7,12 +7,14 @@ use crate::tui::known::Answer;
 use crate::tui::known::Blocks;
 use crate::tui::preview_kind::PreviewKind;
 use crate::tui::state::State;
+use crate::tui::terminals::Terminal;
 use crate::tui::view::ramp;
 
 /// Shows everything as well as the terminal can from now on, if the answer belongs to a question.
 pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
     match answer {
-        Answer::Blocks(blocks) if state.display.ask.blocks => return draw_in(state, blocks),
+        Answer::Name(terminal) => return name(state, terminal),
+        Answer::Focus { is_here } => state.display.has_focus = is_here,
         Answer::TrueColor if state.display.ask.true_color => show(state, ColorDepth::TrueColor),
         Answer::Ink { index, rgb } if state.display.ask.palette => {
             if let Some(ink) = state.display.ansi.get_mut(usize::from(index)).filter(|ink| **ink != rgb) {
@@ -24,8 +26,7 @@ pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
             let is_light = ramp::is_light(rgb);
             state.dirty |= std::mem::replace(&mut state.display.is_light, is_light) != is_light;
         }
-        Answer::Blocks(_)
-        | Answer::TrueColor
+        Answer::TrueColor
         | Answer::Ink { .. }
         | Answer::Background(_)
         | Answer::Ready
@@ -40,6 +41,21 @@ fn show(state: &mut State, depth: ColorDepth) {
     state.display.depth = depth;
     state.display.shades = Shades::new(depth, &state.display.ansi);
     state.dirty = true;
+}
+
+/// The terminal's name, if it was asked for: what it draws, and what it can do besides.
+fn name(state: &mut State, terminal: Terminal) -> Vec<Effect> {
+    let ask = state.display.ask;
+    let mut effects = Vec::new();
+    if ask.name {
+        let had_focus = std::mem::replace(&mut state.display.abilities, terminal.abilities()).focus;
+        effects.extend((state.display.abilities.focus && !had_focus).then_some(Effect::ReportFocus));
+        state.dirty = true;
+    }
+    if ask.blocks {
+        effects.extend(draw_in(state, Blocks::of(terminal)));
+    }
+    effects
 }
 
 fn draw_in(state: &mut State, blocks: Blocks) -> Vec<Effect> {
@@ -62,6 +78,7 @@ mod tests {
     use crate::tui::color::XTERM;
     use crate::tui::fixtures::{state, state_with};
     use crate::tui::known::Ask;
+    use crate::tui::terminals::{Abilities, Brand};
     use crate::tui::update::start;
 
     #[test]
@@ -69,12 +86,24 @@ mod tests {
         let mut state = state(80, 24);
         start(&mut state);
         let before = state.request.preview_size.expect("a size");
-        assert!(learn(&mut state, Answer::Blocks(Blocks::Octants)).is_empty(), "nobody asked");
+        let foot = Answer::Name(Terminal { brand: Brand::Foot, version: [1, 20] });
+        assert!(learn(&mut state, foot).is_empty(), "nobody asked");
+        assert_eq!(state.display.abilities, Abilities::default());
         state.display.ask = Ask { blocks: true, ..Ask::default() };
-        let effects = learn(&mut state, Answer::Blocks(Blocks::Octants));
+        let effects = learn(&mut state, foot);
         let [Effect::Send(Command::Preview(Some(size)))] = &effects[..] else { panic!("{effects:?}") };
         assert_eq!((size.width, size.height), (2 * before.width, 2 * before.height));
         assert_eq!(state.display.kind, PreviewKind::Octant);
+    }
+
+    #[test]
+    fn a_terminal_that_says_its_name_can_what_it_is_known_for() {
+        let mut state = state(80, 24);
+        state.display.ask = Ask { name: true, ..Ask::default() };
+        let ghostty = Terminal { brand: Brand::Ghostty, version: [1, 2] };
+        assert!(matches!(learn(&mut state, Answer::Name(ghostty))[..], [Effect::ReportFocus]));
+        assert_eq!(state.display.abilities, ghostty.abilities());
+        assert!(learn(&mut state, Answer::Name(ghostty)).is_empty(), "it reports the focus already");
     }
 
     #[test]

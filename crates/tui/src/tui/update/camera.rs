@@ -1,6 +1,8 @@
 //! Keys and the mouse on the camera. Steps come faster than pictures: a step waits until the one before has its first picture,
 //! and glimt renders only the newest step that waits.
 
+use std::path::PathBuf;
+
 use super::request::render;
 use super::say::{notify, say};
 use crate::pipeline::protocol::{Command, Kept};
@@ -121,7 +123,7 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
 
 /// Tells the outcome of keeping the camera. A camera that the file has now does not count as moved by keys.
 pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effect> {
-    let Kept { path, is_new, is_own, of_model } = match outcome {
+    let Kept { path, is_new, is_own, of_model, edit } = match outcome {
         Ok(kept) => kept,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
@@ -131,10 +133,11 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
     let name = visible(&path.to_string_lossy()).into_owned();
     let words = match (is_new, is_own) {
         _ if of_model => format!("wrote {name}, a scene of this model with this camera"),
-        (true, true) => format!("the camera is in {name} now"),
+        (true, true) => format!("the camera is in {name} now; u undoes c"),
         (true, false) => format!("the camera is in {name}; in this call --set comes first"),
         (false, _) => format!("{name} has this camera already"),
     };
+    state.saving.camera_edits.extend(edit);
     let mut effects = Vec::new();
     if let Some(since) = state.request.moved_since.filter(|_| is_new) {
         state.picture.history.kept_camera(since);
@@ -145,6 +148,32 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
     }
     state.saving.camera_kept = is_new.then_some(state.now);
     say(state, words);
+    effects
+}
+
+/// The last camera that was written into the scene file is to be taken back.
+pub(super) fn undo(state: &mut State) -> Vec<Effect> {
+    match state.saving.camera_edits.last() {
+        Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
+        None => notify(state, "c has written no camera into the scene file: there is nothing to undo"),
+    }
+}
+
+/// Tells the outcome of that. The picture is that of the file again.
+pub(super) fn undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec<Effect> {
+    let path = match outcome {
+        Ok(path) => path,
+        Err(why) => {
+            state.saving.camera_refused = Some(state.now);
+            return notify(state, &format!("error: {}", visible(&why)));
+        }
+    };
+    state.saving.camera_edits.pop();
+    state.picture.history.edited();
+    let effects = render(state, false);
+    state.saving.camera_kept = Some(state.now);
+    let name = visible(&path.to_string_lossy()).into_owned();
+    say(state, format!("{name} is as it was before c"));
     effects
 }
 

@@ -15,7 +15,8 @@ pub(super) fn record(state: &mut State) {
         state.picture.shown.clone()
     };
     if let Some(shown) = newest.filter(|shown| shown.generation == state.request.generation) {
-        state.picture.history.record(shown, state.now);
+        let toggles = state.request.sent_toggles;
+        state.picture.history.record(shown, state.now, toggles);
     }
 }
 
@@ -29,6 +30,19 @@ pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     match state.picture.history.step(steps, newest) {
         Some(shown) => look_at(state, shown),
         None => notify(state, if steps > 0 { "this is the oldest picture that is kept" } else { NEWEST }),
+    }
+}
+
+/// One of the pictures of the strip.
+pub(super) fn open_at(state: &mut State, at: usize) -> Vec<Effect> {
+    record(state);
+    let Some(newest) = newest(state) else { return Vec::new() };
+    if at + 1 >= state.picture.history.len() {
+        return close(state, NEWEST);
+    }
+    match state.picture.history.open_at(at, newest) {
+        Some(shown) => look_at(state, shown),
+        None => Vec::new(),
     }
 }
 

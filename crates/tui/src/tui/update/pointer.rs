@@ -1,14 +1,16 @@
 //! The mouse on the picture, and questions about a place there.
 
 use super::say::{notify, say};
-use super::{camera, overlay, rectangle};
+use super::{camera, history, overlay, rectangle};
 use crate::math::decimal::{rounded, step_at};
 use crate::pipeline::protocol::{Command, Picked, Thing};
 use crate::scene::sanitize::visible;
+use crate::tui::chrome;
 use crate::tui::event::FilePlace;
 use crate::tui::event::{Effect, Mouse, MouseKind};
 use crate::tui::keymap::Overlay;
 use crate::tui::state::{PickPurpose, Press, State};
+use crate::tui::view;
 use crate::tui::view::layout::Layout;
 use crate::tui::view::preview::spot_at;
 
@@ -23,6 +25,9 @@ pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
         MouseKind::Press => {
             let is_on_picture = Layout::of(state).preview.contains((mouse.column, mouse.row).into());
             let Mouse { column, row, .. } = mouse;
+            if let Some(at) = view::picture_at(state, column, row) {
+                return history::open_at(state, at);
+            }
             let from = spot_at(state, column, row);
             state.selection.press = is_on_picture.then_some(Press { column, row, has_moved: false, from });
             Vec::new()
@@ -133,7 +138,9 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
     match (state.selection.purpose, &picked.thing) {
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
-            state.selection.facts = Some(facts(picked));
+            let facts = facts(picked);
+            state.selection.clicked = Some(clicked(picked, &facts));
+            state.selection.facts = Some(facts);
             state.dirty = true;
             Vec::new()
         }
@@ -160,6 +167,25 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
         );
     }
     effects
+}
+
+/// The same in one line, with the pixel.
+fn clicked(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[String]) -> String {
+    let pixel = thing.as_ref().map_or(String::new(), |_| format!(" · pixel {x}, {y}"));
+    facts.join(" · ") + &pixel
+}
+
+/// Copies what was clicked, if the terminal is known to take it.
+pub(super) fn copy(state: &mut State) -> Vec<Effect> {
+    let Some(clicked) = state.selection.clicked.clone() else {
+        return notify(state, "nothing was clicked yet: click, or press Enter, then y copies what is there");
+    };
+    if !state.display.abilities.clipboard {
+        // It stands there to be selected.
+        return notify(state, &format!("{clicked} · this terminal is not known to copy by itself"));
+    }
+    say(state, format!("copied: {clicked}"));
+    vec![Effect::Aside(chrome::copy(&clicked))]
 }
 
 /// Shape and name, line, material, distance, place, colour, normal.

@@ -1,6 +1,7 @@
 //! Effects of the worker's events on the state. Events of older generations do nothing, except for those about files.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use super::request::resized_preview;
 use super::say::say;
@@ -10,6 +11,7 @@ use crate::pipeline::protocol::{
 };
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
+use crate::tui::chrome;
 use crate::tui::event::{Effect, Unwritten, Written};
 use crate::tui::exit_summary;
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
@@ -18,6 +20,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     let event = match event {
         // Whatever is rendered meanwhile, these answer a person.
         Event::CameraKept { outcome, .. } => return camera::kept(state, outcome),
+        Event::CameraUndone { outcome, .. } => return camera::undone(state, outcome),
         Event::Picked { picked, .. } => return pointer::picked(state, &picked),
         // Files of pictures of before are there all the same.
         Event::Written { path, bytes, generation } if generation != state.request.generation => {
@@ -52,8 +55,17 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             return resized_preview(state);
         }
         Event::Warnings { warnings, .. } => warn(state, warnings),
-        Event::Progress { progress, .. } => state.work.progress = Some(progress),
-        Event::Preview { .. } | Event::Files { .. } | Event::CameraKept { .. } | Event::Picked { .. } => {}
+        Event::Progress { progress, .. } => {
+            if let Some(noise) = progress.noise {
+                state.work.curve.note(progress.elapsed_seconds, noise.now);
+            }
+            state.work.progress = Some(progress);
+        }
+        Event::Preview { .. }
+        | Event::Files { .. }
+        | Event::CameraKept { .. }
+        | Event::CameraUndone { .. }
+        | Event::Picked { .. } => {}
         Event::Written { path, bytes, generation } => wrote(state, path, bytes, generation),
         Event::WriteFailed { message, .. } => {
             let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
@@ -90,8 +102,16 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::WritePostponed { .. } => {
             say(state, "the image is written as soon as every pixel has a sample");
         }
-        Event::Done { report, warnings, unchanged, .. } => done(state, report, warnings, unchanged),
-        Event::Failed { failure, .. } => failed(state, failure),
+        Event::Done { report, warnings, unchanged, .. } => {
+            let time = state.work.running_for(state.now);
+            done(state, report, warnings, unchanged);
+            return notice(state, time);
+        }
+        Event::Failed { failure, .. } => {
+            let time = state.work.running_for(state.now);
+            failed(state, failure);
+            return notice(state, time);
+        }
         Event::Cancelled { .. } => {
             state.work.activity = Activity::Cancelled;
             state.set_paused(false);
@@ -99,6 +119,15 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         }
     }
     Vec::new()
+}
+
+/// Tells a person who is looking elsewhere that a long render has ended, if the terminal has a way.
+fn notice(state: &State, time: Option<Duration>) -> Vec<Effect> {
+    let is_over = matches!(state.work.activity, Activity::Done | Activity::Broken);
+    let is_long = |time: &Duration| state.display.notify_after.is_some_and(|least| *time > least);
+    let time = time.filter(is_long).filter(|_| is_over && !state.display.has_focus);
+    let notice = time.zip(state.display.abilities.notice);
+    notice.map(|(time, way)| Effect::Aside(chrome::notice(state, way, time))).into_iter().collect()
 }
 
 fn generation(event: &Event) -> u64 {
@@ -119,6 +148,7 @@ fn generation(event: &Event) -> u64 {
         | Event::Edited { generation, .. }
         | Event::Files { generation, .. }
         | Event::CameraKept { generation, .. }
+        | Event::CameraUndone { generation, .. }
         | Event::Picked { generation, .. }
         | Event::Done { generation, .. }
         | Event::Failed { generation, .. }
@@ -134,6 +164,7 @@ fn started(state: &mut State) {
     state.work.stages = Default::default();
     state.work.assets.clear();
     state.work.progress = None;
+    state.work.last_curve = std::mem::take(&mut state.work.curve);
     state.work.report = None;
     state.saving.unwritten = None;
     state.work.unchanged = false;
@@ -223,6 +254,7 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     if state.request.is_written() && is_on_disk && state.saving.unwritten.is_none() {
         state.saving.write_failed = None;
     }
+    note_noise(state, &report, unchanged);
     describe(state, state.request.generation, &report);
     state.work.report = Some(report);
     state.work.unchanged = unchanged;
@@ -238,6 +270,22 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     if unchanged && state.saving.change.is_some_and(|change| change.generation == state.request.generation) {
         state.saving.change = None;
         state.saving.first_change = None;
+    }
+}
+
+/// Ends the curve of noise with what was measured. The same picture, or that picture brighter, has the curve that it had.
+fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
+    let render = &report.stages[Stage::Render as usize];
+    match render.status {
+        Status::Done => {
+            if let Some(error) = report.image.error {
+                state.work.curve.end(render.seconds, error);
+            }
+        }
+        Status::Reused if unchanged || state.request.is_exposure_only => {
+            state.work.curve = std::mem::take(&mut state.work.last_curve);
+        }
+        Status::Running | Status::Reused | Status::Skipped => {}
     }
 }
 

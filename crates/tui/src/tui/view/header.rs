@@ -62,8 +62,11 @@ fn block(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
 
 /// A sign, a word and a colour, each of which tells it.
 pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
+    if state.picture.history.is_open() { ("◂", "older", Tone::Warning) } else { work(state) }
+}
+
+fn work(state: &State) -> (&'static str, &'static str, Tone) {
     match state.work.activity {
-        _ if state.picture.history.is_open() => ("◂", "older", Tone::Warning),
         _ if state.work.paused => ("‖", "paused", Tone::Warning),
         Activity::Running { .. } => ("●", "rendering", Tone::Working),
         Activity::Done if state.saving.unwritten.is_some() => ("!", "unwritten", Tone::Error),
@@ -72,6 +75,11 @@ pub(super) fn activity(state: &State) -> (&'static str, &'static str, Tone) {
         Activity::Broken => ("✗", "broken", Tone::Error),
         Activity::Cancelled => ("■", "stopped", Tone::Warning),
     }
+}
+
+/// The word for the work, whatever picture is looked at.
+pub(super) fn word(state: &State) -> &'static str {
+    work(state).1
 }
 
 /// The file with its folder, the view, the picture's size.

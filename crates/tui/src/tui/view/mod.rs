@@ -1,6 +1,8 @@
 //! The state as cells.
 
+mod curve;
 pub(super) mod diagnostics;
+mod drawn;
 mod header;
 pub(super) mod help;
 mod keys;
@@ -10,23 +12,38 @@ mod message;
 mod panel;
 pub(super) mod preview;
 pub(super) mod ramp;
+mod spare;
 mod stages;
+mod strip;
 pub(super) mod text;
 pub(super) mod under;
 pub(super) mod views;
 
 use ratatui::buffer::Buffer;
 
+pub(super) use self::drawn::Drawn;
 use self::layout::Layout;
 use super::state::State;
 
+/// The state in one word.
+pub(super) fn state_word(state: &State) -> &'static str {
+    header::word(state)
+}
+
+/// The picture of the strip at a cell, by its index among those that are kept.
+pub(super) fn picture_at(state: &State, column: u16, row: u16) -> Option<usize> {
+    let layout = Layout::of(state);
+    let is_open = state.overlays.help.open || layout.panel.is_empty();
+    (!is_open).then(|| panel::picture_at(state, layout.panel, (column, row))).flatten()
+}
+
 /// The whole screen, into a buffer of the window's size.
-pub(super) fn draw(state: &State, buffer: &mut Buffer) {
+pub(super) fn draw(state: &State, buffer: &mut Buffer) -> Drawn {
     let layout = Layout::of(state);
     header::draw(state, &layout, buffer);
     preview::draw(state, layout.preview, buffer);
-    panel::draw(state, layout.panel, buffer);
-    under::draw(state, &layout, buffer);
+    let mut drawn = panel::draw(state, layout.panel, buffer);
+    under::draw(state, &layout, buffer, &mut drawn);
     keys::draw(state, &layout, buffer);
     if state.overlays.diagnostics.open {
         diagnostics::draw(state, layout.pane, buffer);
@@ -38,5 +55,13 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     }
     if state.overlays.help.open {
         help::draw(state, buffer);
+    }
+    // Text that lies over the rest waits for nothing, and is no link.
+    let is_covered =
+        state.overlays.help.open || state.overlays.views.is_some() || message::is_over_picture(state);
+    if is_covered || state.overlays.diagnostics.open && layout.pane == layout.panel {
+        Drawn::default()
+    } else {
+        drawn
     }
 }

@@ -3,10 +3,12 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
+use super::drawn::Drawn;
 use super::layout::{ENTRY_WIDTH, Layout};
 use super::message;
+use super::spare;
 use super::stages::{self, Line};
-use super::text::{Tone, bytes, columns, gauge, percent, put, row, share, shortened, wrapped};
+use super::text::{Tone, bytes, columns, gauge, percent, row, share, shortened, wrapped};
 use super::under;
 use crate::pipeline::protocol::Stage;
 use crate::scene::report::summary;
@@ -20,31 +22,59 @@ const BAR: u16 = 8;
 const LABEL: usize = 8;
 
 /// In as many columns as there have to be and can be; what does not fit is left out at the end.
-pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
+pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> Drawn {
     if area.is_empty() {
-        return;
+        return Drawn::default();
     }
-    let is_one_column = |lines: &[Line]| lines.len() <= usize::from(area.height);
-    let mut lines = lines(state, (area.width, area.width), true);
-    if !is_one_column(&lines) {
-        lines = self::lines(state, (area.width, area.width), false);
-    }
-    if !is_one_column(&lines) {
-        lines = self::lines(state, (area.width, area.width.min(ENTRY_WIDTH)), false);
-    }
-    let wanted = lines.len().div_ceil(usize::from(area.height));
-    let number = u16::try_from(wanted).unwrap_or(u16::MAX).clamp(1, (area.width / ENTRY_WIDTH).max(1));
-    let width = area.width / number;
+    let Arranged { lines, columns, room } = arranged(state, area);
+    let width = room.width / columns;
+    let mut drawn = Drawn::default();
     for (index, line) in (0..).zip(lines.iter()) {
-        let (column, line_of) = (index / area.height, index % area.height);
-        if column >= number {
-            return;
+        let (column, line_of) = (index / room.height, index % room.height);
+        if column >= columns {
+            break;
         }
-        let gap = u16::from(column + 1 < number);
-        let place = Rect { x: area.x + column * width, width: width - gap, ..area };
-        let pieces: Vec<(&str, Tone)> = line.iter().map(|(text, tone)| (text.as_str(), *tone)).collect();
-        put(buffer, row(place, line_of), &pieces, state.display.depth);
+        let gap = u16::from(column + 1 < columns);
+        let place = Rect { x: room.x + column * width, width: width - gap, ..room };
+        drawn.put(state, row(place, line_of), line, buffer);
     }
+    drawn.later = spare::draw(state, area, rows(&lines, columns, room), buffer);
+    drawn
+}
+
+/// The picture of the strip at a cell.
+pub(super) fn picture_at(state: &State, area: Rect, place: (u16, u16)) -> Option<usize> {
+    let Arranged { lines, columns, room } = arranged(state, area);
+    spare::picture_at(state, area, rows(&lines, columns, room), place)
+}
+
+/// Lines in a panel, the number of their columns, and the cells that these may take.
+struct Arranged {
+    lines: Vec<Line>,
+    columns: u16,
+    room: Rect,
+}
+
+fn arranged(state: &State, area: Rect) -> Arranged {
+    let room = Rect { width: spare::columns_of_lines(state, area), ..area };
+    let is_one_column = |lines: &[Line]| lines.len() <= usize::from(room.height);
+    let mut lines = lines(state, (room.width, room.width), true);
+    if !is_one_column(&lines) {
+        lines = self::lines(state, (room.width, room.width), false);
+    }
+    let mut room = room;
+    if !is_one_column(&lines) {
+        room = area;
+        lines = self::lines(state, (room.width, room.width.min(ENTRY_WIDTH)), false);
+    }
+    let wanted = lines.len().div_ceil(usize::from(room.height.max(1)));
+    let columns = u16::try_from(wanted).unwrap_or(u16::MAX).clamp(1, (room.width / ENTRY_WIDTH).max(1));
+    Arranged { lines, columns, room }
+}
+
+/// Rows that lines take; all of them if there are several columns.
+fn rows(lines: &[Line], columns: u16, room: Rect) -> u16 {
+    if columns > 1 { room.height } else { u16::try_from(lines.len()).unwrap_or(u16::MAX).min(room.height) }
 }
 
 /// The lines of a panel of this width, the hint wrapped to a column. With the reasons of stages in full, or with what fits of them beside the stages.
@@ -110,7 +140,7 @@ fn results(state: &State) -> Vec<Line> {
     }
     for written in under::files(state) {
         let name = visible(&written.path.to_string_lossy()).into_owned();
-        lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::Plain)]);
+        lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::File)]);
         let size = state.request.effective.as_ref().map(|it| format!(", {}×{}", it.width, it.height));
         lines.push(vec![(format!("  {}{}", bytes(written.bytes), size.unwrap_or_default()), Tone::Faint)]);
     }

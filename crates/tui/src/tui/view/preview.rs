@@ -42,6 +42,16 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
+/// A small picture beside the words.
+pub(super) fn draw_small(state: &State, picture: &Picture, area: Rect, buffer: &mut Buffer) {
+    let area = area.intersection(buffer.area);
+    if !area.is_empty() {
+        let kind = in_cells(state.display.kind, state.display.depth);
+        let placed = Placed::fit(picture, area, kind, state.display.window.cell_aspect, f32::INFINITY);
+        placed.draw(picture, kind, Inks::of(state), buffer);
+    }
+}
+
 /// The place of the picture that a cell shows.
 pub(in crate::tui) fn spot_at(state: &State, column: u16, row: u16) -> Option<Spot> {
     let shown = state.picture.shown.as_ref()?;

@@ -22,6 +22,8 @@ pub(super) enum Tone {
     Good,
     Warning,
     Error,
+    /// The name of a written file: a link, where the terminal has them.
+    File,
     /// The line that is chosen of a list.
     Chosen,
 }
@@ -30,7 +32,7 @@ impl Tone {
     /// Its style; without colours, modifiers alone.
     pub(super) fn style(self, depth: ColorDepth) -> Style {
         let (color, modifier) = match self {
-            Self::Plain => (Color::Reset, Modifier::empty()),
+            Self::Plain | Self::File => (Color::Reset, Modifier::empty()),
             Self::Faint => (Color::Reset, Modifier::DIM),
             Self::Strong => (Color::Reset, Modifier::BOLD),
             // The plain blue of many palettes cannot be read on black.
@@ -52,7 +54,9 @@ impl Tone {
             Self::Good => (Color::Black, Color::Green),
             Self::Warning => (Color::Black, Color::Yellow),
             Self::Error => (Color::White, Color::Red),
-            Self::Plain | Self::Faint | Self::Strong | Self::Chosen => (Color::Reset, Color::Reset),
+            Self::Plain | Self::Faint | Self::Strong | Self::File | Self::Chosen => {
+                (Color::Reset, Color::Reset)
+            }
         };
         // Bold black is grey in xterm and others, which draw bold by the brighter half of the palette.
         let reversed = Modifier::REVERSED.union(Modifier::BOLD);
@@ -150,7 +154,7 @@ pub fn wrapped(text: &str, width: usize) -> Vec<String> {
 }
 
 /// A duration in a few characters.
-pub(super) fn duration(time: Duration) -> String {
+pub(in crate::tui) fn duration(time: Duration) -> String {
     seconds(time.as_secs_f64())
 }
 
@@ -199,7 +203,7 @@ pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String
 }
 
 /// Whole percent; 100 only when everything is done.
-pub(super) fn percent(fraction: f64) -> u32 {
+pub(in crate::tui) fn percent(fraction: f64) -> u32 {
     (fraction.clamp(0.0, 1.0) * 100.0).floor() as u32
 }
 

@@ -5,6 +5,7 @@ use std::time::Duration;
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
+use super::drawn::Drawn;
 use super::header::at_work;
 use super::layout::Layout;
 use super::message;
@@ -21,7 +22,7 @@ const SHORT_HINT: &str = "save it to render again";
 /// A shorter bar says nothing.
 const LEAST_BAR: u16 = 6;
 
-pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
+pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Drawn) {
     let area = layout.under;
     // What the newest picture took says nothing of an older one.
     if message::is_said(state, layout) || state.picture.history.is_open() {
@@ -29,7 +30,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
     }
     match state.work.activity {
         Activity::Running { .. } => bar(state, layout, buffer),
-        Activity::Done => summary(state, layout, buffer),
+        Activity::Done => summary(state, layout, buffer, drawn),
         Activity::Waiting | Activity::Cancelled => {}
         Activity::Broken if let Some(progress) = goes_on(state) => {
             let words = format!("the last good scene goes on: {} %", percent(progress.fraction));
@@ -95,26 +96,26 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
 }
 
 /// Draws the stages in one line, and the other facts that the panel does not show.
-fn summary(state: &State, layout: &Layout, buffer: &mut Buffer) {
+fn summary(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Drawn) {
     let area = layout.under;
     let mut pieces = stages::in_one_line(state);
-    let mut is_room = |text: String, tone| {
-        let width: u16 = pieces.iter().map(|(text, _)| columns(text)).sum();
-        if !text.is_empty() && width + columns(&text) <= area.width {
-            pieces.push((text, tone));
+    let mut is_room = |more: Vec<(String, Tone)>| {
+        let width: u16 = pieces.iter().chain(&more).map(|(text, _)| columns(text)).sum();
+        if width <= area.width {
+            pieces.extend(more);
         }
     };
     if layout.panel.is_empty() {
         if is_in_no_file(state) {
-            is_room(" unwritten: w writes it".to_owned(), Tone::Faint);
+            is_room(vec![(" unwritten: w writes it".to_owned(), Tone::Faint)]);
         }
         for written in files(state) {
             let name = visible(&written.path.to_string_lossy()).into_owned();
-            is_room(format!(" → {name} {}", bytes(written.bytes)), Tone::Faint);
+            let size = format!(" {}", bytes(written.bytes));
+            is_room(vec![(" → ".to_owned(), Tone::Faint), (name, Tone::File), (size, Tone::Faint)]);
         }
     }
-    let pieces: Vec<(&str, Tone)> = pieces.iter().map(|(text, tone)| (&**text, *tone)).collect();
-    let used = put(buffer, area, &pieces, state.display.depth);
+    let used = drawn.put(state, area, &pieces, buffer);
     let free = rest(area, used + 2);
     let words = [hint(state), SHORT_HINT.to_owned()];
     if layout.panel.is_empty() && state.saving.edits == 0 {

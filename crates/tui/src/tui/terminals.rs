@@ -1,0 +1,253 @@
+//! Terminals by name and version, and what each is known to do besides text. Nothing of it is sent to others.
+
+/// Terminals that are told apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Brand {
+    Kitty,
+    Foot,
+    Ghostty,
+    WezTerm,
+    Contour,
+    /// GNOME Terminal, Ptyxis and others.
+    Vte,
+    Konsole,
+    Iterm2,
+    WindowsTerminal,
+    ConEmu,
+    Mintty,
+    Alacritty,
+    VsCode,
+    AppleTerminal,
+    Xterm,
+}
+
+/// A terminal and its version: `[0, 0]` if that is unknown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Terminal {
+    pub(super) brand: Brand,
+    pub(super) version: [u32; 2],
+}
+
+/// Protocols of notifications on the desktop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Notice {
+    /// iTerm2's.
+    Osc9,
+    /// kitty's.
+    Osc99,
+    /// That of rxvt-unicode, with a title.
+    Osc777,
+    /// The bell, by which a window asks for attention.
+    Bell,
+}
+
+/// What a terminal is known to do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Abilities {
+    /// A title of the window (OSC 2).
+    pub(super) title: bool,
+    /// A bar of progress in the window's frame (OSC 9;4).
+    pub(super) progress: bool,
+    pub(super) notice: Option<Notice>,
+    /// Reports whether it has the focus (mode 1004).
+    pub(super) focus: bool,
+    /// Links in text (OSC 8).
+    pub(super) links: bool,
+    /// Takes text for the clipboard (OSC 52), perhaps after a question.
+    pub(super) clipboard: bool,
+}
+
+impl Terminal {
+    /// A terminal as XTVERSION reports it: `foot(1.20.2)`, `ghostty 1.2.0`.
+    pub(super) fn of_report(report: &str) -> Option<Self> {
+        const NAMES: [(&str, Brand); 10] = [
+            ("kitty", Brand::Kitty),
+            ("foot", Brand::Foot),
+            ("ghostty", Brand::Ghostty),
+            ("WezTerm", Brand::WezTerm),
+            ("contour", Brand::Contour),
+            ("VTE", Brand::Vte),
+            ("Konsole", Brand::Konsole),
+            ("iTerm2", Brand::Iterm2),
+            ("mintty", Brand::Mintty),
+            ("XTerm", Brand::Xterm),
+        ];
+        let (name, rest) = report.split_at(report.find(['(', ' ']).unwrap_or(report.len()));
+        let (_, brand) = NAMES.iter().find(|(known, _)| name.eq_ignore_ascii_case(known))?;
+        Some(Self { brand: *brand, version: version(rest.get(1..).unwrap_or_default()) })
+    }
+
+    /// The terminal that the environment tells of. `None` if it tells of none, and inside tmux and screen, which keep such
+    /// sequences for themselves.
+    pub(super) fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Option<Self> {
+        const TERMS: [(&str, Brand); 6] = [
+            ("xterm-kitty", Brand::Kitty),
+            ("foot", Brand::Foot),
+            ("xterm-ghostty", Brand::Ghostty),
+            ("wezterm", Brand::WezTerm),
+            ("contour", Brand::Contour),
+            ("alacritty", Brand::Alacritty),
+        ];
+        const PROGRAMS: [(&str, Brand); 6] = [
+            ("ghostty", Brand::Ghostty),
+            ("WezTerm", Brand::WezTerm),
+            ("iTerm.app", Brand::Iterm2),
+            ("mintty", Brand::Mintty),
+            ("vscode", Brand::VsCode),
+            ("Apple_Terminal", Brand::AppleTerminal),
+        ];
+        let get = |name: &str| variable(name).unwrap_or_default();
+        let is_set = |name: &str| !get(name).is_empty();
+        let term = get("TERM");
+        if is_set("TMUX") || is_set("STY") || is_without_extras(&term) {
+            return None;
+        }
+        let known = |brand: Brand, number: &str| Some(Self { brand, version: version(&get(number)) });
+        // A terminal within another one overwrites these two.
+        if let Some((_, brand)) = PROGRAMS.iter().find(|(name, _)| get("TERM_PROGRAM") == *name) {
+            return known(*brand, "TERM_PROGRAM_VERSION");
+        }
+        if let Some((_, brand)) = TERMS.iter().find(|(name, _)| term.starts_with(name)) {
+            return known(*brand, "TERM_PROGRAM_VERSION").filter(|_| !is_set("TERM_PROGRAM"));
+        }
+        match () {
+            () if is_set("WT_SESSION") => known(Brand::WindowsTerminal, ""),
+            () if get("ConEmuANSI") == "ON" => known(Brand::ConEmu, ""),
+            () if is_set("VTE_VERSION") => known(Brand::Vte, "VTE_VERSION"),
+            () if is_set("KONSOLE_VERSION") => {
+                // 250402 is 25.04.2.
+                let number: u32 = get("KONSOLE_VERSION").parse().unwrap_or(0);
+                Some(Self { brand: Brand::Konsole, version: [number / 10_000, number / 100 % 100] })
+            }
+            () if is_set("XTERM_VERSION") => known(Brand::Xterm, ""),
+            // Over SSH, iTerm2 alone has its name passed on by default.
+            () if get("LC_TERMINAL") == "iTerm2" => known(Brand::Iterm2, "LC_TERMINAL_VERSION"),
+            () => None,
+        }
+    }
+
+    /// What it is known to do, from the documentation of each.
+    pub(super) fn abilities(self) -> Abilities {
+        let Self { brand, version } = self;
+        let all = Abilities {
+            title: true,
+            progress: false,
+            notice: Some(Notice::Bell),
+            focus: true,
+            links: true,
+            clipboard: true,
+        };
+        let since = |least: [u32; 2]| version >= least;
+        match brand {
+            Brand::Kitty => Abilities { notice: Some(Notice::Osc99), ..all },
+            Brand::Foot | Brand::Contour => Abilities { notice: Some(Notice::Osc777), ..all },
+            Brand::Ghostty => Abilities { notice: Some(Notice::Osc777), progress: since([1, 2]), ..all },
+            // Before, it took such a sequence for a notification.
+            Brand::WezTerm => {
+                Abilities { notice: Some(Notice::Osc777), progress: since([20_250_301, 0]), ..all }
+            }
+            Brand::Iterm2 => Abilities { notice: Some(Notice::Osc9), progress: since([3, 7]), ..all },
+            Brand::WindowsTerminal => Abilities { progress: true, ..all },
+            Brand::VsCode => Abilities { progress: since([1, 97]), ..all },
+            Brand::Mintty => Abilities { progress: since([3, 5]), ..all },
+            Brand::Alacritty => all,
+            Brand::Konsole => Abilities { progress: since([25, 4]), clipboard: false, ..all },
+            Brand::Vte => {
+                Abilities { progress: since([8000, 0]), links: since([5000, 0]), clipboard: false, ..all }
+            }
+            // It takes text for the clipboard only if it was told to.
+            Brand::Xterm => Abilities { links: false, clipboard: false, ..all },
+            Brand::ConEmu => Abilities { title: true, progress: true, ..Abilities::default() },
+            Brand::AppleTerminal => {
+                Abilities { links: false, clipboard: false, focus: false, notice: None, ..all }
+            }
+        }
+    }
+}
+
+/// Whether a terminal of this name has text and colours alone, or keeps other sequences for itself.
+fn is_without_extras(term: &str) -> bool {
+    term.is_empty() || ["linux", "dumb", "vt", "screen", "tmux"].iter().any(|name| term.starts_with(name))
+}
+
+/// The first two numbers of a version.
+fn version(text: &str) -> [u32; 2] {
+    let mut numbers = text.split(|c: char| !c.is_ascii_digit());
+    let mut number = || numbers.next().and_then(|digits| digits.parse().ok()).unwrap_or(0);
+    [number(), number()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(pairs: &[(&str, &str)]) -> Option<Terminal> {
+        Terminal::of_environment(|name| {
+            pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned())
+        })
+    }
+
+    #[test]
+    fn terminals_are_known_by_their_variables() {
+        let xterm = ("TERM", "xterm-256color");
+        for (pairs, brand, version) in [
+            (&[("TERM", "xterm-kitty")][..], Brand::Kitty, [0, 0]),
+            (&[("TERM", "foot-extra")], Brand::Foot, [0, 0]),
+            (
+                &[xterm, ("TERM_PROGRAM", "iTerm.app"), ("TERM_PROGRAM_VERSION", "3.6.6")],
+                Brand::Iterm2,
+                [3, 6],
+            ),
+            (&[xterm, ("LC_TERMINAL", "iTerm2"), ("LC_TERMINAL_VERSION", "3.5.1")], Brand::Iterm2, [3, 5]),
+            (&[xterm, ("WT_SESSION", "1-2-3")], Brand::WindowsTerminal, [0, 0]),
+            (&[xterm, ("VTE_VERSION", "8002")], Brand::Vte, [8002, 0]),
+            (&[xterm, ("KONSOLE_VERSION", "250402")], Brand::Konsole, [25, 4]),
+            (
+                &[xterm, ("TERM_PROGRAM", "WezTerm"), ("TERM_PROGRAM_VERSION", "20240203-110809-5046fc22")],
+                Brand::WezTerm,
+                [20_240_203, 110_809],
+            ),
+            // VS Code within kitty.
+            (&[xterm, ("TERM_PROGRAM", "vscode"), ("KITTY_WINDOW_ID", "1")], Brand::VsCode, [0, 0]),
+        ] {
+            assert_eq!(found(pairs), Some(Terminal { brand, version }), "{pairs:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_known_to_show_it_gets_nothing() {
+        let wezterm = ("TERM_PROGRAM", "WezTerm");
+        for pairs in [
+            &[][..],
+            &[("TERM", "xterm-256color")],
+            &[("TERM", "dumb"), ("WT_SESSION", "1")],
+            &[("TERM", "linux"), wezterm],
+            &[("TERM", "screen.xterm-256color"), wezterm],
+            &[("TERM", "xterm-256color"), wezterm, ("STY", "12.pts-0")],
+            &[("TERM", "xterm-256color"), wezterm, ("TMUX", "/tmp/tmux-0/default,1,0")],
+            &[("TERM", "tmux-256color"), ("VTE_VERSION", "8002")],
+        ] {
+            assert_eq!(found(pairs), None, "{pairs:?}");
+        }
+        assert_eq!(Terminal::of_report("tmux 3.4"), None);
+    }
+
+    #[test]
+    fn progress_came_with_a_version() {
+        for (report, has_progress) in [
+            ("ghostty 1.2.0", true),
+            ("ghostty 1.1.3-arch2", false),
+            ("WezTerm 20240203-110809-5046fc22", false),
+            ("WezTerm 20250815-000000-00000000", true),
+            ("VTE(7802)", false),
+            ("VTE(8000)", true),
+            ("Konsole 24.12.3", false),
+            ("Konsole 25.04.2", true),
+            ("kitty(0.40.1)", false),
+            ("XTerm(390)", false),
+        ] {
+            let terminal = Terminal::of_report(report).expect(report);
+            assert_eq!(terminal.abilities().progress, has_progress, "{report}");
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! Tests of what a wide window shows beside a picture, and of notifications.
+
+use ratatui::layout::Rect;
+
+use super::{BLUE, RED, cells_of};
+use crate::pipeline::protocol::{self, NoiseProgress, RenderProgress};
+use crate::pipeline::settings::{Effective, Overrides};
+use crate::tui::Changed;
+use crate::tui::color::ColorDepth;
+use crate::tui::event::{Effect, Event, KeyPress, Mouse, MouseKind};
+use crate::tui::fixtures::*;
+use crate::tui::graphics::Protocol;
+use crate::tui::known::Answer;
+use crate::tui::preview_kind::PreviewKind;
+use crate::tui::terminals::{Brand, Terminal};
+use crate::tui::view;
+use crate::tui::view::layout::Layout;
+
+/// A render whose noise falls from 10 % after a second, with `error` asked for.
+fn rendered(desk: &mut Desk, error: f32) {
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::Started { generation });
+    let settings = Box::new(Effective { error, ..settings() });
+    desk.worker(protocol::Event::Settings {
+        generation,
+        settings: settings.clone(),
+        camera: camera(),
+        exposure: 0.0,
+    });
+    let picture = plain_picture(90, 68, RED);
+    desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });
+    for step in 0..=40 {
+        let seconds = 10_f64.powf(f64::from(step) / 20.0);
+        let noise = Some(NoiseProgress { now: 0.1 / seconds.sqrt(), next: None });
+        let progress = RenderProgress { elapsed_seconds: seconds, noise, ..progress(0.5, None) };
+        desk.worker(protocol::Event::Progress { generation, progress });
+    }
+    let mut event = done(generation, Vec::new(), false);
+    if let protocol::Event::Done { report, .. } = &mut event {
+        report.stages[protocol::Stage::Render as usize].seconds = 110.0;
+        report.image.error = Some(0.0095);
+        report.settings = *settings;
+    }
+    desk.worker(event);
+}
+
+/// Saves of the scene, each with its words.
+fn edited(desk: &mut Desk, edits: &[(&str, [u8; 3])]) {
+    for (what, color) in edits {
+        desk.event(Event::Changed(Changed { noticed: desk.now }));
+        let generation = desk.state.request.generation;
+        desk.worker(protocol::Event::Edited { generation, what: (*what).to_owned() });
+        desk.finish(*color);
+    }
+}
+
+/// The text of the panel, in one line, without the blocks of small pictures.
+fn panel(desk: &mut Desk) -> String {
+    let panel = Layout::of(&desk.state).panel;
+    let buffer = desk.screen();
+    let row = |y: u16| {
+        (panel.left()..panel.right()).map(|x| buffer[(x, y)].symbol().to_owned()).collect::<String>()
+    };
+    let rows: Vec<String> = (panel.top()..panel.bottom()).map(row).collect();
+    let text = rows.join(" ").replace(|c| ('▀'..='▟').contains(&c), "");
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn the_noise_of_a_finished_picture_is_a_curve() {
+    let mut desk = Desk::with(state(120, 40));
+    rendered(&mut desk, 0.01);
+    let text = panel(&mut desk);
+    assert!(text.contains("noise while it rendered"), "{}", desk.text());
+    let words = "10 % after 1.00 s, 0.95 % after 1 min 50 s; the line is the 1 % asked of each tile";
+    assert!(text.contains(words), "{text}");
+    // The line is level: a row of the same dots from the axis to the edge.
+    let is_line = |line: &str| line.chars().filter(|c| ('⠁'..='⣿').contains(c)).count() >= 12;
+    assert!(desk.text().lines().any(is_line), "{}", desk.text());
+    // Another exposure is the same render, a key that changes the light is not.
+    desk.press(']');
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::Started { generation });
+    assert!(!panel(&mut desk).contains("noise while it rendered"), "while it works");
+    let mut event = done(generation, Vec::new(), false);
+    if let protocol::Event::Done { report, .. } = &mut event {
+        report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
+    }
+    desk.worker(event);
+    assert!(panel(&mut desk).contains("noise while it rendered"), "{}", desk.text());
+    desk.press('s');
+    desk.finish(BLUE);
+    assert!(!panel(&mut desk).contains("noise while it rendered"), "one point is no curve");
+    // Nothing is asked for: nothing is a line.
+    let mut desk = Desk::with(state(120, 40));
+    rendered(&mut desk, 0.0);
+    assert!(panel(&mut desk).contains("1 min 50 s") && !panel(&mut desk).contains("the line is"));
+}
+
+#[test]
+fn the_last_pictures_say_what_changed_and_a_click_shows_them() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    assert!(!panel(&mut desk).contains("the last pictures"));
+    edited(&mut desk, &[("camera.fov 40 → 30", BLUE)]);
+    let text = panel(&mut desk);
+    assert!(text.contains("the last pictures n N") && text.contains("▸2 camera.fov"), "{text}");
+    assert!(text.contains("1 the first that"), "{text}");
+    desk.press('s');
+    desk.finish(RED);
+    assert!(panel(&mut desk).contains("▸3 shadows hard"), "{}", desk.text());
+    let all = cells_of(&mut desk, BLUE);
+    assert!(all > 5 && all < 100, "a small picture: {all}");
+    // The cell of the blue one.
+    let buffer = desk.screen();
+    let blue = ratatui::style::Color::Rgb(BLUE[0], BLUE[1], BLUE[2]);
+    let places = buffer.area.positions();
+    let place = places.into_iter().find(|place| buffer[*place].fg == blue).expect("a small picture");
+    let mouse = Mouse { kind: MouseKind::Press, column: place.x, row: place.y };
+    desk.event(Event::Mouse(mouse));
+    desk.event(Event::Mouse(Mouse { kind: MouseKind::Release, ..mouse }));
+    assert!(cells_of(&mut desk, BLUE) > 500, "{}", desk.text());
+    assert!(desk.text().contains("picture 2 of 3") && panel(&mut desk).contains("▸2"), "{}", desk.text());
+    desk.press('N');
+    assert!(panel(&mut desk).contains("▸3") && cells_of(&mut desk, RED) > 500);
+}
+
+/// Whatever the window, the colours and the kind of picture: all is in the panel, and what waits for the picture is not in it.
+#[test]
+fn it_fits_into_every_window() {
+    let kinds = [
+        (PreviewKind::HalfBlock, ColorDepth::TrueColor),
+        (PreviewKind::Octant, ColorDepth::Indexed256),
+        (PreviewKind::Ascii, ColorDepth::None),
+        (PreviewKind::Pixels(Protocol::Kitty), ColorDepth::TrueColor),
+        (PreviewKind::None, ColorDepth::Ansi16),
+    ];
+    let edits =
+        ["a", "materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]", "c", "d", "e", "f", "g"];
+    for (kind, depth) in kinds {
+        let mut desk = Desk::with(state_with(120, 40, kind, depth, Overrides::default()));
+        let all: Vec<_> =
+            (1_u8..).zip(edits).map(|(index, what)| (what, [40 * (index % 5), 10 * index, 7])).collect();
+        desk.finish(RED);
+        edited(&mut desk, &all);
+        desk.event(Event::Changed(Changed { noticed: desk.now }));
+        rendered(&mut desk, 0.01);
+        for columns in [100, 119, 120, 140, 200] {
+            for rows in [1, 5, 12, 24, 40, 60, 90] {
+                desk.event(Event::Resize(window(columns, rows)));
+                for key in ['n', 'N', '?', '?'] {
+                    desk.press(key);
+                    let layout = Layout::of(&desk.state);
+                    let mut buffer = ratatui::buffer::Buffer::empty(Rect::new(0, 0, columns, rows));
+                    let drawn = view::draw(&desk.state, &mut buffer);
+                    let is_inside = drawn.later.intersection(layout.panel) == drawn.later;
+                    assert!(is_inside || drawn.later.is_empty(), "{columns}×{rows}: {:?}", drawn.later);
+                    assert!(drawn.later.intersection(layout.preview).is_empty(), "{columns}×{rows}");
+                    let is_wide = columns >= 120;
+                    assert!(
+                        is_wide || !fixtures_text(&buffer).contains("the last pictures"),
+                        "{columns}×{rows}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+fn fixtures_text(buffer: &ratatui::buffer::Buffer) -> String {
+    text(buffer)
+}
+
+#[test]
+fn what_is_written_is_a_link() {
+    for (columns, rows) in [(120, 40), (80, 20)] {
+        let mut desk = Desk::with(state(columns, rows));
+        desk.worker(protocol::Event::Written { generation: 1, path: "cornell.png".into(), bytes: 107_000 });
+        desk.finish(RED);
+        let mut buffer = desk.screen();
+        let drawn = view::draw(&desk.state, &mut buffer);
+        let [(cells, path)] = &drawn.files[..] else { panic!("{drawn:?}\n{}", desk.text()) };
+        let name: String = cells.positions().map(|place| buffer[place].symbol().to_owned()).collect();
+        assert_eq!((name.as_str(), path.as_os_str().to_str()), ("cornell.png", Some("cornell.png")));
+        desk.press('?');
+        assert!(view::draw(&desk.state, &mut buffer).files.is_empty(), "the help lies over it");
+    }
+}
+
+/// Ends a render after so many seconds. Returns what is sent beside the picture.
+fn told(seconds: u64, prepare: impl Fn(&mut Desk)) -> Option<String> {
+    let mut desk = Desk::new();
+    desk.state.display.abilities = Terminal { brand: Brand::Kitty, version: [0, 40] }.abilities();
+    prepare(&mut desk);
+    desk.wait(1000 * seconds);
+    let effects = desk.worker(done(1, Vec::new(), false));
+    effects.into_iter().find_map(|effect| match effect {
+        Effect::Aside(bytes) => String::from_utf8(bytes).ok(),
+        _ => None,
+    })
+}
+
+#[test]
+fn the_end_of_a_long_render_is_told_to_whoever_looks_elsewhere() {
+    let focus = |is_here| move |desk: &mut Desk| drop(desk.event(Event::Answer(Answer::Focus { is_here })));
+    let words = "\u{1b}]99;;glimt: cornell.toml: done after 31.0 s\u{1b}\\";
+    assert_eq!(told(31, focus(false)).as_deref(), Some(words));
+    assert_eq!(told(30, focus(false)), None);
+    assert_eq!(told(31, focus(true)), None);
+    assert_eq!(told(31, |_| {}), None, "a terminal that never said that it lost the focus");
+    assert_eq!(told(31, |desk| desk.state.display.has_focus = true), None);
+    // A pause is no work.
+    let held = |desk: &mut Desk| {
+        focus(false)(desk);
+        desk.key(KeyPress::plain(' '));
+        desk.wait(60_000);
+        desk.key(KeyPress::plain(' '));
+    };
+    assert_eq!(told(5, held), None);
+    let never = |desk: &mut Desk| {
+        focus(false)(desk);
+        desk.state.display.notify_after = None;
+    };
+    assert_eq!(told(100, never), None);
+}

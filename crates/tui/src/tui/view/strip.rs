@@ -1,0 +1,159 @@
+//! The last pictures as a strip, the newest at its top, each with what changed since the one before.
+
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
+use unicode_width::UnicodeWidthStr;
+
+use super::preview;
+use super::text::{Tone, put, row};
+use crate::film::Picture;
+use crate::tui::action::Action;
+use crate::tui::keymap;
+use crate::tui::state::State;
+
+/// Rows of an entry: of its picture, of all of it, and up to the next one.
+#[derive(Clone, Copy)]
+struct Rows {
+    picture: u16,
+    entry: u16,
+    pitch: u16,
+}
+
+/// In a narrow strip, words go on below the picture.
+const NARROW_ROWS: Rows = Rows { picture: 3, entry: 4, pitch: 4 };
+const WIDE_ROWS: Rows = Rows { picture: 5, entry: 5, pitch: 6 };
+/// A strip of so many columns is wide.
+const WIDE: u16 = 40;
+/// Columns of the words beside a picture.
+const LEAST_WORDS: u16 = 10;
+/// Columns of a column of pictures, where there are several.
+const COLUMN: u16 = 44;
+
+/// A picture of the strip and its place.
+struct Item {
+    /// Index among the pictures that are kept.
+    index: usize,
+    cells: Rect,
+    rows: Rows,
+}
+
+/// Draws it at the bottom of an area.
+pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
+    let items = items(state, area);
+    let Some(top) = items.iter().map(|item| item.cells.y).min() else { return };
+    let depth = state.display.depth;
+    let keys = keymap::of(Action::OlderPicture).map_or("", |binding| binding.label);
+    let title = Rect { y: top - 1, height: 1, ..area };
+    put(
+        buffer,
+        title,
+        &[("the last pictures", Tone::Strong), ("  ", Tone::Plain), (keys, Tone::Faint)],
+        depth,
+    );
+    for item in items {
+        draw_item(state, &item, buffer);
+    }
+}
+
+fn draw_item(state: &State, Item { index, cells, rows }: &Item, buffer: &mut Buffer) {
+    let history = &state.picture.history;
+    let Some(picture) = history.small(*index) else { return };
+    let place = Rect { height: rows.picture, ..*cells };
+    let place = Rect { width: width(state, picture, place), ..place };
+    preview::draw_small(state, picture, place, buffer);
+    let (mark, tone) =
+        if history.looked_at() == Some(*index) { ("▸", Tone::Strong) } else { ("", Tone::Plain) };
+    let words = format!("{mark}{} {}", index + 1, history.change(*index));
+    let beside = super::text::rest(*cells, place.width + 1);
+    let room = |y: u16| row(if y < rows.picture { beside } else { *cells }, y);
+    let lines = filled(&words, rows.entry, |y| usize::from(room(y).width));
+    for (y, line) in (0..).zip(&lines) {
+        put(buffer, room(y), &[(line, tone)], state.display.depth);
+    }
+}
+
+/// Words in so many lines, each of its own width, broken between words, and in long names behind a point. The last line has
+/// the rest, however long.
+fn filled(words: &str, count: u16, width: impl Fn(u16) -> usize) -> Vec<String> {
+    let narrow = (0..count).map(&width).min().unwrap_or(0);
+    let mut lines = vec![String::new()];
+    for word in words.split(' ') {
+        let parts: Vec<&str> =
+            if word.width() > narrow { word.split_inclusive('.').collect() } else { vec![word] };
+        for (number, part) in parts.into_iter().enumerate() {
+            let is_last = lines.len() == usize::from(count);
+            let room = width(lines.len() as u16 - 1);
+            let Some(line) = lines.last_mut() else { return lines };
+            let space = if number == 0 && !line.is_empty() { " " } else { "" };
+            if is_last || line.is_empty() || line.width() + space.len() + part.width() <= room {
+                *line += space;
+                *line += part;
+            } else {
+                lines.push(part.to_owned());
+            }
+        }
+    }
+    lines
+}
+
+/// Columns of a picture of this height, so that words have room beside it.
+fn width(state: &State, picture: &Picture, cells: Rect) -> u16 {
+    let shape = picture.width as f32 / picture.height.max(1) as f32 * state.display.window.cell_aspect;
+    let width = (f32::from(cells.height) * shape).round() as u16;
+    width.clamp(1, cells.width.saturating_sub(LEAST_WORDS + 1).max(1))
+}
+
+/// Rows of the whole strip in an area. 0 if there is nothing to choose from, or no room.
+pub(super) fn rows(state: &State, area: Rect) -> u16 {
+    let items = items(state, area);
+    let top = items.iter().map(|item| item.cells.y).min();
+    top.map_or(0, |top| area.bottom() - top + 1)
+}
+
+/// The pictures that have room, at the bottom of an area: the newest at the top, and of older ones the one that is looked at.
+fn items(state: &State, area: Rect) -> Vec<Item> {
+    let count = state.picture.history.len();
+    let rows = if area.width >= WIDE { WIDE_ROWS } else { NARROW_ROWS };
+    let columns = (area.width / COLUMN).max(1);
+    let gap = rows.pitch - rows.entry;
+    // The title has a row.
+    let most = (area.height + gap).saturating_sub(1) / rows.pitch;
+    let room = usize::from(most) * usize::from(columns);
+    if count < 2 || room < 2 || area.width < LEAST_WORDS + 8 {
+        return Vec::new();
+    }
+    let shown = count.min(room);
+    let looked_at = state.picture.history.looked_at().unwrap_or(count - 1);
+    let first = (count - shown).min(looked_at);
+    // As few rows as hold them all.
+    let high = shown.div_ceil(usize::from(columns)) as u16;
+    let width = area.width / columns;
+    let place = |number: u16| {
+        let (column, line) = (number / high, number % high);
+        let beside = u16::from(column + 1 < columns);
+        let y = area.bottom() + gap - (high - line) * rows.pitch;
+        Rect { x: area.x + column * width, y, width: width - beside, height: rows.entry }
+    };
+    let item = |number: usize| Item { index: first + shown - 1 - number, cells: place(number as u16), rows };
+    (0..shown).map(item).collect()
+}
+
+/// The picture of the strip in this area at a cell.
+pub(super) fn at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
+    let is_there = |item: &Item| item.cells.contains((column, row).into());
+    items(state, area).into_iter().find(is_there).map(|item| item.index)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_are_broken_behind_a_point_and_the_rest_is_in_the_last_line() {
+        let words = "3 materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]";
+        let lines = filled(words, 4, |y| if y < 3 { 14 } else { 23 });
+        assert_eq!(lines, ["3 materials.", "board.diffuse", "[0.8, 0.02,", "0.02] → [0.02, 0.8, 0.02]"]);
+        assert_eq!(filled("2 camera.fov 40 → 30", 4, |_| 14), ["2 camera.fov", "40 → 30"]);
+        assert_eq!(filled("2 a", 4, |_| 0), ["2", "a"]);
+    }
+}

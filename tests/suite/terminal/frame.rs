@@ -1,0 +1,231 @@
+//! The frame of the window, the clipboard, links: what is sent to which terminal, and that nothing of it stays behind.
+
+use nix::sys::signal::Signal;
+
+use super::pty::{Colors, Folder, SCENE, Terminal};
+use super::relay::Answers;
+
+/// Terminals by their variables, with what each has: a title, progress, a protocol of notifications, links, a clipboard.
+const KNOWN: [(&[(&str, &str)], Has); 5] = [
+    (
+        &[("TERM", "xterm-kitty")],
+        Has { progress: false, notice: b"\x1b]99;;glimt: scene.toml: done after ", ..ALL },
+    ),
+    (
+        &[("TERM", "foot")],
+        Has { progress: false, notice: b"\x1b]777;notify;glimt;scene.toml: done after ", ..ALL },
+    ),
+    (
+        &[("TERM_PROGRAM", "ghostty"), ("TERM_PROGRAM_VERSION", "1.2.3")],
+        Has { notice: b"\x1b]777;notify;glimt;scene.toml: done after ", ..ALL },
+    ),
+    (&[("WT_SESSION", "1-2-3")], Has { notice: b"\x07", ..ALL }),
+    (&[("VTE_VERSION", "7600")], Has { progress: false, notice: b"\x07", clipboard: false, ..ALL }),
+];
+
+/// Terminals that are not known to have any of it.
+const OTHERS: [&[(&str, &str)]; 6] = [
+    &[],
+    &[("TERM", "dumb"), ("WT_SESSION", "1-2-3")],
+    &[("TERM", "linux"), ("VTE_VERSION", "8000")],
+    &[("TERM", "screen-256color"), ("STY", "1.pts-0"), ("TERM_PROGRAM", "ghostty")],
+    &[("TERM", "tmux-256color"), ("TMUX", "/tmp/tmux-0/default,1,0"), ("TERM_PROGRAM", "tmux")],
+    &[("TMUX", "/tmp/tmux-0/default,1,0"), ("WT_SESSION", "1-2-3")],
+];
+
+#[derive(Clone, Copy)]
+struct Has {
+    progress: bool,
+    notice: &'static [u8],
+    links: bool,
+    clipboard: bool,
+}
+
+const ALL: Has = Has { progress: true, notice: b"", links: true, clipboard: true };
+
+/// Whether these bytes are among the others.
+fn has(bytes: &[u8], part: &[u8]) -> bool {
+    place(bytes, part).is_some()
+}
+
+fn place(bytes: &[u8], part: &[u8]) -> Option<usize> {
+    bytes.windows(part.len()).position(|window| window == part)
+}
+
+/// Whether the last of the first bytes comes before the last of the others.
+fn is_last(bytes: &[u8], before: &[u8], after: &[u8]) -> bool {
+    let last = |part: &[u8]| bytes.windows(part.len()).rposition(|window| window == part);
+    last(after).is_some_and(|after| last(before).is_none_or(|before| before < after))
+}
+
+/// A render that does not end until the scene is saved again.
+fn endless() -> String {
+    SCENE.replace("samples = 4", "samples = 10000000")
+}
+
+/// The program on the scene, where every end of a render is worth a notification.
+fn open(folder: &Folder, variables: &[(&str, &str)]) -> Terminal {
+    folder.terminal_with(&[folder.program(), "scene.toml", "--notify-after", "0.001"], variables)
+}
+
+/// Makes the program do all that is sent: a render until there is a title, its end without the focus, a click, a copy. Returns
+/// all bytes until the end.
+fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
+    let folder = Folder::new();
+    folder.write("scene.toml", &endless());
+    let mut terminal = open(&folder, variables);
+    terminal.wait_for("ETA");
+    if has_title {
+        terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: rendering 0 %"));
+    }
+    // The focus goes.
+    terminal.press("\x1b[O");
+    folder.write("scene.toml", SCENE);
+    terminal.wait_for_render(1);
+    if has_title {
+        terminal.wait("its last title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: done"));
+    }
+    // And comes back. A click on the board, and what it says is copied.
+    terminal.press("\x1b[I");
+    terminal.press("\x1b[<0;20;10M\x1b[<0;20;10m");
+    terminal.wait_for("radiance");
+    terminal.press("y");
+    terminal.wait("an answer", |screen| {
+        let text: String = screen.contents().split_whitespace().collect::<Vec<_>>().join(" ");
+        text.contains("copied:") || text.contains("not known to copy")
+    });
+    terminal.settled(vt100::Screen::contents);
+    terminal.press("q");
+    terminal.code();
+    terminal.bytes()
+}
+
+#[test]
+fn each_terminal_gets_what_it_is_known_to_have_and_loses_it_at_the_end() {
+    for (variables, has_what) in KNOWN {
+        let bytes = through(variables, true);
+        let check = |part: &[u8], is_there: bool| {
+            assert_eq!(has(&bytes, part), is_there, "{variables:?}: {}", String::from_utf8_lossy(part));
+        };
+        check(b"\x1b[22;2t", true);
+        check(b"\x1b]2;scene.toml: rendering ", true);
+        check(b"\x1b]2;scene.toml: done", true);
+        check(b"\x1b[?1004h", true);
+        check(b"\x1b]9;4;1;", has_what.progress);
+        check(has_what.notice, true);
+        check(b"\x1b]8;;file://", has_what.links);
+        // The address, then perhaps a colour, then the name.
+        let address = b"/scene.png\x1b\\";
+        let name = place(&bytes, address).map(|start| &bytes[start + address.len()..][..24]);
+        assert_eq!(name.is_some_and(|name| has(name, b"scene.png")), has_what.links, "{variables:?}: a link");
+        check(b"\x1b]52;c;", has_what.clipboard);
+        assert!(is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t"), "{variables:?}: the title goes back");
+        assert!(is_last(&bytes, b"\x1b[?1004h", b"\x1b[?1004l"), "{variables:?}: the focus is not reported");
+        if has_what.progress {
+            assert!(is_last(&bytes, b"\x1b]9;4;1;", b"\x1b]9;4;0;0\x1b\\"), "{variables:?}: no bar stays");
+        }
+    }
+}
+
+#[test]
+fn other_terminals_get_nothing_of_it() {
+    for variables in OTHERS {
+        let bytes = through(variables, false);
+        for part in [
+            &b"\x1b]2;"[..],
+            b"\x1b]0;",
+            b"\x1b[22;2t",
+            b"\x1b[23;2t",
+            b"\x1b[?1004",
+            b"\x1b]9;",
+            b"\x1b]99;",
+            b"\x1b]777;",
+            b"\x1b]8;",
+            b"\x1b]52;",
+            b"\x1bPtmux;",
+            b"\x07",
+        ] {
+            assert!(!has(&bytes, part), "{variables:?}: {:?}", String::from_utf8_lossy(part));
+        }
+    }
+}
+
+#[test]
+fn signals_in_the_middle_of_a_render_leave_no_title_and_no_bar() {
+    let folder = Folder::new();
+    folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 10000000"));
+    for (signal, code) in
+        [(Signal::SIGTERM, 143), (Signal::SIGHUP, 129), (Signal::SIGINT, 130), (Signal::SIGABRT, 1)]
+    {
+        let mut terminal = open(&folder, &[("WT_SESSION", "1-2-3")]);
+        terminal.wait_for("ETA");
+        terminal.wait("a title and a bar", |_| {
+            let bytes = terminal.bytes();
+            has(&bytes, b"\x1b]2;scene.toml: rendering") && has(&bytes, b"\x1b]9;4;")
+        });
+        terminal.signal(signal);
+        assert_eq!(terminal.code(), code, "{signal}");
+        terminal.wait("the last bytes", |screen| !screen.alternate_screen() && !screen.hide_cursor());
+        let bytes = terminal.bytes();
+        assert!(is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t"), "{signal}");
+        assert!(is_last(&bytes, b"\x1b]9;4;1;", b"\x1b]9;4;0;0\x1b\\"), "{signal}");
+        assert!(is_last(&bytes, b"\x1b[?1004h", b"\x1b[?1004l"), "{signal}");
+    }
+}
+
+/// Whoever looks at the window needs no notification, nor is a short render worth one.
+#[test]
+fn a_notification_is_for_a_long_render_that_nobody_looks_at() {
+    for (focus, after) in
+        [("\x1b[I", "0.001"), ("\x1b[O\x1b[I", "0.001"), ("\x1b[O", "3600"), ("\x1b[O", "0")]
+    {
+        let folder = Folder::new();
+        folder.write("scene.toml", &endless());
+        let command = [folder.program(), "scene.toml", "--notify-after", after];
+        let mut terminal = folder.terminal_with(&command, &[("TERM", "xterm-kitty")]);
+        terminal.wait_for("ETA");
+        terminal.press(focus);
+        folder.write("scene.toml", SCENE);
+        terminal.wait_for_render(1);
+        terminal.settled(vt100::Screen::contents);
+        assert!(!has(&terminal.bytes(), b"\x1b]99;"), "{focus:?} {after}");
+    }
+}
+
+/// The title and the bar of progress come after the picture, and no more is on the way than without them.
+#[test]
+fn over_a_thin_line_the_picture_comes_first() {
+    let folder = Folder::new();
+    folder.write("scene.toml", &endless());
+    let terminal = folder.thin_line_in(Answers::Terminal, &[("WT_SESSION", "1-2-3")]);
+    terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: rendering"));
+    folder.write("scene.toml", SCENE);
+    terminal.wait_for_render(1);
+    terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: done"));
+    let bytes = terminal.bytes();
+    let title = place(&bytes, b"\x1b]2;").expect("a title");
+    let side = |length| std::num::NonZero::new(length).expect("not zero");
+    let mut before = vt100::Parser::new(side(40), side(120), 0);
+    before.process(&bytes[..title]);
+    let red = Colors::of(before.screen()).red;
+    assert!(red > 500, "{red} cells of the picture before the first title");
+    assert!(terminal.line(|seen| seen.most_unanswered) <= 24_000);
+}
+
+#[test]
+fn a_terminal_that_says_its_name_later_gets_what_it_has() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal();
+    terminal.wait_for_render(1);
+    assert!(!has(&terminal.bytes(), b"\x1b]2;"));
+    terminal.press("\x1bP>|ghostty 1.2.0\x1b\\");
+    terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: done"));
+    terminal.wait("reports of the focus", |_| has(&terminal.bytes(), b"\x1b[?1004h"));
+    terminal.press("q");
+    terminal.code();
+    let bytes = terminal.bytes();
+    assert!(
+        is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t")
+            && is_last(&bytes, b"\x1b[?1004h", b"\x1b[?1004l")
+    );
+}
