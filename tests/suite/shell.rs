@@ -168,6 +168,8 @@ fn the_list_of_variables_has_what_the_sources_ask_for() {
     // Libraries ask for these: those of arguments, help and progress bars.
     let of_libraries = ["CLICOLOR", "CLICOLOR_FORCE", "COLUMNS", "LANG"].map(str::to_owned);
     asked.extend(of_libraries);
+    // The one name that is not in capitals.
+    asked.insert("ConEmuANSI".to_owned());
     assert_eq!(asked, listed);
 }
 

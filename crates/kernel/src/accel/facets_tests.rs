@@ -1,20 +1,32 @@
 //! Few triangles against packets of rays: what is decided is what each ray finds alone, by every instruction set.
 
-use super::Instructions;
+use super::{Instructions, Loops};
 use crate::geometry::facets::Facets;
 use crate::geometry::rows::{HitRows, PACKET, RayRows};
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
+use crate::math::lanes::Folds;
 use crate::math::random::signed;
 
 /// Hits of rays, the undecided, what hits any but its own, and the undecided of those.
-fn asked(by: Instructions, facets: &Facets, rays: &[Ray], except: &[u32; PACKET]) -> (HitRows, [u32; 3]) {
-    let (rows, ends) = RayRows::new(rays);
-    let (met, mut found) = (((1_u64 << rays.len()) - 1) as u32, HitRows::none());
-    let open = facets.closest(by, &rows, (met, &ends), &mut found);
-    let [any, open_any] = facets.any(by, &rows, (met, &ends), except);
-    (found, [open, any, open_any])
+struct Asked<'a> {
+    facets: &'a Facets,
+    rays: &'a [Ray],
+    except: &'a [u32; PACKET],
+}
+
+impl Loops for Asked<'_> {
+    type Done = (HitRows, [u32; 3]);
+
+    #[inline(always)]
+    fn run(self, folds: impl Folds) -> Self::Done {
+        let (rows, ends) = RayRows::new(self.rays);
+        let (met, mut found) = (((1_u64 << self.rays.len()) - 1) as u32, HitRows::none());
+        let open = self.facets.closest(&rows, (met, &ends), &mut found, folds);
+        let [any, open_any] = self.facets.any(&rows, (met, &ends), self.except, folds);
+        (found, [open, any, open_any])
+    }
 }
 
 /// A box's six walls, two triangles each.
@@ -40,7 +52,7 @@ fn room(round: usize, next: &mut dyn FnMut() -> f32) -> Vec<[Vec3; 3]> {
     let angle = [0.0, 0.7, 1e-4][round / 2 % 3];
     let (sine, cosine) = f32::sin_cos(angle);
     let (scale, shift) = ([1.0, 300.0, 1e-3][round % 3], [0.0, 5.0, 100.0][round / 3 % 3]);
-    let uneven = if round % 5 == 0 { 0.01 } else { 0.0 };
+    let uneven = if round.is_multiple_of(5) { 0.01 } else { 0.0 };
     triangles
         .iter()
         .map(|corners| {
@@ -106,7 +118,8 @@ fn what_is_decided_is_what_each_ray_finds_alone() {
         let except: [u32; PACKET] =
             std::array::from_fn(|i| if i % 3 == 0 { any(&mut next) as u32 } else { u32::MAX });
         for instructions in Instructions::ALL {
-            let (found, [open, hits_any, open_any]) = asked(instructions, &facets, &rays, &except);
+            let (found, [open, hits_any, open_any]) =
+                instructions.run(Asked { facets: &facets, rays: &rays, except: &except });
             for (i, ray) in rays.iter().enumerate() {
                 let (own, other) = (alone(&triangles, ray, u32::MAX), alone(&triangles, ray, except[i]));
                 let is = |bits: u32| bits & 1 << i != 0;
@@ -141,7 +154,7 @@ fn no_ray_is_lost_for_numbers_that_are_none() {
         ] {
             for instructions in Instructions::ALL {
                 let (found, [open, any, open_any]) =
-                    asked(instructions, &facets, &[ray], &[u32::MAX; PACKET]);
+                    instructions.run(Asked { facets: &facets, rays: &[ray], except: &[u32::MAX; PACKET] });
                 let own = alone(&walls(Vec3::splat(-1.0), Vec3::ONE), &ray, u32::MAX);
                 assert!(open & 1 == 1 || found.get(0) == own, "{ray:?}");
                 assert!(open_any & 1 == 1 || (any & 1 == 1) == own.is_some(), "{ray:?}");

@@ -21,9 +21,8 @@
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, Row};
 use super::watertight_rows::ShearedRows;
-use crate::accel::{Instructions, Loops};
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::lanes::{Folds, TRUE, Truths, set_lane, take, take_u32};
+use crate::math::lanes::{Folds, Loops, TRUE, Truths, set_lane, take, take_u32};
 use crate::math::{DVec3, Vec3};
 
 /// Most triangles.
@@ -145,26 +144,28 @@ impl Facets {
 
     /// Takes the nearest hits of the rays in `met`; the others end below 0. Returns a bit for each that is undecided, whose hit stays
     /// as it was.
+    #[inline(always)]
     pub fn closest(
         &self,
-        by: Instructions,
         rays: &RayRows,
         (met, ends): (u32, &Ends),
         found: &mut HitRows,
+        folds: impl Folds,
     ) -> u32 {
-        by.run(Closest { facets: self, rays, met, ends, found })
+        folds.call(Closest { facets: self, rays, met, ends, found })
     }
 
     /// A bit for each ray in `met` that hits any triangle but its own of `except`, and one for each that is undecided; the others
     /// end below 0.
+    #[inline(always)]
     pub fn any(
         &self,
-        by: Instructions,
         rays: &RayRows,
         (met, ends): (u32, &Ends),
         except: &[u32; PACKET],
+        folds: impl Folds,
     ) -> [u32; 2] {
-        by.run(Any { facets: self, rays, met, ends, except })
+        folds.call(Any { facets: self, rays, met, ends, except })
     }
 
     /// The nearest candidates; never the triangle on which a ray starts, nor that of `except`.

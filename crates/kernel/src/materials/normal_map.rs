@@ -22,8 +22,8 @@ impl NormalMap {
     #[inline]
     pub fn bend(&self, at: &TexturePoint, normal: Vec3, dpdu: Vec3, dpdv: Vec3) -> Vec3 {
         let mapped = self.texture.lookup(at) * 2.0 - Vec3::ONE;
-        let slope = self.texture.direction_before(at, mapped.truncate() * self.strength);
-        let [dpdu, dpdv] = self.texture.tangents(at, [dpdu, dpdv]);
+        let slope = self.texture.unmirrored(at, mapped.truncate() * self.strength);
+        let [dpdu, dpdv] = self.texture.own_tangents(self.texture.tangents(at, [dpdu, dpdv]));
         let (tangent, bitangent) = tangents(normal, dpdu, dpdv);
         let bent = tangent * slope.x + bitangent * slope.y + normal * mapped.z.abs();
         bent.try_normalize().unwrap_or(normal)
@@ -76,6 +76,19 @@ mod tests {
         // The texture's first coordinate is −v.
         let bent = turned.bend(&middle(), Vec3::Z, Vec3::X, Vec3::Y);
         assert!((bent - Vec3::new(0.0, -0.6, 0.8)).length() < 1e-6, "{bent}");
+        // Coordinates that are turned, stretched and skewed: those of the texture are u' = 2 u cos + 3 v sin, and v' = 3 v cos − 2 u
+        // sin with an angle of −30°; its tangent along u' is that of the point where v' stays.
+        let mut turned = map(Vec3::new(0.6, 0.0, 0.8));
+        let texture = Arc::make_mut(&mut turned.texture);
+        (texture.moved, texture.repeat) =
+            (Moved::new(UvSet::First, -30.0, DVec2::ZERO).map(Box::new), Vec2::new(2.0, 3.0));
+        let (dpdu, dpdv) = (Vec3::new(2.0, 0.5, 0.0), Vec3::new(-0.3, 0.7, 0.0));
+        let (sine, cosine) = 30.0_f32.to_radians().sin_cos();
+        // u' changes by 1 where 2 u = cos and 3 v = sin.
+        let along = dpdu * (cosine / 2.0) + dpdv * (sine / 3.0);
+        let bent = turned.bend(&middle(), Vec3::Z, dpdu, dpdv);
+        let expected = along.normalize() * 0.6 + Vec3::Z * 0.8;
+        assert!((bent - expected).length() < 1e-6, "{bent}, not {expected}");
     }
 
     #[test]

@@ -210,16 +210,23 @@ impl Texture {
         slopes.as_vec2() * self.repeat
     }
 
-    /// A direction in the image at texture coordinates, as one of the surface there: turned back as the image is, and mirrored where
-    /// the repetition or the wrap mirrors it. Its length stays.
-    pub fn direction_before(&self, at: &TexturePoint, direction: Vec2) -> Vec2 {
-        let mut direction = direction.as_dvec2();
-        if self.wrap == Wrap::Mirror {
-            let tiles = self.tiles(at);
-            direction *= DVec2::from([tiles.x, tiles.y].map(mirrored_tile));
+    /// Slopes in the image, as slopes along the texture's own coordinates: the wrap may mirror them.
+    pub fn unmirrored(&self, at: &TexturePoint, slopes: Vec2) -> Vec2 {
+        if self.wrap != Wrap::Mirror {
+            return slopes;
         }
-        let direction = self.moved.as_ref().map_or(direction, |moved| moved.vector_before(direction));
-        direction.as_vec2() * self.repeat.signum()
+        let tiles = self.tiles(at);
+        slopes * Vec2::from([tiles.x, tiles.y].map(|tile| mirrored_tile(tile) as f32))
+    }
+
+    /// The changes of a point with the texture's own coordinates, which are repeated, turned and moved, but for their lengths.
+    pub fn own_tangents(&self, [dpdu, dpdv]: [Vec3; 2]) -> [Vec3; 2] {
+        let sides = self.repeat.signum();
+        let Some(moved) = &self.moved else { return [dpdu * sides.x, dpdv * sides.y] };
+        [DVec2::X, DVec2::Y].map(|axis| {
+            let by = moved.vector_before(axis).as_vec2() / self.repeat;
+            dpdu * by.x + dpdv * by.y
+        })
     }
 
     /// Number of texels in a unit of u and v.

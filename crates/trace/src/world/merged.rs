@@ -6,12 +6,13 @@
 
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
-use crate::accel::{Ends, Instructions, PACKET};
+use crate::accel::{Ends, PACKET};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::facets::{self, Facets};
 use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
+use crate::math::lanes::Folds;
 
 /// Most triangles of a mesh that is merged: a larger one is worth its own tree, and an edit that moves it then rebuilds
 /// nothing.
@@ -153,15 +154,16 @@ impl MergedMeshes {
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
     /// The nearest hits of the rays in `met`, with the numbers of triangles; the others end below 0.
+    #[inline(always)]
     pub fn closest_rows(
         &self,
-        by: Instructions,
         rows: &RayRows,
         (met, ends): (u32, &Ends),
         found: &mut HitRows,
+        folds: impl Folds,
     ) {
         let Some(facets) = &self.facets else { return self.closest_by_tree(rows, met, ends, found) };
-        let undecided = facets.closest(by, rows, (met, ends), found);
+        let undecided = facets.closest(rows, (met, ends), found, folds);
         if undecided != 0 {
             self.closest_of_each(rows, undecided, ends, found);
         }
@@ -191,16 +193,17 @@ impl MergedMeshes {
 
     /// A bit for each ray in `met` that hits any triangle but its own of `except`; this holds a triangle's number for each
     /// ray, or [`MergedMeshes::NO_TRIANGLE`].
+    #[inline(always)]
     pub fn any_rows(
         &self,
-        by: Instructions,
         rows: &RayRows,
         (met, ends): (u32, &Ends),
         except: Option<&[u32; PACKET]>,
+        folds: impl Folds,
     ) -> u32 {
         let Some(facets) = &self.facets else { return self.any_by_tree(rows, met, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET]);
-        let [hit, undecided] = facets.any(by, rows, (met, ends), own);
+        let [hit, undecided] = facets.any(rows, (met, ends), own, folds);
         if undecided == 0 { hit } else { hit | self.any_of_each(rows, undecided, ends, own) }
     }
 
@@ -408,7 +411,13 @@ pub(super) mod tests {
         assert_eq!(members(&[(&small, here), (&few, here)]), Some(vec![0, 1]));
         assert_eq!(members(&[(&small, here), (&few, far), (&few, here)]), Some(vec![0, 2]));
         assert_eq!(members(&[(&small, here)]), None, "alone");
-        assert_eq!(members(&[(&few, here), (&few, here)]), None, "fewer triangles than are worth a tree");
+        // Few triangles are met without a tree, if there are enough, and none is a needle.
+        assert_eq!(members(&[(&few, here), (&few, here)]), Some(vec![0, 1]));
+        assert_eq!(members(&[(&few, here)]), Some(vec![0]));
+        let (least, needles) = (mesh(5, 3), mesh(6, 8));
+        assert_eq!(members(&[(&least, here), (&few, far)]), None, "fewer than are worth it");
+        let flat = Transform::scale_rotate_translate(DVec3::new(1.0, 1e-6, 1e-6), DVec3::ZERO, DVec3::ZERO);
+        assert_eq!(members(&[(&needles, flat), (&few, here)]), None, "needles");
         let large = mesh(3, 14_000);
         assert_eq!(members(&[(&large, here), (&small, here), (&few, here)]), Some(vec![1, 2]));
         // The smallest are merged until there is no room.

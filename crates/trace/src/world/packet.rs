@@ -151,8 +151,7 @@ impl<F: Folds> ClosestTest for Nearest<'_, F> {
         let (these, mut objects) = (of_these(met, ends), [id; PACKET]);
         match self.geometry.merged(id) {
             Some(merged) => {
-                let by = self.geometry.instructions();
-                merged.closest_rows(by, self.rows, (met, &these), &mut found);
+                merged.closest_rows(self.rows, (met, &these), &mut found, self.folds);
                 objects = numbered_by_object(merged, &mut found);
             }
             None => {
@@ -212,14 +211,14 @@ impl<F: Folds> AnyTest for Blockers<'_, F> {
         if let Some(merged) = self.geometry.merged(id) {
             let these = of_these(met, ends);
             if self.in_part & met == 0 {
-                return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), None);
+                return merged.any_rows(self.rows, (met, &these), None, self.folds);
             }
             let mut own = [MergedMeshes::NO_TRIANGLE; PACKET];
             for lane in lanes(self.in_part & met) {
                 let number = merged.number(self.sources.object[lane], self.sources.part[lane]);
                 own[lane] = number.unwrap_or(MergedMeshes::NO_TRIANGLE);
             }
-            return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), Some(&own));
+            return merged.any_rows(self.rows, (met, &these), Some(&own), self.folds);
         }
         let own = own_bits(self.sources, id, self.folds);
         let (whole, in_part) = (own & !self.in_part, own & self.in_part);

@@ -85,7 +85,7 @@ pub fn probe() -> Option<Probe> {
     let questions = if is_plain(variable) || way.is_multiplexed {
         Vec::new()
     } else {
-        let ask = Ask { blocks: true, true_color: true, background: true, palette: false };
+        let ask = Ask { blocks: true, name: true, true_color: true, background: true, palette: false };
         [&ask.questions(), SYNCHRONIZED, IMAGE].concat()
     };
     let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
@@ -183,7 +183,8 @@ impl Heard {
             Answer::Ready
             | Answer::Attributes
             | Answer::Synchronized { .. }
-            | Answer::Blocks(_)
+            | Answer::Name(_)
+            | Answer::Focus { .. }
             | Answer::TrueColor
             | Answer::Ink { .. }
             | Answer::Other => None,

@@ -66,7 +66,7 @@ impl Terminal {
             ("ghostty", Brand::Ghostty),
             ("WezTerm", Brand::WezTerm),
             ("contour", Brand::Contour),
-            ("VTE", Brand::Vte),
+            ("vte", Brand::Vte),
             ("Konsole", Brand::Konsole),
             ("iTerm2", Brand::Iterm2),
             ("mintty", Brand::Mintty),

@@ -444,8 +444,8 @@ mod tests {
         let tables: String = names.iter().map(|name| table(name) + &ball(name)).collect();
         let mut bench = Bench::new(&format!("{SCENE}{tables}"));
         for name in names {
-            // As long as a file of so many pixels may be at the least.
-            bench.write(&format!("{name}.ppm"), &format!("P6 16000 16000 255\n{}", " ".repeat(400_000)));
+            // As long as a file of so many pixels is at the least, a bit for each.
+            bench.write(&format!("{name}.ppm"), &format!("P4 16000 16000\n{}", " ".repeat(16_000 * 2000)));
         }
         let Failure::Scene(errors) = bench.failed() else { panic!("errors in the scene") };
         let over: Vec<_> = errors.iter().filter(|error| error.message.contains("together")).collect();
