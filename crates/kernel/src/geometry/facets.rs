@@ -22,7 +22,7 @@
 use super::rows::{Ends, HitRows, PACKET, RayRows, Row};
 use super::watertight_rows::ShearedRows;
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::lanes::{Folds, Loops, TRUE, Truths, set_lane, take, take_u32};
+use crate::math::lanes::{Folds, TRUE, Truths, set_lane, take, take_u32};
 use crate::math::{DVec3, Vec3};
 
 /// Most triangles.
@@ -152,7 +152,13 @@ impl Facets {
         found: &mut HitRows,
         folds: impl Folds,
     ) -> u32 {
-        folds.call(Closest { facets: self, rays, met, ends, found })
+        let candidates = self.candidates(rays, ends, &[NONE; PACKET]);
+        let Tested { hit, undecided, hits } = self.test(rays, &candidates, (met, ends), folds);
+        take(&hit, &hits.t, &mut found.t);
+        take(&hit, &hits.u, &mut found.u);
+        take(&hit, &hits.v, &mut found.v);
+        take_u32(&hit, &candidates.number, &mut found.primitive);
+        undecided
     }
 
     /// A bit for each ray in `met` that hits any triangle but its own of `except`, and one for each that is undecided; the others
@@ -165,7 +171,16 @@ impl Facets {
         except: &[u32; PACKET],
         folds: impl Folds,
     ) -> [u32; 2] {
-        folds.call(Any { facets: self, rays, met, ends, except })
+        let candidates = self.candidates(rays, ends, except);
+        let mut is_met = candidates.doubtful;
+        for i in 0..PACKET {
+            is_met[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
+        }
+        if folds.bits(&is_met) & met == 0 {
+            return [0; 2];
+        }
+        let Tested { hit, undecided, .. } = self.test(rays, &candidates, (met, ends), folds);
+        [folds.bits(&hit) & met, undecided]
     }
 
     /// The nearest candidates; never the triangle on which a ray starts, nor that of `except`.
@@ -287,59 +302,6 @@ impl Facets {
     /// Bytes that they take.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(&*self.facets) + size_of_val(&*self.corners)
-    }
-}
-
-/// [`Facets::closest`].
-struct Closest<'a> {
-    facets: &'a Facets,
-    rays: &'a RayRows,
-    met: u32,
-    ends: &'a Ends,
-    found: &'a mut HitRows,
-}
-
-impl Loops for Closest<'_> {
-    type Done = u32;
-
-    #[inline(always)]
-    fn run(self, folds: impl Folds) -> u32 {
-        let Self { facets, rays, met, ends, found } = self;
-        let candidates = facets.candidates(rays, ends, &[NONE; PACKET]);
-        let Tested { hit, undecided, hits } = facets.test(rays, &candidates, (met, ends), folds);
-        take(&hit, &hits.t, &mut found.t);
-        take(&hit, &hits.u, &mut found.u);
-        take(&hit, &hits.v, &mut found.v);
-        take_u32(&hit, &candidates.number, &mut found.primitive);
-        undecided
-    }
-}
-
-/// [`Facets::any`].
-struct Any<'a> {
-    facets: &'a Facets,
-    rays: &'a RayRows,
-    met: u32,
-    ends: &'a Ends,
-    except: &'a [u32; PACKET],
-}
-
-impl Loops for Any<'_> {
-    type Done = [u32; 2];
-
-    #[inline(always)]
-    fn run(self, folds: impl Folds) -> [u32; 2] {
-        let Self { facets, rays, met, ends, except } = self;
-        let candidates = facets.candidates(rays, ends, except);
-        let mut is_met = candidates.doubtful;
-        for i in 0..PACKET {
-            is_met[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
-        }
-        if folds.bits(&is_met) & met == 0 {
-            return [0; 2];
-        }
-        let Tested { hit, undecided, .. } = facets.test(rays, &candidates, (met, ends), folds);
-        [folds.bits(&hit) & met, undecided]
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
-use crate::accel::{Ends, PACKET};
+use crate::accel::{Ends, Instructions, Loops, PACKET};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::facets::{self, Facets};
 use crate::geometry::rows::{HitRows, RayRows, lanes};
@@ -154,16 +154,16 @@ impl MergedMeshes {
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
     /// The nearest hits of the rays in `met`, with the numbers of triangles; the others end below 0.
-    #[inline(always)]
+    #[inline(never)]
     pub fn closest_rows(
         &self,
+        by: Instructions,
         rows: &RayRows,
         (met, ends): (u32, &Ends),
         found: &mut HitRows,
-        folds: impl Folds,
     ) {
         let Some(facets) = &self.facets else { return self.closest_by_tree(rows, met, ends, found) };
-        let undecided = facets.closest(rows, (met, ends), found, folds);
+        let undecided = by.run(Nearest { facets, rows, met, ends, found });
         if undecided != 0 {
             self.closest_of_each(rows, undecided, ends, found);
         }
@@ -193,17 +193,17 @@ impl MergedMeshes {
 
     /// A bit for each ray in `met` that hits any triangle but its own of `except`; this holds a triangle's number for each
     /// ray, or [`MergedMeshes::NO_TRIANGLE`].
-    #[inline(always)]
+    #[inline(never)]
     pub fn any_rows(
         &self,
+        by: Instructions,
         rows: &RayRows,
         (met, ends): (u32, &Ends),
         except: Option<&[u32; PACKET]>,
-        folds: impl Folds,
     ) -> u32 {
         let Some(facets) = &self.facets else { return self.any_by_tree(rows, met, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET]);
-        let [hit, undecided] = facets.any(rows, (met, ends), own, folds);
+        let [hit, undecided] = by.run(Any { facets, rows, met, ends, except: own });
         if undecided == 0 { hit } else { hit | self.any_of_each(rows, undecided, ends, own) }
     }
 
@@ -230,6 +230,42 @@ impl MergedMeshes {
     pub fn memory_bytes(&self) -> usize {
         let facets = self.facets.as_ref().map_or(0, Facets::memory_bytes);
         self.tree.memory_bytes() + facets + size_of_val(&*self.triangles) + size_of_val(&*self.first)
+    }
+}
+
+/// [`Facets::closest`].
+struct Nearest<'a> {
+    facets: &'a Facets,
+    rows: &'a RayRows,
+    met: u32,
+    ends: &'a Ends,
+    found: &'a mut HitRows,
+}
+
+impl Loops for Nearest<'_> {
+    type Done = u32;
+
+    #[inline(always)]
+    fn run(self, folds: impl Folds) -> u32 {
+        self.facets.closest(self.rows, (self.met, self.ends), self.found, folds)
+    }
+}
+
+/// [`Facets::any`].
+struct Any<'a> {
+    facets: &'a Facets,
+    rows: &'a RayRows,
+    met: u32,
+    ends: &'a Ends,
+    except: &'a [u32; PACKET],
+}
+
+impl Loops for Any<'_> {
+    type Done = [u32; 2];
+
+    #[inline(always)]
+    fn run(self, folds: impl Folds) -> [u32; 2] {
+        self.facets.any(self.rows, (self.met, self.ends), self.except, folds)
     }
 }
 

@@ -151,7 +151,8 @@ impl<F: Folds> ClosestTest for Nearest<'_, F> {
         let (these, mut objects) = (of_these(met, ends), [id; PACKET]);
         match self.geometry.merged(id) {
             Some(merged) => {
-                merged.closest_rows(self.rows, (met, &these), &mut found, self.folds);
+                let by = self.geometry.instructions();
+                merged.closest_rows(by, self.rows, (met, &these), &mut found);
                 objects = numbered_by_object(merged, &mut found);
             }
             None => {
@@ -211,14 +212,14 @@ impl<F: Folds> AnyTest for Blockers<'_, F> {
         if let Some(merged) = self.geometry.merged(id) {
             let these = of_these(met, ends);
             if self.in_part & met == 0 {
-                return merged.any_rows(self.rows, (met, &these), None, self.folds);
+                return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), None);
             }
             let mut own = [MergedMeshes::NO_TRIANGLE; PACKET];
             for lane in lanes(self.in_part & met) {
                 let number = merged.number(self.sources.object[lane], self.sources.part[lane]);
                 own[lane] = number.unwrap_or(MergedMeshes::NO_TRIANGLE);
             }
-            return merged.any_rows(self.rows, (met, &these), Some(&own), self.folds);
+            return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), Some(&own));
         }
         let own = own_bits(self.sources, id, self.folds);
         let (whole, in_part) = (own & !self.in_part, own & self.in_part);
