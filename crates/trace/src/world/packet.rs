@@ -25,7 +25,10 @@ impl Geometry {
         traced: u32,
         folds: impl Folds,
     ) -> (HitRows, [u32; PACKET]) {
-        folds.call(ClosestRows { geometry: self, rows, ends, traced })
+        let mut nearest =
+            Nearest { geometry: self, rows, hits: HitRows::none(), object: [NONE; PACKET], folds };
+        self.visited().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, folds);
+        (nearest.hits, nearest.object)
     }
 
     /// [`Geometry::occluded`] for the segments of a packet, each with its light: a bit for each that is occluded. `traced` are the
@@ -64,26 +67,6 @@ impl Geometry {
         let is_occluded =
             |&lane: &usize| self.occluded(&Ray { t_max: ends[lane], ..rows.ray(lane) }, sources.source(lane));
         lanes(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
-    }
-}
-
-/// [`Geometry::closest_rows`].
-struct ClosestRows<'a> {
-    geometry: &'a Geometry,
-    rows: &'a RayRows,
-    ends: &'a mut Ends,
-    traced: u32,
-}
-
-impl Loops for ClosestRows<'_> {
-    type Done = (HitRows, [u32; PACKET]);
-
-    #[inline(always)]
-    fn run(self, folds: impl Folds) -> Self::Done {
-        let Self { geometry, rows, ends, traced } = self;
-        let mut nearest = Nearest { geometry, rows, hits: HitRows::none(), object: [NONE; PACKET], folds };
-        geometry.visited().closest_packet(rows, ends, traced, geometry.unbounded(), &mut nearest, folds);
-        (nearest.hits, nearest.object)
     }
 }
 
