@@ -1,14 +1,15 @@
 //! Environment variables that the program reads, with their effects: the one list of them, for the help, the man page and the pages.
 
 /// Names that belong together, separated by commas, and their effect.
-pub const VARIABLES: [(&str, &str); 13] = [
+pub const VARIABLES: [(&str, &str); 14] = [
     ("NO_COLOR", "no colours, unless `--color` asks for them"),
     ("CLICOLOR, CLICOLOR_FORCE, COLUMNS", "colours (0: none, 1: also without a terminal) and width of help"),
     ("COLORTERM, TERM, TERM_PROGRAM", "which colours and blocks the terminal has"),
     (
-        "TERM_PROGRAM_VERSION, VTE_VERSION, KONSOLE_VERSION, XTERM_VERSION, WT_SESSION, ConEmuANSI, LC_TERMINAL, LC_TERMINAL_VERSION",
-        "which terminal it is: whether it has a title, progress, links, notifications and a clipboard",
+        "TERM_PROGRAM_VERSION, VTE_VERSION, KONSOLE_VERSION, XTERM_VERSION",
+        "which version it has, and so whether it shows progress, links and notifications",
     ),
+    ("WT_SESSION, ConEmuANSI, LC_TERMINAL, LC_TERMINAL_VERSION", "the same, of other terminals"),
     ("COLORFGBG", "whether its background is light"),
     ("TMUX, STY", "glimt is in tmux or screen"),
     ("SSH_CONNECTION, SSH_CLIENT, SSH_TTY", "the shell came over SSH"),
