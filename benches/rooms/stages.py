@@ -23,7 +23,7 @@ STAGES = [
     ("lamps: picks", ["pick_flat", "pick_by_cuts", "picks", "flat_shares", "go_to", "samples_at"]),
     ("lamps: samples", ["sample_row", "sample_each", "sample_density", "inverse_densit"]),
     ("shadow rays", ["occluded", "any_packet", "any_rows", "any_avx", "any_of_few", "single::any", "packet::any", "pool", "is_hit", "doubtful_hit", "add_seen"]),
-    ("closest hits", ["closest", "single::nearest", "packet::nearest", "intersect_at_start", "in_f64", "alone", "nearer", "packet::Closest", "merged::rays"]),
+    ("closest hits", ["facets", "closest", "single::nearest", "packet::nearest", "intersect_at_start", "in_f64", "alone", "nearer", "packet::Closest", "merged::rays"]),
     ("surfaces", ["fill_surfaces", "fill_others", "surface", "facet", "place", "set_bsdf", "packet::Meeting"]),
     ("textures", ["lookup", "texture"]),
     ("light of lamps", ["add_all", "add_pick", "Lighting", "Picking", "values", "response"]),

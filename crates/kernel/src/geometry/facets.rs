@@ -198,6 +198,9 @@ impl Facets {
         for facet in &self.facets {
             let Facet { normal, offset, across: [first, second], start, low, high, most, .. } = *facet;
             let (steep, [slender, wide]) = (facet.steep, facet.slender);
+            // By bits, as compilers would choose between two places in memory, one lane after the other.
+            let [one, other] = facet.numbers;
+            let (between, is_single) = (one ^ other, one == other);
             for i in 0..PACKET {
                 // Cut the plane.
                 let above = offset - (normal.x * ox[i] + normal.y * oy[i] + normal.z * oz[i]);
@@ -225,18 +228,19 @@ impl Facets {
                 let is_sharp = (margin < BLUNT) & (least > f32::MIN) & (least < f32::MAX);
                 // Decide which of the two triangles it is.
                 let over = u + v - 1.0;
-                let number = if over < 0.0 { facet.numbers[0] } else { facet.numbers[1] };
+                let number = other ^ (between & if over < 0.0 { TRUE } else { 0 });
                 let is_apart = (over > 2.0 * margin) | (over < -2.0 * margin);
-                let is_sure = is_sharp & (is_apart | (facet.numbers[0] == facet.numbers[1]));
+                let is_sure = is_sharp & (is_apart | is_single);
                 let is_left_out = is_sure & ((rays.start[i] == number) | (except[i] == number));
                 let is_candidate = !(is_far | is_outside & is_sharp | is_left_out);
                 // Keep the nearest.
-                let is_nearer = is_candidate & (least < found.near[i]);
-                let farther = if is_nearer { found.near[i] } else { least };
-                let is_next = is_candidate & (farther < found.next[i]);
-                found.next[i] = if is_next { farther } else { found.next[i] };
-                found.near[i] = if is_nearer { least } else { found.near[i] };
-                found.number[i] = if is_nearer { number } else { found.number[i] };
+                let (near, next, nearest) = (found.near[i], found.next[i], found.number[i]);
+                let is_nearer = is_candidate & (least < near);
+                let farther = if is_nearer { near } else { least };
+                let is_next = is_candidate & (farther < next);
+                found.next[i] = if is_next { farther } else { next };
+                found.near[i] = if is_nearer { least } else { near };
+                found.number[i] = if is_nearer { number } else { nearest };
                 found.doubtful[i] |= if is_candidate & !is_sure { TRUE } else { 0 };
             }
         }
