@@ -162,11 +162,20 @@ impl MergedMeshes {
         (met, ends): (u32, &Ends),
         found: &mut HitRows,
     ) {
-        let Some(facets) = &self.facets else { return self.closest_by_tree(rows, met, ends, found) };
+        let Some(facets) = self.facets_for(rows, met) else {
+            return self.closest_by_tree(rows, met, ends, found);
+        };
         let undecided = by.run(Nearest { facets, rows, met, ends, found });
         if undecided != 0 {
             self.closest_of_each(rows, undecided, ends, found);
         }
+    }
+
+    /// The facets, if there are few triangles, and the rays in `met` do not go the same way: those that do visit fewer triangles of
+    /// the tree.
+    #[inline]
+    fn facets_for(&self, rows: &RayRows, met: u32) -> Option<&Facets> {
+        self.facets.as_ref().filter(|_| !are_alike(rows, met, self.bounds().extent()))
     }
 
     /// The nearest hits of these rays, one by one.
@@ -201,7 +210,9 @@ impl MergedMeshes {
         (met, ends): (u32, &Ends),
         except: Option<&[u32; PACKET]>,
     ) -> u32 {
-        let Some(facets) = &self.facets else { return self.any_by_tree(rows, met, ends, except) };
+        let Some(facets) = self.facets_for(rows, met) else {
+            return self.any_by_tree(rows, met, ends, except);
+        };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET]);
         let [hit, undecided] = by.run(Any { facets, rows, met, ends, except: own });
         if undecided == 0 { hit } else { hit | self.any_of_each(rows, undecided, ends, own) }
@@ -232,6 +243,26 @@ impl MergedMeshes {
         self.tree.memory_bytes() + facets + size_of_val(&*self.triangles) + size_of_val(&*self.first)
     }
 }
+
+/// Whether the rays in `met` start near each other, by the size of a box, and go similar ways.
+fn are_alike(rows: &RayRows, met: u32, size: Vec3) -> bool {
+    let first = met.trailing_zeros() as usize % PACKET;
+    let near = size.element_sum() * ALIKE;
+    let along = (0..3).map(|axis| rows.direction[axis][first].abs()).sum::<f32>() * ALIKE;
+    let mut is_alike = true;
+    for lane in 0..PACKET {
+        let (mut apart, mut aside) = (0.0, 0.0);
+        for axis in 0..3 {
+            apart += (rows.origin[axis][lane] - rows.origin[axis][first]).abs();
+            aside += (rows.direction[axis][lane] - rows.direction[axis][first]).abs();
+        }
+        is_alike &= (met >> lane & 1 == 0) | ((apart <= near) & (aside <= along));
+    }
+    is_alike
+}
+
+/// Greatest distance of the starts of rays, by the size of all triangles, and of their directions, by their length.
+const ALIKE: f32 = 0.125;
 
 /// [`Facets::closest`].
 struct Nearest<'a> {
