@@ -412,3 +412,29 @@ fn photons_pass_rough_glass_that_does_not_refract() {
         assert_same_light(what, means, 1.5e-2, 4e-3);
     }
 }
+
+#[test]
+fn a_sheet_on_glass_gains_no_light() {
+    // From inside of glass below a sheet, under a sky above it: what comes through, by basic radiance, is a part 1/n² of what it is
+    // in air, as from there light spreads over fewer directions. Nothing comes back from the depth.
+    let sky: Vec<Vec3> = [1.0, 1.0, 0.0, 0.0].map(Vec3::splat).to_vec();
+    let sheet = |build: Build| {
+        let build =
+            build.quad(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0), translucent(0.9, 0.6, 0.8));
+        build.sky(2, sky.clone(), 0.0).pictured(v(0.3, -0.5, 0.4), v(0.0, 0.0, 0.0), 6.0, 4, 4)
+    };
+    let half_space = Shape::Plane { point: DVec3::ZERO, normal: DVec3::Y };
+    for (what, build) in [
+        ("after", sheet(scene().shape(half_space.clone(), glass(1.5)))),
+        ("before", sheet(scene()).shape(half_space, glass(1.5))),
+    ] {
+        let means = |build: Build| {
+            let values: Vec<f64> = by_paths(build, 4).values(256, 16);
+            mean_and_error(&values)
+        };
+        let ((air, error), (inside, other)) = (means(sheet(scene())), means(build));
+        let exact = air / 2.25;
+        assert!(air > 0.3 && other < 0.01 * exact, "{what}: {inside} ± {other}, {air} ± {error} in air");
+        assert!((inside - exact).abs() < 4.0 * other.hypot(error), "{what}: {inside} ± {other}, not {exact}");
+    }
+}
