@@ -13,29 +13,6 @@ pub(super) enum Blocks {
     Octants,
 }
 
-/// A terminal that has 24 bits of colour and repeats characters (REP).
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Program {
-    /// Its name in `TERM_PROGRAM`.
-    name: &'static str,
-    /// Whether it shows images by iTerm2's protocol.
-    pub(super) has_iterm: bool,
-}
-
-impl Program {
-    const ALL: [Self; 4] = [
-        Self { name: "iTerm.app", has_iterm: true },
-        Self { name: "WezTerm", has_iterm: true },
-        Self { name: "vscode", has_iterm: true },
-        Self { name: "ghostty", has_iterm: false },
-    ];
-
-    /// The terminal of this name. `None` if nothing is known of it.
-    pub(super) fn of(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|program| program.name == name)
-    }
-}
-
 impl Blocks {
     /// Blocks of a terminal of this version; all those that are known draw sextants since long.
     pub(super) fn of(terminal: Terminal) -> Self {
@@ -68,7 +45,7 @@ pub(super) enum Answer {
     Attributes,
     /// Whether mode 2026 is known, by which large changes appear at once.
     Synchronized { is_known: bool },
-    /// Its name and version (XTVERSION), if it is one of those that are told apart.
+    /// The terminal and its version (XTVERSION), if glimt knows its name.
     Name(Terminal),
     /// Whether its window has the focus now (mode 1004).
     Focus { is_here: bool },

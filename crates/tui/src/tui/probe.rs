@@ -11,9 +11,9 @@ use super::color::{self, ColorChoice, ColorDepth};
 use super::display::{ATTRIBUTES, STATUS, SYNCHRONIZED};
 use super::environment::{is_plain, way};
 use super::input::{Decoder, Input};
-use super::known::{Answer, Ask, Blocks, Program};
+use super::known::{Answer, Ask, Blocks};
 use super::terminal;
-use super::terminals::Terminal;
+use super::terminals::{Brand, Terminal};
 
 /// Answers of a terminal, and what its environment says.
 #[derive(Clone, Debug)]
@@ -90,14 +90,14 @@ pub fn probe() -> Option<Probe> {
     };
     let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
     let answers = if is_dumb { None } else { ask(&questions).ok().flatten() };
-    let program = variable("TERM_PROGRAM").and_then(|program| Program::of(&program));
+    let brand = variable("TERM_PROGRAM").and_then(|program| Brand::of_program(&program));
     Some(Probe {
         cells: (window.columns, window.rows),
         cell_pixels: window.cell_pixels,
         depth: color::depth(ColorChoice::Auto, variable),
         is_multiplexed: way.is_multiplexed,
         is_remote: way.is_remote,
-        has_iterm: program.is_some_and(|program| program.has_iterm),
+        has_iterm: brand.is_some_and(Brand::has_iterm_images),
         answers,
     })
 }

@@ -1,6 +1,6 @@
 //! Terminals by name and version, and what each is known to do besides text. Nothing of it is sent to others.
 
-/// Terminals that are told apart.
+/// Terminals that glimt knows by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Brand {
     Kitty,
@@ -35,13 +35,13 @@ pub(super) enum Notice {
     Osc9,
     /// kitty's.
     Osc99,
-    /// That of rxvt-unicode, with a title.
+    /// rxvt-unicode's, with a title.
     Osc777,
     /// The bell, by which a window asks for attention.
     Bell,
 }
 
-/// What a terminal is known to do.
+/// Abilities of a terminal besides text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Abilities {
     /// A title of the window (OSC 2).
@@ -55,6 +55,58 @@ pub(super) struct Abilities {
     pub(super) links: bool,
     /// Takes text for the clipboard (OSC 52), perhaps after a question.
     pub(super) clipboard: bool,
+}
+
+impl Brand {
+    /// The terminal that `TERM_PROGRAM` names so. `None` if glimt knows none of that name.
+    pub(super) fn of_program(name: &str) -> Option<Self> {
+        const PROGRAMS: [(&str, Brand); 6] = [
+            ("ghostty", Brand::Ghostty),
+            ("WezTerm", Brand::WezTerm),
+            ("iTerm.app", Brand::Iterm2),
+            ("mintty", Brand::Mintty),
+            ("vscode", Brand::VsCode),
+            ("Apple_Terminal", Brand::AppleTerminal),
+        ];
+        PROGRAMS.iter().find(|(known, _)| *known == name).map(|(_, brand)| *brand)
+    }
+
+    /// Whether a terminal that `TERM_PROGRAM` names has 24 bits of colour and repeats characters (REP).
+    pub(super) fn has_colors_and_repeats(self) -> bool {
+        match self {
+            Self::Ghostty | Self::WezTerm | Self::Iterm2 | Self::VsCode => true,
+            Self::Kitty
+            | Self::Foot
+            | Self::Contour
+            | Self::Vte
+            | Self::Konsole
+            | Self::WindowsTerminal
+            | Self::ConEmu
+            | Self::Mintty
+            | Self::Alacritty
+            | Self::AppleTerminal
+            | Self::Xterm => false,
+        }
+    }
+
+    /// Whether it shows images by iTerm2's protocol.
+    pub(super) fn has_iterm_images(self) -> bool {
+        match self {
+            Self::WezTerm | Self::Iterm2 | Self::VsCode => true,
+            Self::Kitty
+            | Self::Foot
+            | Self::Ghostty
+            | Self::Contour
+            | Self::Vte
+            | Self::Konsole
+            | Self::WindowsTerminal
+            | Self::ConEmu
+            | Self::Mintty
+            | Self::Alacritty
+            | Self::AppleTerminal
+            | Self::Xterm => false,
+        }
+    }
 }
 
 impl Terminal {
@@ -88,14 +140,6 @@ impl Terminal {
             ("contour", Brand::Contour),
             ("alacritty", Brand::Alacritty),
         ];
-        const PROGRAMS: [(&str, Brand); 6] = [
-            ("ghostty", Brand::Ghostty),
-            ("WezTerm", Brand::WezTerm),
-            ("iTerm.app", Brand::Iterm2),
-            ("mintty", Brand::Mintty),
-            ("vscode", Brand::VsCode),
-            ("Apple_Terminal", Brand::AppleTerminal),
-        ];
         let get = |name: &str| variable(name).unwrap_or_default();
         let is_set = |name: &str| !get(name).is_empty();
         let term = get("TERM");
@@ -104,8 +148,8 @@ impl Terminal {
         }
         let known = |brand: Brand, number: &str| Some(Self { brand, version: version(&get(number)) });
         // A terminal within another one overwrites these two.
-        if let Some((_, brand)) = PROGRAMS.iter().find(|(name, _)| get("TERM_PROGRAM") == *name) {
-            return known(*brand, "TERM_PROGRAM_VERSION");
+        if let Some(brand) = Brand::of_program(&get("TERM_PROGRAM")) {
+            return known(brand, "TERM_PROGRAM_VERSION");
         }
         if let Some((_, brand)) = TERMS.iter().find(|(name, _)| term.starts_with(name)) {
             return known(*brand, "TERM_PROGRAM_VERSION").filter(|_| !is_set("TERM_PROGRAM"));
@@ -126,7 +170,7 @@ impl Terminal {
         }
     }
 
-    /// What it is known to do, from the documentation of each.
+    /// Its abilities, by its documentation.
     pub(super) fn abilities(self) -> Abilities {
         let Self { brand, version } = self;
         let all = Abilities {
@@ -155,7 +199,7 @@ impl Terminal {
             Brand::Vte => {
                 Abilities { progress: since([8000, 0]), links: since([5000, 0]), clipboard: false, ..all }
             }
-            // It takes text for the clipboard only if it was told to.
+            // By default, xterm refuses text for the clipboard.
             Brand::Xterm => Abilities { links: false, clipboard: false, ..all },
             Brand::ConEmu => Abilities { title: true, progress: true, ..Abilities::default() },
             Brand::AppleTerminal => {

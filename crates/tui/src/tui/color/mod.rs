@@ -15,7 +15,7 @@ pub use self::palette::in_xterm;
 pub(super) use self::palette::{Ansi, XTERM, ansi, fixed, nearest_256};
 pub(super) use self::pattern::finer;
 pub(super) use self::shades::Shades;
-use super::known::Program;
+use super::terminals::Brand;
 use crate::choice;
 
 choice! {
@@ -89,7 +89,7 @@ fn is_true_color(term: &str, program: &str) -> bool {
     // Inside tmux TERM_PROGRAM is `tmux`, so that what the outer terminal can do does not leak in.
     term.ends_with("-direct")
         || TERMS.iter().any(|name| term.contains(name))
-        || Program::of(program).is_some()
+        || Brand::of_program(program).is_some_and(Brand::has_colors_and_repeats)
 }
 
 /// Whether the environment says that the terminal's background is light: rxvt's `COLORFGBG`, which some others set as well.

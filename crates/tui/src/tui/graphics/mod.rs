@@ -29,7 +29,7 @@ pub(super) enum Protocol {
     Kitty,
     /// DEC's: foot, xterm with `-ti vt340`, mlterm, tmux.
     Sixel,
-    /// iTerm2's, for the terminals that [`Program`](super::known::Program) names.
+    /// iTerm2's, for the terminals that [`Brand`](super::terminals::Brand) tells.
     Iterm,
 }
 

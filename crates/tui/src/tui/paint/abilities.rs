@@ -1,6 +1,6 @@
 //! Abilities of a terminal, by its name.
 
-use crate::tui::known::Program;
+use crate::tui::terminals::Brand;
 
 /// Whether the terminal knows REP (ECMA-48 8.3.103: the character before so many times more), by the names that it
 /// leaves in the environment. Many call themselves `xterm-256color`, and not all of those do.
@@ -10,7 +10,7 @@ pub fn can_repeat(variable: impl Fn(&str) -> Option<String>) -> bool {
     let get = |name: &str| variable(name).unwrap_or_default();
     let (term, program) = (get("TERM"), get("TERM_PROGRAM"));
     TERMS.iter().any(|name| term.starts_with(name))
-        || (get("TMUX").is_empty() && Program::of(&program).is_some())
+        || (get("TMUX").is_empty() && Brand::of_program(&program).is_some_and(Brand::has_colors_and_repeats))
 }
 
 #[cfg(test)]
