@@ -73,7 +73,8 @@
 //!
 //! 1. `mod.rs`: takes the tile's samples and the settings that count; `method.rs` derives how rays behave; `transport/tile.rs` stores all.
 //! 2. `transport/camera.rs` makes rows of sixteen rays; `eye.rs` follows them round by round.
-//! 3. `transport/packet.rs` intersects a row: `world/geometry.rs`, then the trees of `accel/wide_bvh/`.
+//! 3. `transport/packet.rs` intersects a row: `world/geometry.rs`, then the trees of `accel/wide_bvh/`, or `geometry/facets.rs` for few
+//!    triangles.
 //! 4. `packet.rs` puts surfaces of simple materials into rows of sixteen vertices, `transport/batch.rs`; all BSDFs of a row are of
 //!    one kind, `materials/rough.rs`.
 //! 5. Others go one by one: `transport/walk.rs` passes parts of one glass (`crossing.rs`), `vertex.rs` prepares the surface.

@@ -274,7 +274,7 @@ fn a_model_s_own_cameras_and_lights_count() {
     assert!(!text.contains("directional"), "{text}");
 }
 
-/// Light by way of polished surfaces is cut, and that is said. Other models show all of it.
+/// glimt cuts the light by way of polished surfaces, and says so. Other models show all of it.
 #[test]
 fn only_polished_models_are_clamped_and_say_so() {
     let desk = Desk::new();

@@ -472,7 +472,7 @@ pub struct RenderArgs {
     /// Colours of the preview and of messages; auto looks at the terminal and at NO_COLOR
     #[arg(long, value_parser = one_of::<ColorChoice>(), default_value = "auto", value_name = "HOW", help_heading = "Terminal")]
     pub color: ColorChoice,
-    /// Notify through the terminal when a render of more seconds than this ends while its window is not looked at; 0: never
+    /// Notify through the terminal when a render of more seconds than this ends while its window has no focus; 0 turns this off
     #[arg(long, allow_negative_numbers = true, value_parser = notice, default_value = "30", value_name = "SECONDS", help_heading = "Terminal")]
     pub notify_after: f64,
     /// Look at the files several times a second rather than rely on the system's notifications

@@ -215,7 +215,7 @@ impl Facets {
                 let distance = plane[i] + (along[0][i] * slender + along[1][i] * wide);
                 let error = distance * size;
                 let margin = steep * (plane[i] * (size * length[i] + 1.0)) + across[i] * slender * size;
-                // What is not certainly missed is a candidate, also if a bound is no number.
+                // A facet that the ray may hit is a candidate, also if a bound is NaN.
                 let least = t - error;
                 let is_outside = (u < low[0] - margin)
                     | (u > high[0] + margin)

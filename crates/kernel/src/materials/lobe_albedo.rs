@@ -261,7 +261,7 @@ impl Facets {
         heights.max_by(|one, other| one.1.total_cmp(&other.1)).filter(|best| best.1 > 0.0).map(|best| best.0)
     }
 
-    /// The ends of the part of the chord around `lit` where it is so, in half chords from its middle.
+    /// The ends of the lit part of the chord around `lit`, in half chords from its middle.
     fn ends(&self, x: f64, lit: f64) -> [f64; 2] {
         [-1.0, 1.0].map(|end| border(lit, end, |part| self.height(x, part) > 0.0))
     }

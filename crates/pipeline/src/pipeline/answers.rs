@@ -110,7 +110,7 @@ pub struct Kept {
     pub is_own: bool,
     /// Whether it is a new scene beside a model, which stays the file that is shown.
     pub of_model: bool,
-    /// How to take that back. `None` if nothing was written, or a new file.
+    /// The edit, by which the key `u` takes it back. `None` if nothing was written, or a new file.
     pub edit: Option<CameraEdit>,
 }
 

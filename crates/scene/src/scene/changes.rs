@@ -10,8 +10,8 @@ const MOST_BYTES: usize = 4 << 20;
 /// Characters of a line that are shown at most.
 const MOST: usize = 40;
 
-/// The difference of two texts, such as `sphere.ball.radius 0.5 → 0.7`. Keys are called as in `--set`. A difference in no key,
-/// or in text that is no TOML, is told by its lines. `None` if the texts are the same or too long.
+/// The difference of two texts, such as `sphere.ball.radius 0.5 → 0.7`. Keys have the names of `--set`. For a difference in no key,
+/// and for text that is no TOML, it has the changed lines. `None` if the texts are the same or too long.
 pub fn changes(before: &str, after: &str) -> Option<String> {
     if before == after || before.len().max(after.len()) > MOST_BYTES {
         return None;

@@ -43,7 +43,7 @@ pub struct MergedTriangle {
 #[derive(Debug)]
 pub struct MergedMeshes {
     tree: TriangleTree,
-    /// What packets meet in place of the tree, if there are few triangles.
+    /// Facets, which packets meet in place of the tree. `None` if there are too many triangles.
     facets: Option<Facets>,
     /// Triangles in the order of objects, so that of hits at one distance the lowest object counts.
     triangles: Vec<MergedTriangle>,

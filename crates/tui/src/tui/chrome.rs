@@ -10,7 +10,7 @@ use super::terminals::Notice;
 use super::view;
 use crate::scene::sanitize::visible;
 
-/// A render is told of once it takes this long: a camera on its way is no news.
+/// Time after which title and progress show a render: a camera on its way is no news.
 const SHORT: Duration = Duration::from_millis(500);
 /// Step of the percentage over a line that takes time.
 const COARSE: u32 = 10;
@@ -55,7 +55,7 @@ pub(super) struct Chrome {
 }
 
 impl Chrome {
-    /// Those of the state. `None`: as they were. `is_slow`: over a line that takes time.
+    /// Title, progress and links of the state; `is_slow` says that the line takes time. `None` if they stay as they are.
     pub(super) fn of(state: &State, is_slow: bool) -> Option<Self> {
         let abilities = state.display.abilities;
         if state.work.running_for(state.now).is_some_and(|time| time < SHORT) && !state.work.paused {

@@ -12,7 +12,7 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Those of this process.
+    /// The files of this process, on this machine.
     pub(super) fn here() -> Self {
         // Elsewhere than on Linux, no name stands for the machine that the terminal is on.
         let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();

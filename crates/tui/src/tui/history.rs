@@ -48,7 +48,7 @@ struct Past {
     edits: u64,
     /// Settings that keys had changed.
     toggles: Toggles,
-    /// The picture for the strip, once it is asked for.
+    /// The small picture of the strip, made at its first use.
     small: OnceCell<Picture>,
 }
 

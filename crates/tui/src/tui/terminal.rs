@@ -59,14 +59,14 @@ const MOUSE_OFF: &str = "\x1b[?1006l\x1b[?1002l\x1b[?1000l";
 const FOCUS_ON: &str = "\x1b[?1004h";
 const FOCUS_OFF: &str = "\x1b[?1004l";
 
-/// What else glimt may have changed, with the bytes that take it back.
+/// Other changes that glimt may have made, with the bytes that take them back.
 static CHANGES: [(&AtomicBool, &[u8]); 4] = [
     (&HAS_LINKS, LINK_OFF),
     (&HAS_TITLE, TITLE_BACK),
     (&HAS_PROGRESS, PROGRESS_OFF),
     (&FOCUS, FOCUS_OFF.as_bytes()),
 ];
-/// What ends a string that was cut: it would take what follows for its own.
+/// End of a control string, in case one was cut: the terminal would add the text behind it to that string.
 const STRING_END: &[u8] = b"\x1b\\";
 
 /// Half blocks are about square at this height over width of a cell.
@@ -414,7 +414,7 @@ fn cell_pixels(cells: (u16, u16), pixels: (u16, u16)) -> (u16, u16) {
 mod tests {
     use super::*;
 
-    /// What is to be taken back belongs to the process: one test at a time.
+    /// Lock for one test at a time: the changes to be taken back are those of the process.
     static ALONE: Mutex<()> = Mutex::new(());
 
     fn alone() -> std::sync::MutexGuard<'static, ()> {

@@ -5,7 +5,7 @@ use crate::scene::toml::{self, Elements, Entries, Item, Value};
 
 /// Bytes of the longest text that is parsed for this: some milliseconds before a save is seen.
 const MOST_BYTES: usize = 256 << 10;
-/// Changes that are told one by one.
+/// Most changes with a text of their own; of more, the text has the number.
 const TOLD: usize = 3;
 /// Characters of a value and of a name that are shown at most.
 const VALUE: usize = 24;

@@ -4,7 +4,7 @@ use ratatui::layout::Rect;
 
 /// Bytes that end a link.
 pub const LINK_OFF: &[u8] = b"\x1b]8;;\x1b\\";
-/// Links that are told apart; a screen has a few, and those of before are forgotten with the screen.
+/// Most links of a screen.
 const MOST: usize = 1000;
 
 /// Cells in a row, and the address that they lead to.

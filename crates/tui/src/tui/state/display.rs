@@ -21,7 +21,7 @@ pub(in crate::tui) struct DisplayState {
     pub ansi: Ansi,
     /// Questions to the terminal.
     pub ask: Ask,
-    /// What the terminal is known to do besides text.
+    /// Abilities of the terminal besides text.
     pub abilities: Abilities,
     /// Time after which the end of a render is worth a notification. `None` for none.
     pub notify_after: Option<Duration>,

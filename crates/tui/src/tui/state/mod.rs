@@ -38,7 +38,7 @@ pub(super) struct Setup {
     pub ansi: Ansi,
     /// Questions to the terminal.
     pub ask: Ask,
-    /// What the environment says that the terminal can do besides text.
+    /// Abilities of the terminal besides text, by the environment.
     pub abilities: Abilities,
     /// Time after which the end of a render is worth a notification. `None` for none.
     pub notify_after: Option<Duration>,

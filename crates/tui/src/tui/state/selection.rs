@@ -37,7 +37,7 @@ pub(in crate::tui) struct SelectionState {
     pub purpose: PickPurpose,
     /// Facts about the picked object, until the next key.
     pub facts: Option<Vec<String>>,
-    /// What was clicked last, in one line.
+    /// Text of the last click, in one line.
     pub clicked: Option<String>,
     /// Place of the picked object in the scene file.
     pub picked: Option<FilePlace>,

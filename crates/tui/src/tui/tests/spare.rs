@@ -91,7 +91,7 @@ fn the_noise_of_a_finished_picture_is_a_curve() {
     desk.press('s');
     desk.finish(BLUE);
     assert!(!panel(&mut desk).contains("noise while it rendered"), "one point is no curve");
-    // Nothing is asked for: nothing is a line.
+    // Without an `error` there is no line.
     let mut desk = Desk::with(state(120, 40));
     rendered(&mut desk, 0.0);
     assert!(panel(&mut desk).contains("1 min 50 s") && !panel(&mut desk).contains("the line is"));

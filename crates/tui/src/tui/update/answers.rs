@@ -43,7 +43,7 @@ fn show(state: &mut State, depth: ColorDepth) {
     state.dirty = true;
 }
 
-/// The terminal's name, if it was asked for: what it draws, and what it can do besides.
+/// Takes the terminal's name: its blocks and its other abilities, if glimt asked for them.
 fn name(state: &mut State, terminal: Terminal) -> Vec<Effect> {
     let ask = state.display.ask;
     let mut effects = Vec::new();

@@ -1,4 +1,4 @@
-//! Noise against time as a small curve, with what is asked for as a line. Both axes are logarithmic.
+//! Noise against time as a small curve, with the requested `error` as a line. Both axes are logarithmic.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -50,12 +50,12 @@ fn points(state: &State) -> Option<&[(f64, f64)]> {
     (points.len() >= LEAST_POINTS && *last >= first * LEAST_RATIO).then_some(points)
 }
 
-/// The noise that is asked of each tile.
+/// The requested noise of each tile.
 fn target(state: &State) -> Option<f64> {
     state.request.effective.as_ref().map(|it| f64::from(it.error)).filter(|error| *error > 0.0)
 }
 
-/// What the curve shows, in plain words.
+/// Caption of the curve, in plain words.
 fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
     let fell = format!("{} after {}, {} after {}", share(*from), seconds(*first), share(*to), seconds(*last));

@@ -1,4 +1,4 @@
-//! What was drawn besides cells.
+//! Parts of the screen besides cells, as drawn last.
 
 use std::path::PathBuf;
 

@@ -52,7 +52,7 @@ pub(super) fn picture_at(state: &State, panel: Rect, lines: u16, place: (u16, u1
     strip::at(state, strip, place)
 }
 
-/// Room of the curve and of the strip. The strip is at the bottom, so that it stays where it is while results change above it.
+/// Room of the curve and of the strip. The strip is at the bottom, so that it keeps its place while results change above it.
 fn divided(state: &State, panel: Rect, lines: u16) -> (Rect, Rect) {
     let area = area(state, panel, lines);
     let is_over = state.work.activity == Activity::Done && !state.picture.history.is_open();

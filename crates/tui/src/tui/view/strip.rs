@@ -26,7 +26,7 @@ const WIDE_ROWS: Rows = Rows { picture: 5, entry: 5, pitch: 6 };
 const WIDE: u16 = 40;
 /// Columns of the words beside a picture.
 const LEAST_WORDS: u16 = 10;
-/// Columns of a column of pictures, where there are several.
+/// Width of a column of pictures if there are several.
 const COLUMN: u16 = 44;
 
 /// A picture of the strip and its place.
