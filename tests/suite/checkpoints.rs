@@ -49,6 +49,17 @@ const LONG: [(&str, &str); 4] = [
 
 #[test]
 fn killed_at_any_time_the_old_image_is_whole_and_the_next_one_has_the_same_pixels() {
+    kill_at_any_time(4);
+}
+
+#[test]
+#[ignore = "twenty seconds: cargo test --release --test suite killed_20_times -- --ignored"]
+fn killed_20_times_at_any_time() {
+    kill_at_any_time(20);
+}
+
+/// Kills renders by each method at random times.
+fn kill_at_any_time(times: u32) {
     let desk = desk();
     let mut next = random(3);
     for (method, options) in LONG {
@@ -57,7 +68,7 @@ fn killed_at_any_time_the_old_image_is_whole_and_the_next_one_has_the_same_pixel
         let line =
             format!("room.toml --once --progress none -o out.exr --resume --checkpoint 0.02 {options}");
         let mut kills = 0;
-        while kills < 20 {
+        while kills < times {
             let child = begin(&desk, &line);
             std::thread::sleep(Duration::from_secs_f64(0.03 + 0.2 * next()));
             end(child, Signal::SIGKILL);

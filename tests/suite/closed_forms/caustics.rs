@@ -127,7 +127,7 @@ fn room(floor: Material, wall: impl Fn(f32) -> Material) -> Build {
 #[test]
 fn a_ball_of_glass_and_a_mirror_in_a_box_throw_the_light_that_paths_find() {
     let middle = looked_at(room(matte(0.7), emitter), v(0.0, 0.0, 0.7), 0.4, 1.9).depth(6);
-    let effort = Effort { path_samples: 256, passes: 16, photons: 60_000, radius: 0.06 };
+    let effort = Effort { path_samples: 256, passes: 16, photons: 30_000, radius: 0.06 };
     assert_same_caustic("the middle of a floor", &middle, &effort);
 }
 
@@ -135,7 +135,7 @@ fn a_ball_of_glass_and_a_mirror_in_a_box_throw_the_light_that_paths_find() {
 fn every_part_of_the_light_by_photons_is_that_by_paths_and_they_add_up() {
     let glossy = room(phong(0.4, 0.4, 20.0, 0.0), |radiance| phong(0.4, 0.0, 1.0, radiance));
     let whole = glossy.pictured(v(0.0, 1.4, 0.9), v(0.15, 0.1, 0.4), 40.0, SIDE as u32, SIDE as u32).depth(5);
-    let effort = Effort { path_samples: 256, passes: 16, photons: 30_000, radius: 0.03 };
+    let effort = Effort { path_samples: 128, passes: 16, photons: 15_000, radius: 0.03 };
     let views = [View::Emission, View::Diffuse, View::Specular, View::Caustic, View::Indirect, View::Beauty];
     assert_same_light("a glowing room", &whole, &views, &effort);
     let part = |view| whole.clone().photons(5000, 0.05).viewed(view).picture(4, 3);
@@ -365,6 +365,6 @@ fn what_a_ball_at_rest_throws_to_its_foot_arrives_there() {
     let ball = floor().sphere(v(0.0, 0.5, 0.0), 0.5, glass(1.5));
     let foot = looked_at(ball, v(0.06, 0.0, 0.0), 0.16, 0.15).depth(6);
     let lit = sun(foot, v(0.2, -1.0, 0.0).normalize(), 1.0, 25.0);
-    let effort = Effort { path_samples: 1024, passes: 16, photons: 40_000, radius: 0.01 };
+    let effort = Effort { path_samples: 512, passes: 16, photons: 20_000, radius: 0.01 };
     assert_same_caustic("a ball at rest", &lit, &effort);
 }

@@ -198,7 +198,7 @@ fn room() -> Build {
 #[test]
 fn photons_and_paths_see_the_same_light_through_rough_glass() {
     for depth in [1, 2, 3, 5] {
-        let means = both(&room().depth(depth), depth, [256, 16], (20_000, 0.05));
+        let means = both(&room().depth(depth), depth, [128, 16], (8_000, 0.05));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }
@@ -220,8 +220,8 @@ fn photons_scatter_at_rough_glass_to_both_sides() {
             .depth(depth)
     };
     for depth in [2, 6] {
-        let means = both(&room(depth), depth, [512, 64], (20_000, 0.03));
-        assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
+        let means = both(&room(depth), depth, [512, 32], (20_000, 0.03));
+        assert_same_light(&format!("depth {depth}"), means, 1.5e-2, 4e-3);
     }
 }
 
@@ -297,14 +297,14 @@ fn a_clear_coat_weakens_what_shines_below_it() {
             };
             mean_and_error(&(0..16).map(means).collect::<Vec<_>>())
         };
-        let samples = means(&lit, 64);
+        let samples = means(&lit, 32);
         // Light samples do not find a lamp in a shell of glass.
         let hidden = lit.clone().sphere(v(0.0, 1.0, 0.0), 0.75, glass(1.0));
-        let photons = hidden.clone().depth(3).photons(8_000, 0.2);
+        let photons = hidden.clone().depth(3).photons(5_000, 0.2);
         let mut found = vec![("path", means(&by_paths(lit, 1), 64)), ("photons", means(&photons, 16))];
         // Samples of lobes alone, the dearest, meet one of the shapes.
         if number == 0 {
-            found.push(("lobes", means(&by_paths(hidden, 3), 768)));
+            found.push(("lobes", means(&by_paths(hidden, 3), 512)));
         }
         for (technique, found) in found {
             let error = found.1.hypot(samples.1);
@@ -380,17 +380,16 @@ fn light_through_a_sheet_on_glass_goes_on_in_the_glass() {
             )),
         ),
     ] {
-        let means = both(&build, 8, [256, 64], (20_000, 0.05));
-        assert!(
-            means.iter().all(|(mean, _)| (mean - exact).abs() < 0.02 * exact),
-            "{what}: {means:?}, {exact}"
-        );
+        for (mean, error) in both(&build, 8, [128, 64], (2_000, 0.05)) {
+            assert!(error < 0.02 * exact, "{what}: {mean} ± {error} says nothing");
+            assert!((mean - exact).abs() < 4.0 * error + 0.01 * exact, "{what}: {mean} ± {error}, {exact}");
+        }
     }
     // Clear glass brings light: all techniques find the same, from above and through the block from below. It gains none.
     for from in [v(0.0, 2.4, 1.5), v(0.2, -2.4, 1.0)] {
         let clear = label(block(glass(1.5)), 0.0).environment(1.0).depth(8);
         let clear = clear.pictured(from, DVec3::ZERO, 8.0, 4, 4);
-        let means = both(&clear, 8, [256, 64], (40_000, 0.03));
+        let means = both(&clear, 8, [128, 16], (20_000, 0.03));
         assert_same_light(&format!("from {from}"), means, 1e-2, 6e-3);
         assert!(means.iter().all(|(mean, error)| *mean < 1.0 + 4.0 * error), "{means:?}");
     }
@@ -408,7 +407,7 @@ fn photons_pass_rough_glass_that_does_not_refract() {
     let two = two.sphere(v(-0.5, 1.0, 0.0), 0.2, matte(0.8)).sphere(v(0.5, 1.0, 0.0), 0.2, emitter(6.0));
     for (what, build) in [("index of air", air), ("two blocks", two)] {
         let build = build.pictured(v(0.0, 1.6, 4.0), v(0.0, 0.5, 0.0), 24.0, 8, 8).depth(6);
-        let means = both(&build, 6, [1024, 64], (20_000, 0.05));
+        let means = both(&build, 6, [512, 16], (20_000, 0.05));
         assert_same_light(what, means, 1.5e-2, 4e-3);
     }
 }

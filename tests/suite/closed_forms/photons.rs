@@ -170,7 +170,7 @@ pub fn assert_same_light(what: &str, [(a, da), (b, db)]: [(f64, f64); 2], most_e
 #[test]
 fn photons_and_paths_see_the_same_light_to_every_depth() {
     for depth in [1, 2, 3, 6] {
-        let means = both(&caustics(depth), depth, [256, 16], (20_000, 0.04));
+        let means = both(&caustics(depth), depth, [128, 16], (10_000, 0.04));
         assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }
@@ -242,7 +242,7 @@ fn a_ball_lens_throws_the_caustic_that_is_known() {
             .quad(v(-0.7, -0.7, 3.0), v(0.0, 1.4, 0.0), v(1.4, 0.0, 0.0), matte(0.5))
             .seen(v(x, y, 2.0), v(x, y, 3.0))
             .depth(3)
-            .photons(40_000, 0.07);
+            .photons(20_000, 0.07);
         let (mean, error) = mean_and_error(&sun(lens, DVec3::Z, 1.0, 0.0).values(16, 16));
         let exact = exact * 0.5 / PI;
         assert!(error < 0.02 * exact, "{mean} ± {error}");

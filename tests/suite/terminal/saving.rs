@@ -170,7 +170,7 @@ fn an_error_that_stays_is_shown() {
 fn a_file_that_breaks_does_not_stop_the_render_of_the_last_good_scene() {
     let folder = Folder::new();
     // Long enough for a save.
-    let slow = SCENE.replace("samples = 4", "samples = 2000").replace("width = 64", "width = 320");
+    let slow = SCENE.replace("samples = 4", "samples = 1000").replace("width = 64", "width = 320");
     let slow = slow.replace("height = 48", "height = 240");
     folder.write("scene.toml", &slow);
     let terminal = folder.terminal();

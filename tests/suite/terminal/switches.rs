@@ -103,6 +103,8 @@ fn the_previous_view_of_the_first_is_the_last() {
     terminal.wait_for_render(1);
     terminal.press("V");
     wait_for_view(&terminal, "error");
+    // The list is closed.
+    terminal.press("\r");
     terminal.wait_for_render(2);
     terminal.press("v");
     wait_for_view(&terminal, "beauty");

@@ -93,16 +93,19 @@ fn the_shell_is_back_at_once() {
 
 #[test]
 fn nothing_is_sent_when_nothing_happens() {
-    for answers in ALL {
+    // All lines at once, as the time goes by in waiting.
+    let terminals = ALL.map(|answers| {
         let folder = Folder::new();
         let terminal = folder.thin_line(answers);
         terminal.wait_for_render(1);
-        // The last exact picture may still be on its way.
-        std::thread::sleep(Duration::from_secs(3));
-        let before = terminal.line(|seen| seen.sent);
-        std::thread::sleep(Duration::from_secs(1));
-        assert_eq!(terminal.line(|seen| seen.sent), before, "{answers:?}");
-    }
+        (folder, terminal)
+    });
+    // The last exact picture may still be on its way.
+    std::thread::sleep(Duration::from_secs(3));
+    let sent = || terminals.each_ref().map(|(_, terminal)| terminal.line(|seen| seen.sent));
+    let before = sent();
+    std::thread::sleep(Duration::from_secs(1));
+    assert_eq!(sent(), before, "{ALL:?}");
 }
 
 #[test]
