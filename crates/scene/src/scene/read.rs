@@ -18,6 +18,9 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
         return Err(mesh(path));
     }
     let bytes = bytes(path).map_err(|(message, help)| problem(path, message, help, None))?;
+    if let Some(content) = OtherContent::of(&bytes) {
+        return Err(content.problem(path));
+    }
     if bytes.contains(&0) || bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(problem(
             path,
@@ -52,6 +55,70 @@ pub(super) fn is_model(path: &Path) -> bool {
         Some(bytes)
     };
     is_mesh(path) && start().is_some_and(|bytes| memchr::memmem::find(&bytes, b"[camera]").is_none())
+}
+
+/// Content of a file that is no scene, as its start shows, whatever its name.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum OtherContent {
+    /// A model, with its format and the usual ending of its files.
+    Model { format: &'static str, ending: &'static str },
+    /// A picture.
+    Picture,
+}
+
+impl OtherContent {
+    /// The content of bytes. `None` for what may be a scene.
+    fn of(bytes: &[u8]) -> Option<Self> {
+        const PICTURES: [&[u8]; 8] = [
+            b"\x89PNG\r\n",
+            b"\xff\xd8\xff",
+            b"\x76\x2f\x31\x01",
+            b"#?RADIANCE",
+            b"RIFF",
+            b"P3\n",
+            b"P6\n",
+            b"GIF8",
+        ];
+        if PICTURES.iter().any(|start| bytes.starts_with(start)) {
+            return Some(Self::Picture);
+        }
+        if bytes.starts_with(b"glTF") {
+            return Some(Self::Model { format: "glTF", ending: "glb" });
+        }
+        // The first line that is no comment.
+        let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+        let line = lines.find(|line| !line.is_empty() && !line.starts_with(b"#"))?;
+        let mut words = line.split(u8::is_ascii_whitespace);
+        let (word, next) = (words.next()?, words.next());
+        // In TOML a key is followed by an equals sign.
+        if line.contains(&b'=') {
+            return None;
+        }
+        let (format, ending) = match (word, next) {
+            (b"ply", None) => ("PLY", "ply"),
+            (b"OFF" | b"COFF" | b"NOFF" | b"CNOFF" | b"STOFF", _) => ("OFF", "off"),
+            (b"solid", _) => ("STL", "stl"),
+            (b"v" | b"vn" | b"vt" | b"mtllib" | b"usemtl" | b"o" | b"g", Some(_)) => ("OBJ", "obj"),
+            _ => return None,
+        };
+        Some(Self::Model { format, ending })
+    }
+
+    fn problem(self, path: &Path) -> Box<Diagnostic> {
+        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        let (message, help) = match self {
+            Self::Model { format, ending } => (
+                format!("this is a model ({format}), but its name does not end in .{ending}"),
+                format!("models are known by their endings: rename it to {}.{ending}", visible(&name)),
+            ),
+            Self::Picture => (
+                "this is a picture, not the text of a scene".to_owned(),
+                "`glimt info` says how a picture was made; `glimt new FILE` writes a scene to start from"
+                    .to_owned(),
+            ),
+        };
+        problem(path, message, Some(help), None)
+    }
 }
 
 fn problem(path: &Path, message: String, help: Option<String>, place: Option<Place>) -> Box<Diagnostic> {
@@ -227,6 +294,44 @@ mod tests {
         let scene = folder.path().join("scene.obj");
         std::fs::write(&scene, "[camera]\n").expect("written");
         assert!(text(&scene).is_ok());
+    }
+
+    #[test]
+    fn models_and_pictures_without_their_endings_are_known_by_their_start() {
+        let of = |text: &str| OtherContent::of(text.as_bytes());
+        let ending = |text: &str| match of(text) {
+            Some(OtherContent::Model { ending, .. }) => ending,
+            Some(OtherContent::Picture) => "picture",
+            None => "",
+        };
+        for (text, expected) in [
+            ("# by a program\n\nmtllib a.mtl\nv 0 0 0\n", "obj"),
+            ("v 0 0 0\r\n", "obj"),
+            ("ply\r\nformat ascii 1.0\r\n", "ply"),
+            ("OFF\n3 1 0\n", "off"),
+            ("OFF 3 1 0\n", "off"),
+            ("solid \nfacet", "stl"),
+            ("glTF\u{2}\0\0\0", "glb"),
+            ("P6\n1 1\n255\nabc", "picture"),
+            ("#?RADIANCE\n", "picture"),
+            ("# a scene\n[camera]\n", ""),
+            ("v = 3\n", ""),
+            ("solid = true\n", ""),
+            ("g \"x\" = 3", ""),
+            ("v\n", ""),
+            ("", ""),
+            ("[render", ""),
+        ] {
+            assert_eq!(ending(text), expected, "{text:?}");
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("model");
+        std::fs::write(&path, "v 0 0 0\n").expect("written");
+        let Diagnostic { message: said, help, .. } = message(&path);
+        assert_eq!(said, "this is a model (OBJ), but its name does not end in .obj");
+        assert!(help.expect("a way out").contains("rename it to model.obj"));
+        std::fs::write(&path, b"\x89PNG\r\n\x1a\n").expect("written");
+        assert_eq!(message(&path).message, "this is a picture, not the text of a scene");
     }
 
     #[test]

@@ -104,6 +104,16 @@ impl Container {
             ))));
         }
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+        if !text.trim_ascii_start().starts_with(b"{") {
+            let reason = if length == 0 {
+                "the file is empty"
+            } else if bytes.starts_with(b"glTF") {
+                "it is no glTF: its JSON is no object"
+            } else {
+                "it is no glTF: neither GLB nor an object of JSON"
+            };
+            return Err(AssetError::malformed(path, None, reason));
+        }
         let mut root: Root = serde_json::from_slice(text).map_err(|error| {
             let what = error.to_string();
             let what = what.split(" at line ").next().unwrap_or_default();

@@ -396,9 +396,7 @@ fn a_glb_that_is_cut_or_foreign_is_an_error() {
     let mut old = whole;
     old[4] = 1;
     assert!(desk.open("a.glb", &old).expect_err("refused").to_string().contains("GLB of version 1"));
-    assert!(
-        desk.open("a.glb", b"PK\x03\x04").expect_err("refused").to_string().contains("a.glb:1: column 1")
-    );
+    assert!(desk.open("a.glb", b"PK\x03\x04").expect_err("refused").to_string().contains("neither GLB"));
 }
 
 proptest! {
