@@ -307,6 +307,16 @@ const BROKEN: &[(&str, &[Said])] = &[
     ),
     ("output_ending", &[(3, 10, "`output`: unknown file ending .tiff")]),
     (
+        "partners",
+        &[
+            (10, 1, "warning: `normal_strength` does nothing without `normal_map`"),
+            (11, 1, "warning: `bump_scale` does nothing without `bump`"),
+            (12, 1, "warning: `opacity_cutoff` does nothing without `opacity`"),
+            (13, 1, "warning: `emission_sides` does nothing without `emission`"),
+            (17, 1, "warning: `clearcoat_roughness` does nothing without `clearcoat`"),
+        ],
+    ),
+    (
         "photons",
         &[
             (3, 11, r#"`enabled` must be true or false; found the string "yes""#),
@@ -365,6 +375,7 @@ const BROKEN: &[(&str, &[Said])] = &[
             (8, 10, r#"`rotate` must be a number; found the string "half""#),
             (9, 10, "`offset` must be two numbers, [u, v]; found an array of 1 value"),
             (10, 6, "`uv` must be a whole number between 0 and 1; found 2"),
+            (17, 1, "warning: `emission_sides` does nothing without `emission`"),
             (17, 18, r#"`emission_sides` cannot be "back""#),
             (18, 11, r#"`opacity` must be a number, or { texture = "name" }; found the name of a texture"#),
             (19, 18, "`opacity_cutoff` must be between 0 and 1; found 2"),
@@ -523,7 +534,11 @@ fn what_is_no_text_is_refused_with_its_place() {
     let latin = said(&of_bytes(b"[camera]\n# caf\xe9\n"));
     assert_eq!((latin.0, latin.1), (2, 6));
     assert!(latin.2.starts_with("line 2 is not UTF-8 text: byte 0xe9 at offset 14"), "{}", latin.2);
-    assert!(of_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").message.contains("binary"));
+    assert!(of_bytes(b"\x7fELF\x02\x01\0\0").message.contains("binary"));
+    assert!(of_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").message.contains("a picture, not"));
+    let model = of_bytes(b"# by hand\nv 0 0 0\n");
+    assert!(model.message.contains("a model (OBJ)"), "{}", model.message);
+    assert!(model.help.expect("a way out").contains("rename it to scene.obj"));
     assert!(
         of_bytes("[camera]".encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>().as_slice())
             .message

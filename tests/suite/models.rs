@@ -146,6 +146,34 @@ fn pictures_of_a_material_file_are_named_with_their_material() {
     desk.write("a.mtl", "newmtl brick\nmap_Bump heights.pgm\n");
     let grey = desk.expect("a.toml --once -o a.png", 0);
     assert!(grey.contains("heights.pgm is grey: heights in place of the normals of \"brick\""), "{grey}");
+    assert!(grey.contains("it bends nothing"), "{grey}");
+}
+
+#[test]
+fn images_that_cannot_be_what_a_material_takes_them_for_are_named() {
+    let desk = Desk::new();
+    desk.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
+    let said = |material: &str| {
+        desk.write(
+            "a.toml",
+            format!(
+                "{CAMERA}[textures.t]\nfile = \"heights.pgm\"\n[materials.m]\n{material}\n\
+                 [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\nmaterial = \"m\"\n"
+            ),
+        );
+        desk.expect("a.toml --once -o a.png", 0)
+    };
+    let grey = said("normal_map = \"t\"");
+    assert!(
+        grey.contains("heights.pgm is grey: heights in place of the normals of \"m\"; it tilts"),
+        "{grey}"
+    );
+    let alpha = said("opacity = { texture = \"t\", channel = \"a\" }");
+    assert!(alpha.contains("heights.pgm has no alpha below 1: `channel = \"a\"` is 1 everywhere"), "{alpha}");
+    for fine in ["bump = \"t\"", "opacity = { texture = \"t\" }", "diffuse = { texture = \"t\" }"] {
+        let said = said(fine);
+        assert!(!said.contains("is grey") && !said.contains("alpha"), "{said}");
+    }
 }
 
 #[test]

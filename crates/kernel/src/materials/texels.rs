@@ -111,6 +111,16 @@ impl Texels {
         }
     }
 
+    /// Whether all texels are 1.
+    pub fn is_white(&self) -> bool {
+        match &self.data {
+            TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => {
+                bytes.iter().all(|texel| *texel == [255; 3])
+            }
+            TexelData::Float(floats) => floats.iter().all(|texel| *texel == Vec3::ONE),
+        }
+    }
+
     /// Number of texels.
     pub fn len(&self) -> usize {
         self.width as usize * self.height as usize

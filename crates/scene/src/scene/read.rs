@@ -105,7 +105,9 @@ impl OtherContent {
     }
 
     fn problem(self, path: &Path) -> Box<Diagnostic> {
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+        // The name without an ending that is for scenes.
+        let name = if may_be_scene(path) { path.file_stem() } else { path.file_name() };
+        let name = name.unwrap_or(path.as_os_str()).to_string_lossy();
         let (message, help) = match self {
             Self::Model { format, ending } => (
                 format!("this is a model ({format}), but its name does not end in .{ending}"),

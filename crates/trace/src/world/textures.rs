@@ -34,6 +34,8 @@ pub struct NeededTexture {
     pub mesh_file: Option<usize>,
     /// Name of the mesh file's material, which names it. `None` for others.
     pub material: Option<String>,
+    /// Name of a material that takes its normals from it. `None` if no material does.
+    pub normals_of: Option<String>,
     /// Whether `[environment]` names it.
     pub is_environment: bool,
     /// Whether its mip levels are looked up.
@@ -49,6 +51,7 @@ impl NeededTexture {
             declared: None,
             mesh_file: None,
             material: None,
+            normals_of: None,
             is_environment: true,
             has_mipmaps: false,
         }
@@ -112,7 +115,11 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
             new.insert(needed.len());
             needed.push(texture);
         }
-        Entry::Occupied(place) => needed[*place.get()].has_mipmaps |= texture.has_mipmaps,
+        Entry::Occupied(place) => {
+            let known = &mut needed[*place.get()];
+            known.has_mipmaps |= texture.has_mipmaps;
+            known.normals_of = known.normals_of.take().or(texture.normals_of);
+        }
     };
     let (used_materials, own_materials) = in_use(scene);
     for (material, _) in scene.materials.iter().zip(used_materials).filter(|(_, used)| *used) {
@@ -124,6 +131,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
                 declared: Some(texture),
                 mesh_file: None,
                 material: None,
+                normals_of: (role == TextureRole::NormalMap).then(|| material.name.clone()),
                 is_environment: false,
                 has_mipmaps: has_mipmaps(scene, texture),
             });
@@ -139,6 +147,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
                 declared: None,
                 mesh_file: Some(file),
                 material: Some(own.name.clone()),
+                normals_of: (used == TextureUse::Normal).then(|| own.name.clone()),
                 is_environment: false,
                 has_mipmaps: false,
             });

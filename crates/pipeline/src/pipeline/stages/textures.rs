@@ -20,7 +20,7 @@ use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
 use crate::materials::texels::Texels;
 use crate::scene::Loaded;
-use crate::scene::description::{Encoding, Scene};
+use crate::scene::description::{Channel, Encoding, PixelNumber, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::world::{
     Image, Images, Lookups, NeededTexture, TextureSource, environment_source, textures_needed,
@@ -180,6 +180,7 @@ pub(in crate::pipeline) fn textures(
                 }
                 warn_of_unusable(loaded, &image, texels, findings);
                 warn_of_heights(loaded, &image, texels, findings);
+                warn_of_full_alpha(loaded, &image, texels, findings);
                 if let Some(mipmaps) = mipmaps {
                     let bytes = mipmaps.memory_bytes();
                     cache.mipmaps.insert(image.name.clone(), key, (mipmaps.clone(), bytes));
@@ -224,15 +225,28 @@ fn warn_of_unusable(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findin
     findings.warn(loaded, place(loaded, image.asked_by[0]), message);
 }
 
-/// Says that a grey image bends no normals.
+/// Says that a grey image has heights in place of normals. That of a mesh file bends nothing.
 fn warn_of_heights(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findings: &mut Findings) {
-    let is_normal_map =
-        |one: &&&NeededTexture| one.source.encoding == ImageEncoding::Linear && one.mesh_file.is_some();
-    let Some(one) = image.asked_by.iter().find(is_normal_map).filter(|_| texels.is_grey()) else { return };
-    let (path, material) = (image.path().display(), one.material.as_deref().unwrap_or_default());
-    let message = format!(
-        "{path} is grey: heights in place of the normals of \"{material}\"; it bends nothing (`bump` takes heights)"
-    );
+    let normals = image.asked_by.iter().find_map(|one| Some((one, one.normals_of.as_deref()?)));
+    let Some((one, material)) = normals.filter(|_| texels.is_grey()) else { return };
+    let effect = match one.mesh_file {
+        Some(_) => "it bends nothing (`bump` takes heights)",
+        None => "it tilts everything to one side; `bump` takes heights",
+    };
+    let path = image.path().display();
+    let message = format!("{path} is grey: heights in place of the normals of \"{material}\"; {effect}");
+    findings.warn(loaded, place(loaded, one), message);
+}
+
+/// Says that alpha by `channel = "a"` is 1 in all pixels.
+fn warn_of_full_alpha(loaded: &Loaded, image: &Wanted<'_>, texels: &Texels, findings: &mut Findings) {
+    const ALPHA: PixelNumber = PixelNumber::Channel(Channel::Alpha);
+    let is_alpha = |one: &&&NeededTexture| {
+        matches!(one.source.encoding, ImageEncoding::Number { of: ALPHA, is_srgb: _ })
+    };
+    let Some(one) = image.asked_by.iter().find(is_alpha).filter(|_| texels.is_white()) else { return };
+    let path = image.path().display();
+    let message = format!("{path} has no alpha below 1: `channel = \"a\"` is 1 everywhere");
     findings.warn(loaded, place(loaded, one), message);
 }
 
@@ -401,6 +415,7 @@ pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<Needed
             declared: Some(index),
             mesh_file: None,
             material: None,
+            normals_of: None,
             is_environment: false,
             has_mipmaps: false,
         });

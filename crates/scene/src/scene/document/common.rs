@@ -1,6 +1,7 @@
 //! The keys that all materials have.
 
 use super::super::description::{Bump, EmissionSource, NormalMap, NumberSource, OpacitySource};
+use super::context::Issue;
 use super::names::Names;
 use super::table::Table;
 
@@ -8,6 +9,7 @@ use super::table::Table;
 pub(super) fn emission(table: &Table<'_>, textures: &Names) -> EmissionSource {
     let source = table.optional("emission").emission(textures).unwrap_or(EmissionSource::NONE);
     let sides = table.optional("emission_sides").choice().unwrap_or(source.sides);
+    warn_without(table, "emission_sides", "emission");
     EmissionSource { sides, ..source }
 }
 
@@ -15,6 +17,7 @@ pub(super) fn emission(table: &Table<'_>, textures: &Names) -> EmissionSource {
 pub(super) fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMap> {
     let texture = table.optional("normal_map").name_in(textures);
     let strength = table.optional("normal_strength").number32(table.limits("normal_strength")).unwrap_or(1.0);
+    warn_without(table, "normal_strength", "normal_map");
     texture.map(|texture| NormalMap { texture, strength })
 }
 
@@ -22,6 +25,7 @@ pub(super) fn normal_map(table: &Table<'_>, textures: &Names) -> Option<NormalMa
 pub(super) fn bump(table: &Table<'_>, textures: &Names) -> Option<Bump> {
     let texture = table.optional("bump").texture_of_numbers(textures);
     let scale = table.optional("bump_scale").number32(table.limits("bump_scale")).unwrap_or(0.01);
+    warn_without(table, "bump_scale", "bump");
     texture.map(|(texture, channel)| Bump { texture, channel, scale })
 }
 
@@ -29,7 +33,16 @@ pub(super) fn bump(table: &Table<'_>, textures: &Names) -> Option<Bump> {
 pub(super) fn opacity(table: &Table<'_>, textures: &Names) -> OpacitySource {
     let value = table.optional("opacity").number_or_texture(textures, table.limits("opacity"));
     let cutoff = table.optional("opacity_cutoff").number32(table.limits("opacity_cutoff")).unwrap_or(0.0);
+    warn_without(table, "opacity_cutoff", "opacity");
     OpacitySource { value: value.unwrap_or(NumberSource::Constant(1.0)), cutoff }
+}
+
+/// Warns of a key that changes nothing without another one.
+pub(super) fn warn_without(table: &Table<'_>, name: &'static str, other: &'static str) {
+    let key = table.optional(name);
+    if let Some(span) = key.key_span().filter(|_| !table.optional(other).is_given()) {
+        key.context.report(Issue::warning(span, format!("`{name}` does nothing without `{other}`")));
+    }
 }
 
 /// Reports these keys in a material that fills its shape.

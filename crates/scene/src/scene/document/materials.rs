@@ -141,6 +141,7 @@ fn plastic(table: &Table<'_>, textures: &Names) -> MaterialKind {
 }
 
 fn principled(table: &Table<'_>, textures: &Names) -> MaterialKind {
+    common::warn_without(table, "clearcoat_roughness", "clearcoat");
     let (color, number) = (
         |path, default| color(table, textures, path, default),
         |path, default| number(table, textures, path, default),
