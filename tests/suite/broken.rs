@@ -101,7 +101,7 @@ const BROKEN: &[(&str, &[Said])] = &[
     (
         "endings",
         &[
-            (3, 10, "`output`: .webp files are not available in this version"),
+            (3, 10, "`output`: unknown file ending .tiff"),
             (10, 8, "`file`: unknown file ending .gif"),
             (13, 8, "`file` needs a file ending that says its format"),
             (20, 8, "`file`: unknown file ending .fbx"),

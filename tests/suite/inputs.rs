@@ -3,7 +3,10 @@
 use std::fs;
 use std::os::unix::fs::symlink;
 
+use serde_json::json;
+
 use super::desk::{Desk, SCENE};
+use super::gltf::Glb;
 
 /// A picture that glimt did not write: a red texel.
 const PHOTOGRAPH: &[u8] = b"P6\n1 1\n255\n\xff\x20\x20";
@@ -163,6 +166,49 @@ fn every_kind_of_input_stays() {
     let text = fs::read_to_string(desk.path("scene.toml")).expect("the scene");
     desk.write("scene.toml", text.replace("one.obj\"", "one.obj\"\nmaterial = \"ball\""));
     refused(&desk, &format!("scene.toml {ENDLESS} -o deep/wood.ppm"), &["deep/wood.ppm", "one.obj"]);
+}
+
+#[test]
+fn every_picture_that_a_gltf_file_names_stays() {
+    let desk = Desk::new();
+    let mut glb = Glb::default();
+    let positions = glb.vectors(&[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    // An occlusion map, the picture of a material that no face has, and one that no texture has: none is looked up.
+    let json = json!({
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": positions}, "material": 0}]}],
+        "materials": [{"occlusionTexture": {"index": 0}}, {"emissiveTexture": {"index": 1}}],
+        "textures": [{"source": 0}, {"source": 1}],
+        "images": [{"uri": "deep/ao.png"}, {"uri": "glow.png"}, {"uri": "spare%2Done.png"}],
+    });
+    desk.write("m.glb", glb.finish(json));
+    fs::create_dir(desk.path("deep")).expect("a folder");
+    desk.write("scene.toml", format!("{SCENE}\n[[mesh]]\nfile = \"m.glb\"\n"));
+    desk.write(
+        "textured.toml",
+        SCENE
+            .replace("[materials.ball]", "[textures.t]\nfile = \"m.glb\"\nimage = 1\n[materials.ball]")
+            .replace("[0.8, 0.2, 0.1]", "{ texture = \"t\" }"),
+    );
+    desk.write("other.off", "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    let pictures = ["deep/ao.png", "glow.png", "spare-one.png"];
+    for picture in pictures {
+        desk.write(picture, PHOTOGRAPH);
+    }
+    for picture in pictures {
+        for call in [
+            "m.glb",
+            "scene.toml",
+            "textured.toml",
+            "scene.toml --set mesh.1.file=other.off --set mesh.1.material=ball",
+        ] {
+            let stderr =
+                refused(&desk, &format!("{call} {ENDLESS} --force -o {picture}"), &[picture, "cannot write"]);
+            assert!(stderr.contains("m.glb") || stderr.contains("the scene names"), "{call}: {stderr}");
+        }
+    }
 }
 
 #[test]

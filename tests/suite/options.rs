@@ -228,7 +228,7 @@ fn wrong_values_are_answered_with_what_is_expected() {
         ("--progress loud", "[possible values: auto, plain, json, none]"),
         ("--color pink", "truecolor"),
         ("--sampels 3", "--samples"),
-        ("-o a.webp", "use one of .png, .exr"),
+        ("-o a.tiff", "use one of .png, .exr"),
         ("-o a", "use one of .png, .exr"),
         ("-o a.png -o a.png", "twice"),
         ("--set render.samples=0", "--set:1:18"),

@@ -351,3 +351,43 @@ fn a_broken_model_is_an_error_with_its_place() {
         assert!(said.contains(words) && said.contains(file), "{file}: {said}");
     }
 }
+
+#[test]
+fn a_small_model_far_from_the_origin_is_framed_as_at_the_origin() {
+    let desk = Desk::new();
+    let moved = |size: f64, to: f64| {
+        let corner = |bits: i32| {
+            let at = |axis: i32, length: f64| to + size * length * f64::from(bits >> axis & 1);
+            format!("v {:e} {:e} {:e}\n", at(0, 3.0), at(1, 2.0), at(2, 1.0))
+        };
+        let corners: String = (0..8).map(corner).collect();
+        corners + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
+    };
+    desk.write("near.obj", moved(1.0, 0.0));
+    let near = picture(&desk, "near.obj --view normal");
+    for (size, to) in [(1e-6, 1.0), (1e-6, 10.0), (1e-5, 100.0), (1e-7, 10.0), (1e7, 1e15), (1e9, 1e17)] {
+        desk.write("far.obj", moved(size, to));
+        let far = picture(&desk, "far.obj --view normal");
+        let squares: f32 = near.iter().zip(&far).map(|(a, b)| (a - b) * (a - b)).sum();
+        let off = (squares / near.len() as f32).sqrt();
+        assert!(off < 0.05, "{size} at {to}: {off}");
+    }
+}
+
+#[test]
+fn messages_about_a_model_name_no_line_of_a_scene_that_nobody_wrote() {
+    let desk = Desk::new();
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl q\nf 1 2 3\n";
+    desk.write("a.obj", format!("mtllib a.mtl\n{triangle}"));
+    // A material file that was not copied along.
+    for call in [format!("a.obj {SMALL} -o a.png"), "check a.obj".to_owned()] {
+        let said = String::from_utf8(desk.run(&call).stderr).expect("UTF-8");
+        assert!(said.contains("cannot read a.mtl"), "{call}: {said}");
+    }
+    desk.write("a.mtl", "newmtl q\nmap_Kd nope.png\n");
+    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 2);
+    assert!(said.contains("nope.png") && said.contains("--> a.obj\n"), "{said}");
+    desk.write("nope.png", checker());
+    let said = desk.expect(&format!("a.obj {SMALL} -o nope.png"), 2);
+    assert!(said.contains("cannot write nope.png") && !said.contains("a.obj:"), "{said}");
+}

@@ -96,7 +96,7 @@ impl<'a> Diff<'a> {
     fn is_float(&self) -> bool {
         match self.format {
             Format::Exr | Format::Hdr => true,
-            Format::Png | Format::Jpeg | Format::Ppm => false,
+            Format::Png | Format::Jpeg | Format::Ppm | Format::WebP => false,
         }
     }
 

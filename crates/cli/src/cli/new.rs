@@ -102,12 +102,9 @@ fn quoted(file: &Path) -> String {
     shlex::try_quote(&name).map_or(name.clone(), |quoted| quoted.into_owned())
 }
 
-/// Whether a name is that of a picture, of a format that glimt writes or will.
+/// Whether a name is that of a picture, of a format that glimt writes.
 fn is_picture(file: &Path) -> bool {
-    match Format::of(file) {
-        Ok(_) | Err(OutputError::NotAvailable { .. }) => true,
-        Err(_) => false,
-    }
+    Format::of(file).is_ok()
 }
 
 #[cfg(test)]

@@ -69,10 +69,10 @@ pub struct LoadedMesh {
     pub warnings: Vec<String>,
     /// Warnings about its own materials, a line each; they do not matter if the scene gives the mesh another material.
     pub material_warnings: Vec<String>,
-    /// Files that belong to the mesh file, read or missing: material libraries. If one of them changes, so does this
-    /// value.
+    /// Files that belong to the mesh file, read or missing: material libraries, or the buffers of a glTF file. If one of them
+    /// changes, so does this value.
     pub companions: Vec<PathBuf>,
-    /// Pictures that the material libraries name, looked up or not.
+    /// Pictures that the material libraries or the glTF file name, looked up or not.
     pub pictures: Vec<PathBuf>,
 }
 

@@ -23,12 +23,6 @@ pub enum OutputError {
         /// Its ending, in small letters.
         ending: String,
     },
-    /// The format is planned, but not yet available.
-    #[error("cannot write {}: WebP is not available in this version; use one of {}", path.display(), Format::known_endings())]
-    NotAvailable {
-        /// The path.
-        path: PathBuf,
-    },
     /// The bit depth is neither 8 nor 16.
     #[error("{bits} bits a channel are not possible; use 8 or 16")]
     BitDepth {

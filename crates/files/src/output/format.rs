@@ -18,6 +18,8 @@ pub enum Format {
     Jpeg,
     /// 8 or 16 bit sRGB, binary.
     Ppm,
+    /// 8 bit sRGB, without loss.
+    WebP,
 }
 
 /// Bits per channel of integer formats.
@@ -44,13 +46,14 @@ impl TryFrom<u8> for BitDepth {
 
 impl Format {
     /// Endings, without the dot, and their formats.
-    const ENDINGS: [(&'static str, Self); 6] = [
+    const ENDINGS: [(&'static str, Self); 7] = [
         ("png", Self::Png),
         ("exr", Self::Exr),
         ("hdr", Self::Hdr),
         ("jpg", Self::Jpeg),
         ("jpeg", Self::Jpeg),
         ("ppm", Self::Ppm),
+        ("webp", Self::WebP),
     ];
 
     /// All known endings, without the dot.
@@ -73,10 +76,7 @@ impl Format {
         };
         let ending = ending.to_string_lossy().to_lowercase();
         let known = Self::ENDINGS.iter().find(|(known, _)| *known == ending).map(|&(_, format)| format);
-        known.ok_or_else(|| match ending.as_str() {
-            "webp" => OutputError::NotAvailable { path: path.to_owned() },
-            _ => OutputError::UnknownEnding { path: path.to_owned(), ending },
-        })
+        known.ok_or_else(|| OutputError::UnknownEnding { path: path.to_owned(), ending })
     }
 
     /// Checks that a file of this format can hold such a picture.
@@ -88,11 +88,13 @@ impl Format {
         if width == 0 || height == 0 {
             return unsuitable(format!("hold a picture without pixels ({width}×{height})"));
         }
-        if self != Self::Jpeg {
-            return Ok(());
-        }
-        if width > 65535 || height > 65535 {
-            return unsuitable(format!("hold {width}×{height} pixels, at most 65535×65535"));
+        let most = match self {
+            Self::Png | Self::Exr | Self::Hdr | Self::Ppm => return Ok(()),
+            Self::Jpeg => 65535,
+            Self::WebP => 16383,
+        };
+        if width > most || height > most {
+            return unsuitable(format!("hold {width}×{height} pixels, at most {most}×{most}"));
         }
         match bit_depth {
             BitDepth::Eight => Ok(()),
@@ -109,6 +111,7 @@ impl fmt::Display for Format {
             Self::Hdr => "HDR",
             Self::Jpeg => "JPEG",
             Self::Ppm => "PPM",
+            Self::WebP => "WebP",
         })
     }
 }

@@ -24,6 +24,7 @@ mod protection;
 pub mod settings;
 mod stoppable;
 mod temporary;
+mod webp;
 pub mod write;
 
 use std::path::Path;
@@ -104,6 +105,7 @@ pub(crate) fn encode_with(
         Format::Hdr => hdr::encode(image, options, token),
         Format::Jpeg => jpeg::encode(image, options, token),
         Format::Ppm => ppm::encode(image, options, token),
+        Format::WebP => webp::encode(image, options, token),
     };
     // An encoder that was stopped reports an error of its writer.
     token.check()?;

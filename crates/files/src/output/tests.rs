@@ -227,9 +227,32 @@ fn jpeg_is_near_the_developed_picture_in_colour_too() {
 }
 
 #[test]
+fn webp_has_the_pixels_of_png_and_its_settings() {
+    let image = picture(37, 21);
+    let mut options = options(BitDepth::Eight);
+    options.metadata.push(("glimt:scene".to_owned(), "a \"b\" <c> & d".to_owned()));
+    let bytes = encode(&image, &options, Format::WebP).expect("a WebP");
+    let png = encode(&image, &options, Format::Png).expect("a PNG");
+    let decoded = decode(&bytes, image::ImageFormat::WebP).into_rgb8();
+    assert_eq!(decoded, decode(&png, image::ImageFormat::Png).into_rgb8());
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.webp");
+    std::fs::write(&path, &bytes).expect("written");
+    let made = super::settings::made(&path).expect("settings");
+    assert_eq!((made.format.as_str(), made.size, made.is_own()), ("WebP", Some((37, 21)), true));
+    assert!(
+        made.settings.contains(&("scene".to_owned(), "a \"b\" <c> & d".to_owned())),
+        "{:?}",
+        made.settings
+    );
+    let wide = encode(&picture(16384, 1), &options, Format::WebP).expect_err("too wide");
+    assert!(wide.to_string().contains("at most 16383×16383"), "{wide}");
+}
+
+#[test]
 fn the_same_picture_gives_the_same_bytes() {
     let image = picture(200, 150);
-    for format in [Format::Png, Format::Exr, Format::Hdr, Format::Jpeg, Format::Ppm] {
+    for format in [Format::Png, Format::Exr, Format::Hdr, Format::Jpeg, Format::Ppm, Format::WebP] {
         let once = encode(&image, &options(BitDepth::Eight), format).expect("bytes");
         let again = || encode(&image, &options(BitDepth::Eight), format).expect("bytes");
         assert!(once == again(), "{format}");
@@ -249,8 +272,8 @@ fn endings() {
     assert_eq!(format("x.exr"), Ok(Format::Exr));
     assert_eq!(format("x.Hdr"), Ok(Format::Hdr));
     assert_eq!(format("x.ppm"), Ok(Format::Ppm));
+    assert_eq!(format("x.WebP"), Ok(Format::WebP));
     for (path, words) in [
-        ("x.webp", "WebP is not available in this version"),
         ("x.tiff", ".tiff is not a format that glimt writes"),
         ("x", "no ending"),
         (".png", "no ending"),
@@ -258,7 +281,7 @@ fn endings() {
     ] {
         let message = format(path).expect_err(path);
         assert!(message.contains(words), "{message}");
-        assert!(message.contains(".png, .exr, .hdr, .jpg, .jpeg, .ppm"), "{message}");
+        assert!(message.contains(".png, .exr, .hdr, .jpg, .jpeg, .ppm, .webp"), "{message}");
     }
 }
 
@@ -283,7 +306,7 @@ const NOTHING_KEPT: write::Guard<'_> =
 fn what_is_cancelled_is_neither_encoded_nor_written() {
     let token = CancelToken::new();
     token.cancel();
-    for format in [Format::Png, Format::Exr, Format::Hdr, Format::Jpeg, Format::Ppm] {
+    for format in [Format::Png, Format::Exr, Format::Hdr, Format::Jpeg, Format::Ppm, Format::WebP] {
         let stopped = super::encode(&picture(30, 20), &options(BitDepth::Eight), format, &token);
         assert!(matches!(stopped, Err(OutputError::Cancelled(_))), "{format}");
     }
@@ -361,4 +384,42 @@ fn a_file_of_somebody_else_is_kept_or_gives_nobody_more_rights() {
     assert_eq!(*told.lock().expect("no panic"), [expected]);
     let found = std::fs::metadata(&path).expect("a file");
     assert_eq!((found.uid(), found.mode() & 0o7777), (65534, 0o644));
+}
+
+#[test]
+fn what_is_saved_in_the_moment_of_a_replacement_stays() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("scene.toml");
+    let refused = || OutputError::Refused { reason: "it has changed".to_owned() };
+    let swap = |may_replace: &dyn Fn(&Path) -> Result<(), OutputError>| {
+        std::fs::write(&path, "read").expect("written");
+        let guard = write::Guard { may_replace, ..NOTHING_KEPT };
+        write::atomic_in_place_of(&path, (b"read", b"new"), &guard, &CancelToken::new())
+    };
+    let has = |text: &str| std::fs::read(&path).expect("read") == text.as_bytes();
+    let is_as_read = |path: &Path| match std::fs::read(path) {
+        Ok(content) if content == b"read" => Ok(()),
+        Ok(_) | Err(_) => Err(refused()),
+    };
+    swap(&is_as_read).expect("replaced");
+    assert!(has("new"));
+    // An editor saves after the last look: by writing, and by a file of its own in that place.
+    let beside = folder.path().join("edited");
+    for by_rename in [false, true] {
+        let saved = std::cell::Cell::new(false);
+        let swapped = swap(&|path| {
+            let looked = is_as_read(path);
+            if !saved.replace(true) {
+                let to = if by_rename { &beside } else { path };
+                std::fs::write(to, "an edit").expect("written");
+                if by_rename {
+                    std::fs::rename(to, path).expect("renamed");
+                }
+            }
+            looked
+        });
+        assert!(matches!(swapped, Err(OutputError::Refused { .. })), "{swapped:?}");
+        assert!(has("an edit"), "by a rename: {by_rename}");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "nothing else is left");
+    }
 }

@@ -73,6 +73,21 @@ pub fn atomic_until(
         .map(drop)
 }
 
+/// [`atomic_until`] in place of a file with this content alone: if it has another one in the moment of the replacement, it stays,
+/// and the guard is asked again for the reason.
+///
+/// # Errors
+/// As [`atomic_until`].
+pub fn atomic_in_place_of(
+    path: &Path,
+    (expected, bytes): (&[u8], &[u8]),
+    guard: &Guard<'_>,
+    token: &CancelToken,
+) -> Result<(), OutputError> {
+    let content: &dyn Fn(&mut dyn Write) -> io::Result<()> = &|file| stoppable::write_all(file, bytes, token);
+    replace(path, content, guard, (token, Durability::Power, Some(expected))).map(drop)
+}
+
 /// Events that a file survives from the moment at which it has its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Durability {
@@ -93,6 +108,16 @@ pub fn atomic_by(
     guard: &Guard<'_>,
     (token, durability): (&CancelToken, Durability),
 ) -> Result<Option<File>, OutputError> {
+    replace(path, content, guard, (token, durability, None))
+}
+
+/// [`atomic_by`], in place of a file with the expected content if there is one.
+fn replace(
+    path: &Path,
+    content: &dyn Fn(&mut dyn Write) -> io::Result<()>,
+    guard: &Guard<'_>,
+    (token, durability, expected): (&CancelToken, Durability, Option<&[u8]>),
+) -> Result<Option<File>, OutputError> {
     prepare_process();
     let named = |error| OutputError::file(path, error);
     match place::find(path)? {
@@ -109,7 +134,16 @@ pub fn atomic_by(
             }
             stoppable::or_cancelled(fill(&new, content, carried.as_ref(), durability), named)?;
             (guard.may_replace)(&target.path)?;
-            let file = new.rename_to(&target.path).map_err(named)?;
+            let file = match expected {
+                None => new.rename_to(&target.path).map_err(named)?,
+                Some(expected) => match new.exchange_with(&target.path, expected).map_err(named)? {
+                    Some(file) => file,
+                    None => {
+                        (guard.may_replace)(&target.path)?;
+                        return Err(named(io::Error::other("it changed while it was written")));
+                    }
+                },
+            };
             match durability {
                 Durability::Process => {}
                 Durability::Power => sync_directory(target.directory()).map_err(named)?,

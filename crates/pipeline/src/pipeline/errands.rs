@@ -162,7 +162,8 @@ fn replace(
         may_replace: &may_replace,
         losses: Losses::Refused,
     };
-    write::atomic_until(path, new.as_bytes(), &guard, &CancelToken::new()).map_err(|error| error.to_string())
+    write::atomic_in_place_of(path, (old.as_bytes(), new.as_bytes()), &guard, &CancelToken::new())
+        .map_err(|error| error.to_string())
 }
 
 /// Writes the scene of a model, with this camera, beside the model; never over a file.

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use super::stages::meshes::Meshes;
 use super::stages::parse::Parsed;
 use super::watch::content::FileRead;
+use crate::assets::gltf::is_gltf;
 use crate::output::FileIdentity;
 use crate::scene::Loaded;
 use crate::scene::description::Camera;
@@ -59,7 +60,7 @@ impl Inputs {
         inputs
     }
 
-    /// The material libraries that mesh files name, and the pictures that those name.
+    /// The material libraries that mesh files name, the pictures that those name, and what glTF files name.
     pub(super) fn add_meshes(&mut self, loaded: &Arc<Loaded>, meshes: &Meshes) {
         for (file, kept) in loaded.scene.mesh_files.iter().zip(meshes) {
             let name = file.value.file_name().unwrap_or_default().to_string_lossy();
@@ -67,11 +68,12 @@ impl Inputs {
                 let place = Some((Arc::clone(loaded), file.span.clone()));
                 self.0.push(Input { path: path.clone(), role, place });
             };
-            for library in &kept.mesh.companions {
-                add(library, format!("a material file of {name}"));
+            let kind = if is_gltf(&file.value) { "buffer" } else { "material file" };
+            for companion in &kept.mesh.companions {
+                add(companion, format!("a {kind} of {name}"));
             }
             for picture in &kept.mesh.pictures {
-                add(picture, format!("a picture that a material of {name} names"));
+                add(picture, format!("a picture that {name} or its materials name"));
             }
         }
     }

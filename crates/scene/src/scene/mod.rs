@@ -129,7 +129,7 @@ impl Loaded {
         help: Option<String>,
     ) -> Diagnostic {
         let (path, place) = self.source.place(&self.path, span, String::new());
-        Diagnostic { severity, message: message.into(), path, place: Some(place), help }
+        Diagnostic { severity, message: message.into(), path, place, help }
     }
 }
 
@@ -151,15 +151,18 @@ pub struct Outcome {
 /// of at most [`MAX_FILE_BYTES`] bytes of UTF-8 text is refused without blocking.
 pub fn load(path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     let text = read::text(path).map_err(|problem| vec![*problem])?;
-    load_text(text, path, sets)
+    load_source(Source::with_sets(text, sets)?, path, sets)
 }
 
-/// Validates a text as the scene of a file, which is not read: that of a model. Otherwise as [`load`].
+/// Validates a text as the scene of a model, which is not read: its lines are in no file. Otherwise as [`load`].
 ///
 /// # Errors
 /// As for [`load`].
-pub fn load_text(text: Arc<str>, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
-    let source = Source::with_sets(text, sets)?;
+pub fn load_made(text: Arc<str>, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
+    load_source(Source::with_sets(text, sets)?.made(), path, sets)
+}
+
+fn load_source(source: Source, path: &Path, sets: &[String]) -> Result<Loaded, Vec<Diagnostic>> {
     let Outcome { scene, diagnostics, settings } = document::lower(&source, path);
     match scene {
         Some(scene) => {

@@ -17,6 +17,8 @@ pub struct Source {
     /// Bytes of the file.
     file: usize,
     sets: Vec<Set>,
+    /// Whether the text was made of a model: its lines are in no file.
+    is_made: bool,
 }
 
 /// A value that the call sets: its part of the text, and the same as a text of its own.
@@ -29,7 +31,7 @@ struct Set {
 impl Source {
     /// A file as it is.
     pub fn file(text: Arc<str>) -> Self {
-        Self { file: text.len(), all: text, sets: Vec::new() }
+        Self { file: text.len(), all: text, sets: Vec::new(), is_made: false }
     }
 
     /// A file with texts of the form `TABLE.KEY=VALUE`. A value that is neither TOML nor a number is taken for a text.
@@ -52,7 +54,7 @@ impl Source {
             }
         }
         if wrong.is_empty() {
-            Ok(Self { all: all.into(), file: file.len(), sets: known })
+            Ok(Self { all: all.into(), file: file.len(), sets: known, is_made: false })
         } else {
             Err(wrong)
         }
@@ -73,18 +75,24 @@ impl Source {
         self.sets.iter().map(|set| set.span.start)
     }
 
-    /// A place of the file at `path`, or of what is set, and what holds it.
-    pub(super) fn place(&self, path: &Path, span: Range<usize>, label: String) -> (PathBuf, Place) {
+    /// The same as the text of a model's scene.
+    pub(super) fn made(self) -> Self {
+        Self { is_made: true, ..self }
+    }
+
+    /// A place of the file at `path`, or of what is set, and what holds it. `None` for a place of a text that is in no file.
+    pub(super) fn place(&self, path: &Path, span: Range<usize>, label: String) -> (PathBuf, Option<Place>) {
         let set = self.sets.iter().find(|set| set.span.start <= span.start && span.end <= set.span.end);
         let (path, source, span) = match set {
             Some(Set { span: own, text }) => {
                 (Path::new(CALL), text, span.start - own.start..span.end - own.start)
             }
+            None if self.is_made => return (path.to_owned(), None),
             None => (path, &self.all, span),
         };
         let is_inside = source.get(span.clone()).is_some();
         let span = if is_inside { span } else { 0..0 };
-        (path.to_owned(), Place { source: Arc::clone(source), span, label })
+        (path.to_owned(), Some(Place { source: Arc::clone(source), span, label }))
     }
 }
 

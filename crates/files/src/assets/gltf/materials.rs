@@ -107,6 +107,9 @@ impl Reader<'_> {
         // Read what extensions add.
         if let Some(ior) = &more.ior {
             // 0 stands for a reflection of everything, as old files of specular colours have it.
+            if ior.ior == 0.0 {
+                self.note("its index of refraction, 0 for a reflection of everything, becomes 10");
+            }
             material.ior = if ior.ior == 0.0 { 10.0 } else { ior.ior.clamp(1.0, 10.0) };
         }
         if let Some(specular) = &more.specular {
@@ -134,7 +137,10 @@ impl Reader<'_> {
         if more.unlit {
             self.note("it is unlit: its colour becomes light, which also falls on others");
             material.emission = std::mem::replace(&mut material.color, Slot::number(0.0));
-            (material.metallic, material.specular) = (Slot::number(0.0), Slot::number(0.0));
+            // Nothing of its surface is left: no coat, no highlight, no glass.
+            let black = || Slot::number(0.0);
+            (material.metallic, material.specular) = (black(), black());
+            (material.clearcoat, material.transmission, material.glass) = (black(), black(), None);
         }
         for name in &more.others {
             match LEFT_OUT.iter().find(|(known, _)| known == name) {

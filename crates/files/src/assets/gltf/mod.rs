@@ -149,6 +149,15 @@ impl Container {
         &self.companions
     }
 
+    /// Files that its images name, shown or not.
+    pub fn pictures(&self) -> Vec<PathBuf> {
+        let file = |number| match self.image_bytes(number) {
+            Ok(ImageBytes::File(path)) => Some(path),
+            Ok(ImageBytes::Inside(_)) | Err(_) => None,
+        };
+        (0..self.root.images.len()).filter_map(file).collect()
+    }
+
     /// The bytes of an image, or the file that holds them.
     ///
     /// # Errors

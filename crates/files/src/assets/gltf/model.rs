@@ -3,10 +3,11 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
+use super::accessor::Numbers;
 use super::description::{
-    ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelScene, Notes, Placed,
+    Alpha, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelScene, Notes, Placed,
 };
-use super::json::{Camera, Light, Node};
+use super::json::{Camera, Light, Node, Primitive};
 use super::materials::material;
 use super::{Container, Wrong};
 use crate::assets::AssetError;
@@ -190,6 +191,12 @@ impl Walk<'_> {
             }
             let material = self.material(primitive.material, container.coordinate_sets(primitive))?;
             let colors = container.attribute(primitive, "COLOR_0")?;
+            self.note_attributes(
+                &format!("meshes[{mesh}].primitives[{index}]"),
+                primitive,
+                material,
+                &colors,
+            );
             self.scene.instances.push(ModelInstance {
                 name: name.clone(),
                 part: first + index,
@@ -200,6 +207,26 @@ impl Walk<'_> {
             });
         }
         Ok(())
+    }
+
+    /// Notes what is not read of a primitive's attributes, where its material would show it.
+    fn note_attributes(
+        &mut self,
+        place: &str,
+        primitive: &Primitive,
+        material: usize,
+        colors: &Option<Numbers<'_>>,
+    ) {
+        let material = &self.scene.materials[material];
+        let has_alpha = colors.as_ref().is_some_and(|colors| {
+            colors.width == 4 && (0..colors.count).any(|vertex| colors.floats::<4>(vertex, 1.0)[3] < 1.0)
+        });
+        if has_alpha && material.alpha != Alpha::Opaque {
+            self.notes.add(place, "the alpha of its vertex colours is left out");
+        }
+        if material.normal.is_some() && primitive.attributes.contains_key("TANGENT") {
+            self.notes.add(place, "its tangents are left out: its normal map lies along its coordinates");
+        }
     }
 
     /// Index of a material, which is read when it is met first.
@@ -231,7 +258,7 @@ impl Walk<'_> {
         let Some(joint) = joint else { return Ok(None) };
         let bind = match skin.inverse_bind_matrices {
             Some(accessor) => {
-                let numbers = super::accessor::Numbers::of(self.container, accessor)?;
+                let numbers = Numbers::of(self.container, accessor)?;
                 if numbers.count == 0 || numbers.width != 16 {
                     return Err(Wrong::new("no matrix").inside(format!("accessors[{accessor}]")));
                 }
@@ -249,6 +276,9 @@ impl Walk<'_> {
             "spot" => {
                 let outer = json.spot.outer_cone_angle.clamp(1e-3, std::f64::consts::FRAC_PI_2);
                 let inner = json.spot.inner_cone_angle.clamp(0.0, outer);
+                if inner < outer {
+                    self.notes.add(place, "its light fades to the edge of its cone along the angle");
+                }
                 ModelLightKind::Spot { angle: 2.0 * outer.to_degrees(), blend: 1.0 - inner / outer }
             }
             other => {

@@ -61,7 +61,7 @@ impl Container {
             }
             other => other,
         })?;
-        loaded.companions = self.companions.clone();
+        (loaded.companions, loaded.pictures) = (self.companions.clone(), self.pictures());
         Ok(loaded)
     }
 

@@ -25,7 +25,8 @@ impl Container {
             return Err(self.wrong(Wrong::new("its scene shows no faces")));
         };
         let origin = origin_near((least + greatest) * 0.5, (greatest - least).max_element() * 0.5);
-        let mut whole = LoadedMesh { companions: self.companions.clone(), ..LoadedMesh::default() };
+        let (companions, pictures) = (self.companions.clone(), self.pictures());
+        let mut whole = LoadedMesh { companions, pictures, ..LoadedMesh::default() };
         whole.mesh.origin = origin;
         whole.material_warnings = self.material_warnings(&scene);
         whole.warnings = scene.notes;

@@ -2,6 +2,7 @@
 
 mod gif;
 mod text;
+mod webp;
 
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
@@ -100,6 +101,13 @@ pub fn made(path: &Path) -> Result<Made, MadeError> {
         return of_part(path).map_err(unreadable);
     }
     let start = start(&opened).map_err(|error| unreadable(in_words(&error)))?;
+    // A WebP file has its settings behind the pixels.
+    if start.len() as u64 == START_BYTES
+        && start.starts_with(b"RIFF")
+        && let Some(made) = webp::of_webp(&opened)
+    {
+        return Ok(made);
+    }
     of_bytes(&start).map_err(|why| MadeError::NoPicture { path: path.to_owned(), why })
 }
 
@@ -118,8 +126,9 @@ fn of_bytes(bytes: &[u8]) -> Result<Made, String> {
         [b'#', b'?', ..] => text::of_hdr(bytes).ok_or_else(|| wrong("HDR")),
         [b'P', b'6', ..] => text::of_ppm(bytes).ok_or_else(|| wrong("PPM")),
         [0xff, 0xd8, ..] => text::of_jpeg(bytes).ok_or_else(|| wrong("JPEG")),
+        [b'R', b'I', b'F', b'F', ..] => webp::of_webp(Cursor::new(bytes)).ok_or_else(|| wrong("WebP")),
         [b'G', b'I', b'F', ..] => gif::of_gif(bytes).ok_or_else(|| wrong("GIF")),
-        _ => Err("it is no picture that carries settings: png, apng, gif, exr, hdr, jpg, ppm, nor a part or a checkpoint".to_owned()),
+        _ => Err("it is no picture that carries settings: png, apng, gif, exr, hdr, jpg, ppm, webp, nor a part or a checkpoint".to_owned()),
     }
 }
 

@@ -10,6 +10,9 @@ pub(super) const FOV: f64 = 30.0;
 /// Part of the picture's half height and half width that the model's points may fill.
 const FILLED: f64 = 0.88;
 
+/// Least size of a model.
+const LEAST: f64 = 1e-30;
+
 /// Pictures of a turntable that are measured: more are all alike.
 const MOST_MEASURED: u32 = 72;
 
@@ -59,9 +62,9 @@ pub(super) fn framed(
             distance = distance.max(near + (across / (tangent * aspect)).max(upwards / tangent));
         }
     }
-    let distance = distance.max(1e-12);
+    let distance = distance.max(LEAST);
     // Digits that nobody sees are left out.
-    let size = half.length().max(1e-12);
+    let size = half.length().max(LEAST);
     let step = size * 1e-4;
     let tidy = |at: DVec3| DVec3::from(at.to_array().map(|part| tidied(part, step)));
     Eye { position: tidy(middle + back * distance), look_at: tidy(middle), up }

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use self::frame::{Eye, FOV, KEY, SKY, ground_reflectance, key_direction};
 use self::gltf::{Asset, Naming};
-use self::toml::{Toml, number, rounded, vector};
+use self::toml::{Toml, exact_vector, number, rounded, vector};
 use super::settings::{Overrides, Side, UpAxis};
 use super::stages::containers::Containers;
 use crate::assets::AssetError;
@@ -177,8 +177,8 @@ fn render(toml: &mut Toml, size: Option<[u32; 2]>, light: Lighting) {
 /// The camera that frames the model.
 fn camera(toml: &mut Toml, eye: &Eye, fov: f64) {
     toml.table("[camera]");
-    toml.key("position", vector(eye.position));
-    toml.key("look_at", vector(eye.look_at));
+    toml.key("position", exact_vector(eye.position));
+    toml.key("look_at", exact_vector(eye.look_at));
     if eye.up != DVec3::Y {
         toml.key("up", vector(eye.up));
     }
@@ -211,7 +211,7 @@ fn ground(toml: &mut Toml, names: &mut Unique, [least, greatest]: [DVec3; 2], ey
     toml.table(&format!("[materials.{name}]"));
     toml.key("diffuse", number(ground_reflectance()));
     toml.table("[[plane]]");
-    toml.key("point", vector(DVec3::new(0.0, frame::tidied(height, size * 1e-5), 0.0)));
+    toml.key("point", exact_vector(DVec3::new(0.0, frame::tidied(height, size * 1e-5), 0.0)));
     toml.key("material", format!("\"{name}\""));
 }
 

@@ -127,7 +127,9 @@ pub(super) fn text(
         toml.key("vertex_colors", "true");
     }
     ground(&mut toml, &mut names, bounds, &eye);
-    let (companions, notes, assets) = (loaded.companions.clone(), Vec::new(), Vec::new());
+    // The scene gives the mesh another material where the file's own are missing, and would say nothing of that.
+    let notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
+    let (companions, assets) = (loaded.companions.clone(), Vec::new());
     containers.keep(path, loaded);
     Ok(ModelText { text: toml.finish(), companions, notes, assets })
 }

@@ -68,6 +68,16 @@ pub(super) fn number(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text }
 }
 
+/// A point with all of its digits: a small model may be far from the origin.
+pub(super) fn exact_vector(value: DVec3) -> String {
+    let exact = |value: f64| match value.abs() {
+        0.0 => "0".to_owned(),
+        magnitude if !(1e-5..1e15).contains(&magnitude) => format!("{value:e}"),
+        _ => format!("{value}"),
+    };
+    format!("[{}]", value.to_array().map(exact).join(", "))
+}
+
 /// A number with some significant digits.
 pub(super) fn rounded(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {

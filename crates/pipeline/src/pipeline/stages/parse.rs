@@ -1,5 +1,6 @@
 //! The scene file, and the orbiter file that holds its camera.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,10 +10,11 @@ use super::super::protocol::Failure;
 use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::containers::Containers;
 use super::{Findings, Staged, Stop};
+use crate::assets::gltf::{Container, is_gltf};
 use crate::assets::mesh::load as load_mesh;
 use crate::assets::orbiter::load as load_orbiter;
 use crate::assets::{AssetError, OrbiterCamera};
-use crate::control::{CancelToken, Cancelled};
+use crate::control::{CancelToken, Cancelled, unwatched};
 use crate::scene;
 use crate::scene::description::Camera;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -67,7 +69,7 @@ fn model_scene(
         }
     })?;
     let notes = made.notes.into_iter().map(|note| of_file(path, Severity::Warning, note)).collect();
-    let loaded = scene::load_text(made.text.into(), path, sets);
+    let loaded = scene::load_made(made.text.into(), path, sets);
     Ok((loaded.map_err(|errors| Stop::Failed(Failure::Scene(errors)))?, made.companions, notes))
 }
 
@@ -152,10 +154,17 @@ pub(in crate::pipeline) fn parse(
 fn named(loaded: &scene::Loaded) -> Vec<PathBuf> {
     let mut named = loaded.named.clone();
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
+    // What cannot be read names nothing that could be known.
+    let token = CancelToken::new();
     for path in loaded.named.iter().filter(|path| has_material_files(path) && !is_read(path)) {
-        // What cannot be read names nothing that could be known.
-        if let Ok(mesh) = load_mesh(path, &|_, _| {}, &CancelToken::new()) {
+        if let Ok(mesh) = load_mesh(path, &unwatched, &token) {
             named.extend(mesh.companions.into_iter().chain(mesh.pictures));
+        }
+    }
+    let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
+    for path in textures.into_iter().chain(&loaded.named).filter(|path| is_gltf(path) && !is_read(path)) {
+        if let Ok(container) = Container::open(path, &unwatched, &token) {
+            named.extend(container.companions().iter().cloned().chain(container.pictures()));
         }
     }
     named

@@ -89,7 +89,7 @@ fn upright(table: &Table<'_>, view: DVec3, up: DVec3) -> Option<DVec3> {
 }
 
 fn orbiter(table: &Table<'_>) -> Option<Camera> {
-    let file = table.optional("orbiter").file(&[], &[]);
+    let file = table.optional("orbiter").file(&[]);
     let (fov, aperture) = (fov(table), aperture(table));
     let focus = table.optional("focus").number(table.limits("focus"));
     for name in ["position", "look_at", "up"] {

@@ -207,8 +207,12 @@ const MOST_COLLECTED: usize = 10_000;
 
 impl Issue {
     fn into_diagnostic(self, path: &Path, source: &Source) -> Diagnostic {
+        let label = if self.label.is_empty() { String::new() } else { format!("; {}", self.label) };
         let (path, place) = source.place(path, self.span, self.label);
-        let (severity, message, help) = (self.severity, self.message, self.help);
-        Diagnostic { severity, message, path, place: Some(place), help }
+        let (severity, mut message, help) = (self.severity, self.message, self.help);
+        if place.is_none() {
+            message += &label;
+        }
+        Diagnostic { severity, message, path, place, help }
     }
 }

@@ -13,7 +13,7 @@ pub(super) fn read(root: &Table<'_>) -> Option<Option<Environment>> {
         return (!key.is_given()).then_some(None);
     };
     let (color, file) = (table.optional("color"), table.optional("file"));
-    let map = if file.is_given() { file.file(MAPS, &[]).map(Some) } else { Some(None) };
+    let map = if file.is_given() { file.file(MAPS).map(Some) } else { Some(None) };
     let default = if file.is_given() { Vec3::ONE } else { Vec3::ZERO };
     let radiance = if color.is_given() { color.color() } else { Some(default) };
     let rotate = table.optional("rotate");

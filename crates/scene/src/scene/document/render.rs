@@ -57,7 +57,7 @@ pub(super) fn read(root: &Table<'_>) -> (Option<Render>, Option<PathBuf>) {
 fn output(table: &Table<'_>) -> Option<PathBuf> {
     let key = table.optional("output");
     let text = key.text("the path of a picture, such as \"picture.png\"")?;
-    key.has_ending(text, IMAGES, &["webp"]).then(|| table.context.resolve(text))
+    key.has_ending(text, IMAGES).then(|| table.context.resolve(text))
 }
 
 fn check_size(table: &Table<'_>, render: &Render) {

@@ -50,9 +50,9 @@ fn texture(name: String, table: &Table<'_>) -> Option<Texture> {
 fn image(table: &Table<'_>) -> (Option<Located<PathBuf>>, Option<Option<u32>>) {
     let (key, number) = (table.required("file", "\"picture.png\""), table.optional("image"));
     if !number.is_given() {
-        return (key.file(MAPS, &[]), Some(None));
+        return (key.file(MAPS), Some(None));
     }
-    (key.file(GLTF, &[]), number.whole(table.range("image")).map(Some))
+    (key.file(GLTF), number.whole(table.range("image")).map(Some))
 }
 
 /// Reports textures without an encoding that materials use for colours and for numbers. Alpha has no encoding.

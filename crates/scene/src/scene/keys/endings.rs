@@ -1,7 +1,7 @@
 //! Endings of the files that keys name, without dots and in small letters.
 
 /// Images that can be written.
-pub const IMAGES: &[&str] = &["png", "exr", "ppm", "hdr", "jpg", "jpeg"];
+pub const IMAGES: &[&str] = &["png", "exr", "ppm", "hdr", "jpg", "jpeg", "webp"];
 
 /// Images that can be read, and then the files that hold numbered images.
 const READ: [&str; 14] =

@@ -14,8 +14,7 @@ use crate::system::in_words;
 
 impl Key<'_> {
     /// An existing file with one of these endings (none given: any), resolved against the scene's folder.
-    /// `unavailable` are endings that other versions read.
-    pub(in super::super) fn file(&self, endings: &[&str], unavailable: &[&str]) -> Option<Located<PathBuf>> {
+    pub(in super::super) fn file(&self, endings: &[&str]) -> Option<Located<PathBuf>> {
         let text = self.text("the path of a file")?;
         let span = self.span()?;
         if text.is_empty() {
@@ -25,7 +24,7 @@ impl Key<'_> {
             ));
             return None;
         }
-        if !endings.is_empty() && !self.has_ending(text, endings, unavailable) {
+        if !endings.is_empty() && !self.has_ending(text, endings) {
             return None;
         }
         let path = self.context.resolve(text);
@@ -45,7 +44,7 @@ impl Key<'_> {
     }
 
     /// Whether a path ends as it should; an error if not.
-    pub(in super::super) fn has_ending(&self, text: &str, endings: &[&str], unavailable: &[&str]) -> bool {
+    pub(in super::super) fn has_ending(&self, text: &str, endings: &[&str]) -> bool {
         let ending = ending(text);
         if endings.contains(&ending.as_str()) {
             return true;
@@ -55,9 +54,6 @@ impl Key<'_> {
         let shown = shortened(&ending, 16);
         let message = match ending.as_str() {
             "" => format!("`{}` needs a file ending that says its format", self.name),
-            known if unavailable.contains(&known) => {
-                format!("`{}`: .{shown} files are not available in this version", self.name)
-            }
             _ => format!("`{}`: unknown file ending .{shown}", self.name),
         };
         let mut issue = Issue::error(span, message).help(format!("expected one of {list}"));

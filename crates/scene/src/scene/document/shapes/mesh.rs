@@ -35,7 +35,7 @@ impl MeshFiles {
 }
 
 pub(super) fn read(table: &Table<'_>, files: &mut MeshFiles) -> Option<Shape> {
-    let file = table.required("file", "\"mesh.obj\"").file(MESHES, &[]);
+    let file = table.required("file", "\"mesh.obj\"").file(MESHES);
     let part = part(table, file.as_ref());
     let placed = placement(table);
     let smooth = table.optional("smooth").flag().unwrap_or(true);
