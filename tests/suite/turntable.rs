@@ -216,3 +216,13 @@ fn a_scene_that_changes_on_the_way_ends_its_turntable() {
     assert_eq!(output.status.code(), Some(1), "{stderr}");
     assert!(stderr.contains("the pictures would not be of one turntable"), "{stderr}");
 }
+
+#[test]
+fn pictures_of_a_longer_turntable_before_are_named_and_stay() {
+    let desk = around();
+    assert!(!desk.expect(&format!("around.toml {SMALL} --turntable 4 -o w_##.png"), 0).contains("longer"));
+    let third = desk.bytes("w_03.png");
+    let said = desk.expect(&format!("around.toml {SMALL} --turntable 2 -o w_##.png"), 0);
+    assert!(said.contains("w_03.png and 1 more: of a longer turntable before"), "{said}");
+    assert_eq!(desk.bytes("w_03.png"), third);
+}

@@ -14,7 +14,7 @@ use crate::pipeline::protocol::{
     CheckpointNews, Command, Event, Failure, Report, Request, Stage, StageReport, Status, Writing,
 };
 use crate::pipeline::settings::{Effective, Overrides};
-use crate::pipeline::turntable::Turn;
+use crate::pipeline::turntable::{Turn, left_over};
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::system::priority;
@@ -289,10 +289,21 @@ fn done(
     if reporter.says_results() {
         written.iter().for_each(|path| console.say(&wrote(path, report, turn)));
     }
+    if let Some(turn) = turn.filter(|turn| turn.is_last()) {
+        written.iter().filter_map(|path| longer(path, turn)).for_each(|message| console.say(&message));
+    }
     if !reporter.says_diagnostics() {
         unwritten.iter().for_each(|message| console.say(&format!("error: {message}")));
     }
     if unwritten.is_empty() { Exit::DONE } else { Exit::FAILED }
+}
+
+/// Says which files of a longer turntable are behind the last picture of this one. `None` if there are none.
+fn longer(last: &Path, turn: Turn) -> Option<String> {
+    let left = left_over(last, turn);
+    let (first, more) = (left.first()?.display(), left.len() - 1);
+    let more = if more == 0 { String::new() } else { format!(" and {more} more") };
+    Some(format!("warning: {first}{more}: of a longer turntable before; they are left as they are"))
 }
 
 fn failed(failure: &Failure, console: &Console) -> Exit {

@@ -26,7 +26,7 @@ pub struct Turn {
 
 impl Turn {
     /// Whether it is the last one.
-    pub(super) fn is_last(self) -> bool {
+    pub fn is_last(self) -> bool {
         self.number + 1 == self.of
     }
 
@@ -97,6 +97,20 @@ pub fn twin(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
     (0..of).flat_map(all).find(|path| !seen.insert(path.clone()))
 }
 
+/// Files that have the next numbers behind the last picture of a turntable: those of a longer one before.
+pub fn left_over(last: &Path, turn: Turn) -> Vec<PathBuf> {
+    let Some(name) = last.file_name().and_then(|name| name.to_str()) else { return Vec::new() };
+    // Find the picture's number: the last run of digits that is it.
+    let is_digit = |c: char| c.is_ascii_digit();
+    let mut runs =
+        name.match_indices(is_digit).map(|(at, _)| at).filter(|at| !name[..*at].ends_with(is_digit));
+    let number = |at: usize| name[at..].split(|c| !is_digit(c)).next().unwrap_or_default();
+    let Some(at) = runs.rfind(|at| number(*at).parse() == Ok(turn.number + 1)) else { return Vec::new() };
+    let (before, digits, after) = (&name[..at], number(at).len(), &name[at + number(at).len()..]);
+    let file = |next: u32| last.with_file_name(format!("{before}{next:0digits$}{after}"));
+    (turn.number + 2..=MOST).map(file).take_while(|path| path.symlink_metadata().is_ok()).collect()
+}
+
 /// Text before the last run of `#` in a file's name, the length of the run, and the text behind it.
 fn numbers(path: &Path) -> Option<(&str, usize, &str)> {
     let name = path.file_name()?.to_str()?;
@@ -108,6 +122,20 @@ fn numbers(path: &Path) -> Option<(&str, usize, &str)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_of_a_longer_turntable_are_found() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| folder.path().join(name);
+        for name in ["w_3.png", "a2_003.png", "a2_004.png", "a2_006.png", "v1_2_2.png", "v1_3_2.png"] {
+            std::fs::write(path(name), "").expect("written");
+        }
+        let last = Turn { number: 1, of: 2 };
+        let found = |name: &str| left_over(&path(name), last);
+        assert_eq!(found("a2_002.png"), [path("a2_003.png"), path("a2_004.png")]);
+        assert_eq!(found("w_2.png"), [path("w_3.png")]);
+        assert_eq!((found("w_02.png"), found("w.png")), (Vec::new(), Vec::new()));
+    }
 
     #[test]
     fn the_camera_goes_all_around_and_keeps_its_distance() {
