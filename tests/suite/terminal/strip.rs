@@ -61,7 +61,7 @@ fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
         let beside = beside(screen, PANEL.into());
         beside.contains("the last pictures n N")
             && beside.contains("▸3 materials. board.diffuse [0.02, 0.8,")
-            && beside.contains("1 the first that is kept")
+            && beside.contains("1 first")
     });
     // A picture of each colour, the newest at the top.
     let colors = terminal.settled(|screen| colors_from(screen, PANEL));
@@ -73,7 +73,7 @@ fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
             .position(|line| line.chars().skip(PANEL.into()).collect::<String>().contains(text));
         row.unwrap_or_else(|| panic!("no {text}\n{screen}"))
     };
-    let (newest, oldest) = (row_of("▸3 mat"), row_of("1 the"));
+    let (newest, oldest) = (row_of("▸3 mat"), row_of("1 first"));
     assert!(newest < oldest);
     // A click shows it, and `n` what it shows.
     let click = |row: usize| format!("\x1b[<0;{0};{1}M\x1b[<0;{0};{1}m", PANEL + 4, row + 1);
@@ -92,6 +92,28 @@ fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
     // A narrower window has no room for it.
     terminal.resize(119, 40);
     terminal.wait("no strip", |screen| !screen.contents().contains("the last pictures"));
+}
+
+/// Several saves and a broken one are one edit in words, and so are `c` and `u`.
+#[test]
+fn an_entry_tells_what_changed_since_the_picture_before_it_and_nothing_else() {
+    let folder = Folder::new();
+    let mut terminal = folder.terminal_of(120, 40);
+    terminal.wait_for_render(1);
+    let is_told = |screen: &vt100::Screen, words: &str| {
+        let beside = beside(screen, PANEL.into());
+        beside.contains(words) && !beside.contains("changed") && !beside.contains("again")
+    };
+    terminal.press("+");
+    terminal.wait("a moved camera", |screen| is_told(screen, "▸2 camera moved"));
+    terminal.wait_for("done");
+    terminal.press("c");
+    terminal
+        .wait("what c wrote", |screen| is_told(screen, "▸2 camera. position [") && is_told(screen, "done"));
+    folder.write("scene.toml", "[render");
+    terminal.wait_for("broken");
+    folder.write("scene.toml", &SCENE.replace(RED, BLUE));
+    terminal.wait("the edit", |screen| is_told(screen, "▸3 materials. board.diffuse"));
 }
 
 /// Over a thin line no more is on the way than without a strip. (That it comes behind the picture is a test of the painter.)

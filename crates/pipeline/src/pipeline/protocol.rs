@@ -143,12 +143,12 @@ pub enum Event {
         /// The scene's own exposure, in stops.
         exposure: f32,
     },
-    /// The scene file holds another text than that of the last scene that could be read.
-    Edited {
+    /// The scene file could be read.
+    Text {
         /// Number of the request.
         generation: u64,
-        /// Differences, in a few words.
-        what: String,
+        /// Text of the scene file; of a model, of the scene that was made for it.
+        text: Arc<str>,
     },
     /// The render went on.
     Progress {

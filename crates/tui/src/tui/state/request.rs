@@ -1,12 +1,16 @@
 //! The newest request to the worker, and what it is made of.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::choice::Choice;
+use crate::pipeline::FileRead;
 use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
 use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
 use crate::scene::description::{Integrator, Shadows};
+use crate::scene::sanitize::visible;
+use crate::scene::{changes, is_mesh};
 
 /// Settings that keys changed, on top of the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,6 +52,32 @@ impl Toggles {
     }
 }
 
+/// Scene and settings that a picture was made of.
+#[derive(Clone, Debug, Default)]
+pub(in crate::tui) struct Origin {
+    /// Settings that keys had changed.
+    pub toggles: Toggles,
+    /// Text of the scene file. `None` for a model.
+    pub text: Option<Arc<str>>,
+    /// The other files of the scene.
+    pub files: Arc<[FileRead]>,
+}
+
+impl Origin {
+    /// Changes of the files since another one, in words.
+    pub(in crate::tui) fn edits(&self, before: &Self) -> Vec<String> {
+        let of_text =
+            before.text.as_deref().zip(self.text.as_deref()).and_then(|(old, new)| changes(old, new));
+        let is_changed = |file: &&FileRead| {
+            before.files.iter().any(|old| old.path == file.path && old.content != file.content)
+        };
+        let name = |file: &FileRead| file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let of_files =
+            self.files.iter().filter(is_changed).map(|file| format!("{} changed", visible(&name(file))));
+        of_text.into_iter().chain(of_files).collect()
+    }
+}
+
 /// A step of the camera. Steps come faster than pictures: the newest step waits until the step before has its first picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(in crate::tui) struct CameraStep {
@@ -80,6 +110,10 @@ pub(in crate::tui) struct RequestState {
     /// First request of a camera that keys have moved.
     pub moved_since: Option<u64>,
 
+    /// Text of the scene file, in the newest request that was understood.
+    pub text: Option<Arc<str>>,
+    /// The other files of the scene.
+    pub files: Arc<[FileRead]>,
     /// Settings that hold, as the worker reports them.
     pub effective: Option<Effective>,
     /// The scene's own camera, in the newest request that was understood.
@@ -102,9 +136,26 @@ impl RequestState {
             first_section: None,
             camera_step: CameraStep::default(),
             moved_since: None,
+            text: None,
+            files: Arc::default(),
             effective: None,
             camera: None,
             exposure: None,
+        }
+    }
+
+    /// Notes the files that the newest request is made of. The text of a scene is compared by itself; a model has none.
+    pub(in crate::tui) fn note_files(&mut self, files: Vec<FileRead>) {
+        let is_model = is_mesh(&self.scene);
+        self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
+    }
+
+    /// Description of what the newest request shows.
+    pub(in crate::tui) fn origin(&self) -> Origin {
+        Origin {
+            toggles: self.sent_toggles,
+            text: self.text.clone().filter(|_| !is_mesh(&self.scene)),
+            files: self.files.clone(),
         }
     }
 

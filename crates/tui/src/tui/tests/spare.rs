@@ -44,12 +44,12 @@ fn rendered(desk: &mut Desk, error: f32) {
     desk.worker(event);
 }
 
-/// Saves of the scene, each with its words.
+/// Saves of the scene, each with its text.
 fn edited(desk: &mut Desk, edits: &[(&str, [u8; 3])]) {
-    for (what, color) in edits {
+    for (text, color) in edits {
         desk.event(Event::Changed(Changed { noticed: desk.now }));
         let generation = desk.state.request.generation;
-        desk.worker(protocol::Event::Edited { generation, what: (*what).to_owned() });
+        desk.worker(protocol::Event::Text { generation, text: (*text).into() });
         desk.finish(*color);
     }
 }
@@ -100,12 +100,12 @@ fn the_noise_of_a_finished_picture_is_a_curve() {
 #[test]
 fn the_last_pictures_say_what_changed_and_a_click_shows_them() {
     let mut desk = Desk::with(state(120, 40));
-    desk.finish(RED);
+    edited(&mut desk, &[("camera.fov = 40", RED)]);
     assert!(!panel(&mut desk).contains("the last pictures"));
-    edited(&mut desk, &[("camera.fov 40 → 30", BLUE)]);
+    edited(&mut desk, &[("camera.fov = 30", BLUE)]);
     let text = panel(&mut desk);
     assert!(text.contains("the last pictures n N") && text.contains("▸2 camera.fov"), "{text}");
-    assert!(text.contains("1 the first that"), "{text}");
+    assert!(text.contains("1 first"), "{text}");
     desk.press('s');
     desk.finish(RED);
     assert!(panel(&mut desk).contains("▸3 shadows hard"), "{}", desk.text());
@@ -135,8 +135,15 @@ fn it_fits_into_every_window() {
         (PreviewKind::Pixels(Protocol::Kitty), ColorDepth::TrueColor),
         (PreviewKind::None, ColorDepth::Ansi16),
     ];
-    let edits =
-        ["a", "materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]", "c", "d", "e", "f", "g"];
+    let edits = [
+        "a = 1",
+        "materials.board.diffuse = [0.8, 0.02, 0.02]",
+        "materials.board.diffuse = [0.02, 0.8, 0.02]",
+        "d = 1",
+        "e = 1",
+        "f = 1",
+        "g = 1",
+    ];
     for (kind, depth) in kinds {
         let mut desk = Desk::with(state_with(120, 40, kind, depth, Overrides::default()));
         let all: Vec<_> =

@@ -61,8 +61,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             }
             state.work.progress = Some(progress);
         }
+        Event::Files { files, .. } => state.request.note_files(files),
         Event::Preview { .. }
-        | Event::Files { .. }
         | Event::CameraKept { .. }
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
@@ -98,7 +98,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             | CheckpointNews::Ignored { .. } => {}
         },
         Event::Refused { conflicts, .. } => refused(state, conflicts),
-        Event::Edited { what, .. } => state.picture.history.describe_edit(what),
+        Event::Text { text, .. } => state.request.text = Some(text),
         Event::WritePostponed { .. } => {
             say(state, "the image is written as soon as every pixel has a sample");
         }
@@ -145,7 +145,7 @@ fn generation(event: &Event) -> u64 {
         | Event::Refused { generation, .. }
         | Event::Checkpoint { generation, .. }
         | Event::WritePostponed { generation }
-        | Event::Edited { generation, .. }
+        | Event::Text { generation, .. }
         | Event::Files { generation, .. }
         | Event::CameraKept { generation, .. }
         | Event::CameraUndone { generation, .. }
