@@ -130,6 +130,17 @@ impl History {
         }
     }
 
+    /// Scene and settings of the picture that is looked at. `None` if that is the newest one.
+    pub(super) fn origin_of_open(&self) -> Option<&Origin> {
+        let (at, _) = self.open.as_ref()?;
+        self.past.get(*at).map(|past| &past.origin)
+    }
+
+    /// Whether the oldest picture is looked at.
+    pub(super) fn is_oldest_open(&self) -> bool {
+        self.open.as_ref().is_some_and(|(at, _)| *at == 0)
+    }
+
     /// Whether an older picture is looked at.
     pub(super) fn is_open(&self) -> bool {
         self.open.is_some()
@@ -186,11 +197,13 @@ impl History {
     /// Changes from the picture before to this one: by edits, by keys.
     pub(super) fn change(&self, at: usize) -> String {
         let Some(past) = self.past.get(at) else { return String::new() };
-        if at == 0 {
-            return "first".to_owned();
-        }
-        let all = past.changes.concat();
-        if all.is_empty() { "rendered again".to_owned() } else { all.join("; ") }
+        let changes = past.changes.concat();
+        let changes = match changes.as_slice() {
+            _ if at == 0 => "first".to_owned(),
+            [] => "rendered again".to_owned(),
+            _ => changes.join("; "),
+        };
+        if past.origin.is_unfinished { format!("unfinished; {changes}") } else { changes }
     }
 
     /// One of the pictures that are kept.

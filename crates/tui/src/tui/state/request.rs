@@ -61,6 +61,8 @@ pub(in crate::tui) struct Origin {
     pub text: Option<Arc<str>>,
     /// The other files of the scene.
     pub files: Arc<[FileRead]>,
+    /// Whether its render was not over.
+    pub is_unfinished: bool,
 }
 
 impl Origin {
@@ -151,11 +153,12 @@ impl RequestState {
     }
 
     /// Description of what the newest request shows.
-    pub(in crate::tui) fn origin(&self) -> Origin {
+    pub(in crate::tui) fn origin(&self, is_unfinished: bool) -> Origin {
         Origin {
             toggles: self.sent_toggles,
             text: self.text.clone().filter(|_| !is_mesh(&self.scene)),
             files: self.files.clone(),
+            is_unfinished,
         }
     }
 

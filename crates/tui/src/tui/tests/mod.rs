@@ -7,6 +7,7 @@ mod keys;
 mod layout;
 mod manual;
 mod noise;
+mod older;
 mod overlay;
 mod pointer;
 mod screen;

@@ -2,8 +2,7 @@
 
 use super::say::{notify, say};
 use crate::tui::event::Effect;
-use crate::tui::history::ago;
-use crate::tui::state::State;
+use crate::tui::state::{Activity, State};
 
 const NEWEST: &str = "this is the newest picture";
 
@@ -15,7 +14,7 @@ pub(super) fn record(state: &mut State) {
         state.picture.shown.clone()
     };
     if let Some(shown) = newest.filter(|shown| shown.generation == state.request.generation) {
-        let origin = state.request.origin();
+        let origin = state.request.origin(state.work.activity != Activity::Done);
         state.picture.history.record(shown, state.now, origin);
     }
 }
@@ -80,11 +79,12 @@ fn newest(state: &State) -> Option<crate::tui::history::Shown> {
 
 fn look_at(state: &mut State, shown: crate::tui::history::Shown) -> Vec<Effect> {
     state.picture.shown = Some(shown);
-    let place = state.picture.history.place().map_or(String::new(), |(number, count, time)| {
-        let age = ago(state.now.saturating_duration_since(time));
+    // The first line says how old it is, which goes on.
+    let place = state.picture.history.place().map_or(String::new(), |(number, count, _)| {
         let edits = state.picture.history.edits_of_open();
         let edits = if edits.is_empty() { edits } else { format!(", after {edits}") };
-        format!("picture {number} of {count}, {age}{edits}; n older, N newer")
+        let older = if number > 1 { "n older, " } else { "" };
+        format!("picture {number} of {count}{edits}; {older}N newer")
     });
     say(state, place);
     Vec::new()

@@ -17,6 +17,7 @@ use crate::tui::view::preview::spot_at;
 /// Degrees that a drag over the width of the picture's area turns by.
 const TURN_ACROSS: f64 = 180.0;
 
+const OLDER: &str = "of an older picture nothing is known but its pixels: b shows the newest one";
 const IN_FOCUS: &str = "everything is in focus: the scene's camera has no `aperture`";
 
 /// Reacts to the mouse.
@@ -76,6 +77,9 @@ fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
 }
 
 fn click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
     let Some(spot) = spot_at(state, mouse.column, mouse.row) else { return Vec::new() };
     state.selection.crosshair = spot;
     let purpose = if std::mem::take(&mut state.selection.is_focusing) {
@@ -93,6 +97,9 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
 
 /// First it waits for a click; asked again it takes the crosshair.
 pub(super) fn focus(state: &mut State) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
         state.selection.is_focusing = false;
         return notify(state, IN_FOCUS);
@@ -109,6 +116,9 @@ pub(super) fn focus(state: &mut State) -> Vec<Effect> {
 }
 
 fn ask(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
     if state.request.camera.is_none() {
         return notify(state, "the scene has not been read yet");
     }
@@ -130,6 +140,10 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 
 /// The answer.
 pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
+    // An older picture is looked at meanwhile.
+    if state.picture.history.is_open() {
+        return Vec::new();
+    }
     state.selection.picked = picked.thing.as_ref().map(|thing| FilePlace {
         path: thing.path.clone(),
         line: thing.line,
@@ -177,6 +191,9 @@ fn clicked(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[String]) -> St
 
 /// Copies what was clicked, if the terminal is known to take it.
 pub(super) fn copy(state: &mut State) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
     let Some(clicked) = state.selection.clicked.clone() else {
         return notify(state, "nothing was clicked yet: click, or press Enter, then y copies what is there");
     };

@@ -189,7 +189,9 @@ fn asset(state: &mut State, progress: AssetProgress) {
 fn wrote(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
     // What is written of itself stands beside the picture and does not cover the keys.
     if std::mem::take(&mut state.saving.is_write_requested) {
-        say(state, format!("wrote {}", visible(&path.to_string_lossy())));
+        let is_open = state.picture.history.is_open();
+        let which = if is_open { ": the newest picture, not the one that is shown" } else { "" };
+        say(state, format!("wrote {}{which}", visible(&path.to_string_lossy())));
     }
     // Of several outputs, another one may have failed.
     let is_by_hand = state.work.activity == Activity::Done;

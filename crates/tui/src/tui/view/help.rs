@@ -15,7 +15,7 @@ const NOTES: &[(&str, &str)] = &[
     ("31 kB 150 ms", "bytes of the last picture, and the terminal's time to answer"),
     ("bold", "what the last edit or a key has changed"),
     ("render 1 s −.3", "the time of a stage, and against the last time"),
-    ("run 3", "renders that were finished so far"),
+    ("run 3", "pictures that were finished so far, old ones found again too"),
 ];
 
 /// In the middle of the screen.

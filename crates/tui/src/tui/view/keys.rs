@@ -99,6 +99,10 @@ fn show(hint: &Hint, area: Rect, is_long: bool, state: &State, buffer: &mut Buff
 
 /// Each toggle with its value, in bold where the keys have changed it.
 fn toggles(state: &State) -> Vec<Hint> {
+    // They are those of the newest picture.
+    if state.picture.history.is_open() {
+        return Vec::new();
+    }
     let honours_shadows = state.request.integrator().method().honours_shadows;
     let shadows = if honours_shadows { state.request.shadows().name() } else { "–" };
     let on_off = |on| if on { "on" } else { "off" };
@@ -152,7 +156,14 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     }
     if state.picture.history.is_open() {
         urgent.extend(named(Action::BeforeAfter, "newest"));
-        urgent.extend(named(Action::OlderPicture, "older, newer"));
+        let both = if state.picture.history.is_oldest_open() {
+            named(Action::NewerPicture, "newer")
+        } else {
+            named(Action::OlderPicture, "older, newer")
+        };
+        urgent.extend(both);
+        // All else is about the newest one.
+        return (urgent, Hint::of(Action::PictureAlone).into_iter().collect());
     }
     if state.request.toggles.camera.is_any() {
         urgent.extend(named(Action::KeepCamera, "keep"));

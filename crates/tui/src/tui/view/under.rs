@@ -25,7 +25,8 @@ const LEAST_BAR: u16 = 6;
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Drawn) {
     let area = layout.under;
     // What the newest picture took says nothing of an older one.
-    if message::is_said(state, layout) || state.picture.history.is_open() {
+    let is_older = state.picture.history.is_open();
+    if message::is_said(state, layout) || is_older && !state.work.is_running() {
         return;
     }
     match state.work.activity {
