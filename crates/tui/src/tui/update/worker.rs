@@ -57,7 +57,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => {
             if let Some(noise) = progress.noise {
-                state.work.curve.note(progress.elapsed_seconds, noise.now);
+                state.work.curve.note(noise.seconds, noise.now);
             }
             state.work.progress = Some(progress);
         }

@@ -13,6 +13,8 @@ use crate::tui::state::State;
 const NOTES: &[(&str, &str)] = &[
     ("saved → seen", "from a save to the first changed cell"),
     ("31 kB 150 ms", "bytes of the last picture, and the terminal's time to answer"),
+    ("noise 2 % in all", "against the brightness of the whole picture"),
+    ("asked 1 % a tile", "each tile against its own brightness; ✓ all are there"),
     ("bold", "what the last edit or a key has changed"),
     ("render 1 s −.3", "the time of a stage, and against the last time"),
     ("run 3", "pictures that were finished so far, old ones found again too"),

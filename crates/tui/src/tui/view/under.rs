@@ -62,7 +62,11 @@ fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let name = at_work(state).unwrap_or_default();
     let (fraction, words) = match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
-            let samples = format!("{}/{} samples", progress.samples, progress.total_samples);
+            let RenderProgress { samples, total_samples, .. } = progress;
+            // Where noise decides, the total is a guess.
+            let is_guess = state.request.effective.as_ref().is_some_and(|it| it.error > 0.0);
+            let of = if is_guess { " of about " } else { "/" };
+            let samples = format!("{samples}{of}{total_samples} samples");
             (progress.fraction, format!("{samples} · {time}"))
         }
         (None, Some(asset)) if layout.panel.is_empty() => {
@@ -72,6 +76,8 @@ fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
     };
     let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
+    // A pause ends when somebody wants it to.
+    let noise = noise.map(|noise| NoiseProgress { next: noise.next.filter(|_| !state.work.paused), ..noise });
     let fits = |noise: &String| room >= columns(noise) + 3 + LEAST_BAR;
     let noise = noise.and_then(|noise| noise_words(&noise).into_iter().find(fits));
     let words = noise.map_or(words.clone(), |noise| format!("{noise} · {words}"));
