@@ -12,7 +12,7 @@ use crate::tui::state::State;
 /// Notes about the rest of the screen.
 const NOTES: &[(&str, &str)] = &[
     ("saved → seen", "from a save to the first changed cell"),
-    ("31 kB 150 ms", "bytes of the last picture, and the terminal's time to answer"),
+    ("31 kB 150 ms", "sent since the render began, and the terminal's time to answer"),
     ("noise 2 % in all", "against the brightness of the whole picture"),
     ("asked 1 % a tile", "each tile against its own brightness; ✓ all are there"),
     ("bold", "what the last edit or a key has changed"),

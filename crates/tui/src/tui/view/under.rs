@@ -166,7 +166,7 @@ pub(super) fn hint(state: &State) -> String {
     format!("save {} to render again", visible(&name))
 }
 
-/// Cost of the last picture on its way: its size, and the terminal's time to answer; in full and in short.
+/// Cost of the last picture on its way: the bytes since its render began, and the terminal's time to answer; in full and in short.
 fn frame(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
     let size = format!("{} kB", frame.bytes.div_ceil(1000));
