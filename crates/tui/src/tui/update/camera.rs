@@ -127,9 +127,13 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         Ok(kept) => kept,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
+            state.saving.has_scene_of_model |= is_mesh(&state.request.scene);
             return notify(state, &format!("error: {}", visible(&why)));
         }
     };
+    if of_model {
+        (state.saving.has_scene_of_model, state.saving.camera_of_model) = (true, state.request.viewpoint());
+    }
     let name = visible(&path.to_string_lossy()).into_owned();
     let words = match (is_new, is_own) {
         _ if of_model => format!("wrote {name}, a scene of this model with this camera"),

@@ -4,6 +4,7 @@ use super::say::{notify, say};
 use super::{camera, history, overlay, rectangle};
 use crate::math::decimal::{rounded, step_at};
 use crate::pipeline::protocol::{Command, Picked, Thing};
+use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::tui::chrome;
 use crate::tui::event::FilePlace;
@@ -144,11 +145,9 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
     if state.picture.history.is_open() {
         return Vec::new();
     }
-    state.selection.picked = picked.thing.as_ref().map(|thing| FilePlace {
-        path: thing.path.clone(),
-        line: thing.line,
-        column: 1,
-    });
+    let in_text = picked.thing.as_ref().filter(|thing| !is_mesh(&thing.path));
+    state.selection.picked =
+        in_text.map(|thing| FilePlace { path: thing.path.clone(), line: thing.line, column: 1 });
     match (state.selection.purpose, &picked.thing) {
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
@@ -215,13 +214,14 @@ fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
     let name = name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", visible(name)));
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
-    let mut facts = vec![
-        format!("{shape}{name}"),
-        format!("{}:{line}", visible(&file)),
+    let mut facts = vec![format!("{shape}{name}")];
+    // The lines of a model's scene are in no file.
+    facts.extend((!is_mesh(path)).then(|| format!("{}:{line}", visible(&file))));
+    facts.extend([
         visible(material).into_owned(),
         format!("{} away", number(*distance)),
         format!("at {}", numbers(*position)),
-    ];
+    ]);
     facts.extend(light);
     facts.push(format!("normal {}{back}", numbers(normal.map(f64::from))));
     facts
@@ -268,6 +268,9 @@ mod tests {
                 "normal (0, 1, 0)"
             ]
         );
+        let of_model = picked.thing.clone().map(|thing| Thing { path: "scenes/vase.obj".into(), ..thing });
+        let of_model = facts(&Picked { thing: of_model, ..picked.clone() });
+        assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "a model has no lines");
         assert_eq!(facts(&Picked { thing: None, color: None, ..picked }), ["nothing at pixel 3, 4"]);
     }
 }

@@ -8,6 +8,7 @@ use super::layout::Layout;
 use super::message;
 use super::text::{Tone, columns, put, rest};
 use crate::choice::Choice;
+use crate::scene::is_mesh;
 use crate::scene::report::summary;
 use crate::tui::action::Action;
 use crate::tui::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
@@ -151,7 +152,8 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     }
     urgent.extend(unseen(state));
     let named = |action, words| keymap::of(action).map(|it| Hint::new(it.label, words));
-    if state.overlays.problems.is_some() || state.selection.picked.is_some() {
+    let has_place = state.overlays.problems.is_some() || state.selection.picked.is_some();
+    if has_place && !is_mesh(&state.request.scene) {
         urgent.extend(named(Action::Edit, "edit"));
     }
     if state.picture.history.is_open() {
@@ -165,7 +167,7 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
         // All else is about the newest one.
         return (urgent, Hint::of(Action::PictureAlone).into_iter().collect());
     }
-    if state.request.toggles.camera.is_any() {
+    if state.request.toggles.camera.is_any() && !state.saving.has_scene_of_model {
         urgent.extend(named(Action::KeepCamera, "keep"));
     }
     if state.picture.close_up.is_some() {
