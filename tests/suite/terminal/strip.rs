@@ -102,7 +102,7 @@ fn an_entry_tells_what_changed_since_the_picture_before_it_and_nothing_else() {
     terminal.wait_for_render(1);
     let is_told = |screen: &vt100::Screen, words: &str| {
         let beside = beside(screen, PANEL.into());
-        beside.contains(words) && !beside.contains("changed") && !beside.contains("again")
+        beside.contains(words) && !beside.contains("changed") && !beside.contains("rendered again")
     };
     terminal.press("+");
     terminal.wait("a moved camera", |screen| is_told(screen, "▸2 camera moved"));
@@ -144,7 +144,7 @@ fn noise_against_time_is_a_curve() {
     });
     // Another exposure is the same render.
     terminal.press("[");
-    terminal.wait_for("exposure -0.25");
+    terminal.wait_for("exposure −0.25");
     terminal.wait_for_render(1);
     terminal.wait_for("noise while it rendered");
     terminal.press("r");

@@ -35,7 +35,8 @@ fn since(state: &State) -> String {
         (Activity::Running { .. } | Activity::Cancelled, None) => format!("; {next} was stopped"),
         (Activity::Waiting | Activity::Broken, _) => {
             let name = state.request.scene.file_name().unwrap_or_default().to_string_lossy();
-            format!("; {} has errors since", visible(&name))
+            let since = if state.saving.written.is_empty() { "" } else { " since" };
+            format!("; {} has errors{since}", visible(&name))
         }
     }
 }

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 pub(super) use self::display::DisplayState;
 pub(super) use self::overlays::{OverlayState, Pane, Problems, ViewList};
 pub(super) use self::picture::PictureState;
-pub(super) use self::request::{CameraStep, Origin, RequestState, Toggles};
+pub(super) use self::request::{CameraStep, Origin, RequestState, Toggles, signed_stops};
 pub(super) use self::saving::{PendingChange, SavingState};
 pub(super) use self::selection::{PickPurpose, Press, SelectionState};
 pub(super) use self::work::{Activity, AssetBar, WorkState};

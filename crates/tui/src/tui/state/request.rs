@@ -44,7 +44,7 @@ impl Toggles {
             said("photons", self.photons != before.photons, self.photons.map(on_off)),
             said("view", self.view != before.view, self.view.map(|it| it.name().to_owned())),
             said("camera", self.camera != before.camera, camera),
-            said("exposure", self.exposure != before.exposure, self.exposure.map(|it| format!("{it:+}"))),
+            said("exposure", self.exposure != before.exposure, self.exposure.map(signed_stops)),
         ]
         .into_iter()
         .flatten()
@@ -53,7 +53,7 @@ impl Toggles {
 }
 
 /// Scene and settings that a picture was made of.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::tui) struct Origin {
     /// Settings that keys had changed.
     pub toggles: Toggles,
@@ -66,6 +66,11 @@ pub(in crate::tui) struct Origin {
 }
 
 impl Origin {
+    /// The same in any exposure: of the same light.
+    pub(in crate::tui) fn of_light(self) -> Self {
+        Self { toggles: Toggles { exposure: None, ..self.toggles }, ..self }
+    }
+
     /// Changes of the files since another one, in words.
     pub(in crate::tui) fn edits(&self, before: &Self) -> Vec<String> {
         let of_text =
@@ -77,6 +82,15 @@ impl Origin {
         let of_files =
             self.files.iter().filter(is_changed).map(|file| format!("{} changed", visible(&name(file))));
         of_text.into_iter().chain(of_files).collect()
+    }
+}
+
+/// Stops of exposure, with their sign.
+pub(in crate::tui) fn signed_stops(stops: f32) -> String {
+    match stops {
+        0.0 => "0".to_owned(),
+        stops if stops < 0.0 => format!("−{}", -stops),
+        stops => format!("+{stops}"),
     }
 }
 
@@ -182,9 +196,12 @@ impl RequestState {
 
     /// Changes by keys that the picture alone does not show, in words.
     pub(in crate::tui) fn changes(&self) -> Vec<String> {
-        let moved = self.toggles.camera.is_any().then(|| "camera moved".to_owned());
-        let exposed = self.toggles.exposure.map(|stops| format!("exposure {stops:+}"));
-        moved.into_iter().chain(exposed).collect()
+        let CameraChange { pose, fov, focus } = self.toggles.camera;
+        let is_moved = pose.is_some() || fov.is_some();
+        let moved = is_moved.then(|| "camera moved".to_owned());
+        let focused = (focus.is_some() && !is_moved).then(|| "focus moved".to_owned());
+        let exposed = self.toggles.exposure.map(|it| format!("exposure {}", signed_stops(it)));
+        moved.into_iter().chain(focused).chain(exposed).collect()
     }
 
     /// Whether the image is written without a key: the scene's own camera, in the view that the run began with.
@@ -226,5 +243,15 @@ impl RequestState {
             .as_ref()
             .map_or(USUAL, |it| it.width as f32 / it.height.max(1) as f32)
             .clamp(0.02, 50.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exposure_has_the_minus_of_all_numbers() {
+        assert_eq!([-0.25, 0.0, 1.5].map(signed_stops), ["−0.25", "0", "+1.5"]);
     }
 }

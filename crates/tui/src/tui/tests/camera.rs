@@ -127,7 +127,7 @@ fn keys_that_are_held_come_to_an_end_and_say_so() {
         ('-', "as far as keys go"),
         ('<', "field of view 1°"),
         ('>', "field of view 160°"),
-        ('[', "exposure -20"),
+        ('[', "exposure −20"),
         (']', "exposure +20"),
     ] {
         let mut desk = Desk::new();

@@ -13,6 +13,7 @@ mod pointer;
 mod screen;
 mod spare;
 mod warnings;
+mod words;
 
 use ratatui::style::Color;
 

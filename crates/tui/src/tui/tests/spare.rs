@@ -88,6 +88,16 @@ fn the_noise_of_a_finished_picture_is_a_curve() {
     desk.press('s');
     desk.finish(BLUE);
     assert!(!panel(&mut desk).contains("noise while it rendered"), "one point is no curve");
+    // A picture that is found again has its curve.
+    desk.press('0');
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::Started { generation });
+    let mut event = done(generation, Vec::new(), false);
+    if let protocol::Event::Done { report, .. } = &mut event {
+        report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
+    }
+    desk.worker(event);
+    assert!(panel(&mut desk).contains("noise while it rendered"), "{}", desk.text());
     // The `error` asked of each tile is of another brightness, and no line beside it.
     assert!(!panel(&mut desk).contains("the line"), "{}", desk.text());
 }

@@ -12,7 +12,7 @@ use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::tui::camera::{dollied, orbited, zoomed};
 use crate::tui::event::Effect;
-use crate::tui::state::State;
+use crate::tui::state::{State, signed_stops};
 
 /// Degrees of a step around.
 const TURN: f64 = 3.0;
@@ -68,11 +68,11 @@ pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MOST_STOPS).min(before), MOST_STOPS.max(before));
     if stops == before {
-        return notify(state, &format!("exposure {stops:+}: keys go from -20 to +20"));
+        return notify(state, &format!("exposure {}: keys go from −20 to +20", signed_stops(stops)));
     }
     state.request.toggles.exposure = (stops != own).then_some(stops);
     let effects = step(state);
-    say(state, format!("exposure {stops:+}"));
+    say(state, format!("exposure {}", signed_stops(stops)));
     effects
 }
 

@@ -133,7 +133,7 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
     let words = if state.selection.is_mouse_on {
         "mouse on: drag turns, the wheel goes nearer, a click says what is there"
     } else {
-        "mouse off: it selects text"
+        "mouse off: a drag selects text; m turns it on again"
     };
     say(state, words);
     vec![Effect::Mouse(state.selection.is_mouse_on)]
@@ -198,7 +198,12 @@ pub(super) fn copy(state: &mut State) -> Vec<Effect> {
     };
     if !state.display.abilities.clipboard {
         // It stands there to be selected.
-        return notify(state, &format!("{clicked} · this terminal is not known to copy by itself"));
+        return notify(
+            state,
+            &format!(
+                "{clicked} · this terminal is not known to copy by itself: shift and a drag select it, or m and a drag"
+            ),
+        );
     }
     say(state, format!("copied: {clicked}"));
     vec![Effect::Aside(chrome::copy(&clicked))]

@@ -16,6 +16,9 @@ use crate::tui::event::{Effect, Unwritten, Written};
 use crate::tui::exit_summary;
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
+/// Message that ends with the render.
+const GOING_ON: &str = "going on from";
+
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     let event = match event {
         // Whatever is rendered meanwhile, these answer a person.
@@ -80,7 +83,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Checkpoint { news, .. } => match news {
             CheckpointNews::Failed { message } => say(state, format!("warning: {}", visible(&message))),
             CheckpointNews::Resumed { path, .. } => {
-                say(state, format!("going on from {}", visible(&path.to_string_lossy())));
+                say(state, format!("{GOING_ON} {}", visible(&path.to_string_lossy())));
             }
             CheckpointNews::SetAside { path } => {
                 say(
@@ -243,6 +246,7 @@ fn mended(state: &mut State) {
 }
 
 fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
+    state.overlays.message.take_if(|message| message.starts_with(GOING_ON));
     mended(state);
     for stage in &report.stages {
         record(state, stage.clone());
@@ -278,16 +282,19 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
 /// Ends the curve of noise with what was measured. The same picture, or that picture brighter, has the curve that it had.
 fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
     let render = &report.stages[Stage::Render as usize];
+    let origin = state.request.origin(false).of_light();
     match render.status {
         Status::Done => {
             if let Some(error) = report.image.error {
                 state.work.curve.end(render.seconds, error);
             }
+            state.work.keep_curve(origin);
         }
         Status::Reused if unchanged || state.request.is_exposure_only => {
             state.work.curve = std::mem::take(&mut state.work.last_curve);
         }
-        Status::Running | Status::Reused | Status::Skipped => {}
+        Status::Reused => state.work.find_curve(&origin),
+        Status::Running | Status::Skipped => {}
     }
 }
 

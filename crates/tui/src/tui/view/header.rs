@@ -36,8 +36,13 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
             keymap::of(Action::PictureAlone).map_or(String::new(), |it| format!("  {} back", it.label));
         room.width -= put_right(buffer, room, &back, Tone::Faint, state.display.depth);
     }
-    let fitting = figures(state).into_iter().find(|words| columns(words) <= room.width);
-    room.width -= put_right(buffer, room, &fitting.unwrap_or_default(), Tone::Strong, state.display.depth);
+    let figures = figures(state);
+    // The name has room beside them, if the shortest of them leave it.
+    let fitting = [LEAST_NAME + 1, 0]
+        .into_iter()
+        .find_map(|name| figures.iter().find(|words| columns(words) + name <= room.width));
+    room.width -=
+        put_right(buffer, room, fitting.map_or("", String::as_str), Tone::Strong, state.display.depth);
     room.width = room.width.saturating_sub(1);
     if room.width >= LEAST_NAME {
         name(state, room, buffer);

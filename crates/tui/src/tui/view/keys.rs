@@ -12,6 +12,7 @@ use crate::scene::is_mesh;
 use crate::scene::report::summary;
 use crate::tui::action::Action;
 use crate::tui::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
+use crate::tui::preview_kind::PreviewKind;
 use crate::tui::state::{Activity, State, Toggles, ViewList};
 
 /// A key with its description, in full and in short.
@@ -179,7 +180,8 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     }
     let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
     let changed = |words| Hint { tone: Tone::Strong, ..Hint::new(reset, words) };
-    urgent.extend(state.request.changes().into_iter().map(changed));
+    let changes = state.request.changes().join(", ");
+    urgent.extend((!changes.is_empty()).then(|| changed(changes)));
     let now: &[Action] = match state.work.activity {
         _ if state.work.paused => &[Action::TogglePause, Action::WriteNow],
         Activity::Running { .. } => &[Action::TogglePause],
@@ -190,12 +192,19 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     urgent.extend(held);
     let is_other =
         |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
+    let has_picture = state.display.kind != PreviewKind::None;
+    let is_shown = |it: &&Binding| it.action != Action::PictureAlone || has_picture;
     let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
     // Another hint has it above, with what it takes back.
     let is_of_use = state.request.toggles != Toggles::default() && state.request.changes().is_empty();
     let is_back = |it: &&Binding| it.action != Action::SceneSettings || is_of_use;
-    let others =
-        KEYMAP.iter().filter(is_other).filter(is_idle).filter(is_back).map(|it| Hint::new(it.label, it.hint));
+    let others = KEYMAP
+        .iter()
+        .filter(is_other)
+        .filter(is_shown)
+        .filter(is_idle)
+        .filter(is_back)
+        .map(|it| Hint::new(it.label, it.hint));
     (urgent, first.into_iter().chain(others).collect())
 }
 

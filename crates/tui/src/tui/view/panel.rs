@@ -100,7 +100,8 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Li
 
 /// Facts about a place.
 fn inspected(state: &State, width: u16) -> Vec<Line> {
-    let facts = state.selection.facts.iter().filter(|_| message::is_in_panel(&Layout::of(state))).flatten();
+    let facts =
+        state.selection.facts.iter().filter(|_| message::is_in_panel(state, &Layout::of(state))).flatten();
     let lines = facts.flat_map(|fact| wrapped(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
     let mut lines: Vec<Line> = lines.map(|line| vec![(line, Tone::Strong)]).collect();
     if !lines.is_empty() {

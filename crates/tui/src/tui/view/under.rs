@@ -41,7 +41,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &
             put(
                 buffer,
                 area,
-                &[("the last good picture stays until the errors are mended", Tone::Faint)],
+                &[("the last good picture stays until the errors are fixed", Tone::Faint)],
                 state.display.depth,
             );
         }
@@ -105,7 +105,7 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
 /// Draws the stages in one line, and the other facts that the panel does not show.
 fn summary(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Drawn) {
     let area = layout.under;
-    let mut pieces = stages::in_one_line(state);
+    let mut pieces = stages::in_one_line(state, area.width);
     let mut is_room = |more: Vec<(String, Tone)>| {
         let width: u16 = pieces.iter().chain(&more).map(|(text, _)| columns(text)).sum();
         if width <= area.width {
@@ -163,7 +163,8 @@ pub(super) fn hint(state: &State) -> String {
     }
     let name =
         state.request.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    format!("save {} to render again", visible(&name))
+    let again = if state.picture.shown.is_some() || state.work.renders > 0 { " again" } else { "" };
+    format!("save {} to render{again}", visible(&name))
 }
 
 /// Cost of the last picture on its way: the bytes since its render began, and the terminal's time to answer; in full and in short.
