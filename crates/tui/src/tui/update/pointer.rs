@@ -274,7 +274,7 @@ mod tests {
             ]
         );
         let of_model = picked.thing.clone().map(|thing| Thing { path: "scenes/vase.obj".into(), ..thing });
-        let of_model = facts(&Picked { thing: of_model, ..picked.clone() });
+        let of_model = facts(&Picked { thing: of_model, ..picked });
         assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "a model has no lines");
         assert_eq!(facts(&Picked { thing: None, color: None, ..picked }), ["nothing at pixel 3, 4"]);
     }
