@@ -123,8 +123,12 @@ impl History {
     fn compare(&mut self, at: usize) {
         let before = at.checked_sub(1).and_then(|before| self.past.get(before));
         let Some((before, past)) = before.zip(self.past.get(at)) else { return };
-        let keys = past.origin.toggles.differences(&before.origin.toggles);
-        let changes = [past.origin.edits(&before.origin), keys];
+        let edits = past.origin.edits(&before.origin);
+        let mut keys = past.origin.toggles.differences(&before.origin.toggles);
+        // A camera that was written into the scene is told by the scene's keys.
+        let is_written = edits.iter().any(|edit| edit.contains("camera."));
+        keys.retain(|key| !(is_written && key == "camera of the scene"));
+        let changes = [edits, keys];
         if let Some(past) = self.past.get_mut(at) {
             past.changes = changes;
         }
@@ -254,7 +258,7 @@ pub(super) fn ago(time: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::settings::View;
+    use crate::pipeline::settings::{CameraChange, View};
     use crate::pipeline::{Content, FileRead};
     use crate::tui::fixtures::plain_picture;
     use crate::tui::state::Toggles;
@@ -351,6 +355,27 @@ mod tests {
             ["first", "camera.fov 40 → 30", "view normal", "+ seed = 1; view of the scene", "rendered again",]
         );
         assert_eq!((history.len(), history.looked_at()), (5, Some(4)));
+    }
+
+    #[test]
+    fn a_camera_that_is_written_into_the_scene_is_told_once() {
+        let mut history = History::default();
+        let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
+        let moved = Toggles { camera, ..Toggles::default() };
+        history.record(shown(1, 10), Instant::now(), origin("camera.fov = 40", None));
+        let before = Origin { toggles: moved, ..origin("camera.fov = 40", None) };
+        history.record(shown(2, 20), Instant::now(), before.clone());
+        history.record(shown(3, 30), Instant::now(), origin("camera.fov = 30", None));
+        history.record(shown(4, 40), Instant::now(), before);
+        history.record(shown(5, 50), Instant::now(), origin("camera.fov = 40", None));
+        let words = [
+            "first",
+            "camera moved",
+            "camera.fov 40 → 30",
+            "camera.fov 30 → 40; camera moved",
+            "camera of the scene",
+        ];
+        assert_eq!(changes(&history), words);
     }
 
     #[test]
