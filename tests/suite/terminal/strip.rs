@@ -108,10 +108,13 @@ fn an_entry_tells_what_changed_since_the_picture_before_it_and_nothing_else() {
     terminal.wait("a moved camera", |screen| is_told(screen, "▸2 camera moved"));
     terminal.wait_for("done");
     terminal.press("c");
-    terminal.wait("what c wrote", |screen| is_told(screen, " camera. position [") && is_told(screen, "done"));
+    terminal.wait("what c wrote", |screen| {
+        is_told(screen, " camera. position [") && screen.contents().contains("✓ done")
+    });
+    let kept = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     folder.write("scene.toml", "[render");
     terminal.wait_for("broken");
-    folder.write("scene.toml", &SCENE.replace(RED, BLUE));
+    folder.write("scene.toml", &kept.replace(RED, BLUE));
     terminal.wait("the edit", |screen| is_told(screen, " materials. board.diffuse"));
 }
 
