@@ -64,7 +64,7 @@ pub(crate) fn render(
             | Event::NotKept { .. }
             | Event::Checkpoint { .. }
             | Event::WritePostponed { .. }
-            | Event::Edited { .. }
+            | Event::Text { .. }
             | Event::Warnings { .. }
             | Event::Refused { .. }
             | Event::CameraKept { .. }

@@ -56,7 +56,7 @@ fn the_exposure_is_written_as_other_settings_are() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("[");
-    terminal.wait_for("exposure -0.25");
+    terminal.wait_for("exposure −0.25");
     terminal.wait("the darker picture on disk", |_| {
         folder.bytes("scene.png") == folder.once(&["--set", "render.exposure=-0.25"])
     });

@@ -23,7 +23,7 @@ use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, re
 use crate::tui::{ColorChoice, PreviewChoice};
 
 /// Calls, with what they do.
-pub(super) const EXAMPLES: &str = "\
+pub(super) const EXAMPLES: &str = "  \
   glimt new ball.toml                     write a scene to start from
   glimt ball.toml                         edit it in an editor and see it here
   glimt ball.toml --once -o a.png -o a.exr

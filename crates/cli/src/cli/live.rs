@@ -190,7 +190,7 @@ impl Writes {
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
             | Event::Checkpoint { .. }
-            | Event::Edited { .. }
+            | Event::Text { .. }
             | Event::CameraKept { .. }
             | Event::CameraUndone { .. }
             | Event::Picked { .. }

@@ -203,7 +203,7 @@ fn follow(
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
             | Event::Checkpoint { .. }
-            | Event::Edited { .. }
+            | Event::Text { .. }
             | Event::CameraKept { .. }
             | Event::CameraUndone { .. }
             | Event::Picked { .. } => {}

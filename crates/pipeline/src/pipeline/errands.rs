@@ -171,7 +171,9 @@ fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<Kept, Str
     let path = loaded.path.with_extension("toml");
     let shown = path.display();
     if path.symlink_metadata().is_ok() {
-        return Err(format!("{shown} exists already, and is left as it is"));
+        return Err(format!(
+            "{shown} exists already, and is left as it is: move it away, then press c again"
+        ));
     }
     let text = loaded.text_with_camera(camera)?;
     write::new_file(&path, text.as_bytes()).map_err(|error| format!("{shown}: {}", in_words(&error)))?;

@@ -143,12 +143,12 @@ pub enum Event {
         /// The scene's own exposure, in stops.
         exposure: f32,
     },
-    /// The scene file holds another text than that of the last scene that could be read.
-    Edited {
+    /// The scene file could be read.
+    Text {
         /// Number of the request.
         generation: u64,
-        /// Differences, in a few words.
-        what: String,
+        /// Text of the scene file; of a model, of the scene that was made for it.
+        text: Arc<str>,
     },
     /// The render went on.
     Progress {
@@ -340,9 +340,12 @@ pub struct RenderProgress {
 /// Noise now, and noise to come.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseProgress {
-    /// [`Film::relative_error`](crate::film::Film::relative_error), as it is to be expected by now.
+    /// [`Film::relative_error`](crate::film::Film::relative_error), as it was measured last.
     pub now: f64,
-    /// A round level below that, or the noise in the end where that comes first; and seconds until then.
+    /// Seconds from the beginning of the render stage to that measurement.
+    pub seconds: f64,
+    /// A round level below that, and seconds until then. `None` if the render ends first, and if nobody knows how noise falls:
+    /// with photons and with `error`.
     pub next: Option<(f64, f64)>,
 }
 

@@ -66,8 +66,10 @@ pub(super) struct Display {
     chrome: [Chrome; 2],
     /// Notifications and texts for the clipboard, not sent yet.
     asides: Vec<u8>,
-    /// Bytes of the picture under way.
-    frame: Option<usize>,
+    /// Bytes that were sent since the render of the newest picture began.
+    sent: usize,
+    /// Whether a picture is under way.
+    is_picture_due: bool,
     /// Cost of the last picture.
     report: Option<FrameReport>,
     /// Whether that is news.
@@ -87,7 +89,8 @@ impl Display {
             is_complete: true,
             chrome: Default::default(),
             asides: Vec::new(),
-            frame: None,
+            sent: 0,
+            is_picture_due: false,
             report: None,
             is_reported: true,
         };
@@ -138,9 +141,12 @@ impl Display {
         }
         self.painter.aim_with(wanted, picture, fidelity, besides);
         self.is_complete = false;
-        if is_new {
-            self.frame = Some(0);
-        }
+        self.is_picture_due |= is_new;
+    }
+
+    /// The first picture of a render is the next one: bytes are counted from here on.
+    pub(super) fn begin_count(&mut self) {
+        self.sent = 0;
     }
 
     /// Gives the window this frame, behind the picture.
@@ -214,8 +220,8 @@ impl Display {
 
     fn complete(&mut self) {
         self.is_complete = true;
-        if let Some(bytes) = self.frame.take() {
-            self.report = Some(FrameReport { bytes, round_trip: self.line.round_trip() });
+        if std::mem::take(&mut self.is_picture_due) {
+            self.report = Some(FrameReport { bytes: self.sent, round_trip: self.line.round_trip() });
             self.is_reported = false;
         }
     }
@@ -225,9 +231,7 @@ impl Display {
         if question.is_some() {
             slice.extend_from_slice(STATUS);
         }
-        if let Some(bytes) = &mut self.frame {
-            *bytes += slice.len();
-        }
+        self.sent += slice.len();
         self.send(slice, question, now);
     }
 
@@ -301,5 +305,55 @@ impl Display {
         const MOST: Duration = Duration::from_secs(1);
         let round_trip = self.line.round_trip().unwrap_or_default();
         self.line.owes().then(|| (round_trip * 3 / 2).clamp(LEAST, MOST))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+    use std::rc::Rc;
+
+    use ratatui::style::Color;
+
+    use super::*;
+
+    /// A small difference of a picture does not stand for the picture.
+    #[test]
+    fn the_bytes_of_a_picture_are_those_since_its_render_began() {
+        let now = Instant::now();
+        let all = Rc::new(Cell::new(0));
+        let count = all.clone();
+        let out: Out = Box::new(move |bytes: Vec<u8>| count.set(count.get() + bytes.len()));
+        let mut display = Display::new(ColorDepth::TrueColor, Way::default(), None, out, now);
+        let area = Rect::new(0, 0, 40, 20);
+        let mut buffer = Buffer::empty(area);
+        for (number, cell) in (0_u32..).zip(&mut buffer.content) {
+            let code = |times: u32| (number * times % 251) as u8;
+            cell.set_symbol("▀").set_fg(Color::Rgb(code(7), code(13), code(29)));
+        }
+        let show = |display: &mut Display, buffer: &Buffer| {
+            let before = all.get();
+            display.aim(buffer, area, Fidelity::Still, (true, &Besides::default()));
+            for second in 1..100 {
+                let (now, sent) = (now + Duration::from_millis(second), all.get());
+                display.pump(now, || false);
+                display.written(all.get() - sent);
+                display.answered(Answer::Attributes, now);
+                display.answered(Answer::Ready, now);
+            }
+            assert!(display.is_complete());
+            (display.take_report().expect("a report").bytes, all.get() - before)
+        };
+        display.begin_count();
+        let (told, whole) = show(&mut display, &buffer);
+        assert_eq!(told, whole);
+        assert!(whole > 5_000, "{whole}");
+        buffer.content[7].set_fg(Color::Rgb(255, 255, 255));
+        let (told, difference) = show(&mut display, &buffer);
+        assert!(difference < 200 && told == whole + difference, "{told}: {whole} and {difference}");
+        display.begin_count();
+        buffer.content[9].set_fg(Color::Rgb(255, 255, 255));
+        let (told, difference) = show(&mut display, &buffer);
+        assert_eq!(told, difference, "of another render");
     }
 }

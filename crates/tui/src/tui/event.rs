@@ -195,6 +195,7 @@ pub(super) struct FilePlace {
 /// Cost of the last picture on its way to the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct FrameReport {
+    /// Bytes that were sent since its render began.
     pub bytes: usize,
     /// Time until the terminal answers. `None` if it does not.
     pub round_trip: Option<Duration>,

@@ -14,7 +14,10 @@ pub(super) fn words(state: &State) -> String {
         Some(failed) => unwritten(state, failed),
         None => files(&state.saving.written) + &since(state),
     };
-    let not_kept = if state.request.toggles.camera.is_any() { "; camera changes discarded" } else { "" };
+    let is_kept =
+        state.saving.camera_of_model.is_some() && state.saving.camera_of_model == state.request.viewpoint();
+    let is_discarded = state.request.toggles.camera.is_any() && !is_kept;
+    let not_kept = if is_discarded { "; camera changes discarded" } else { "" };
     files + not_kept
 }
 
@@ -32,7 +35,8 @@ fn since(state: &State) -> String {
         (Activity::Running { .. } | Activity::Cancelled, None) => format!("; {next} was stopped"),
         (Activity::Waiting | Activity::Broken, _) => {
             let name = state.request.scene.file_name().unwrap_or_default().to_string_lossy();
-            format!("; {} has errors since", visible(&name))
+            let since = if state.saving.written.is_empty() { "" } else { " since" };
+            format!("; {} has errors{since}", visible(&name))
         }
     }
 }

@@ -1,14 +1,14 @@
 //! The last pictures, within bounds.
 
 use std::cell::OnceCell;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::film::Picture;
 use crate::pipeline::protocol::Section;
 use crate::tui::rescale::resized;
-use crate::tui::state::Toggles;
+use crate::tui::state::Origin;
 
 /// Bytes that all of them take, at most.
 const MOST_BYTES: usize = 16 << 20;
@@ -35,8 +35,6 @@ pub(super) struct History {
     past: VecDeque<Past>,
     /// Edits of the scene so far.
     edits: u64,
-    /// Changes by edits, by the edits' numbers.
-    texts: BTreeMap<u64, String>,
     /// Index of the picture that is looked at, and the newest picture meanwhile.
     open: Option<(usize, Shown)>,
 }
@@ -46,8 +44,9 @@ struct Past {
     shown: Shown,
     time: Instant,
     edits: u64,
-    /// Settings that keys had changed.
-    toggles: Toggles,
+    origin: Origin,
+    /// Changes since the picture before: of files, then by keys.
+    changes: [Vec<String>; 2],
     /// The small picture of the strip, made at its first use.
     small: OnceCell<Picture>,
 }
@@ -58,20 +57,17 @@ impl History {
         self.edits += 1;
     }
 
-    /// Notes the changes of the last edit.
-    pub(super) fn describe_edit(&mut self, what: String) {
-        self.texts.insert(self.edits, what);
+    /// Changes of files from the picture that is looked at to the newest one.
+    pub(super) fn edits_since_open(&self) -> String {
+        let open = self.open.as_ref().and_then(|(at, _)| self.past.get(*at));
+        let edits = open.zip(self.past.back()).map(|(open, newest)| newest.origin.edits(&open.origin));
+        edits.unwrap_or_default().join("; ")
     }
 
-    /// Changes of the last edit, if they are known.
-    pub(super) fn last_edit(&self) -> Option<&str> {
-        self.texts.get(&self.edits).map(String::as_str)
-    }
-
-    /// Changes of the edit before the picture that is looked at.
-    pub(super) fn edit_of_open(&self) -> Option<&str> {
-        let (at, _) = self.open.as_ref()?;
-        self.texts.get(&self.past.get(*at)?.edits).map(String::as_str)
+    /// Changes of files from the picture before to the one that is looked at.
+    pub(super) fn edits_of_open(&self) -> String {
+        let open = self.open.as_ref().filter(|(at, _)| *at > 0).and_then(|(at, _)| self.past.get(*at));
+        open.map_or(String::new(), |past| past.changes[0].join("; "))
     }
 
     /// The camera that keys had moved since this request was written into the scene: an edit, which its pictures are after.
@@ -95,7 +91,7 @@ impl History {
     }
 
     /// Keeps a picture, in place of an earlier one of the same request.
-    pub(super) fn record(&mut self, shown: Shown, time: Instant, toggles: Toggles) {
+    pub(super) fn record(&mut self, shown: Shown, time: Instant, origin: Origin) {
         let is_same = |past: &Past| past.shown.picture == shown.picture;
         let last = self.past.len().wrapping_sub(1);
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
@@ -105,11 +101,14 @@ impl History {
                 if past.shown.picture != shown.picture {
                     past.small = OnceCell::new();
                 }
-                (past.shown, past.toggles) = (shown, toggles);
+                (past.shown, past.origin) = (shown, origin);
+                self.compare(at);
+                self.compare(at + 1);
             }
             None => {
-                let small = OnceCell::new();
-                self.past.push_back(Past { shown, time, edits: self.edits, toggles, small });
+                let (small, changes) = (OnceCell::new(), Default::default());
+                self.past.push_back(Past { shown, time, edits: self.edits, origin, changes, small });
+                self.compare(self.past.len() - 1);
             }
         }
         while self.past.len() > 1 && self.past.iter().map(Past::bytes).sum::<usize>() > MOST_BYTES {
@@ -118,8 +117,32 @@ impl History {
                 *at = at.saturating_sub(1);
             }
         }
-        let oldest = self.past.front().map_or(0, |past| past.edits);
-        self.texts.retain(|edit, _| *edit >= oldest);
+    }
+
+    /// Compares a picture's scene and settings with those of the picture before.
+    fn compare(&mut self, at: usize) {
+        let before = at.checked_sub(1).and_then(|before| self.past.get(before));
+        let Some((before, past)) = before.zip(self.past.get(at)) else { return };
+        let edits = past.origin.edits(&before.origin);
+        let mut keys = past.origin.toggles.differences(&before.origin.toggles);
+        // A camera that was written into the scene is told by the scene's keys.
+        let is_written = edits.iter().any(|edit| edit.contains("camera."));
+        keys.retain(|key| !(is_written && key == "camera of the scene"));
+        let changes = [edits, keys];
+        if let Some(past) = self.past.get_mut(at) {
+            past.changes = changes;
+        }
+    }
+
+    /// Scene and settings of the picture that is looked at. `None` if that is the newest one.
+    pub(super) fn origin_of_open(&self) -> Option<&Origin> {
+        let (at, _) = self.open.as_ref()?;
+        self.past.get(*at).map(|past| &past.origin)
+    }
+
+    /// Whether the oldest picture is looked at.
+    pub(super) fn is_oldest_open(&self) -> bool {
+        self.open.as_ref().is_some_and(|(at, _)| *at == 0)
     }
 
     /// Whether an older picture is looked at.
@@ -178,15 +201,13 @@ impl History {
     /// Changes from the picture before to this one: by edits, by keys.
     pub(super) fn change(&self, at: usize) -> String {
         let Some(past) = self.past.get(at) else { return String::new() };
-        let Some(before) = at.checked_sub(1).and_then(|before| self.past.get(before)) else {
-            return "the first that is kept".to_owned();
+        let changes = past.changes.concat();
+        let changes = match changes.as_slice() {
+            _ if at == 0 => "first".to_owned(),
+            [] => "rendered again".to_owned(),
+            _ => changes.join("; "),
         };
-        let edits = before.edits + 1..=past.edits;
-        let edits =
-            edits.map(|edit| self.texts.get(&edit).map_or("a file that the scene names", String::as_str));
-        let keys = past.toggles.differences(&before.toggles);
-        let all: Vec<String> = edits.map(str::to_owned).chain(keys).collect();
-        if all.is_empty() { "rendered again".to_owned() } else { all.join("; ") }
+        if past.origin.is_unfinished { format!("unfinished; {changes}") } else { changes }
     }
 
     /// One of the pictures that are kept.
@@ -237,8 +258,10 @@ pub(super) fn ago(time: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::settings::View;
+    use crate::pipeline::settings::{CameraChange, View};
+    use crate::pipeline::{Content, FileRead};
     use crate::tui::fixtures::plain_picture;
+    use crate::tui::state::Toggles;
 
     fn shown(generation: u64, side: u32) -> Shown {
         Shown {
@@ -255,10 +278,10 @@ mod tests {
         let mut history = History::default();
         for generation in 0..10 {
             let picture = plain_picture(1000, 1000, [generation as u8, 0, 0]);
-            history.record(Shown { picture, ..shown(generation, 1) }, Instant::now(), Toggles::default());
+            history.record(Shown { picture, ..shown(generation, 1) }, Instant::now(), Origin::default());
         }
         assert_eq!(history.past.len(), 5, "3 MB each");
-        history.record(shown(10, 10_000), Instant::now(), Toggles::default());
+        history.record(shown(10, 10_000), Instant::now(), Origin::default());
         assert_eq!(history.past.len(), 1, "the last one stays whatever it takes");
     }
 
@@ -267,7 +290,7 @@ mod tests {
         let mut history = History::default();
         for generation in 0..3 {
             history.edited();
-            history.record(shown(generation, 10), Instant::now(), Toggles::default());
+            history.record(shown(generation, 10), Instant::now(), Origin::default());
         }
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
     }
@@ -275,9 +298,9 @@ mod tests {
     #[test]
     fn an_edit_that_changed_nothing_is_none_to_look_back_over() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), Toggles::default());
+        history.record(shown(1, 10), Instant::now(), Origin::default());
         history.edited();
-        history.record(shown(2, 20), Instant::now(), Toggles::default());
+        history.record(shown(2, 20), Instant::now(), Origin::default());
         history.edited();
         history.edited_nothing();
         let before = history.before_edit(shown(2, 20)).expect("a picture");
@@ -287,9 +310,9 @@ mod tests {
     #[test]
     fn a_camera_that_was_kept_is_an_edit() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), Toggles::default());
-        history.record(shown(2, 20), Instant::now(), Toggles::default());
-        history.record(shown(3, 30), Instant::now(), Toggles::default());
+        history.record(shown(1, 10), Instant::now(), Origin::default());
+        history.record(shown(2, 20), Instant::now(), Origin::default());
+        history.record(shown(3, 30), Instant::now(), Origin::default());
         history.kept_camera(2);
         let before = history.before_edit(shown(3, 30)).expect("a picture");
         assert_eq!(before.generation, 1, "of the camera before");
@@ -298,47 +321,86 @@ mod tests {
     #[test]
     fn one_request_has_one_picture() {
         let mut history = History::default();
-        history.record(shown(1, 10), Instant::now(), Toggles::default());
-        history.record(shown(1, 20), Instant::now(), Toggles::default());
+        history.record(shown(1, 10), Instant::now(), Origin::default());
+        history.record(shown(1, 20), Instant::now(), Origin::default());
         assert_eq!((history.past.len(), history.past[0].shown.picture.width), (1, 20));
+    }
+
+    /// A scene with this text, and settings by keys.
+    fn origin(text: &str, view: Option<View>) -> Origin {
+        let toggles = Toggles { view, ..Toggles::default() };
+        Origin { toggles, text: Some(text.into()), ..Origin::default() }
+    }
+
+    fn changes(history: &History) -> Vec<String> {
+        (0..history.len()).map(|at| history.change(at)).collect()
     }
 
     #[test]
     fn each_picture_says_what_changed_since_the_one_before() {
         let mut history = History::default();
-        let keys = |view| Toggles { view, ..Toggles::default() };
-        history.record(shown(1, 10), Instant::now(), keys(None));
+        let (wide, narrow) = ("camera.fov = 40", "camera.fov = 30");
+        let seed = "camera.fov = 30\nseed = 1";
+        history.record(shown(1, 10), Instant::now(), origin(wide, None));
+        // Two saves, of which one alone can be read.
         history.edited();
-        history.describe_edit("camera.fov 40 → 30".to_owned());
         history.edited();
-        history.record(shown(2, 20), Instant::now(), keys(None));
-        history.record(shown(3, 30), Instant::now(), keys(Some(View::Normal)));
+        history.record(shown(2, 20), Instant::now(), origin(narrow, None));
+        history.record(shown(3, 30), Instant::now(), origin(narrow, Some(View::Normal)));
         history.edited();
-        history.describe_edit("render.seed 0 → 1".to_owned());
-        history.record(shown(4, 40), Instant::now(), keys(None));
-        history.record(shown(5, 50), Instant::now(), keys(None));
-        let changes: Vec<String> = (0..5).map(|at| history.change(at)).collect();
+        history.record(shown(4, 40), Instant::now(), origin(seed, None));
+        history.record(shown(5, 50), Instant::now(), origin(seed, None));
         assert_eq!(
-            changes,
-            [
-                "the first that is kept",
-                "camera.fov 40 → 30; a file that the scene names",
-                "view normal",
-                "render.seed 0 → 1; view of the scene",
-                "rendered again",
-            ]
+            changes(&history),
+            ["first", "camera.fov 40 → 30", "view normal", "+ seed = 1; view of the scene", "rendered again",]
         );
         assert_eq!((history.len(), history.looked_at()), (5, Some(4)));
     }
 
     #[test]
+    fn a_camera_that_is_written_into_the_scene_is_told_once() {
+        let mut history = History::default();
+        let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
+        let moved = Toggles { camera, ..Toggles::default() };
+        history.record(shown(1, 10), Instant::now(), origin("camera.fov = 40", None));
+        let before = Origin { toggles: moved, ..origin("camera.fov = 40", None) };
+        history.record(shown(2, 20), Instant::now(), before.clone());
+        history.record(shown(3, 30), Instant::now(), origin("camera.fov = 30", None));
+        history.record(shown(4, 40), Instant::now(), before);
+        history.record(shown(5, 50), Instant::now(), origin("camera.fov = 40", None));
+        let words = [
+            "first",
+            "camera moved",
+            "camera.fov 40 → 30",
+            "camera.fov 30 → 40; camera moved",
+            "camera of the scene",
+        ];
+        assert_eq!(changes(&history), words);
+    }
+
+    #[test]
+    fn files_that_the_scene_names_are_told_by_name() {
+        let file = |name: &str, hash: u8| FileRead { path: name.into(), content: Content::Hash([hash; 32]) };
+        let files = |bricks, knot| -> Arc<[FileRead]> {
+            [file("textures/bricks.png", bricks), file("knot.obj", knot)].into()
+        };
+        let mut history = History::default();
+        for (number, (bricks, knot)) in (1..).zip([(1, 1), (2, 1), (2, 1), (3, 2)]) {
+            let origin = Origin { files: files(bricks, knot), ..origin("camera.fov = 40", None) };
+            history.record(shown(number, 10 * number as u32), Instant::now(), origin);
+        }
+        let words = ["first", "bricks.png changed", "rendered again", "bricks.png changed; knot.obj changed"];
+        assert_eq!(changes(&history), words);
+    }
+
+    #[test]
     fn small_pictures_are_made_anew_when_their_pictures_change() {
         let mut history = History::default();
-        history.record(shown(1, 1000), Instant::now(), Toggles::default());
+        history.record(shown(1, 1000), Instant::now(), Origin::default());
         let size = |history: &History| history.small(0).map(|small| (small.width, small.pixels[0]));
         assert_eq!(size(&history), Some((64, [1, 2, 3])));
         let picture = plain_picture(10, 10, [9, 8, 7]);
-        history.record(Shown { picture, ..shown(1, 1) }, Instant::now(), Toggles::default());
+        history.record(Shown { picture, ..shown(1, 1) }, Instant::now(), Origin::default());
         assert_eq!(size(&history), Some((10, [9, 8, 7])));
     }
 

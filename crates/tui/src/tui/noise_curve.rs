@@ -5,7 +5,7 @@ const MOST: usize = 256;
 /// Least ratio of the times of two points: the axis of time is logarithmic.
 const STEP: f64 = 1.02;
 
-/// Seconds of a render, and the noise after them, in the order of time.
+/// Seconds of a render, and the noise that was measured after them, in the order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct NoiseCurve(Vec<(f64, f64)>);
 

@@ -33,6 +33,8 @@ pub(super) struct Presenter {
     files: Files,
     /// No frame before this.
     next_frame: Instant,
+    /// The newest request of which a picture was drawn.
+    newest: u64,
 }
 
 /// The picture that was drawn last.
@@ -56,7 +58,7 @@ struct Aimed {
 
 impl Presenter {
     pub(super) fn new(display: Display, previews: PreviewSlot, now: Instant) -> Self {
-        Self { display, drawn: Aimed::default(), previews, files: Files::here(), next_frame: now }
+        Self { display, drawn: Aimed::default(), previews, files: Files::here(), next_frame: now, newest: 0 }
     }
 
     /// Takes note of a newer picture and gives it if it is to be drawn. Until it is worth its bytes it stays in the slot,
@@ -178,6 +180,10 @@ impl Presenter {
         let is_first = self.drawn.generation != shown.generation;
         let (picture, samples, at) = (Some(shown.picture.clone()), samples(state), Some(now));
         let generation = shown.generation;
+        if generation > self.newest {
+            self.newest = generation;
+            self.display.begin_count();
+        }
         self.drawn = Aimed { picture, generation, samples, at, is_first, ..Aimed::default() };
         true
     }

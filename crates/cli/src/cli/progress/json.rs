@@ -90,7 +90,7 @@ fn value(event: &Event) -> Option<Value> {
         | Event::NotKept { .. }
         | Event::Refused { .. }
         | Event::WritePostponed { .. }
-        | Event::Edited { .. }
+        | Event::Text { .. }
         | Event::CameraKept { .. }
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => return None,

@@ -65,7 +65,6 @@ use crate::lights::Lights;
 use crate::math::DVec3;
 use crate::output::LayerImage;
 use crate::output::part::Trait;
-use crate::scene::changes;
 use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
@@ -357,11 +356,8 @@ impl Engine {
             let origin = Origin { path: &request.scene, sets: &request.overrides.sets, show };
             parse(origin, (contents, &containers), &mut self.parsed, findings, token)
         })?;
-        let before = self.good.as_ref().map(|good| good.parsed.loaded.source.text());
-        let edit = before.and_then(|before| changes(before, parsed.loaded.source.text()));
-        if let Some(what) = edit {
-            table.sink.send(Event::Edited { generation: request.generation, what });
-        }
+        let text = Arc::from(parsed.loaded.source.text());
+        table.sink.send(Event::Text { generation: request.generation, text });
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
         Foretold::of_picture(&plan).check(&plan)?;

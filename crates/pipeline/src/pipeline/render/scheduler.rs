@@ -206,14 +206,14 @@ impl<'a> Scheduler<'a> {
         while !self.state.is_complete_in(part, samples) && !self.is_over_time {
             if let Some(goals) = self.next_round().filter(|_| part.is_none()) {
                 self.round(&goals)?;
-                self.forecast.look_at_noise(self.state, self.rendering.tracer.pool);
+                self.look_at_noise();
                 continue;
             }
             let pixels = self.state.film.crop().area();
             let target = next_pass(self.state.samples_in(part, samples), samples, pixels);
             self.pass(part, target)?;
             if target.is_power_of_two() {
-                self.forecast.look_at_noise(self.state, self.rendering.tracer.pool);
+                self.look_at_noise();
             }
             if error > 0.0 && target.is_power_of_two() && !self.is_over_time {
                 self.rendering.tracer.pool.install(|| self.state.judge(target, error.into()));
@@ -221,6 +221,12 @@ impl<'a> Scheduler<'a> {
             }
         }
         Ok(())
+    }
+
+    fn look_at_noise(&mut self) {
+        let Tracer { pool, token, .. } = self.rendering.tracer;
+        let seconds = self.clock.seconds(token.is_paused());
+        self.forecast.look_at_noise(self.state, pool, seconds);
     }
 
     /// All tiles of a part that have fewer samples than `target`.

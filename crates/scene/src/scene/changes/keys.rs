@@ -55,11 +55,11 @@ impl Found<'_> {
             let name = joined(name, entry.key);
             match old.get(entry.key) {
                 Some(before) => self.values(&name, &before.value, &entry.value),
-                None => self.one_sided('+', &name, &entry.value, 1),
+                None => self.whole('+', &name, &entry.value, 1),
             }
         }
         for entry in old.iter().filter(|entry| new.get(entry.key).is_none()) {
-            self.one_sided('−', &joined(name, entry.key), &entry.value, 0);
+            self.whole('−', &joined(name, entry.key), &entry.value, 0);
         }
     }
 
@@ -96,7 +96,25 @@ impl Found<'_> {
         }
     }
 
-    /// A key that only one of the texts has.
+    /// A key that only one of the texts has; of tables `[[name]]`, each by itself.
+    fn whole(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
+        match value.item() {
+            Item::Array(array) if array.is_of_tables() => {
+                for (index, value) in array.iter().enumerate() {
+                    self.one_sided(sign, &joined(name, &called(&value, index + 1)), &value, text);
+                }
+            }
+            Item::Array(_)
+            | Item::Table(_)
+            | Item::String(_)
+            | Item::Integer { .. }
+            | Item::Float(_)
+            | Item::Boolean(_)
+            | Item::Datetime => self.one_sided(sign, name, value, text),
+        }
+    }
+
+    /// A key or a table that only one of the texts has.
     fn one_sided(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
         let is_short = match value.item() {
             Item::Table(_) => false,
@@ -186,7 +204,8 @@ mod tests {
         said("width = 64", "width = 64\nseed = 7", "+ render.seed = 7");
         said("[[sphere]]\nradius = 1\n", "", "− sphere.2");
         said("[[sphere]]\nradius = 1", "[[sphere]]\nname = \"b\"\n[[sphere]]\nradius = 1", "+ sphere.b");
-        said("[[sphere]]\nname", "[[quad]]\nu = 1\n[[sphere]]\nname", "+ quad");
+        said("[[sphere]]\nname", "[[quad]]\nu = 1\n[[sphere]]\nname", "+ quad.1");
+        said("[[sphere]]\nname", "[[quad]]\nname = \"wall\"\n[[sphere]]\nname", "+ quad.wall");
     }
 
     #[test]

@@ -181,6 +181,31 @@ fn end_of_damage(context: &Context<'_>, line: usize) -> usize {
     (line + 1..).find(|next| is_header(*next) != Some(false)).unwrap_or(usize::MAX)
 }
 
+/// The number around a place.
+fn number_at<'c>(context: &'c Context<'_>, span: &Range<usize>) -> &'c str {
+    let is_of_number = |text: &str| text.starts_with(|c: char| c.is_ascii_digit() || "+-._eE".contains(c));
+    let (mut start, mut end) = (span.start, span.end);
+    while start > 0 && is_of_number(context.text(&(start - 1..start))) {
+        start -= 1;
+    }
+    while is_of_number(context.text(&(end..end + 1))) {
+        end += 1;
+    }
+    context.text(&(start..end))
+}
+
+/// A number with the digits around its point that it lacks. `None` if that makes no number of it.
+fn with_digits(number: &str) -> Option<String> {
+    let unsigned = number.trim_start_matches(['+', '-']);
+    let sign = &number[..number.len() - unsigned.len()];
+    let end = unsigned.find(['e', 'E']).unwrap_or(unsigned.len());
+    let (mantissa, exponent) = unsigned.split_at(end);
+    let before = if mantissa.starts_with('.') { "0" } else { "" };
+    let after = if mantissa.ends_with('.') { "0" } else { "" };
+    let whole = format!("{sign}{before}{mantissa}{after}{exponent}");
+    (whole != number && whole.parse::<f64>().is_ok()).then_some(whole)
+}
+
 fn issue(context: &Context<'_>, lists: &Lists<'_>, error: SyntaxError) -> Issue {
     let is_deep = is_too_deep(&error);
     let SyntaxError { span, what, expected } = error;
@@ -203,7 +228,11 @@ fn issue(context: &Context<'_>, lists: &Lists<'_>, error: SyntaxError) -> Issue 
             error("this header is not closed").help(format!("expected {expected}"))
         }
         "invalid mantissa" | "invalid fraction" | "invalid exponent" => {
-            error("digits are missing in this number").help("write 0.5, 5.0 and 1e3")
+            let help = match with_digits(number_at(context, &span)) {
+                Some(number) => format!("write {number}"),
+                None => "write 0.5, 5.0 and 1e3".to_owned(),
+            };
+            error("digits are missing in this number").help(help)
         }
         "unexpected key or value" => error("there is more on this line than one value")
             .help("expected the end of the line; several numbers stand in brackets, such as [0, 1, 0]"),
@@ -240,4 +269,26 @@ fn not_a_value(span: Range<usize>, written: &str) -> Issue {
         return Issue::error(span, format!("`{written}` is not a number")).help(VALUES);
     }
     Issue::error(span, "a text must stand in quotes").label(format!("write \"{written}\""))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_digits_that_a_number_lacks_are_written_for_it() {
+        for (number, whole) in [
+            (".3", Some("0.3")),
+            ("-.5", Some("-0.5")),
+            ("5.", Some("5.0")),
+            (".5e3", Some("0.5e3")),
+            ("5.e-3", Some("5.0e-3")),
+            (".", None),
+            ("1e", None),
+            ("1.2.", None),
+            ("", None),
+        ] {
+            assert_eq!(with_digits(number).as_deref(), whole, "{number}");
+        }
+    }
 }

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 pub(super) use self::display::DisplayState;
 pub(super) use self::overlays::{OverlayState, Pane, Problems, ViewList};
 pub(super) use self::picture::PictureState;
-pub(super) use self::request::{CameraStep, RequestState, Toggles};
+pub(super) use self::request::{CameraStep, Origin, RequestState, Toggles, signed_stops};
 pub(super) use self::saving::{PendingChange, SavingState};
 pub(super) use self::selection::{PickPurpose, Press, SelectionState};
 pub(super) use self::work::{Activity, AssetBar, WorkState};
@@ -112,9 +112,12 @@ impl State {
     /// Time at which the state needs the next tick, if nothing else happens.
     pub(super) fn next_tick(&self) -> Option<Instant> {
         const CLOCK: Duration = Duration::from_millis(250);
+        const AGE: Duration = Duration::from_secs(1);
         let clock = (self.work.is_running() && !self.work.paused).then(|| self.now + CLOCK);
         let bars = self.work.assets.iter().filter_map(AssetBar::end).min();
         let views = self.overlays.views.as_ref().map(|views| views.until);
-        [clock, self.request.resize_due, bars, views].into_iter().flatten().min()
+        // An older picture grows older.
+        let age = self.picture.history.is_open().then(|| self.now + AGE);
+        [clock, age, self.request.resize_due, bars, views].into_iter().flatten().min()
     }
 }

@@ -1,12 +1,16 @@
 //! The newest request to the worker, and what it is made of.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::choice::Choice;
+use crate::pipeline::FileRead;
 use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
 use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
 use crate::scene::description::{Integrator, Shadows};
+use crate::scene::sanitize::visible;
+use crate::scene::{changes, is_mesh};
 
 /// Settings that keys changed, on top of the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,11 +44,53 @@ impl Toggles {
             said("photons", self.photons != before.photons, self.photons.map(on_off)),
             said("view", self.view != before.view, self.view.map(|it| it.name().to_owned())),
             said("camera", self.camera != before.camera, camera),
-            said("exposure", self.exposure != before.exposure, self.exposure.map(|it| format!("{it:+}"))),
+            said("exposure", self.exposure != before.exposure, self.exposure.map(signed_stops)),
         ]
         .into_iter()
         .flatten()
         .collect()
+    }
+}
+
+/// Scene and settings that a picture was made of.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::tui) struct Origin {
+    /// Settings that keys had changed.
+    pub toggles: Toggles,
+    /// Text of the scene file. `None` for a model.
+    pub text: Option<Arc<str>>,
+    /// The other files of the scene.
+    pub files: Arc<[FileRead]>,
+    /// Whether its render was not over.
+    pub is_unfinished: bool,
+}
+
+impl Origin {
+    /// The same in any exposure: of the same light.
+    pub(in crate::tui) fn of_light(self) -> Self {
+        Self { toggles: Toggles { exposure: None, ..self.toggles }, ..self }
+    }
+
+    /// Changes of the files since another one, in words.
+    pub(in crate::tui) fn edits(&self, before: &Self) -> Vec<String> {
+        let of_text =
+            before.text.as_deref().zip(self.text.as_deref()).and_then(|(old, new)| changes(old, new));
+        let is_changed = |file: &&FileRead| {
+            before.files.iter().any(|old| old.path == file.path && old.content != file.content)
+        };
+        let name = |file: &FileRead| file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let of_files =
+            self.files.iter().filter(is_changed).map(|file| format!("{} changed", visible(&name(file))));
+        of_text.into_iter().chain(of_files).collect()
+    }
+}
+
+/// Stops of exposure, with their sign.
+pub(in crate::tui) fn signed_stops(stops: f32) -> String {
+    match stops {
+        0.0 => "0".to_owned(),
+        stops if stops < 0.0 => format!("−{}", -stops),
+        stops => format!("+{stops}"),
     }
 }
 
@@ -80,6 +126,10 @@ pub(in crate::tui) struct RequestState {
     /// First request of a camera that keys have moved.
     pub moved_since: Option<u64>,
 
+    /// Text of the scene file, in the newest request that was understood.
+    pub text: Option<Arc<str>>,
+    /// The other files of the scene.
+    pub files: Arc<[FileRead]>,
     /// Settings that hold, as the worker reports them.
     pub effective: Option<Effective>,
     /// The scene's own camera, in the newest request that was understood.
@@ -102,9 +152,27 @@ impl RequestState {
             first_section: None,
             camera_step: CameraStep::default(),
             moved_since: None,
+            text: None,
+            files: Arc::default(),
             effective: None,
             camera: None,
             exposure: None,
+        }
+    }
+
+    /// Notes the files that the newest request is made of. The text of a scene is compared by itself; a model has none.
+    pub(in crate::tui) fn note_files(&mut self, files: Vec<FileRead>) {
+        let is_model = is_mesh(&self.scene);
+        self.files = files.into_iter().filter(|file| is_model || file.path != self.scene).collect();
+    }
+
+    /// Description of what the newest request shows.
+    pub(in crate::tui) fn origin(&self, is_unfinished: bool) -> Origin {
+        Origin {
+            toggles: self.sent_toggles,
+            text: self.text.clone().filter(|_| !is_mesh(&self.scene)),
+            files: self.files.clone(),
+            is_unfinished,
         }
     }
 
@@ -128,9 +196,12 @@ impl RequestState {
 
     /// Changes by keys that the picture alone does not show, in words.
     pub(in crate::tui) fn changes(&self) -> Vec<String> {
-        let moved = self.toggles.camera.is_any().then(|| "camera moved".to_owned());
-        let exposed = self.toggles.exposure.map(|stops| format!("exposure {stops:+}"));
-        moved.into_iter().chain(exposed).collect()
+        let CameraChange { pose, fov, focus } = self.toggles.camera;
+        let is_moved = pose.is_some() || fov.is_some();
+        let moved = is_moved.then(|| "camera moved".to_owned());
+        let focused = (focus.is_some() && !is_moved).then(|| "focus moved".to_owned());
+        let exposed = self.toggles.exposure.map(|it| format!("exposure {}", signed_stops(it)));
+        moved.into_iter().chain(focused).chain(exposed).collect()
     }
 
     /// Whether the image is written without a key: the scene's own camera, in the view that the run began with.
@@ -172,5 +243,15 @@ impl RequestState {
             .as_ref()
             .map_or(USUAL, |it| it.width as f32 / it.height.max(1) as f32)
             .clamp(0.02, 50.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exposure_has_the_minus_of_all_numbers() {
+        assert_eq!([-0.25, 0.0, 1.5].map(signed_stops), ["−0.25", "0", "+1.5"]);
     }
 }

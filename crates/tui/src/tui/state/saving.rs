@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::pipeline::protocol::CameraEdit;
+use crate::pipeline::protocol::{CameraEdit, Viewpoint};
 use crate::tui::event::{Unwritten, Written};
 
 /// A save on its way to the screen.
@@ -32,6 +32,10 @@ pub(in crate::tui) struct SavingState {
     pub camera_kept: Option<Instant>,
     /// Cameras that glimt wrote into the scene file and can take back, the last one at the end.
     pub camera_edits: Vec<CameraEdit>,
+    /// Whether there is a scene beside the model that is shown: `c` does not write over it.
+    pub has_scene_of_model: bool,
+    /// Camera of the scene that `c` wrote beside the model.
+    pub camera_of_model: Option<Viewpoint>,
     /// Time at which glimt refused to write the camera into the scene file.
     pub camera_refused: Option<Instant>,
 
@@ -56,6 +60,8 @@ impl SavingState {
             first_change: None,
             camera_kept: None,
             camera_edits: Vec::new(),
+            has_scene_of_model: false,
+            camera_of_model: None,
             camera_refused: None,
             is_write_requested: false,
             unwritten: None,

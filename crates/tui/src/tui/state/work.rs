@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::request::Origin;
 use crate::pipeline::protocol::{AssetProgress, RenderProgress, Report, Stage, StageReport};
 use crate::tui::noise_curve::NoiseCurve;
 
@@ -52,6 +53,8 @@ pub(in crate::tui) struct WorkState {
     /// Noise against the time of this render, and of the one before.
     pub curve: NoiseCurve,
     pub last_curve: NoiseCurve,
+    /// Curves of the last renders, the newest at the end: a picture that is found again has its curve.
+    curves: Vec<(Origin, NoiseCurve)>,
     /// Whether the request changed nothing.
     pub unchanged: bool,
     /// Finished renders so far; another exposure is no render.
@@ -71,9 +74,26 @@ impl WorkState {
             report: None,
             curve: NoiseCurve::default(),
             last_curve: NoiseCurve::default(),
+            curves: Vec::new(),
             unchanged: false,
             renders: 0,
         }
+    }
+
+    /// Keeps the curve of a finished render.
+    pub(in crate::tui) fn keep_curve(&mut self, origin: Origin) {
+        const MOST: usize = 16;
+        self.curves.retain(|(other, _)| *other != origin);
+        self.curves.push((origin, self.curve.clone()));
+        if self.curves.len() > MOST {
+            self.curves.remove(0);
+        }
+    }
+
+    /// Takes up the curve of a picture that is found again, if it is known.
+    pub(in crate::tui) fn find_curve(&mut self, origin: &Origin) {
+        let found = self.curves.iter().find(|(other, _)| other == origin);
+        self.curve = found.map(|(_, curve)| curve.clone()).unwrap_or_default();
     }
 
     pub(in crate::tui) fn is_running(&self) -> bool {

@@ -127,7 +127,7 @@ fn keys_that_are_held_come_to_an_end_and_say_so() {
         ('-', "as far as keys go"),
         ('<', "field of view 1°"),
         ('>', "field of view 160°"),
-        ('[', "exposure -20"),
+        ('[', "exposure −20"),
         (']', "exposure +20"),
     ] {
         let mut desk = Desk::new();
@@ -180,4 +180,26 @@ fn the_call_s_own_exposure_is_no_change_either() {
         (desk.state.request.toggles.exposure, desk.state.request.overrides().exposure),
         (None, Some(1.0))
     );
+}
+
+#[test]
+fn the_scene_of_a_model_is_written_once_and_its_camera_is_kept() {
+    use crate::pipeline::protocol::{Event as WorkerEvent, Kept};
+    let mut desk = Desk::new();
+    desk.state.request.scene = "assets/vase.obj".into();
+    desk.finish([200, 30, 30]);
+    desk.press('l');
+    desk.finish([30, 30, 200]);
+    desk.key(KeyPress::special(KeyCode::Esc));
+    assert!(desk.text().contains("c keep") && !desk.text().contains("o edit"), "{}", desk.text());
+    let kept =
+        Kept { path: "assets/vase.toml".into(), is_new: true, is_own: false, of_model: true, edit: None };
+    let generation = desk.state.request.generation;
+    desk.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
+    desk.key(KeyPress::special(KeyCode::Esc));
+    assert!(!desk.text().contains("c keep"), "there is a scene already: {}", desk.text());
+    assert!(!crate::tui::exit_summary::words(&desk.state).contains("discarded"));
+    desk.press('l');
+    desk.finish([200, 30, 30]);
+    assert!(crate::tui::exit_summary::words(&desk.state).contains("discarded"), "it was moved since");
 }

@@ -100,7 +100,11 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
                 request(&effects).map(|it| (it.overrides.exposure, it.write)),
                 Some((Some(stops), Writing::Try))
             );
-            assert!(desk.text().contains(&format!("exposure {stops:+}")), "{}", desk.text());
+            assert!(
+                desk.text().contains(&format!("exposure {}", crate::tui::state::signed_stops(stops))),
+                "{}",
+                desk.text()
+            );
         }
         Action::KeepCamera => {
             assert!(desk.key(key).is_empty(), "it has not moved");

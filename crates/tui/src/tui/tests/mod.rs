@@ -7,11 +7,13 @@ mod keys;
 mod layout;
 mod manual;
 mod noise;
+mod older;
 mod overlay;
 mod pointer;
 mod screen;
 mod spare;
 mod warnings;
+mod words;
 
 use ratatui::style::Color;
 

@@ -9,7 +9,7 @@ use crate::tui::fixtures::*;
 fn the_noise_is_told_as_it_falls() {
     let mut desk = Desk::new();
     desk.worker(protocol::Event::Started { generation: 1 });
-    let noise = Some(NoiseProgress { now: 0.021, next: Some((0.01, 14.0)) });
+    let noise = Some(NoiseProgress { now: 0.021, seconds: 1.0, next: Some((0.01, 14.0)) });
     let progress = RenderProgress { noise, ..progress(0.5, Some(20.0)) };
     desk.worker(protocol::Event::Progress { generation: 1, progress });
     for (columns, rows, words) in [
@@ -21,6 +21,51 @@ fn the_noise_is_told_as_it_falls() {
         assert!(desk.text().contains(words), "{words}: {}", desk.text());
     }
     assert!(!desk.text().contains("noise"), "{}", desk.text());
+    // A pause has no end that is known.
+    desk.event(Event::Resize(window(80, 24)));
+    desk.press(' ');
+    assert!(desk.text().contains("noise 2.1 % · 32/64 samples"), "{}", desk.text());
+}
+
+#[test]
+fn the_total_of_samples_is_a_guess_while_noise_decides_it() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Started { generation: 1 });
+    let settings = Box::new(crate::pipeline::settings::Effective { error: 0.02, ..settings() });
+    desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
+    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
+    assert!(desk.text().contains("32 of about 64 samples"), "{}", desk.text());
+}
+
+/// The end of a render with `error`, or with a budget of time: whether it was complete, and the samples that it had.
+fn ended(error: f32, time_seconds: Option<f64>, complete: bool, samples: u32) -> String {
+    let overrides = crate::pipeline::settings::Overrides { time_seconds, ..Default::default() };
+    let (kind, depth) =
+        (crate::tui::preview_kind::PreviewKind::HalfBlock, crate::tui::color::ColorDepth::None);
+    let mut desk = Desk::with(state_with(80, 24, kind, depth, overrides));
+    desk.finish(RED);
+    let report = desk.state.work.report.as_mut().expect("a report");
+    (report.image.complete, report.image.samples.max) = (complete, samples);
+    desk.state.request.effective.as_mut().expect("settings").error = error;
+    desk.text()
+}
+
+#[test]
+fn what_ended_a_render_is_told_if_several_things_could() {
+    for (error, time, complete, samples, words) in [
+        (0.02, None, true, 40, "2 % a tile ✓"),
+        (0.02, None, true, 64, "ended by samples"),
+        (0.02, Some(5.0), false, 40, "ended by time"),
+        (0.0, Some(5.0), false, 40, "ended by time"),
+        (0.0, Some(5.0), true, 64, "ended by samples"),
+    ] {
+        let text = ended(error, time, complete, samples).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(text.contains(words), "{words}: {text}");
+        assert_eq!(text.contains("✓ ") && text.contains("tile ✓"), words.contains("✓"), "{text}");
+        assert_eq!(text.contains("ended by"), words.contains("ended"), "{text}");
+    }
+    let plain = ended(0.0, None, true, 64);
+    assert!(!plain.contains("ended"), "{plain}");
 }
 
 #[test]

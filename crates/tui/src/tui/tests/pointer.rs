@@ -350,7 +350,7 @@ fn an_older_picture_is_said_to_be_older_in_the_first_line() {
     // A key that means nothing takes the message away.
     desk.press('y');
     let text = desk.text();
-    assert!(text.contains("b newest") && text.contains("n N older, newer"), "the ways on: {text}");
+    assert!(text.contains("b newest") && text.contains("N newer"), "the ways on: {text}");
     assert!(!text.contains("samples") && !text.contains("render 1"), "that is of the newest one: {text}");
     desk.event(Event::Resize(window(30, 8)));
     assert!(first(&mut desk).contains("1 of 2"), "{}", desk.text());
@@ -454,25 +454,20 @@ fn an_exposure_is_no_picture_of_its_own_in_the_history() {
 fn an_older_picture_says_what_its_edit_changed() {
     use crate::pipeline::protocol;
     let mut desk = Desk::with(state(120, 40));
-    desk.finish(RED);
-    for (color, what) in [(BLUE, "line 3: radius 1 → 2"), (RED, "line 7: fov 40 → 30")] {
+    for (color, text) in [(RED, "r = 1\nfov = 40"), (BLUE, "r = 2\nfov = 40"), (RED, "r = 2\nfov = 30")] {
         desk.event(Event::Changed(Changed { noticed: desk.now }));
         let generation = desk.state.request.generation;
-        desk.worker(protocol::Event::Edited { generation, what: what.to_owned() });
+        desk.worker(protocol::Event::Text { generation, text: text.into() });
         desk.finish(color);
     }
     desk.press('n');
-    assert!(desk.text().contains("picture 2 of 3, 0 s ago, after line 3: radius 1 → 2"), "{}", desk.text());
+    assert!(desk.text().contains("picture 2 of 3, after r 1 → 2; n older, N newer"), "{}", desk.text());
     desk.press('n');
-    assert!(
-        desk.text().contains("picture 1 of 3, 0 s ago; n older"),
-        "the first is of no edit: {}",
-        desk.text()
-    );
+    assert!(desk.text().contains("picture 1 of 3; N newer"), "the first is of no edit: {}", desk.text());
     desk.press('b');
     desk.press('b');
     assert!(
-        desk.text().contains("before the last edit, line 7: fov 40 → 30; b is after it"),
+        desk.text().contains("before the last edit, fov 40 → 30; b shows the newest picture"),
         "{}",
         desk.text()
     );

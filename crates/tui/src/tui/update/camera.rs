@@ -12,7 +12,7 @@ use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::tui::camera::{dollied, orbited, zoomed};
 use crate::tui::event::Effect;
-use crate::tui::state::State;
+use crate::tui::state::{State, signed_stops};
 
 /// Degrees of a step around.
 const TURN: f64 = 3.0;
@@ -68,11 +68,11 @@ pub(super) fn expose(state: &mut State, steps: f32) -> Vec<Effect> {
     let before = state.request.toggles.exposure.unwrap_or(own);
     let stops = (before + steps * STOPS).clamp((-MOST_STOPS).min(before), MOST_STOPS.max(before));
     if stops == before {
-        return notify(state, &format!("exposure {stops:+}: keys go from -20 to +20"));
+        return notify(state, &format!("exposure {}: keys go from −20 to +20", signed_stops(stops)));
     }
     state.request.toggles.exposure = (stops != own).then_some(stops);
     let effects = step(state);
-    say(state, format!("exposure {stops:+}"));
+    say(state, format!("exposure {}", signed_stops(stops)));
     effects
 }
 
@@ -127,9 +127,13 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         Ok(kept) => kept,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
+            state.saving.has_scene_of_model |= is_mesh(&state.request.scene);
             return notify(state, &format!("error: {}", visible(&why)));
         }
     };
+    if of_model {
+        (state.saving.has_scene_of_model, state.saving.camera_of_model) = (true, state.request.viewpoint());
+    }
     let name = visible(&path.to_string_lossy()).into_owned();
     let words = match (is_new, is_own) {
         _ if of_model => format!("wrote {name}, a scene of this model with this camera"),

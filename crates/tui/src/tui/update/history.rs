@@ -2,8 +2,7 @@
 
 use super::say::{notify, say};
 use crate::tui::event::Effect;
-use crate::tui::history::ago;
-use crate::tui::state::State;
+use crate::tui::state::{Activity, State};
 
 const NEWEST: &str = "this is the newest picture";
 
@@ -15,8 +14,8 @@ pub(super) fn record(state: &mut State) {
         state.picture.shown.clone()
     };
     if let Some(shown) = newest.filter(|shown| shown.generation == state.request.generation) {
-        let toggles = state.request.sent_toggles;
-        state.picture.history.record(shown, state.now, toggles);
+        let origin = state.request.origin(state.work.activity != Activity::Done);
+        state.picture.history.record(shown, state.now, origin);
     }
 }
 
@@ -56,8 +55,9 @@ pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
     match state.picture.history.before_edit(newest) {
         Some(shown) => {
             let effects = look_at(state, shown);
-            let edit = state.picture.history.last_edit().map_or(String::new(), |what| format!(", {what}"));
-            say(state, format!("before the last edit{edit}; b is after it"));
+            let edits = state.picture.history.edits_since_open();
+            let edits = if edits.is_empty() { edits } else { format!(", {edits}") };
+            say(state, format!("before the last edit{edits}; b shows the newest picture"));
             effects
         }
         None => notify(state, "there is no picture from before an edit"),
@@ -79,11 +79,12 @@ fn newest(state: &State) -> Option<crate::tui::history::Shown> {
 
 fn look_at(state: &mut State, shown: crate::tui::history::Shown) -> Vec<Effect> {
     state.picture.shown = Some(shown);
-    let place = state.picture.history.place().map_or(String::new(), |(number, count, time)| {
-        let age = ago(state.now.saturating_duration_since(time));
-        let edit =
-            state.picture.history.edit_of_open().map_or(String::new(), |what| format!(", after {what}"));
-        format!("picture {number} of {count}, {age}{edit}; n older, N newer")
+    // The first line says how old it is, which goes on.
+    let place = state.picture.history.place().map_or(String::new(), |(number, count, _)| {
+        let edits = state.picture.history.edits_of_open();
+        let edits = if edits.is_empty() { edits } else { format!(", after {edits}") };
+        let older = if number > 1 { "n older, " } else { "" };
+        format!("picture {number} of {count}{edits}; {older}N newer")
     });
     say(state, place);
     Vec::new()

@@ -192,7 +192,15 @@ fn toggle_pause(state: &mut State) -> Vec<Effect> {
 }
 
 fn write_now(state: &mut State) -> Vec<Effect> {
-    say(state, "writing the image as it is now");
+    let is_open = state.picture.history.is_open();
+    say(
+        state,
+        if is_open {
+            "writing the newest image, not the one that is shown"
+        } else {
+            "writing the image as it is now"
+        },
+    );
     state.saving.is_write_requested = true;
     vec![Effect::Send(Command::Write)]
 }

@@ -171,7 +171,7 @@ fn resize(state: &mut State, window: Window) -> Vec<Effect> {
 }
 
 fn tick(state: &mut State) -> Vec<Effect> {
-    state.dirty |= state.work.is_running() && !state.work.paused;
+    state.dirty |= state.work.is_running() && !state.work.paused || state.picture.history.is_open();
     let (now, bars) = (state.now, state.work.assets.len());
     state.work.assets.retain(|asset| asset.end().is_none_or(|end| now < end));
     state.dirty |= state.work.assets.len() != bars;

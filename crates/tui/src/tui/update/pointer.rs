@@ -4,6 +4,7 @@ use super::say::{notify, say};
 use super::{camera, history, overlay, rectangle};
 use crate::math::decimal::{rounded, step_at};
 use crate::pipeline::protocol::{Command, Picked, Thing};
+use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::tui::chrome;
 use crate::tui::event::FilePlace;
@@ -17,6 +18,7 @@ use crate::tui::view::preview::spot_at;
 /// Degrees that a drag over the width of the picture's area turns by.
 const TURN_ACROSS: f64 = 180.0;
 
+const OLDER: &str = "of an older picture nothing is known but its pixels: b shows the newest one";
 const IN_FOCUS: &str = "everything is in focus: the scene's camera has no `aperture`";
 
 /// Reacts to the mouse.
@@ -76,6 +78,9 @@ fn drag(state: &mut State, mouse: Mouse) -> Vec<Effect> {
 }
 
 fn click(state: &mut State, mouse: Mouse) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
     let Some(spot) = spot_at(state, mouse.column, mouse.row) else { return Vec::new() };
     state.selection.crosshair = spot;
     let purpose = if std::mem::take(&mut state.selection.is_focusing) {
@@ -93,6 +98,9 @@ pub(super) fn inspect(state: &mut State) -> Vec<Effect> {
 
 /// First it waits for a click; asked again it takes the crosshair.
 pub(super) fn focus(state: &mut State) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
         state.selection.is_focusing = false;
         return notify(state, IN_FOCUS);
@@ -109,6 +117,9 @@ pub(super) fn focus(state: &mut State) -> Vec<Effect> {
 }
 
 fn ask(state: &mut State, purpose: PickPurpose) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
     if state.request.camera.is_none() {
         return notify(state, "the scene has not been read yet");
     }
@@ -122,7 +133,7 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
     let words = if state.selection.is_mouse_on {
         "mouse on: drag turns, the wheel goes nearer, a click says what is there"
     } else {
-        "mouse off: it selects text"
+        "mouse off: a drag selects text; m turns it on again"
     };
     say(state, words);
     vec![Effect::Mouse(state.selection.is_mouse_on)]
@@ -130,11 +141,13 @@ pub(super) fn toggle_mouse(state: &mut State) -> Vec<Effect> {
 
 /// The answer.
 pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
-    state.selection.picked = picked.thing.as_ref().map(|thing| FilePlace {
-        path: thing.path.clone(),
-        line: thing.line,
-        column: 1,
-    });
+    // An older picture is looked at meanwhile.
+    if state.picture.history.is_open() {
+        return Vec::new();
+    }
+    let in_text = picked.thing.as_ref().filter(|thing| !is_mesh(&thing.path));
+    state.selection.picked =
+        in_text.map(|thing| FilePlace { path: thing.path.clone(), line: thing.line, column: 1 });
     match (state.selection.purpose, &picked.thing) {
         (PickPurpose::Inspect, _) => {
             state.overlays.message = None;
@@ -177,12 +190,20 @@ fn clicked(Picked { thing, pixel: [x, y], .. }: &Picked, facts: &[String]) -> St
 
 /// Copies what was clicked, if the terminal is known to take it.
 pub(super) fn copy(state: &mut State) -> Vec<Effect> {
+    if state.picture.history.is_open() {
+        return notify(state, OLDER);
+    }
     let Some(clicked) = state.selection.clicked.clone() else {
         return notify(state, "nothing was clicked yet: click, or press Enter, then y copies what is there");
     };
     if !state.display.abilities.clipboard {
         // It stands there to be selected.
-        return notify(state, &format!("{clicked} · this terminal is not known to copy by itself"));
+        return notify(
+            state,
+            &format!(
+                "{clicked} · this terminal is not known to copy by itself: shift and a drag select it, or m and a drag"
+            ),
+        );
     }
     say(state, format!("copied: {clicked}"));
     vec![Effect::Aside(chrome::copy(&clicked))]
@@ -198,13 +219,14 @@ fn facts(Picked { thing, color, pixel: [x, y] }: &Picked) -> Vec<String> {
     let name = name.as_ref().map_or(String::new(), |name| format!(" \"{}\"", visible(name)));
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let back = if *is_front { "" } else { " (back)" };
-    let mut facts = vec![
-        format!("{shape}{name}"),
-        format!("{}:{line}", visible(&file)),
+    let mut facts = vec![format!("{shape}{name}")];
+    // The lines of a model's scene are in no file.
+    facts.extend((!is_mesh(path)).then(|| format!("{}:{line}", visible(&file))));
+    facts.extend([
         visible(material).into_owned(),
         format!("{} away", number(*distance)),
         format!("at {}", numbers(*position)),
-    ];
+    ]);
     facts.extend(light);
     facts.push(format!("normal {}{back}", numbers(normal.map(f64::from))));
     facts
@@ -251,6 +273,9 @@ mod tests {
                 "normal (0, 1, 0)"
             ]
         );
+        let of_model = picked.thing.clone().map(|thing| Thing { path: "scenes/vase.obj".into(), ..thing });
+        let of_model = facts(&Picked { thing: of_model, ..picked });
+        assert_eq!(of_model[..2], ["sphere \"ball\"", "glass crystal"], "a model has no lines");
         assert_eq!(facts(&Picked { thing: None, color: None, ..picked }), ["nothing at pixel 3, 4"]);
     }
 }

@@ -27,6 +27,8 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     state.request.preview_size = Layout::preview_size(state);
     state.request.resize_due = None;
     state.request.camera_step = CameraStep::default();
+    // A save that this answers says so afterwards.
+    (state.saving.change, state.saving.first_change) = (None, None);
     state.overlays.unconfirmed = None;
     state.overlays.are_warnings_known = false;
     state.dirty = true;

@@ -64,7 +64,10 @@ pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
     state.request.toggles.view = (view != state.request.base_view()).then_some(view);
     let effects = render(state, false);
     if state.request.toggles.view.is_some() {
-        say(state, format!("view {}: shown, not written; w writes it", view.name()));
+        let is_empty = view == View::Photons && !state.request.photons();
+        let words =
+            if is_empty { "photons are off; p turns them on" } else { "shown, not written; w writes it" };
+        say(state, format!("view {}: {words}", view.name()));
     }
     effects
 }

@@ -16,6 +16,9 @@ use crate::tui::event::{Effect, Unwritten, Written};
 use crate::tui::exit_summary;
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
+/// Message that ends with the render.
+const GOING_ON: &str = "going on from";
+
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     let event = match event {
         // Whatever is rendered meanwhile, these answer a person.
@@ -57,12 +60,12 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => {
             if let Some(noise) = progress.noise {
-                state.work.curve.note(progress.elapsed_seconds, noise.now);
+                state.work.curve.note(noise.seconds, noise.now);
             }
             state.work.progress = Some(progress);
         }
+        Event::Files { files, .. } => state.request.note_files(files),
         Event::Preview { .. }
-        | Event::Files { .. }
         | Event::CameraKept { .. }
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
@@ -80,7 +83,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Checkpoint { news, .. } => match news {
             CheckpointNews::Failed { message } => say(state, format!("warning: {}", visible(&message))),
             CheckpointNews::Resumed { path, .. } => {
-                say(state, format!("going on from {}", visible(&path.to_string_lossy())));
+                say(state, format!("{GOING_ON} {}", visible(&path.to_string_lossy())));
             }
             CheckpointNews::SetAside { path } => {
                 say(
@@ -98,7 +101,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             | CheckpointNews::Ignored { .. } => {}
         },
         Event::Refused { conflicts, .. } => refused(state, conflicts),
-        Event::Edited { what, .. } => state.picture.history.describe_edit(what),
+        Event::Text { text, .. } => state.request.text = Some(text),
         Event::WritePostponed { .. } => {
             say(state, "the image is written as soon as every pixel has a sample");
         }
@@ -145,7 +148,7 @@ fn generation(event: &Event) -> u64 {
         | Event::Refused { generation, .. }
         | Event::Checkpoint { generation, .. }
         | Event::WritePostponed { generation }
-        | Event::Edited { generation, .. }
+        | Event::Text { generation, .. }
         | Event::Files { generation, .. }
         | Event::CameraKept { generation, .. }
         | Event::CameraUndone { generation, .. }
@@ -189,7 +192,9 @@ fn asset(state: &mut State, progress: AssetProgress) {
 fn wrote(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
     // What is written of itself stands beside the picture and does not cover the keys.
     if std::mem::take(&mut state.saving.is_write_requested) {
-        say(state, format!("wrote {}", visible(&path.to_string_lossy())));
+        let is_open = state.picture.history.is_open();
+        let which = if is_open { ": the newest picture, not the one that is shown" } else { "" };
+        say(state, format!("wrote {}{which}", visible(&path.to_string_lossy())));
     }
     // Of several outputs, another one may have failed.
     let is_by_hand = state.work.activity == Activity::Done;
@@ -241,6 +246,7 @@ fn mended(state: &mut State) {
 }
 
 fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
+    state.overlays.message.take_if(|message| message.starts_with(GOING_ON));
     mended(state);
     for stage in &report.stages {
         record(state, stage.clone());
@@ -276,16 +282,19 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
 /// Ends the curve of noise with what was measured. The same picture, or that picture brighter, has the curve that it had.
 fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
     let render = &report.stages[Stage::Render as usize];
+    let origin = state.request.origin(false).of_light();
     match render.status {
         Status::Done => {
             if let Some(error) = report.image.error {
                 state.work.curve.end(render.seconds, error);
             }
+            state.work.keep_curve(origin);
         }
         Status::Reused if unchanged || state.request.is_exposure_only => {
             state.work.curve = std::mem::take(&mut state.work.last_curve);
         }
-        Status::Running | Status::Reused | Status::Skipped => {}
+        Status::Reused => state.work.find_curve(&origin),
+        Status::Running | Status::Skipped => {}
     }
 }
 

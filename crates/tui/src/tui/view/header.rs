@@ -9,7 +9,7 @@ use super::layout::{BLOCK, Layout};
 use super::message;
 use super::text::{Tone, columns, counted, number, percent, put, put_right, rest, running, seconds};
 use crate::choice::Choice;
-use crate::pipeline::protocol::Status;
+use crate::pipeline::protocol::{RenderProgress, Status};
 use crate::pipeline::settings::View;
 use crate::scene::diagnostic::Severity;
 use crate::scene::sanitize::visible;
@@ -36,8 +36,13 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
             keymap::of(Action::PictureAlone).map_or(String::new(), |it| format!("  {} back", it.label));
         room.width -= put_right(buffer, room, &back, Tone::Faint, state.display.depth);
     }
-    let fitting = figures(state).into_iter().find(|words| columns(words) <= room.width);
-    room.width -= put_right(buffer, room, &fitting.unwrap_or_default(), Tone::Strong, state.display.depth);
+    let figures = figures(state);
+    // The name has room beside them, if the shortest of them leave it.
+    let fitting = [LEAST_NAME + 1, 0]
+        .into_iter()
+        .find_map(|name| figures.iter().find(|words| columns(words) + name <= room.width));
+    room.width -=
+        put_right(buffer, room, fitting.map_or("", String::as_str), Tone::Strong, state.display.depth);
     room.width = room.width.saturating_sub(1);
     if room.width >= LEAST_NAME {
         name(state, room, buffer);
@@ -87,8 +92,9 @@ fn name(state: &State, area: Rect, buffer: &mut Buffer) {
     let path = state.request.scene.to_string_lossy();
     let (folder, file) = path.rsplit_once('/').map_or(("", &*path), |(folder, file)| (folder, file));
     let (folder, file) = (visible(folder), visible(file));
-    let size =
-        state.request.effective.as_ref().map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
+    // The size of an older picture is not known.
+    let effective = state.request.effective.as_ref().filter(|_| !state.picture.history.is_open());
+    let size = effective.map_or(String::new(), |it| format!("  {}×{}", it.width, it.height));
     let folder = if folder.is_empty() { String::new() } else { format!("{folder}/") };
     let view = close_up(state) + &view(state);
     let view = (&*view, Tone::Strong);
@@ -106,14 +112,18 @@ fn name(state: &State, area: Rect, buffer: &mut Buffer) {
 
 /// The view, unless it is beauty, and its range.
 fn view(state: &State) -> String {
-    if state.request.view() == View::Beauty {
+    let open = state.picture.history.origin_of_open();
+    let of_open = open.map(|origin| origin.toggles.view.unwrap_or_else(|| state.request.base_view()));
+    let view = of_open.unwrap_or_else(|| state.request.view());
+    if view == View::Beauty {
         return String::new();
     }
-    let shown = state.picture.shown.as_ref().filter(|shown| shown.generation == state.request.generation);
+    let is_at_hand = |generation: u64| open.is_some() || generation == state.request.generation;
+    let shown = state.picture.shown.as_ref().filter(|shown| is_at_hand(shown.generation));
     let range = shown.and_then(|shown| shown.range);
     let range =
         range.map_or(String::new(), |[least, most]| format!(" {} to {}", number(least), number(most)));
-    format!("  view {}{range}", state.request.view().name())
+    format!("  view {}{range}", view.name())
 }
 
 /// Whether the picture at hand lacks the light that photons bring.
@@ -136,7 +146,20 @@ fn figures(state: &State) -> Vec<String> {
     if let Some((number, count, time)) = state.picture.history.place() {
         let place = format!("{number} of {count}");
         let age = ago(state.now.saturating_duration_since(time));
-        return vec![format!("picture {place}, {age}"), place];
+        let mut figures = vec![format!("picture {place}, {age}"), place.clone()];
+        // The newest one is at work meanwhile.
+        if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_running()) {
+            let done = format!("newest {} %", percent(progress.fraction));
+            let eta = eta(state, progress);
+            figures = [
+                format!("picture {place}, {age}  {done}{eta}"),
+                format!("{place}  {done}{eta}"),
+                format!("{place}  {done}"),
+                place,
+            ]
+            .into();
+        }
+        return figures;
     }
     if state.work.is_running() && lacks_photons(state) {
         return ["shown without photons yet", "no photons yet"].map(str::to_owned).to_vec();
@@ -144,9 +167,7 @@ fn figures(state: &State) -> Vec<String> {
     match (state.work.activity, &state.work.report, &state.work.progress) {
         (Activity::Running { .. }, _, Some(progress)) => {
             let done = format!("{} %", percent(progress.fraction));
-            let eta = progress.eta_seconds.and_then(|eta| Duration::try_from_secs_f64(eta).ok());
-            let eta = eta.map_or("…".to_owned(), running);
-            if state.work.paused { vec![done] } else { vec![format!("{done}  ETA {eta}"), done] }
+            vec![format!("{done}{}", eta(state, progress)), done]
         }
         (Activity::Running { .. }, _, None) => {
             at_work(state).map(|name| format!("{name}…")).into_iter().collect()
@@ -162,6 +183,13 @@ fn figures(state: &State) -> Vec<String> {
         (Activity::Broken, _, _) => vec![errors(state)],
         (Activity::Done | Activity::Cancelled, _, _) => Vec::new(),
     }
+}
+
+/// Time until the end, unless the render is paused.
+fn eta(state: &State, progress: &RenderProgress) -> String {
+    let eta = progress.eta_seconds.and_then(|eta| Duration::try_from_secs_f64(eta).ok());
+    let eta = eta.map_or("…".to_owned(), running);
+    if state.work.paused { String::new() } else { format!("  ETA {eta}") }
 }
 
 /// The stage that is at work.

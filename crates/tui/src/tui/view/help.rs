@@ -12,10 +12,12 @@ use crate::tui::state::State;
 /// Notes about the rest of the screen.
 const NOTES: &[(&str, &str)] = &[
     ("saved → seen", "from a save to the first changed cell"),
-    ("31 kB 150 ms", "bytes of the last picture, and the terminal's time to answer"),
+    ("31 kB 150 ms", "sent for this render, and the terminal's time to answer"),
+    ("noise 2 % in all", "against the brightness of the whole picture"),
+    ("asked 1 % a tile", "each tile against its own brightness; ✓ all are there"),
     ("bold", "what the last edit or a key has changed"),
     ("render 1 s −.3", "the time of a stage, and against the last time"),
-    ("run 3", "renders that were finished so far"),
+    ("run 3", "pictures that were finished so far, old ones found again too"),
 ];
 
 /// In the middle of the screen.
@@ -27,7 +29,7 @@ pub(super) fn draw(state: &State, buffer: &mut Buffer) {
     let lines = lines(inner.width);
     let mut title = " keys ".to_owned();
     if last > 0 {
-        title = format!(" keys {}–{} of {} · j k ", first + 1, first + page, lines.len());
+        title = format!(" keys · lines {}–{} of {} · j k ", first + 1, first + page, lines.len());
     }
     Clear.render(area, buffer);
     // Lines of words that it covers in part would be cut without a mark.

@@ -8,9 +8,11 @@ use super::layout::Layout;
 use super::message;
 use super::text::{Tone, columns, put, rest};
 use crate::choice::Choice;
+use crate::scene::is_mesh;
 use crate::scene::report::summary;
 use crate::tui::action::Action;
 use crate::tui::keymap::{self, Binding, KEYMAP, OVERLAY, Overlay};
+use crate::tui::preview_kind::PreviewKind;
 use crate::tui::state::{Activity, State, Toggles, ViewList};
 
 /// A key with its description, in full and in short.
@@ -99,6 +101,10 @@ fn show(hint: &Hint, area: Rect, is_long: bool, state: &State, buffer: &mut Buff
 
 /// Each toggle with its value, in bold where the keys have changed it.
 fn toggles(state: &State) -> Vec<Hint> {
+    // They are those of the newest picture.
+    if state.picture.history.is_open() {
+        return Vec::new();
+    }
     let honours_shadows = state.request.integrator().method().honours_shadows;
     let shadows = if honours_shadows { state.request.shadows().name() } else { "–" };
     let on_off = |on| if on { "on" } else { "off" };
@@ -147,14 +153,22 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     }
     urgent.extend(unseen(state));
     let named = |action, words| keymap::of(action).map(|it| Hint::new(it.label, words));
-    if state.overlays.problems.is_some() || state.selection.picked.is_some() {
+    let has_place = state.overlays.problems.is_some() || state.selection.picked.is_some();
+    if has_place && !is_mesh(&state.request.scene) {
         urgent.extend(named(Action::Edit, "edit"));
     }
     if state.picture.history.is_open() {
         urgent.extend(named(Action::BeforeAfter, "newest"));
-        urgent.extend(named(Action::OlderPicture, "older, newer"));
+        let both = if state.picture.history.is_oldest_open() {
+            named(Action::NewerPicture, "newer")
+        } else {
+            named(Action::OlderPicture, "older, newer")
+        };
+        urgent.extend(both);
+        // All else is about the newest one.
+        return (urgent, Hint::of(Action::PictureAlone).into_iter().collect());
     }
-    if state.request.toggles.camera.is_any() {
+    if state.request.toggles.camera.is_any() && !state.saving.has_scene_of_model {
         urgent.extend(named(Action::KeepCamera, "keep"));
     }
     if state.picture.close_up.is_some() {
@@ -166,7 +180,8 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     }
     let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
     let changed = |words| Hint { tone: Tone::Strong, ..Hint::new(reset, words) };
-    urgent.extend(state.request.changes().into_iter().map(changed));
+    let changes = state.request.changes().join(", ");
+    urgent.extend((!changes.is_empty()).then(|| changed(changes)));
     let now: &[Action] = match state.work.activity {
         _ if state.work.paused => &[Action::TogglePause, Action::WriteNow],
         Activity::Running { .. } => &[Action::TogglePause],
@@ -177,12 +192,19 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     urgent.extend(held);
     let is_other =
         |it: &&Binding| !it.hint.is_empty() && !now.contains(&it.action) && !ELSEWHERE.contains(&it.action);
+    let has_picture = state.display.kind != PreviewKind::None;
+    let is_shown = |it: &&Binding| it.action != Action::PictureAlone || has_picture;
     let is_idle = |it: &&Binding| it.action != Action::TogglePause || state.work.is_running();
     // Another hint has it above, with what it takes back.
     let is_of_use = state.request.toggles != Toggles::default() && state.request.changes().is_empty();
     let is_back = |it: &&Binding| it.action != Action::SceneSettings || is_of_use;
-    let others =
-        KEYMAP.iter().filter(is_other).filter(is_idle).filter(is_back).map(|it| Hint::new(it.label, it.hint));
+    let others = KEYMAP
+        .iter()
+        .filter(is_other)
+        .filter(is_shown)
+        .filter(is_idle)
+        .filter(is_back)
+        .map(|it| Hint::new(it.label, it.hint));
     (urgent, first.into_iter().chain(others).collect())
 }
 

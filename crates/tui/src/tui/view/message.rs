@@ -46,12 +46,13 @@ pub(super) fn is_over_picture(state: &State) -> bool {
 }
 
 /// Whether the panel has room for what was found at a place.
-pub(super) fn is_in_panel(layout: &Layout) -> bool {
-    layout.panel.height >= FACTS
+pub(super) fn is_in_panel(state: &State, layout: &Layout) -> bool {
+    let is_covered = state.overlays.diagnostics.open && layout.pane == layout.panel;
+    layout.panel.height >= FACTS && !is_covered
 }
 
 fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
-    if let Some(facts) = state.selection.facts.as_ref().filter(|_| !is_in_panel(layout)) {
+    if let Some(facts) = state.selection.facts.as_ref().filter(|_| !is_in_panel(state, layout)) {
         return Some((facts.join(" · "), Tone::Strong));
     }
     let message = state.overlays.message.as_ref().filter(|message| !message.is_empty())?;

@@ -100,7 +100,8 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Li
 
 /// Facts about a place.
 fn inspected(state: &State, width: u16) -> Vec<Line> {
-    let facts = state.selection.facts.iter().filter(|_| message::is_in_panel(&Layout::of(state))).flatten();
+    let facts =
+        state.selection.facts.iter().filter(|_| message::is_in_panel(state, &Layout::of(state))).flatten();
     let lines = facts.flat_map(|fact| wrapped(fact, usize::from(width.min(2 * ENTRY_WIDTH))));
     let mut lines: Vec<Line> = lines.map(|line| vec![(line, Tone::Strong)]).collect();
     if !lines.is_empty() {
@@ -156,11 +157,14 @@ fn results(state: &State) -> Vec<Line> {
         ));
         lines.extend(report.image.error.map(|error| fact("noise", format!("{} in all", share(error)))));
         lines.extend(state.request.effective.as_ref().filter(|it| it.error > 0.0).map(|it| {
-            // Tiles with as many samples as there may be are perhaps not there yet.
-            let is_reached = samples.max < it.samples;
-            let sign = if is_reached { " ✓" } else { "" };
+            let sign = if end(state) == Some(RenderEnd::Error) { " ✓" } else { "" };
             fact("asked", format!("{} % a tile{sign}", f64::from((it.error * 1e4).round()) / 100.0))
         }));
+    }
+    match end(state) {
+        Some(RenderEnd::Time) => lines.push(fact("ended by", "time".to_owned())),
+        Some(RenderEnd::Samples) => lines.push(fact("ended by", "samples".to_owned())),
+        Some(RenderEnd::Error) | None => {}
     }
     lines.extend(under::seen(state).map(|words| vec![(words, Tone::Faint)]));
     if !state.overlays.warnings.is_empty() {
@@ -169,6 +173,28 @@ fn results(state: &State) -> Vec<Line> {
         lines.push(vec![(words, Tone::Warning)]);
     }
     lines
+}
+
+/// The first limit that a render met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum RenderEnd {
+    Time,
+    Samples,
+    /// Every tile has the `error` asked for.
+    Error,
+}
+
+/// The limit that ended the render. `None` if there is but one.
+fn end(state: &State) -> Option<RenderEnd> {
+    let (image, effective) = (&state.work.report.as_ref()?.image, state.request.effective.as_ref()?);
+    let is_by_error = effective.error > 0.0;
+    match () {
+        () if !is_by_error && state.request.command_line.time_seconds.is_none() => None,
+        () if !image.complete => Some(RenderEnd::Time),
+        // Tiles with as many samples as there may be are perhaps not there yet.
+        () if is_by_error && image.samples.max < effective.samples => Some(RenderEnd::Error),
+        () => Some(RenderEnd::Samples),
+    }
 }
 
 /// The hint for whoever has not saved yet, broken between words.

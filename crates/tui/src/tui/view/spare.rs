@@ -9,13 +9,15 @@ use crate::tui::state::{Activity, State};
 
 /// Columns of a window from which on there is such room.
 const WIDE: u16 = 120;
+/// Columns of the lines in a panel that is divided: as many as a stage with its reason takes.
+const COLUMN: u16 = 44;
 /// Columns of a panel that is divided side by side.
 const DIVIDED: u16 = 3 * ENTRY_WIDTH;
 
 /// Columns that the lines of a panel may take: the rest is spare.
 pub(super) fn columns_of_lines(state: &State, panel: Rect) -> u16 {
     let is_divided = is_wide(state) && panel.width >= DIVIDED;
-    if is_divided { ENTRY_WIDTH + ENTRY_WIDTH / 2 } else { panel.width }
+    if is_divided { COLUMN } else { panel.width }
 }
 
 fn is_wide(state: &State) -> bool {

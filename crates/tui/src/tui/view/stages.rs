@@ -1,6 +1,6 @@
 //! The stages: a line for each while they are at work, one for all of them when they are done.
 
-use super::text::{Tone, columns, delta, seconds, shortened, wrapped};
+use super::text::{Tone, columns, counted, delta, delta_with_unit, seconds, shortened, wrapped};
 use crate::pipeline::protocol::{Stage, StageReport, Status};
 use crate::scene::sanitize::visible;
 use crate::tui::state::{AssetBar, State};
@@ -83,16 +83,26 @@ fn weight(state: &State, report: Option<&StageReport>) -> Tone {
 
 /// Against the last time that the stage was at work.
 fn change(state: &State, report: &StageReport) -> String {
+    change_by(state, report, delta)
+}
+
+/// The same in words of the caller's choice.
+fn change_by(state: &State, report: &StageReport, words: impl Fn(f64, Option<f64>) -> String) -> String {
     match report.status {
         Status::Done => {
-            delta(report.seconds, state.work.last_seconds.get(report.name as usize).copied().flatten())
+            words(report.seconds, state.work.last_seconds.get(report.name as usize).copied().flatten())
         }
         Status::Running | Status::Reused | Status::Skipped => String::new(),
     }
 }
 
-/// The stages that count, and how many were reused.
-pub(super) fn in_one_line(state: &State) -> Line {
+/// The stages that count, and how many were reused; in short where there is no room for units.
+pub(super) fn in_one_line(state: &State, room: u16) -> Line {
+    let line = in_one_line_of(state, true);
+    if width(&line) <= room { line } else { in_one_line_of(state, false) }
+}
+
+fn in_one_line_of(state: &State, is_long: bool) -> Line {
     let total: f64 =
         state.work.stages.iter().flatten().filter(|it| it.status == Status::Done).map(|it| it.seconds).sum();
     let mut line = Line::new();
@@ -105,7 +115,7 @@ pub(super) fn in_one_line(state: &State) -> Line {
                 format!("{comma}{} {}", report.name.name(), seconds(report.seconds)),
                 weight(state, Some(report)),
             ));
-            let change = change(state, report);
+            let change = change_by(state, report, if is_long { delta_with_unit } else { delta });
             if !change.is_empty() {
                 line.push((format!(" {change}"), Tone::Strong));
             }
@@ -113,7 +123,8 @@ pub(super) fn in_one_line(state: &State) -> Line {
     }
     if reused > 0 {
         let comma = if line.is_empty() { "" } else { ", " };
-        line.push((format!("{comma}{reused} reused"), Tone::Faint));
+        let stages = if is_long { counted(reused, "stage") } else { reused.to_string() };
+        line.push((format!("{comma}{stages} reused"), Tone::Faint));
     }
     line
 }

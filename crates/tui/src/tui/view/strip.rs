@@ -26,6 +26,8 @@ const WIDE_ROWS: Rows = Rows { picture: 5, entry: 5, pitch: 6 };
 const WIDE: u16 = 40;
 /// Columns of the words beside a picture.
 const LEAST_WORDS: u16 = 10;
+/// So many of them are enough for all words.
+const ENOUGH: u16 = 20;
 /// Width of a column of pictures if there are several.
 const COLUMN: u16 = 44;
 
@@ -65,7 +67,9 @@ fn draw_item(state: &State, Item { index, cells, rows }: &Item, buffer: &mut Buf
         if history.looked_at() == Some(*index) { ("▸", Tone::Strong) } else { ("", Tone::Plain) };
     let words = format!("{mark}{} {}", index + 1, history.change(*index));
     let beside = super::text::rest(*cells, place.width + 1);
-    let room = |y: u16| row(if y < rows.picture { beside } else { *cells }, y);
+    // Where words have room beside the picture, none go on below it.
+    let is_beside = |y: u16| y < rows.picture || beside.width >= ENOUGH;
+    let room = |y: u16| row(if is_beside(y) { beside } else { *cells }, y);
     let lines = filled(&words, rows.entry, |y| usize::from(room(y).width));
     for (y, line) in (0..).zip(&lines) {
         put(buffer, room(y), &[(line, tone)], state.display.depth);

@@ -194,6 +194,14 @@ pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
     if is_far_more { format!("{sign}{}", self::seconds(change.abs())) } else { format!("{sign}{amount}") }
 }
 
+/// The same with the unit of the time.
+pub(super) fn delta_with_unit(seconds: f64, before: Option<f64>) -> String {
+    let change = delta(seconds, before);
+    let has_unit = change.is_empty() || change.ends_with('s');
+    let unit = if seconds < 0.999_5 { "ms" } else { "s" };
+    if has_unit { change } else { format!("{change} {unit}") }
+}
+
 /// A thin bar: its filled part and the rest, together of this many columns.
 pub(super) fn gauge(fraction: f64, columns: u16, ascii: bool) -> (String, String) {
     let (full, empty) = if ascii { ("#", "-") } else { ("━", "─") };
@@ -283,6 +291,9 @@ mod tests {
         ] {
             assert_eq!(delta(seconds, before), words, "{seconds} {before:?}");
         }
+        let with_units = [(1.12, 1.42), (0.023, 0.019), (0.02, 200.0), (2.0, 1.96)];
+        let words = with_units.map(|(seconds, before)| delta_with_unit(seconds, Some(before)));
+        assert_eq!(words, ["−.3 s", "+4.0 ms", "−3 min 20 s", ""]);
     }
 
     #[test]

@@ -25,7 +25,8 @@ const LEAST_BAR: u16 = 6;
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Drawn) {
     let area = layout.under;
     // What the newest picture took says nothing of an older one.
-    if message::is_said(state, layout) || state.picture.history.is_open() {
+    let is_older = state.picture.history.is_open();
+    if message::is_said(state, layout) || is_older && !state.work.is_running() {
         return;
     }
     match state.work.activity {
@@ -40,7 +41,7 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &
             put(
                 buffer,
                 area,
-                &[("the last good picture stays until the errors are mended", Tone::Faint)],
+                &[("the last good picture stays until the errors are fixed", Tone::Faint)],
                 state.display.depth,
             );
         }
@@ -61,7 +62,11 @@ fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let name = at_work(state).unwrap_or_default();
     let (fraction, words) = match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
-            let samples = format!("{}/{} samples", progress.samples, progress.total_samples);
+            let RenderProgress { samples, total_samples, .. } = progress;
+            // Where noise decides, the total is a guess.
+            let is_guess = state.request.effective.as_ref().is_some_and(|it| it.error > 0.0);
+            let of = if is_guess { " of about " } else { "/" };
+            let samples = format!("{samples}{of}{total_samples} samples");
             (progress.fraction, format!("{samples} · {time}"))
         }
         (None, Some(asset)) if layout.panel.is_empty() => {
@@ -71,6 +76,8 @@ fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
     };
     let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
+    // A pause ends when somebody wants it to.
+    let noise = noise.map(|noise| NoiseProgress { next: noise.next.filter(|_| !state.work.paused), ..noise });
     let fits = |noise: &String| room >= columns(noise) + 3 + LEAST_BAR;
     let noise = noise.and_then(|noise| noise_words(&noise).into_iter().find(fits));
     let words = noise.map_or(words.clone(), |noise| format!("{noise} · {words}"));
@@ -98,7 +105,7 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
 /// Draws the stages in one line, and the other facts that the panel does not show.
 fn summary(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Drawn) {
     let area = layout.under;
-    let mut pieces = stages::in_one_line(state);
+    let mut pieces = stages::in_one_line(state, area.width);
     let mut is_room = |more: Vec<(String, Tone)>| {
         let width: u16 = pieces.iter().chain(&more).map(|(text, _)| columns(text)).sum();
         if width <= area.width {
@@ -156,10 +163,11 @@ pub(super) fn hint(state: &State) -> String {
     }
     let name =
         state.request.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    format!("save {} to render again", visible(&name))
+    let again = if state.picture.shown.is_some() || state.work.renders > 0 { " again" } else { "" };
+    format!("save {} to render{again}", visible(&name))
 }
 
-/// Cost of the last picture on its way: its size, and the terminal's time to answer; in full and in short.
+/// Cost of the last picture on its way: the bytes since its render began, and the terminal's time to answer; in full and in short.
 fn frame(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
     let size = format!("{} kB", frame.bytes.div_ceil(1000));

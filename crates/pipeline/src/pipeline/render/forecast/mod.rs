@@ -22,6 +22,7 @@ use rayon::ThreadPool;
 use self::noise::NoiseForecast;
 use self::pace::{Pace, Work};
 use super::film_state::FilmState;
+use crate::film::Convergence;
 use crate::pipeline::plan::Plan;
 use crate::pipeline::protocol::RenderProgress;
 use crate::pipeline::stages::photons::PhotonStore;
@@ -104,9 +105,10 @@ impl Forecast {
     }
 
     /// Measures the noise of the film, if it is time for that.
-    pub(in crate::pipeline) fn look_at_noise(&mut self, state: &FilmState, pool: &ThreadPool) {
+    /// `seconds` of the stage's clock.
+    pub(in crate::pipeline) fn look_at_noise(&mut self, state: &FilmState, pool: &ThreadPool, seconds: f64) {
         let least = state.samples(u32::MAX);
-        pool.install(|| self.noise.look(&state.film, least, state.seconds()));
+        pool.install(|| self.noise.look(&state.film, least, (state.seconds(), seconds)));
     }
 
     /// Progress at a moment, with the time and the noise that are expected.
@@ -126,13 +128,14 @@ impl Forecast {
         }
         self.fraction = if moment.is_last { 1.0 } else { self.fraction.max(fraction) };
         let pixels = moment.state.film.crop().area() as u64;
+        let left = eta_seconds.filter(|_| falls_evenly(moment));
         RenderProgress {
             fraction: self.fraction,
             elapsed_seconds,
             eta_seconds: if moment.is_last { Some(0.0) } else { eta_seconds },
             samples: (moment.units / pixels) as u32,
             total_samples: self.total_units.div_ceil(pixels) as u32,
-            noise: self.noise.at(work, self.pace.rate()),
+            noise: self.noise.at(work, self.pace.rate(), left),
         }
     }
 
@@ -161,6 +164,15 @@ impl Forecast {
         let pixels = moment.state.film.crop().area() as u64;
         pixels.saturating_sub(moment.units) as f64
             / self.total_units.saturating_sub(moment.units).max(1) as f64
+    }
+}
+
+/// Whether noise is known to fall as it did. With `error`, fewer and fewer tiles get samples; the first passes of photons tell
+/// little of later ones, whose radius is smaller.
+fn falls_evenly(moment: &Moment<'_>) -> bool {
+    match moment.state.film.convergence() {
+        Convergence::Stratified => !(moment.plan.settings.render.error > 0.0),
+        Convergence::Photons => false,
     }
 }
 

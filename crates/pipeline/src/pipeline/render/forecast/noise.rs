@@ -16,8 +16,17 @@ const STEP: f64 = 1.5;
 #[derive(Debug)]
 pub(in crate::pipeline) struct NoiseForecast {
     due: Instant,
-    /// And the work that was done.
-    told: Option<(PictureNoise, f64)>,
+    told: Option<Measured>,
+}
+
+/// A measurement of noise.
+#[derive(Clone, Copy, Debug)]
+struct Measured {
+    noise: PictureNoise,
+    /// The work that was done.
+    done: f64,
+    /// Seconds of the stage.
+    seconds: f64,
 }
 
 impl NoiseForecast {
@@ -26,40 +35,40 @@ impl NoiseForecast {
     }
 
     /// Measures again, if it is time: every pixel has at least `samples`, a power of two.
-    pub(in crate::pipeline) fn look(&mut self, film: &Film, samples: u32, done: f64) {
+    pub(in crate::pipeline) fn look(&mut self, film: &Film, samples: u32, (done, seconds): (f64, f64)) {
         if samples < LEAST || Instant::now() < self.due {
             return;
         }
-        self.told = film.noise().map(|noise| (noise, done));
+        self.told = film.noise().map(|noise| Measured { noise, done, seconds });
         self.due = Instant::now() + INTERVAL;
     }
 
-    /// Expected noise, once it has been measured.
-    pub(in crate::pipeline) fn at(&self, work: Work, rate: Option<f64>) -> Option<NoiseProgress> {
-        let (PictureNoise { relative_error, power }, done) = self.told.filter(|(_, done)| *done > 0.0)?;
+    /// Noise as it was measured last, and its fall from now on, at `rate` of work a second. `left`: seconds until the end. `None` if
+    /// nobody can tell how noise falls.
+    pub(in crate::pipeline) fn at(
+        &self,
+        work: Work,
+        rate: Option<f64>,
+        left: Option<f64>,
+    ) -> Option<NoiseProgress> {
+        let Measured { noise: PictureNoise { relative_error, power }, done, seconds } = self.told?;
         // The part of the noise that so many times the samples leave.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
-        Some(expected(relative_error * fall(work.done / done), work, rate, fall))
+        let by_now = if done > 0.0 { relative_error * fall(work.done / done) } else { relative_error };
+        let next = rate.zip(left).and_then(|(rate, left)| next_level(by_now, work, rate, power, left));
+        Some(NoiseProgress { now: relative_error, seconds, next })
     }
 }
 
-/// The noise now; the next round level below it, or the noise at the end of the render if that is higher; and the seconds until
-/// then, at `rate` of work a second.
-fn expected(now: f64, work: Work, rate: Option<f64>, fall: impl Fn(f64) -> f64) -> NoiseProgress {
-    let Work { done, total, aside: [aside, _] } = work;
-    let total = total.unwrap_or(f64::INFINITY).max(done);
-    let to_go = total - done;
-    let end = now * fall(total / done.max(f64::MIN_POSITIVE));
-    let level = level_below(now / STEP).max(end);
-    let next = rate.filter(|rate| to_go > 0.0 && now > 0.0 && *rate > 0.0).map(|rate| {
-        // The power by which the noise falls, from twice the samples.
-        let power = -libm::log2(fall(2.0));
-        let more = done * (libm::pow(now / level, 1.0 / power) - 1.0);
-        // What goes on aside takes its part of the time from here on too.
-        let seconds_of_done = done / rate;
-        (level, more.min(to_go) / rate * (1.0 + aside / seconds_of_done))
-    });
-    NoiseProgress { now, next }
+/// The next round level below the noise that is expected `by_now`, and the seconds until then. `None` if the render ends first:
+/// what is left at its end hangs on all its samples.
+fn next_level(by_now: f64, work: Work, rate: f64, power: f64, left: f64) -> Option<(f64, f64)> {
+    let Work { done, aside: [aside, _], .. } = work;
+    let level = level_below(by_now / STEP);
+    let more = done * (libm::pow(by_now / level, 2.0 / power) - 1.0);
+    // What goes on aside takes its part of the time from here on too.
+    let seconds = more / rate * (1.0 + aside * rate / done);
+    (level > 0.0 && seconds <= left).then_some((level, seconds))
 }
 
 /// The largest of 1, 2, 5, 10, … %, up and down, that is not above a number.
@@ -75,11 +84,6 @@ fn level_below(most: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Independent samples.
-    fn root(times: f64) -> f64 {
-        1.0 / times.sqrt()
-    }
-
     #[test]
     fn levels_are_round_and_well_below() {
         for (most, level) in [(0.02, 0.02), (0.0199, 0.01), (0.07, 0.05), (0.0049, 0.002), (3.0, 2.0)] {
@@ -88,24 +92,43 @@ mod tests {
         assert_eq!(level_below(0.0), 0.0);
     }
 
-    #[test]
-    fn the_next_level_comes_when_so_many_samples_are_done() {
-        // 2.1 % after 100 of 10,000 units, 10 a second: 1 % takes 4.41 times as many.
-        let work = Work { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
-        let (level, seconds) = expected(0.021, work, Some(10.0), root).next.expect("a level");
-        assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
+    /// Noise of independent samples, 2.1 % after 100 units of work and 9 seconds.
+    fn measured() -> NoiseForecast {
+        let noise = PictureNoise { relative_error: 0.021, power: 1.0 };
+        NoiseForecast { due: Instant::now(), told: Some(Measured { noise, done: 100.0, seconds: 9.0 }) }
     }
 
     #[test]
-    fn a_render_that_ends_first_says_what_is_left_then() {
-        let work = Work { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
-        let (level, seconds) = expected(0.021, work, Some(10.0), root).next.expect("a level");
-        assert!((level - 0.021 / 2.0_f64.sqrt()).abs() < 1e-12 && (seconds - 10.0).abs() < 1e-6);
-        let over = Work { done: 200.0, ..work };
-        assert_eq!(expected(0.021, over, Some(10.0), root), NoiseProgress { now: 0.021, next: None });
-        assert_eq!(expected(0.021, work, None, root).next, None);
+    fn the_next_level_comes_when_so_many_samples_are_done() {
+        // 10 units a second: 1 % takes 4.41 times as many.
+        let work = Work { done: 100.0, total: Some(10_000.0), aside: [0.0; 2] };
+        let told = measured().at(work, Some(10.0), Some(100.0)).expect("noise");
+        let (level, seconds) = told.next.expect("a level");
+        assert!((level - 0.01).abs() < 1e-12 && (seconds - 34.1).abs() < 1e-6, "{level} {seconds}");
+        assert_eq!((told.now, told.seconds), (0.021, 9.0));
         // As much time goes by aside as at work.
         let half = Work { aside: [10.0, 10.0], ..work };
-        assert_eq!(expected(0.021, half, Some(10.0), root).next.map(|(_, seconds)| seconds), Some(20.0));
+        let (_, seconds) =
+            measured().at(half, Some(10.0), Some(100.0)).expect("noise").next.expect("a level");
+        assert!((seconds - 68.2).abs() < 1e-6, "{seconds}");
+    }
+
+    #[test]
+    fn what_was_measured_stays_until_it_is_measured_again_and_its_fall_counts() {
+        let work = Work { done: 400.0, total: Some(10_000.0), aside: [0.0; 2] };
+        let told = measured().at(work, Some(10.0), Some(1000.0)).expect("noise");
+        assert_eq!(told.now, 0.021);
+        // 1.05 % is expected by now: half a percent takes 4.41 times as many.
+        let (level, seconds) = told.next.expect("a level");
+        assert!((level - 0.005).abs() < 1e-12 && (seconds - 136.4).abs() < 1e-6, "{level} {seconds}");
+    }
+
+    #[test]
+    fn nothing_is_foretold_for_a_time_after_the_end() {
+        let work = Work { done: 100.0, total: Some(200.0), aside: [0.0; 2] };
+        for left in [Some(10.0), Some(34.0), None] {
+            assert_eq!(measured().at(work, Some(10.0), left).expect("noise").next, None, "{left:?}");
+        }
+        assert_eq!(measured().at(work, None, Some(100.0)).expect("noise").next, None);
     }
 }

@@ -33,7 +33,7 @@ impl Key<'_> {
         if let Err((message, is_missing)) = regular_file(&path) {
             let help = is_missing.then(|| {
                 match self.context.search(MOST_FILES, || neighbour(&path, may_be_meant)) {
-                    Some(near) => format!("did you mean {}?", visible(&near.to_string_lossy())),
+                    Some(near) => format!("did you mean {}?", visible(&as_written(text, &near))),
                     None => "paths are relative to the scene file".to_owned(),
                 }
             });
@@ -65,6 +65,12 @@ impl Key<'_> {
     }
 }
 
+/// A file beside one that the scene names, as the scene is to name it: relative to the scene's folder, not to the caller's.
+fn as_written(text: &str, near: &Path) -> String {
+    let name = near.file_name().unwrap_or(near.as_os_str());
+    Path::new(text).with_file_name(name).to_string_lossy().into_owned()
+}
+
 /// Ending of a path after its last dot, in small letters; may be empty.
 fn ending(text: &str) -> String {
     Path::new(text).extension().unwrap_or_default().to_string_lossy().to_lowercase()
@@ -83,5 +89,17 @@ fn regular_file(path: &Path) -> Result<(), (String, bool)> {
             Err((format!("there is no file {shown}"), true))
         }
         Err(error) => Err((format!("cannot read {shown}: {}", in_words(&error)), false)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_neighbour_is_called_as_the_scene_has_to_call_it() {
+        let near = Path::new("scenes/../assets/textures/bricks.png");
+        assert_eq!(as_written("../assets/textures/brick.png", near), "../assets/textures/bricks.png");
+        assert_eq!(as_written("brick.png", Path::new("scenes/bricks.png")), "bricks.png");
     }
 }
