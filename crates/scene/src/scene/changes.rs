@@ -5,7 +5,7 @@ mod keys;
 use super::sanitize::shortened;
 
 /// Bytes of the longest text that is looked at: the answer is for a person who edits it.
-const MOST_BYTES: usize = 4 << 20;
+pub const MOST_COMPARED_BYTES: usize = 4 << 20;
 
 /// Characters of a line that are shown at most.
 const MOST: usize = 40;
@@ -13,7 +13,7 @@ const MOST: usize = 40;
 /// The difference of two texts, such as `sphere.ball.radius 0.5 → 0.7`. Keys have the names of `--set`. For a difference in no key,
 /// and for text that is no TOML, it has the changed lines. `None` if the texts are the same or too long.
 pub fn changes(before: &str, after: &str) -> Option<String> {
-    if before == after || before.len().max(after.len()) > MOST_BYTES {
+    if before == after || before.len().max(after.len()) > MOST_COMPARED_BYTES {
         return None;
     }
     keys::changes(before, after).or_else(|| lines(before, after))

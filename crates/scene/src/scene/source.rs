@@ -70,6 +70,11 @@ impl Source {
         self.all.get(..self.file).unwrap_or_default()
     }
 
+    /// [`Self::text`], to be kept: shared, unless the call sets anything.
+    pub fn shared_text(&self) -> Arc<str> {
+        if self.sets.is_empty() { Arc::clone(&self.all) } else { self.text().into() }
+    }
+
     /// Beginnings of the values that the call sets.
     pub(super) fn sets(&self) -> impl Iterator<Item = usize> + '_ {
         self.sets.iter().map(|set| set.span.start)

@@ -1,7 +1,7 @@
 //! The last pictures, within bounds.
 
 use std::cell::OnceCell;
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -101,9 +101,12 @@ impl History {
                 if past.shown.picture != shown.picture {
                     past.small = OnceCell::new();
                 }
+                let is_other = past.origin != origin;
                 (past.shown, past.origin) = (shown, origin);
-                self.compare(at);
-                self.compare(at + 1);
+                if is_other {
+                    self.compare(at);
+                    self.compare(at + 1);
+                }
             }
             None => {
                 let (small, changes) = (OnceCell::new(), Default::default());
@@ -111,12 +114,20 @@ impl History {
                 self.compare(self.past.len() - 1);
             }
         }
-        while self.past.len() > 1 && self.past.iter().map(Past::bytes).sum::<usize>() > MOST_BYTES {
+        while self.past.len() > 1 && self.bytes() > MOST_BYTES {
             self.past.pop_front();
             if let Some((at, _)) = &mut self.open {
                 *at = at.saturating_sub(1);
             }
         }
+    }
+
+    /// Bytes of the pictures and of their scenes' texts, which pictures of one scene share.
+    fn bytes(&self) -> usize {
+        let pictures: usize = self.past.iter().map(Past::bytes).sum();
+        let texts = self.past.iter().filter_map(|past| past.origin.text.as_ref());
+        let texts: HashMap<*const u8, usize> = texts.map(|text| (text.as_ptr(), text.len())).collect();
+        pictures + texts.values().sum::<usize>()
     }
 
     /// Compares a picture's scene and settings with those of the picture before.
@@ -283,6 +294,22 @@ mod tests {
         assert_eq!(history.past.len(), 5, "3 MB each");
         history.record(shown(10, 10_000), Instant::now(), Origin::default());
         assert_eq!(history.past.len(), 1, "the last one stays whatever it takes");
+    }
+
+    #[test]
+    fn texts_of_scenes_count_once_each() {
+        let mut history = History::default();
+        let shared: Arc<str> = "x".repeat(3 << 20).into();
+        let mut record = |generation: u64, text: Arc<str>| {
+            let picture = plain_picture(1, 1, [generation as u8, 0, 0]);
+            let origin = Origin { text: Some(text), ..Origin::default() };
+            history.record(Shown { picture, ..shown(generation, 1) }, Instant::now(), origin);
+            history.past.len()
+        };
+        assert_eq!((0..8).map(|generation| record(generation, Arc::clone(&shared))).max(), Some(8));
+        // Five edits of 3 MiB beside the shared text are too many.
+        assert_eq!((8..13).map(|generation| record(generation, "y".repeat(3 << 20).into())).max(), Some(12));
+        assert_eq!(record(13, "z".into()), 6);
     }
 
     #[test]

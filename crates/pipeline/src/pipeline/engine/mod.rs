@@ -356,7 +356,7 @@ impl Engine {
             let origin = Origin { path: &request.scene, sets: &request.overrides.sets, show };
             parse(origin, (contents, &containers), &mut self.parsed, findings, token)
         })?;
-        let text = Arc::from(parsed.loaded.source.text());
+        let text = parsed.loaded.source.shared_text();
         table.sink.send(Event::Text { generation: request.generation, text });
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;

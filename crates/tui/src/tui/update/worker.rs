@@ -9,6 +9,7 @@ use super::{camera, history, pointer};
 use crate::pipeline::protocol::{
     AssetProgress, CheckpointNews, Event, Failure, Report, Stage, StageReport, Status,
 };
+use crate::scene::MOST_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
 use crate::tui::chrome;
@@ -101,7 +102,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             | CheckpointNews::Ignored { .. } => {}
         },
         Event::Refused { conflicts, .. } => refused(state, conflicts),
-        Event::Text { text, .. } => state.request.text = Some(text),
+        Event::Text { text, .. } => state.request.text = (text.len() <= MOST_COMPARED_BYTES).then_some(text),
         Event::WritePostponed { .. } => {
             say(state, "the image is written as soon as every pixel has a sample");
         }
