@@ -203,7 +203,8 @@ fn with_digits(number: &str) -> Option<String> {
     let before = if mantissa.starts_with('.') { "0" } else { "" };
     let after = if mantissa.ends_with('.') { "0" } else { "" };
     let whole = format!("{sign}{before}{mantissa}{after}{exponent}");
-    (whole != number && whole.parse::<f64>().is_ok()).then_some(whole)
+    let has_digit = mantissa.contains(|c: char| c.is_ascii_digit());
+    (has_digit && whole != number && whole.parse::<f64>().is_ok()).then_some(whole)
 }
 
 fn issue(context: &Context<'_>, lists: &Lists<'_>, error: SyntaxError) -> Issue {
