@@ -68,7 +68,13 @@ fn model_scene(
     })?;
     let notes = made.notes.into_iter().map(|note| of_file(path, Severity::Warning, note)).collect();
     let loaded = scene::load_text(made.text.into(), path, sets);
-    Ok((loaded.map_err(|errors| Stop::Failed(Failure::Scene(errors)))?, made.companions, notes))
+    let loaded = loaded.map_err(|errors| {
+        let is_inside = |one: &Diagnostic| one.path == path && one.place.is_some();
+        let shown =
+            errors.iter().map(|one| if is_inside(one) { model::without_place(one) } else { one.clone() });
+        Stop::Failed(Failure::Scene(shown.collect()))
+    })?;
+    Ok((loaded, made.companions, notes))
 }
 
 fn broken(path: &Path, message: String) -> Stop {
