@@ -28,6 +28,9 @@ look_at = [0, 1, 0]
 [materials.wall]
 [materials.window]
 type = "glass"
+[materials."sp ace"]
+[materials."$(touch HACKED)"]
+[materials."`touch HACKED`"]
 
 [[sphere]]
 name = "ball"
@@ -48,6 +51,32 @@ LINES = [
     ("glimt ball.toml --set=photons.en\tt\t", ["ball.toml", "--set=photons.enabled=true"]),
     ("glimt ball.toml --set sphere.ball.mat\twi\t", ["ball.toml", "--set", "sphere.ball.material=window"]),
     ("glimt explain materials.metal.anis\t", ["explain", "materials.metal.anisotropy"]),
+]
+# Names that a shell takes for more than names, by the keys that lead to them.
+NAMES = {
+    "My": "My scene.toml",
+    "X": "X$(touch HACKED).toml",
+    "Y": "Y`touch HACKED`.toml",
+    "W": "W;touch HACKED;.toml",
+    "T": "T'q.toml",
+    "R": 'R"q.toml',
+    "K": "K*.toml",
+}
+LINES += [(f"glimt check {keys}\t", ["check", name]) for keys, name in NAMES.items()]
+LINES += [("glimt ball.toml --set sphere.ball.material=sp\t", ["ball.toml", "--set", "sphere.ball.material=sp ace"])]
+# Words that are quoted already, which the scripts for zsh and fish do not complete.
+QUOTED = [
+    ("glimt check F\tin\t", ["check", "F older/in side.toml"]),
+    ("glimt check My\\ s\t", ["check", "My scene.toml"]),
+    ("glimt check 'My s\t", ["check", "My scene.toml"]),
+    ('glimt check "My s\t', ["check", "My scene.toml"]),
+    ("glimt check 'X\t", ["check", NAMES["X"]]),
+    ('glimt check "X\t', ["check", NAMES["X"]]),
+    ('glimt check "Y\t', ["check", NAMES["Y"]]),
+    ("glimt check 'T\t", ["check", NAMES["T"]]),
+    ('glimt check "R\t', ["check", NAMES["R"]]),
+    ("glimt ball.toml --set=sphere.ball.material=\\$\t", ["ball.toml", "--set=sphere.ball.material=$(touch HACKED)"]),
+    ("glimt ball.toml --set sphere.ball.material=\\`\t", ["ball.toml", "--set", "sphere.ball.material=`touch HACKED`"]),
 ]
 # Keys, and what the shell then lists.
 LISTS = [
@@ -150,7 +179,8 @@ def main():
         (folder / "bin" / "glimt").write_text(STAND_IN.format(program=f"'{program}'"))
         (folder / "bin" / "glimt").chmod(0o755)
         (folder / "ball.toml").write_text(SCENE)
-        for other in ["knot.obj", "bark.txt", "known.png"]:
+        (folder / "F older").mkdir()
+        for other in ["knot.obj", "bark.txt", "known.png", "F older/in side.toml", *NAMES.values()]:
             (folder / other).write_text("")
         for shell in wanted or ["bash", "zsh", "zsh of a package", "fish"]:
             if not shutil.which(shell.split()[0]):
@@ -158,11 +188,15 @@ def main():
                 faults += [f"{shell} is not there"] if wanted else []
                 continue
             before = len(faults)
-            for keys, expected in LINES:
+            lines = LINES + (QUOTED if shell == "bash" else [])
+            for keys, expected in lines:
                 try:
                     found = words_of(shell, folder, keys)
                 except TimeoutError as error:
                     found = str(error)
+                if (folder / "HACKED").exists():
+                    (folder / "HACKED").unlink()
+                    found = f"{found}, and runs what a name holds"
                 if found != expected:
                     faults.append(f"{shell}: {keys!r} makes {found}, not {expected}")
             for keys, listed in LISTS:
@@ -170,8 +204,8 @@ def main():
                     shows(shell, folder, keys, listed)
                 except TimeoutError as error:
                     faults.append(f"{shell}: {keys!r}: {error}")
-            right = len(LINES) + len(LISTS) - (len(faults) - before)
-            print(f"{shell}: {right} of {len(LINES) + len(LISTS)} lines complete")
+            right = len(lines) + len(LISTS) - (len(faults) - before)
+            print(f"{shell}: {right} of {len(lines) + len(LISTS)} lines complete")
     print("\n".join(faults), end="\n" if faults else "")
     sys.exit(bool(faults))
 

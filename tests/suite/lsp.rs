@@ -250,3 +250,78 @@ fn the_server_ends_when_it_is_told_and_when_nobody_is_left() {
     };
     assert_eq!(unknown["error"]["code"], -32601);
 }
+
+/// Sends bytes to a new server; returns its exit code, what it answered and what it said on stderr.
+fn answers(frames: &[&str]) -> (Option<i32>, String, String) {
+    let desk = Desk::new();
+    let mut process = desk.glimt("lsp");
+    process.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = process.spawn().expect("it runs");
+    let mut keys = child.stdin.take().expect("stdin");
+    for frame in frames {
+        let header = format!("Content-Length: {}\r\n\r\n", frame.len());
+        let bytes = if frame.starts_with("Content-Length") { (*frame).to_owned() } else { header + frame };
+        // A server that has ended does not read the rest.
+        let _ = keys.write_all(bytes.as_bytes());
+    }
+    drop(keys);
+    let output = child.wait_with_output().expect("its end");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+const INITIALIZE: &str = r#"{"jsonrpc":"2.0","id":1,"method":"initialize","params":{"capabilities":{}}}"#;
+const EXIT: &str = r#"{"jsonrpc":"2.0","method":"exit"}"#;
+const SHUTDOWN: &str = r#"{"jsonrpc":"2.0","id":2,"method":"shutdown"}"#;
+const HOVER: &str = r#"{"jsonrpc":"2.0","id":3,"method":"textDocument/hover","params":{}}"#;
+
+#[test]
+fn the_server_answers_what_is_no_message_and_goes_on() {
+    let (code, said, _) =
+        answers(&[INITIALIZE, "{no json", r#"{"jsonrpc":"2.0","id":"x"}"#, HOVER, SHUTDOWN, EXIT]);
+    assert_eq!(code, Some(0), "{said}");
+    for part in ["-32700", "-32600", r#""id":"x""#, r#""id":3,"result":null"#] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+}
+
+#[test]
+fn the_server_waits_for_its_exit_and_says_how_it_came() {
+    let (code, said, _) = answers(&[INITIALIZE, SHUTDOWN, HOVER, EXIT]);
+    assert!(code == Some(0) && said.contains("-32600") && said.contains(r#""id":3"#), "{said}");
+    assert_eq!(answers(&[INITIALIZE, EXIT]).0, Some(1), "exit without shutdown");
+    assert!(answers(&[HOVER, EXIT]).1.contains("-32002"), "nothing before initialize");
+}
+
+#[test]
+fn a_length_beyond_all_scenes_is_an_error() {
+    let (code, _, said) = answers(&[INITIALIZE, "Content-Length: 1000000000000\r\n\r\n{}"]);
+    assert!(code == Some(1) && said.contains("1000000000000 bytes") && said.lines().count() == 1, "{said}");
+}
+
+#[test]
+fn texts_that_are_half_there_and_edits_of_ranges_end_nothing() {
+    let mut editor = Editor::open(TEXT);
+    // A surrogate without its partner stands for a character.
+    let document = json!({ "uri": editor.uri, "version": 2 });
+    let change = json!({ "textDocument": document, "contentChanges": [{ "text": "# HALF\nx = 1\n" }] });
+    let message =
+        json!({ "jsonrpc": "2.0", "method": "textDocument/didChange", "params": change }).to_string();
+    let message = message.replace("HALF", "\\ud83d");
+    write!(editor.keys, "Content-Length: {}\r\n\r\n{message}", message.len()).expect("sent");
+    editor.mistakes(|list| {
+        list.iter().any(|one| one["message"].as_str().is_some_and(|text| text.contains('x')))
+    });
+    // A NUL makes it a binary file, as for `glimt check`, and nothing else.
+    editor.change("a\0b = = 1\n");
+    let list = editor.mistakes(|list| {
+        list.iter().any(|one| one["message"].as_str().is_some_and(|text| text.contains("binary")))
+    });
+    assert_eq!(list.len(), 1, "{list:?}");
+    // A range is not the whole text.
+    let start = json!({ "line": 0, "character": 0 });
+    let change = json!({ "range": { "start": start, "end": start }, "text": "y" });
+    editor.tell("textDocument/didChange", &json!({ "textDocument": document, "contentChanges": [change] }));
+    let message = editor.hear();
+    assert_eq!(message["method"], "window/logMessage", "{message}");
+}

@@ -14,7 +14,7 @@ fn in_bash(desk: &Desk, line: &str) -> Vec<String> {
     // As bash does when the key is pressed; `=` ends a word there.
     let script = r#"
         source <(glimt completions bash)
-        COMP_LINE=$1 COMP_TYPE=9 COMP_WORDBREAKS=$' \t\n"\'><=;|&(:'
+        COMP_LINE=$1 COMP_POINT=${#1} COMP_TYPE=9 COMP_WORDBREAKS=$' \t\n"\'><=;|&(:'
         COMP_WORDS=($1); [[ $1 == *' ' ]] && COMP_WORDS+=("")
         COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
         _glimt_complete glimt "${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD - 1]}"
@@ -60,7 +60,7 @@ fn real_shells_complete_what_is_typed() {
     let output = output.expect("python3");
     let said = String::from_utf8(output.stdout).expect("UTF-8");
     println!("{said}");
-    assert!(output.status.success() && said.contains("bash: 13 of 13 lines complete"), "{said}");
+    assert!(output.status.success() && said.contains("bash: 32 of 32 lines complete"), "{said}");
 }
 
 #[test]

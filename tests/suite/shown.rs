@@ -220,6 +220,103 @@ fn an_import_that_fails_leaves_nothing() {
     desk.expect("import cubes.glb -o full.toml", 0);
 }
 
+/// A scene whose numbers no scene takes is not written, and the message names the number of the glTF file.
+#[test]
+fn numbers_beyond_what_scenes_take_are_the_files_own_fault() {
+    let desk = Desk::new();
+    let lamp = |intensity: f64| {
+        json!({"nodes": [{"mesh": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}, "translation": [0, 5, 0]}],
+            "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "name": "sun", "intensity": intensity}]}}})
+    };
+    for (mut model, words) in [
+        (json!({"nodes": [{"mesh": 0, "scale": [1e30, 1e30, 1e30]}]}), "nodes[0]: its scale has 1e30"),
+        (json!({"nodes": [{"mesh": 0, "translation": [0, -1e30, 0]}]}), "nodes[0]: its translation has 1e30"),
+        (
+            json!({"scenes": [{"nodes": [1]}], "nodes": [{"mesh": 0, "scale": [1e9, 1e9, 1e9]}, {"children": [0], "scale": [1e9, 1e9, 1e9]}]}),
+            "nodes[0]: with those of its ancestors, its placement has 1e18",
+        ),
+        (lamp(1e30), "nodes[1]: its light lights[0] \"sun\" has intensity 1e30"),
+        (lamp(1e300), "nodes[1]: its light lights[0] \"sun\" has intensity 1e300"),
+    ] {
+        let mut glb = Glb::default();
+        model["meshes"] = json!([{"primitives": [cube(&mut glb)]}]);
+        desk.write("a.glb", glb.finish(model));
+        let said = desk.expect("import a.glb --strict", 2);
+        assert!(said.contains(words), "{words}: {said}");
+        assert!(!desk.path("a.toml").exists() && !desk.path("a_files").exists(), "{words}");
+        let said = desk.expect(&format!("a.glb {SMALL}"), 2);
+        assert!(said.contains(words) && !said.contains("a.glb:"), "{words}: {said}");
+    }
+    // What is read is a scene that can be checked.
+    let mut glb = Glb::default();
+    let mut model = lamp(9e14);
+    model["meshes"] = json!([{"primitives": [cube(&mut glb)]}]);
+    desk.write("a.glb", glb.finish(model));
+    desk.expect("import a.glb", 0);
+    assert!(desk.run("check a.toml").status.success());
+}
+
+#[test]
+fn a_count_that_no_file_holds_is_shown_as_it_is() {
+    let desk = Desk::new();
+    let mut glb = Glb::default();
+    let cube = cube(&mut glb);
+    let text = glb.finish_text(json!({"nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}]}));
+    desk.write("a.gltf", text.replace("\"count\":36", "\"count\":1000000000000"));
+    let said = desk.expect("import a.gltf", 2);
+    assert!(said.contains("1000000000000 corners"), "{said}");
+}
+
+/// Whenever it is killed, an import leaves all of a scene or nothing that is seen, and the next one is not in its way.
+#[test]
+fn an_interrupted_import_leaves_nothing() {
+    use nix::sys::signal::{Signal, kill};
+    use nix::unistd::Pid;
+    let desk = Desk::new();
+    // Many parts of some size, so that writing takes a while.
+    let mut glb = Glb::default();
+    let positions: Vec<[f32; 3]> =
+        (0..60_000).map(|i| [(i % 250) as f32, (i / 250) as f32, (i % 7) as f32]).collect();
+    let position = glb.vectors(&positions);
+    let primitives = vec![json!({"attributes": {"POSITION": position}}); 30];
+    desk.write(
+        "big.glb",
+        glb.finish(json!({"nodes": [{"mesh": 0}], "meshes": [{"primitives": primitives}]})),
+    );
+    let hidden = || {
+        let entries = fs::read_dir(desk.path(".")).expect("a folder").flatten();
+        entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(".o.toml.glimt-")).count()
+    };
+    for (signal, code) in [
+        (Signal::SIGINT, Some(130)),
+        (Signal::SIGTERM, Some(143)),
+        (Signal::SIGHUP, Some(129)),
+        (Signal::SIGKILL, None),
+    ] {
+        let mut import = desk.glimt("import big.glb -o o.toml");
+        let mut child = import.stderr(std::process::Stdio::piped()).spawn().expect("it runs");
+        // End it while it writes.
+        while hidden() == 0 && child.try_wait().expect("a state").is_none() {
+            std::thread::yield_now();
+        }
+        kill(Pid::from_raw(child.id() as i32), signal).expect("sent");
+        let output = child.wait_with_output().expect("its end");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), code, "{signal}: {said}");
+        let is_whole = desk.path("o.toml").exists();
+        assert_eq!(desk.path("o_files").exists(), is_whole, "{signal}: {said}");
+        if is_whole {
+            fs::remove_file(desk.path("o.toml")).expect("removed");
+            fs::remove_dir_all(desk.path("o_files")).expect("removed");
+        } else if matches!(signal, Signal::SIGINT | Signal::SIGTERM) {
+            assert!(said.contains(&format!("ended by {signal}: nothing was written")), "{said}");
+        }
+        assert_eq!(hidden(), usize::from(signal == Signal::SIGKILL && !is_whole), "{signal}");
+    }
+    desk.expect("import big.glb -o o.toml", 0);
+    assert_eq!(hidden(), 0, "what a killed one left is removed");
+}
+
 #[test]
 fn approximations_are_named_counted_and_refused_if_strict() {
     let desk = Desk::new();

@@ -51,3 +51,18 @@ fn once(folder: &Folder, options: &[&str]) -> Vec<u8> {
     assert!(process.current_dir(folder.path("")).status().expect("it runs").success());
     folder.bytes("once.png")
 }
+
+#[test]
+fn a_model_that_is_gone_is_named() {
+    let folder = Folder::new();
+    folder.write("a.mtl", "newmtl red\nKd 0.9 0 0\n");
+    folder.write("wall.obj", &wall(0.1));
+    let small = ["--width", "32", "--height", "24", "--samples", "4"];
+    let call = [&[folder.program(), "wall.obj"][..], &small].concat();
+    let mut terminal = folder.terminal_with(&call, &[]);
+    terminal.wait_for_render(1);
+    terminal.resize(120, 40);
+    fs::remove_file(folder.path("wall.obj")).expect("removed");
+    terminal.press("c");
+    terminal.wait_for("wall.obj is gone: its scene is not written");
+}

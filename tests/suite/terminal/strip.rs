@@ -129,7 +129,7 @@ fn the_strip_comes_over_a_thin_line_too() {
 }
 
 #[test]
-fn noise_against_time_is_a_curve() {
+fn noise_against_time_is_a_curve_with_its_target() {
     let folder = Folder::new();
     let noisy = SCENE.replace("samples = 4", "samples = 10000000\nerror = 0.0001\nintegrator = \"path\"");
     folder.write("scene.toml", &noisy);
@@ -142,6 +142,7 @@ fn noise_against_time_is_a_curve() {
     terminal.wait("a curve", |screen| {
         let beside = beside(screen, PANEL.into());
         beside.contains("noise while it rendered")
+            && beside.contains("the line is the 0.01 % asked of each tile")
             && cells(screen).filter(|cell| is_braille(cell)).count() >= 10
     });
     // Another exposure is the same render.

@@ -1,7 +1,7 @@
 //! Arguments of the command line.
 
 mod bench;
-mod candidates;
+pub(in crate::cli) mod candidates;
 mod parts;
 
 use std::ops::RangeInclusive;

@@ -2,11 +2,17 @@
 //!
 //! The script asks the program at each press of the key, so that it knows the tables, names and keys of the scene in the line.
 
+mod bash;
+mod powershell;
+
 use std::ffi::OsString;
 
 use clap::CommandFactory;
 use clap_complete::CompleteEnv;
-use clap_complete::env::{Elvish, EnvCompleter, Fish, Powershell};
+use clap_complete::env::{Elvish, EnvCompleter, Fish, Shells, Zsh};
+
+use self::bash::Bash;
+use self::powershell::Powershell;
 
 use super::args::{Args, Shell};
 use super::console::Console;
@@ -14,56 +20,6 @@ use super::exit::Exit;
 
 /// The variable that a script sets to the name of its shell.
 const VARIABLE: &str = "GLIMT_COMPLETE";
-
-/// The script for bash, in place of `clap_complete`'s: bash takes words apart at `=` and `:`, and this one joins them for the program,
-/// so that it completes the values of `--set KEY=VALUE` and `--option=VALUE`. The variables are those of `clap_complete`.
-const BASH: &str = r#"_glimt_complete() {
-    local word rest=$COMP_LINE words=() at=-1 index=0 begun= i
-    # Join what has no space between.
-    for ((i = 0; i < ${#COMP_WORDS[@]}; i++)); do
-        word=${COMP_WORDS[i]}
-        if ((at < 0)) || [[ $rest == [[:space:]]* ]]; then
-            words[++at]=
-            rest=${rest#"${rest%%[![:space:]]*}"}
-        fi
-        rest=${rest#"$word"}
-        if ((i == COMP_CWORD)); then
-            # Bash completes what stands behind the last = or :.
-            if [[ $word == [=:]* ]]; then
-                begun=${words[at]}$word word=
-            else
-                begun=${words[at]} word=$2
-            fi
-            words[at]=$begun$word index=$at
-            break
-        fi
-        words[at]+=$word
-    done
-    local IFS=$'\013' space=true
-    compopt +o nospace 2> /dev/null && space=false
-    COMPREPLY=($(
-        _CLAP_IFS="$IFS" \
-        _CLAP_COMPLETE_INDEX="$index" \
-        _CLAP_COMPLETE_COMP_TYPE="$COMP_TYPE" \
-        _CLAP_COMPLETE_SPACE="$space" \
-        GLIMT_COMPLETE="bash" \
-        "glimt" -- "${words[@]}"
-    ))
-    if [[ $? != 0 ]]; then
-        unset COMPREPLY
-        return
-    fi
-    COMPREPLY=("${COMPREPLY[@]#"$begun"}")
-    if [[ $space == false && "${COMPREPLY-}" =~ [=/:]$ ]]; then
-        compopt -o nospace
-    fi
-}
-if [[ "${BASH_VERSINFO[0]}" -eq 4 && "${BASH_VERSINFO[1]}" -ge 4 || "${BASH_VERSINFO[0]}" -gt 4 ]]; then
-    complete -o nospace -o bashdefault -o nosort -F _glimt_complete glimt
-else
-    complete -o nospace -o bashdefault -F _glimt_complete glimt
-fi
-"#;
 
 /// The script for zsh, in place of `clap_complete`'s, which puts a space behind `KEY=`.
 const ZSH: &str = r#"#compdef glimt
@@ -96,10 +52,7 @@ fi
 /// Prints the script of a shell.
 pub(super) fn run(shell: Shell, console: &Console) -> Exit {
     let completer: &dyn EnvCompleter = match shell {
-        Shell::Bash => {
-            console.text(BASH);
-            return Exit::DONE;
-        }
+        Shell::Bash => &Bash,
         Shell::Zsh => {
             console.text(ZSH);
             return Exit::DONE;
@@ -122,7 +75,9 @@ pub(super) fn run(shell: Shell, console: &Console) -> Exit {
 pub(super) fn answer(arguments: &[OsString]) -> Option<Exit> {
     std::env::var_os(VARIABLE)?;
     let folder = std::env::current_dir().ok();
-    let complete = CompleteEnv::with_factory(Args::command).var(VARIABLE).bin("glimt").completer("glimt");
+    let shells = Shells(&[&Bash, &Elvish, &Fish, &Powershell, &Zsh]);
+    let complete = CompleteEnv::with_factory(Args::command).var(VARIABLE).shells(shells);
+    let complete = complete.bin("glimt").completer("glimt");
     match complete.try_complete(arguments, folder.as_deref()) {
         Ok(true) => Some(Exit::DONE),
         Ok(false) => None,

@@ -6,11 +6,30 @@ use super::args::ImportArgs;
 use super::check::count;
 use super::console::Console;
 use super::exit::Exit;
-use crate::output::{OutputError, write};
+use super::signals;
+use crate::control::CancelToken;
+use crate::output::OutputError;
+use crate::output::staged::new_files;
 use crate::pipeline::{Imported, import};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 pub(super) fn run(args: &ImportArgs, console: &Console) -> Exit {
+    let token = CancelToken::new();
+    let cancel = token.clone();
+    let ended = match signals::catch(move || cancel.cancel()) {
+        Ok(ended) => ended,
+        Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
+    };
+    let exit = make(args, console, &token);
+    let Some(number) = ended.by() else { return exit };
+    if let Some(signal) = signals::name(number).filter(|_| exit != Exit::DONE) {
+        console.say(&format!("ended by {signal}: nothing was written"));
+    }
+    Exit::signal(number)
+}
+
+/// Makes the scene. Once the token is cancelled, a failure says nothing.
+fn make(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     let scene = match &args.output {
         Some(output) => output.clone(),
         None => PathBuf::from(args.file.with_extension("toml").file_name().unwrap_or_default()),
@@ -28,8 +47,9 @@ pub(super) fn run(args: &ImportArgs, console: &Console) -> Exit {
             &format!("{} exists already, and is left as it is; name another scene with -o", there.display()),
         );
     }
-    let imported = match import(&args.file, &folder) {
+    let imported = match import(&args.file, &folder, token) {
         Ok(imported) => imported,
+        Err(_) if token.is_cancelled() => return Exit::FAILED,
         Err(message) => return console.fail(Exit::WRONG, &message),
     };
     tell_notes(&args.file, &imported.notes, console);
@@ -37,12 +57,13 @@ pub(super) fn run(args: &ImportArgs, console: &Console) -> Exit {
         let what = count(imported.notes.len() as u64, "approximation");
         return console.fail(Exit::FAILED, &format!("{what} with --strict: nothing is written"));
     }
-    match write_all(&scene, &imported) {
+    match write_all(&scene, &imported, token) {
         Ok(()) => {
             let files = count(imported.files.len() as u64, "file");
             console.say(&format!("wrote {}, and {files} in {}", scene.display(), beside.display()));
             Exit::DONE
         }
+        Err(OutputError::Cancelled(_)) => Exit::FAILED,
         Err(error) => console.fail(Exit::FAILED, &error.to_string()),
     }
 }
@@ -67,35 +88,10 @@ fn tell_notes(file: &Path, notes: &[String], console: &Console) {
     }
 }
 
-/// Writes the other files, then the scene, none of them over a file. After an error, nothing of this is left.
-fn write_all(scene: &Path, imported: &Imported) -> Result<(), OutputError> {
-    let mut made = Vec::new();
-    let written = write_each(scene, imported, &mut made);
-    if written.is_err() {
-        // Folders stay if somebody else has put a file there. The caller reports the error in any case.
-        for path in made.iter().rev() {
-            let _ = if path.is_dir() { std::fs::remove_dir(path) } else { std::fs::remove_file(path) };
-        }
-    }
-    written
-}
-
-/// Writes the files; adds to `made` what is new, folders before their files.
-fn write_each(scene: &Path, imported: &Imported, made: &mut Vec<PathBuf>) -> Result<(), OutputError> {
-    let folder = scene.parent().unwrap_or(Path::new(""));
-    let at = |path: &Path| {
-        let path = path.to_owned();
-        move |source| OutputError::File { path, source }
-    };
-    let files = imported.files.iter().map(|(name, bytes)| (folder.join(name), bytes.as_slice()));
-    for (path, bytes) in files.chain([(scene.to_owned(), imported.text.as_bytes())]) {
-        let inside = path.parent().unwrap_or(folder);
-        if inside != folder && !made.iter().any(|known| known == inside) {
-            std::fs::create_dir(inside).map_err(at(inside))?;
-            made.push(inside.to_owned());
-        }
-        write::new_file(&path, bytes).map_err(at(&path))?;
-        made.push(path);
-    }
-    Ok(())
+/// Writes the other files and the scene: all of them or none, the scene last.
+fn write_all(scene: &Path, imported: &Imported, token: &CancelToken) -> Result<(), OutputError> {
+    let name = PathBuf::from(scene.file_name().unwrap_or_default());
+    let others = imported.files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice()));
+    let files: Vec<_> = others.chain([(name, imported.text.as_bytes())]).collect();
+    new_files(scene.parent().unwrap_or(Path::new("")), &files, token)
 }

@@ -22,6 +22,7 @@ mod png;
 mod ppm;
 mod protection;
 pub mod settings;
+pub mod staged;
 mod stoppable;
 mod temporary;
 mod webp;

@@ -13,7 +13,7 @@ use nix::fcntl::OFlag;
 /// Longest file name of nearly every file system.
 const NAME_BYTES: usize = 255;
 /// Names to try before giving up; a second one is needed only if another program removes the first at the wrong moment.
-const ATTEMPTS: usize = 64;
+pub(super) const ATTEMPTS: usize = 64;
 
 /// A file that is removed unless it gets its final name.
 #[derive(Debug)]
@@ -128,17 +128,28 @@ pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     for entry in entries.flatten() {
         let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
         if is_file && is_temporary(&entry.file_name()) && !is_kept(&entry.path()) {
-            let _ = remove_if_stale(&entry.path());
+            let _ = remove_if_stale(&entry.path(), |path| fs::remove_file(path));
         }
     }
 }
 
-fn remove_if_stale(path: &Path) -> io::Result<()> {
+/// Removes the temporary folders of killed writers from a directory, with what is in them. Folders of living writers are locked.
+pub(super) fn remove_stale_folders(directory: &Path) {
+    let Ok(entries) = fs::read_dir(directory) else { return };
+    for entry in entries.flatten() {
+        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+        if is_folder && is_temporary(&entry.file_name()) {
+            let _ = remove_if_stale(&entry.path(), |path| fs::remove_dir_all(path));
+        }
+    }
+}
+
+fn remove_if_stale(path: &Path, remove: impl Fn(&Path) -> io::Result<()>) -> io::Result<()> {
     // Since the check it may have become a link or a pipe.
     let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
     let file = OpenOptions::new().read(true).custom_flags(flags.bits()).open(path)?;
     if file.try_lock().is_ok() && is_same(&file, path)? {
-        fs::remove_file(path)?;
+        remove(path)?;
     }
     Ok(())
 }
@@ -153,7 +164,7 @@ fn is_same(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-fn next_name(name: &OsStr) -> OsString {
+pub(super) fn next_name(name: &OsStr) -> OsString {
     static NUMBER: AtomicU64 = AtomicU64::new(0);
     let number = NUMBER.fetch_add(1, Ordering::Relaxed);
     let ending = format!(".glimt-{}-{number}.tmp", std::process::id());

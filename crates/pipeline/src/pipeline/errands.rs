@@ -14,7 +14,7 @@ use crate::film::Quantity;
 use crate::integrators::RenderSettings;
 use crate::math::DVec2;
 use crate::output::{Losses, OutputError, write};
-use crate::scene::{Loaded, is_model, text_now};
+use crate::scene::{Loaded, is_mesh, is_model, text_now};
 use crate::system::{file, in_words};
 use crate::world::World;
 
@@ -109,6 +109,9 @@ impl AtHand {
         let path = loaded.path.clone();
         if is_model(&path) {
             return write_scene_of_model(loaded, camera);
+        }
+        if is_mesh(&path) && path.symlink_metadata().is_err() {
+            return Err(format!("{} is gone: its scene is not written", path.display()));
         }
         let read = loaded.source.text();
         let changed = "the scene file has changed since it was read: the camera is not written into it";

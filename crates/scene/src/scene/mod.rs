@@ -177,6 +177,9 @@ fn load_source(source: Source, path: &Path, sets: &[String]) -> Result<Loaded, V
 /// Validates the text of a scene file. Of the files that it names only the metadata are looked at; they are
 /// searched for beside `path`, which names the scene in diagnostics and is not read.
 pub fn parse(text: Arc<str>, path: &Path) -> Outcome {
+    if text.contains('\0') {
+        return Outcome { scene: None, diagnostics: vec![*read::binary(path)], settings: Vec::new() };
+    }
     document::lower(&Source::file(text), path)
 }
 

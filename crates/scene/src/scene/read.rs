@@ -22,17 +22,22 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
         return Err(content.problem(path));
     }
     if bytes.contains(&0) || bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return Err(problem(
-            path,
-            "this is a binary file, not the text of a scene".to_owned(),
-            Some("a scene is TOML, saved as UTF-8; `glimt new FILE` writes one to start from".to_owned()),
-            None,
-        ));
+        return Err(binary(path));
     }
     match String::from_utf8(bytes) {
         Ok(text) => Ok(text.into()),
         Err(error) => Err(not_utf8(path, error.as_bytes(), error.utf8_error().valid_up_to())),
     }
+}
+
+/// A file that is no text.
+pub(super) fn binary(path: &Path) -> Box<Diagnostic> {
+    problem(
+        path,
+        "this is a binary file, not the text of a scene".to_owned(),
+        Some("a scene is TOML, saved as UTF-8; `glimt new FILE` writes one to start from".to_owned()),
+        None,
+    )
 }
 
 /// A mesh in place of a scene, and how to show it.

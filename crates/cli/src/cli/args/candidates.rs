@@ -1,7 +1,8 @@
 //! Values that shells offer for arguments: files by their endings, and the keys of `--set`.
 
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use clap_complete::engine::{ArgValueCompleter, CompletionCandidate, PathCompleter};
 
@@ -9,6 +10,19 @@ use crate::scene::keys::key::{Form, KeyInfo, Kind};
 use crate::scene::keys::{color_names, paths, tables};
 use crate::scene::outline::{OutlineTable, outline};
 use crate::scene::{is_mesh, text_now};
+
+/// Words of the line that a shell completes, if its script passes the line in another form.
+static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// Keeps the words of the line for completers that look at other words than theirs.
+pub(in crate::cli) fn remember(words: &[OsString]) {
+    WORDS.get_or_init(|| words.to_vec());
+}
+
+/// Returns the words of the line that is completed.
+fn line() -> Vec<OsString> {
+    WORDS.get().cloned().unwrap_or_else(|| std::env::args_os().collect())
+}
 
 /// Completes scenes.
 pub(in crate::cli) fn scenes() -> ArgValueCompleter {
@@ -34,7 +48,7 @@ fn is_scene(path: &Path) -> bool {
 pub(in crate::cli) fn sets() -> ArgValueCompleter {
     ArgValueCompleter::new(|current: &OsStr| {
         let Some(current) = current.to_str() else { return Vec::new() };
-        let scene = std::env::args_os().map(PathBuf::from).find(|word| is_scene(word));
+        let scene = line().into_iter().map(PathBuf::from).find(|word| is_scene(word));
         let text = scene.and_then(|scene| text_now(&scene).ok());
         candidates(text.as_deref().unwrap_or_default(), current)
     })

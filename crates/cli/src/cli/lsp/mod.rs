@@ -10,37 +10,41 @@ mod document;
 mod files;
 mod look;
 mod place;
+mod wire;
 
 use std::collections::HashMap;
+use std::io::BufRead;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use lsp_server::{Connection, ErrorCode, Message, Notification, Request, RequestId, Response};
+use lsp_server::{ErrorCode, Message, Notification, Request, RequestId, Response};
 use lsp_types::notification::{
-    DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, DidSaveTextDocument, Notification as _,
-    PublishDiagnostics,
+    DidChangeTextDocument, DidCloseTextDocument, DidOpenTextDocument, DidSaveTextDocument, Exit as Exited,
+    LogMessage, Notification as _, PublishDiagnostics,
 };
 use lsp_types::request::{
-    ColorPresentationRequest, Completion, DocumentColor, GotoDefinition, HoverRequest, Request as _,
+    ColorPresentationRequest, Completion, DocumentColor, GotoDefinition, HoverRequest, Initialize,
+    Request as _, Shutdown,
 };
 use lsp_types::{
     Diagnostic, DidChangeTextDocumentParams, DidCloseTextDocumentParams, DidOpenTextDocumentParams,
-    DidSaveTextDocumentParams, PublishDiagnosticsParams, TextDocumentPositionParams, Uri,
+    DidSaveTextDocumentParams, LogMessageParams, MessageType, PublishDiagnosticsParams,
+    TextDocumentPositionParams, Uri,
 };
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 
 use self::document::Document;
 use self::files::FileThread;
+use self::wire::{Client, Received};
 use super::console::Console;
 use super::exit::Exit;
 
-/// Serves until the client ends it, or its end of stdin is closed.
+/// Serves until the client ends it, or its end of stdin is closed. Without a request to shut down before, that it ends is a failure,
+/// as the protocol has it.
 pub(super) fn run(console: &Console) -> Exit {
-    let (connection, threads) = Connection::stdio();
-    let outcome = serve(connection).and_then(|()| threads.join().map_err(|error| error.to_string()));
-    match outcome {
-        Ok(()) => Exit::DONE,
+    match serve(&mut std::io::stdin().lock(), &Client::new(std::io::stdout())) {
+        Ok(exit) => exit,
         Err(message) => console.fail(Exit::FAILED, &format!("language server: {message}")),
     }
 }
@@ -58,41 +62,51 @@ fn capabilities() -> Value {
     })
 }
 
-// The connection is dropped at the end, without which its threads do not end.
-#[allow(clippy::needless_pass_by_value)]
-fn serve(connection: Connection) -> Result<(), String> {
-    let (id, _) = connection.initialize_start().map_err(|error| error.to_string())?;
-    connection.initialize_finish(id, capabilities()).map_err(|error| error.to_string())?;
+/// Part of a server's life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// The client has not said yet what it can.
+    New,
+    /// It serves.
+    Serving,
+    /// It waits for its end.
+    ShutDown,
+}
+
+fn serve(from: &mut impl BufRead, client: &Client) -> Result<Exit, String> {
     let documents = Documents::default();
-    let (open, sender) = (Arc::clone(&documents), connection.sender.clone());
+    let (open, to) = (Arc::clone(&documents), client.clone());
     let publish = move |uri, document: &Document, found| {
-        // A client that is gone hears nothing.
-        publish_if_current(&open, |message| drop(sender.send(message)), uri, document, found);
+        publish_if_current(&open, |message| to.send(&message), uri, document, found);
     };
     let files = FileThread::start(publish);
-    let mut server = Server { connection: &connection, documents, files };
-    for message in &connection.receiver {
-        match message {
-            Message::Request(request) => {
-                if connection.handle_shutdown(&request).map_err(|error| error.to_string())? {
-                    return Ok(());
-                }
-                let response = server.answer(request);
+    let mut server = Server { client, documents, files };
+    let mut phase = Phase::New;
+    while let Some(received) = wire::read(from)? {
+        match received {
+            Received::Wrong(answer) => client.refuse(&answer),
+            Received::Message(Message::Request(request)) => {
+                let response = server.respond(request, &mut phase);
                 server.send(response.into());
             }
-            Message::Notification(notification) => server.hear(notification),
+            Received::Message(Message::Notification(one)) => match (one.method.as_str(), phase) {
+                (Exited::METHOD, Phase::ShutDown) => return Ok(Exit::DONE),
+                (Exited::METHOD, Phase::New | Phase::Serving) => return Ok(Exit::FAILED),
+                (_, Phase::Serving) => server.hear(one),
+                (_, Phase::New | Phase::ShutDown) => {}
+            },
             // The server asks nothing.
-            Message::Response(_) => {}
+            Received::Message(Message::Response(_)) => {}
         }
     }
-    Ok(())
+    Ok(Exit::DONE)
 }
 
 /// Open texts by their addresses.
 type Documents = Arc<Mutex<HashMap<String, Document>>>;
 
 struct Server<'c> {
-    connection: &'c Connection,
+    client: &'c Client,
     documents: Documents,
     /// Reads files. `None` without a thread for it: then the mistakes of the texts alone are shown.
     files: Option<FileThread>,
@@ -103,9 +117,33 @@ impl Server<'_> {
         self.documents.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A client that is gone hears nothing.
     fn send(&self, message: Message) {
-        let _ = self.connection.sender.send(message);
+        self.client.send(&message);
+    }
+
+    /// The answer to a request in a phase, which it may change.
+    fn respond(&self, request: Request, phase: &mut Phase) -> Response {
+        let refused = |id, code: ErrorCode, why: &str| Response::new_err(id, code as i32, why.to_owned());
+        match (request.method.as_str(), *phase) {
+            (Initialize::METHOD, Phase::New) => {
+                *phase = Phase::Serving;
+                Response::new_ok(request.id, capabilities())
+            }
+            (_, Phase::New) => {
+                refused(request.id, ErrorCode::ServerNotInitialized, "`initialize` comes first")
+            }
+            (Initialize::METHOD, Phase::Serving) => {
+                refused(request.id, ErrorCode::InvalidRequest, "the server is initialized already")
+            }
+            (Shutdown::METHOD, Phase::Serving) => {
+                *phase = Phase::ShutDown;
+                Response::new_ok(request.id, Value::Null)
+            }
+            (_, Phase::Serving) => self.answer(request),
+            (_, Phase::ShutDown) => {
+                refused(request.id, ErrorCode::InvalidRequest, "the server is shut down and waits for `exit`")
+            }
+        }
     }
 
     fn answer(&self, request: Request) -> Response {
@@ -152,9 +190,12 @@ impl Server<'_> {
             }
             DidChangeTextDocument::METHOD => {
                 if let Some(DidChangeTextDocumentParams { text_document, mut content_changes }) = read(params)
-                    && let Some(last) = content_changes.pop()
                 {
-                    self.put(&text_document.uri, text_document.version, last.text);
+                    if content_changes.iter().any(|change| change.range.is_some()) {
+                        self.note("a change of a range is left out: this server takes whole texts");
+                    } else if let Some(last) = content_changes.pop() {
+                        self.put(&text_document.uri, text_document.version, last.text);
+                    }
                 }
             }
             DidSaveTextDocument::METHOD => {
@@ -170,6 +211,12 @@ impl Server<'_> {
             }
             _ => {}
         }
+    }
+
+    /// Writes an error into the client's log.
+    fn note(&self, message: &str) {
+        let params = LogMessageParams { typ: MessageType::ERROR, message: message.to_owned() };
+        self.send(Notification::new(LogMessage::METHOD.to_owned(), params).into());
     }
 
     /// Takes a text, and says what is wrong in it.

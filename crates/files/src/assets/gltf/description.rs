@@ -51,6 +51,8 @@ impl Placed {
 pub struct ModelInstance {
     /// Name of its node or its mesh; may be empty.
     pub name: String,
+    /// Number of its node.
+    pub node: usize,
     /// Number of its part.
     pub part: usize,
     /// Its placement.

@@ -199,12 +199,12 @@ impl Container {
     /// Refuses files whose primitives share bytes so often that the meshes would take many times the file's size.
     fn check_corners(&self) -> Result<(), Wrong> {
         let mut known = HashSet::new();
-        let mut corners = 0;
+        let mut corners: u64 = 0;
         for primitive in self.root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
             let list = primitive.indices.or_else(|| primitive.attributes.get("POSITION").copied());
             if known.insert((list, &primitive.attributes)) {
                 let accessor = list.and_then(|list| self.root.accessors.get(list));
-                corners += accessor.map_or(0, |accessor| accessor.count.min(u64::from(u32::MAX)));
+                corners = corners.saturating_add(accessor.map_or(0, |accessor| accessor.count));
             }
         }
         let bytes: u64 = self.buffers.iter().map(|buffer| buffer.len() as u64).sum();

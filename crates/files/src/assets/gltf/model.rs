@@ -17,6 +17,9 @@ use crate::math::{DMat3, DVec3};
 
 /// Most vertices, those of instances counted, that are all measured.
 const MOST_MEASURED: usize = 20_000_000;
+/// Most that a coordinate, a factor of a placement or the intensity of a light may be: scenes take less than 10¹⁸, and cameras stand
+/// some sizes of the model away.
+const MOST: f64 = 1e15;
 /// Most placed parts of a file.
 const MOST_INSTANCES: usize = 1 << 20;
 
@@ -70,6 +73,14 @@ impl Container {
             for at in places.map(|at| placed.point(at)) {
                 let [least, greatest] = scene.bounds.unwrap_or([at; 2]);
                 scene.bounds = Some([least.min(at), greatest.max(at)]);
+            }
+            if let Some([least, greatest]) = scene.bounds
+                && !(least.abs().max(greatest.abs()).max_element() < MOST)
+            {
+                let farthest = least.abs().max(greatest.abs()).max_element();
+                let wrong =
+                    Wrong::new(format!("its mesh reaches to {farthest:e}, and must stay below {MOST:e}"));
+                return Err(self.wrong(wrong.inside(format!("nodes[{}]", instance.node))));
             }
             token.check()?;
         }
@@ -145,10 +156,14 @@ impl Walk<'_> {
         let root = &container.root;
         let node = &root.nodes[number];
         let place = format!("nodes[{number}]");
+        if node.mesh.is_some() || node.camera.is_some() || node.extensions.light.is_some() {
+            check_reach(node, &placed)?;
+        }
         if let Some(light) = &node.extensions.light {
             let lights = &root.extensions.lights.lights;
             let json =
                 lights.get(light.light).ok_or_else(|| Wrong::index("lights", light.light, lights.len()))?;
+            check_intensity(json, light.light)?;
             self.light(json, &node.name, placed, &place);
         }
         if let Some(camera) = node.camera {
@@ -199,6 +214,7 @@ impl Walk<'_> {
             );
             self.scene.instances.push(ModelInstance {
                 name: name.clone(),
+                node: number,
                 part: first + index,
                 placed,
                 material,
@@ -325,7 +341,7 @@ impl Walk<'_> {
             }
             (None, None) => return,
         };
-        let is_usable = position.is_finite() && fov > 0.0 && fov < 180.0;
+        let is_usable = position.abs().max_element() < MOST && fov > 0.0 && fov < 180.0;
         if is_usable {
             let name = if json.name.is_empty() { node } else { &json.name };
             let aspect = aspect.filter(|aspect| *aspect > 0.05 && *aspect < 20.0);
@@ -341,6 +357,41 @@ impl Walk<'_> {
             self.notes.add(place, "its camera is left out: it has no place or no angle");
         }
     }
+}
+
+/// Refuses a placement whose numbers no scene takes. It names the node's own number if that is the one.
+fn check_reach(node: &Node, placed: &Placed) -> Result<(), Wrong> {
+    let most = |numbers: &[f64]| numbers.iter().fold(0.0_f64, |most, number| most.max(number.abs()));
+    let all = |placed: &Placed| most(&placed.linear.to_cols_array()).max(most(&placed.translate.to_array()));
+    if all(placed) < MOST {
+        return Ok(());
+    }
+    let own = [
+        ("scale", node.scale.as_ref().map(|numbers| &numbers[..])),
+        ("translation", node.translation.as_ref().map(|numbers| &numbers[..])),
+        ("matrix", node.matrix.as_ref().map(|numbers| &numbers[..])),
+    ];
+    let of_own = own.into_iter().filter_map(|(name, numbers)| Some((name, most(numbers?))));
+    Err(Wrong::new(match of_own.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, largest)| *largest >= MOST) {
+        Some((name, largest)) => format!("its {name} has {largest:e}, and must stay below {MOST:e}"),
+        None => format!(
+            "with those of its ancestors, its placement has {:e}, and must stay below {MOST:e}",
+            all(placed)
+        ),
+    }))
+}
+
+/// Refuses a light that no scene takes.
+fn check_intensity(json: &Light, number: usize) -> Result<(), Wrong> {
+    let brightest = json.color.iter().fold(0.0_f64, |most, part| most.max(*part)) * json.intensity;
+    if brightest < MOST || !(json.intensity > 0.0) {
+        return Ok(());
+    }
+    let name = if json.name.is_empty() { String::new() } else { format!(" {:?}", super::shown(&json.name)) };
+    let intensity = json.intensity;
+    Err(Wrong::new(format!(
+        "its light lights[{number}]{name} has intensity {intensity:e}, and must stay below {MOST:e}"
+    )))
 }
 
 /// Placements of all nodes.

@@ -3,13 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use super::gltf::{Content, Naming};
-use super::{ModelText, Show};
+use super::{ModelText, Show, in_its_scene};
 use crate::assets::AssetError;
 use crate::assets::gltf::{Container, ImageBytes, is_gltf};
 use crate::assets::image::{ImageLimits, ImageWithin, size, size_within};
 use crate::assets::mesh::ply::write;
 use crate::control::{CancelToken, unwatched};
 use crate::pipeline::stages::containers::Containers;
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::load_made;
 
 /// A scene that can be written.
 #[derive(Debug)]
@@ -25,24 +27,25 @@ pub struct Imported {
 /// Reads a file of another program as a scene whose other files are in a folder of this name.
 ///
 /// # Errors
-/// What is wrong with the file, in words.
-pub fn import(path: &Path, folder: &str) -> Result<Imported, String> {
+/// What is wrong with the file, in words; or the token is cancelled.
+pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported, String> {
     if !is_gltf(path) {
         return Err(format!("{} is no file that can be imported: .gltf or .glb", path.display()));
     }
-    let (containers, token) = (Containers::default(), CancelToken::new());
+    let containers = Containers::default();
     let naming = Naming::Folder(folder.to_owned());
     let read = || {
         let ModelText { text, notes, assets, .. } =
-            super::gltf::text(path, (Show::default(), &naming), &containers, &token)?;
-        let container = containers.open(path, &unwatched, &token)?;
+            super::gltf::text(path, (Show::default(), &naming), &containers, token)?;
+        check_scene(path, &containers, token)?;
+        let container = containers.open(path, &unwatched, token)?;
         let mut files = Vec::new();
         for asset in assets {
             let bytes = match asset.content {
-                Content::Part(part) => write::bytes(&container.part(part, &unwatched, &token)?.mesh),
+                Content::Part(part) => write::bytes(&container.part(part, &unwatched, token)?.mesh),
                 Content::Image(image) => {
-                    check_image(&container, image, &token)?;
-                    container.image_content(image, &token)?
+                    check_image(&container, image, token)?;
+                    container.image_content(image, token)?
                 }
             };
             files.push((PathBuf::from(asset.name), bytes));
@@ -50,6 +53,16 @@ pub fn import(path: &Path, folder: &str) -> Result<Imported, String> {
         Ok(Imported { text, files, notes })
     };
     read().map_err(|error: AssetError| error.to_string())
+}
+
+/// Refuses a scene that `glimt check` would refuse. It reads the text that `glimt MODEL` shows, whose files are there.
+fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Result<(), AssetError> {
+    let shown = super::gltf::text(path, (Show::default(), &Naming::Inside), containers, token)?;
+    let Err(errors) = load_made(shown.text.into(), path, &[]) else { return Ok(()) };
+    // Files have other names where the scene is written.
+    let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
+    let Some(first) = errors.into_iter().find(|one| counts(&one)) else { return Ok(()) };
+    Err(AssetError::Malformed { path: path.to_owned(), line: None, reason: in_its_scene(first).message })
 }
 
 /// Refuses what is no image: files from anywhere could be copied under the name of one.

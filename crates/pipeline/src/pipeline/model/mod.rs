@@ -20,6 +20,7 @@ use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
 use crate::control::CancelToken;
 use crate::math::DVec3;
+use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Fingerprint;
 
 /// Way of showing a model.
@@ -109,6 +110,11 @@ pub(in crate::pipeline) fn text(
     plain::text(path, show, containers, token)
 }
 
+/// A mistake in the scene of a model, which is in no file.
+pub(in crate::pipeline) fn in_its_scene(one: Diagnostic) -> Diagnostic {
+    Diagnostic { message: format!("in the scene of this model, {}", one.message), ..one }
+}
+
 /// Name of a file in its folder.
 fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
@@ -144,7 +150,9 @@ impl Lighting {
         // A white surface is then as bright as under our lights.
         const USUAL: f64 = 3.0;
         let over = (irradiance / USUAL).max(1.0);
-        Self::Own { exposure: -(libm::log2(over) * 10.0).round() / 10.0 }
+        // The sky stays within what a scene may have, however near a light is.
+        const MOST: f64 = 40.0;
+        Self::Own { exposure: -(libm::log2(over).min(MOST) * 10.0).round() / 10.0 }
     }
 
     /// Radiance of the sky.

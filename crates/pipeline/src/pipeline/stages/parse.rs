@@ -70,7 +70,11 @@ fn model_scene(
     })?;
     let notes = made.notes.into_iter().map(|note| of_file(path, Severity::Warning, note)).collect();
     let loaded = scene::load_made(made.text.into(), path, sets);
-    Ok((loaded.map_err(|errors| Stop::Failed(Failure::Scene(errors)))?, made.companions, notes))
+    let loaded = loaded.map_err(|errors| {
+        let shown = |one: Diagnostic| if one.path == path { model::in_its_scene(one) } else { one };
+        Stop::Failed(Failure::Scene(errors.into_iter().map(shown).collect()))
+    })?;
+    Ok((loaded, made.companions, notes))
 }
 
 fn broken(path: &Path, message: String) -> Stop {

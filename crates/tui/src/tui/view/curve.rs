@@ -1,4 +1,4 @@
-//! Noise against time as a small curve. Both axes are logarithmic.
+//! Noise against time as a small curve, with the requested `error` as a line. Both axes are logarithmic.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -27,7 +27,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
     let (Some(rows), Some(points)) = (rows(state, area), points(state)) else { return 0 };
     let depth = state.display.depth;
     put(buffer, row(area, 0), &[("noise while it rendered", Tone::Strong)], depth);
-    let caption = caption(points, area.width);
+    let caption = caption(state, points, area.width);
     let chart = Rect { y: area.y + 1, height: rows - 1 - caption.len() as u16, ..area };
     plot(state, points, chart, buffer);
     for (index, line) in (chart.bottom() - area.y..).zip(&caption) {
@@ -38,7 +38,7 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) -> u16 {
 
 /// Rows of the curve with its words. `None` if they do not fit.
 pub(super) fn rows(state: &State, area: Rect) -> Option<u16> {
-    let words = 1 + caption(points(state)?, area.width.min(MOST_COLUMNS)).len() as u16;
+    let words = 1 + caption(state, points(state)?, area.width.min(MOST_COLUMNS)).len() as u16;
     let chart = area.height.checked_sub(words)?.min(MOST_ROWS);
     (chart >= LEAST_ROWS && area.width >= 20).then_some(words + chart)
 }
@@ -50,28 +50,46 @@ fn points(state: &State) -> Option<&[(f64, f64)]> {
     (points.len() >= LEAST_POINTS && *last >= first * LEAST_RATIO).then_some(points)
 }
 
+/// The requested noise of each tile.
+fn target(state: &State) -> Option<f64> {
+    state.request.effective.as_ref().map(|it| f64::from(it.error)).filter(|error| *error > 0.0)
+}
+
 /// Caption of the curve, in plain words.
-fn caption(points: &[(f64, f64)], width: u16) -> Vec<String> {
+fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
     let fell = format!("{} after {}, {} after {}", share(*from), seconds(*first), share(*to), seconds(*last));
-    wrapped(&fell, usize::from(width))
+    let line = match target(state) {
+        Some(target) => format!(
+            "; the line is the {} asked of each tile",
+            share(f64::from((target * 1e6).round() as f32) / 1e6)
+        ),
+        None => String::new(),
+    };
+    wrapped(&(fell + &line), usize::from(width))
 }
 
 fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {
     let depth = state.display.depth;
     let log = |(seconds, noise): &(f64, f64)| (seconds.log10(), noise.log10());
     let curve: Vec<(f64, f64)> = points.iter().map(log).collect();
-    let ends = |of: &dyn Fn(&(f64, f64)) -> f64| {
-        let all = || curve.iter().map(of);
+    let ends = |of: &dyn Fn(&(f64, f64)) -> f64, more: Option<f64>| {
+        let all = || curve.iter().map(of).chain(more);
         [all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max)]
     };
-    let (x, y) = (ends(&|point| point.0), ends(&|point| point.1));
+    let target = target(state).map(f64::log10);
+    let (x, y) = (ends(&|point| point.0, None), ends(&|point| point.1, target));
+    let line = target.map(|target| [(x[0], target), (x[1], target)]);
     // A line along the edge would not be seen.
     let margin = 0.05 * (y[1] - y[0]).max(0.1);
     let bounds = [y[0] - margin, y[1] + margin];
     let style = |tone: Tone| tone.style(depth);
-    let line = Dataset::default().data(&curve).marker(marker(state)).graph_type(GraphType::Line);
-    let sets = vec![line.style(style(Tone::Working))];
+    let dataset = |data, tone| {
+        Dataset::default().data(data).marker(marker(state)).graph_type(GraphType::Line).style(style(tone))
+    };
+    let mut sets = Vec::new();
+    sets.extend(line.as_ref().map(|line| dataset(&line[..], Tone::Good)));
+    sets.push(dataset(&curve, Tone::Working));
     let axis = |bounds, labels: [String; 2]| {
         let labels = labels.map(|label| Span::styled(label, style(Tone::Faint)));
         Axis::default().bounds(bounds).labels(labels).style(style(Tone::Faint))

@@ -1,0 +1,179 @@
+//! Messages over stdin and stdout: a header with a length, then JSON (the base protocol of LSP).
+//!
+//! `lsp_server`'s own reader ends at what is not a message, and allocates whatever length a header names. This one answers the former
+//! and refuses the latter.
+
+use std::io::{self, BufRead, Read, Write};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use lsp_server::{ErrorCode, Message};
+use serde_json::{Value, json};
+
+/// Most bytes of a message: those of the longest scene, each of them escaped.
+const MOST: u64 = 6 << 27;
+/// Most bytes of a header.
+const HEADER: u64 = 1 << 14;
+
+/// Something that a client sent.
+#[derive(Debug)]
+pub(super) enum Received {
+    /// A message.
+    Message(Message),
+    /// A frame without a message in it, and the answer to it.
+    Wrong(Value),
+}
+
+/// Reads the next frame. `None` at the end of the stream.
+///
+/// # Errors
+/// The stream cannot be read on: its frames are lost.
+pub(super) fn read(from: &mut impl BufRead) -> Result<Option<Received>, String> {
+    let Some(length) = length(from)? else { return Ok(None) };
+    if length > MOST {
+        return Err(format!("a message of {length} bytes is too long; {MOST} are read at most"));
+    }
+    // Memory is taken as bytes arrive.
+    let mut bytes = Vec::new();
+    from.by_ref().take(length).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
+    if (bytes.len() as u64) < length {
+        return Err(format!("stdin ended within a message: {} of {length} bytes", bytes.len()));
+    }
+    Ok(Some(message(bytes)))
+}
+
+/// Reads a header. `None` if the stream ends before it.
+fn length(from: &mut impl BufRead) -> Result<Option<u64>, String> {
+    let mut header = from.by_ref().take(HEADER);
+    let mut length = None;
+    let mut is_first = true;
+    loop {
+        let mut line = Vec::new();
+        header.read_until(b'\n', &mut line).map_err(|error| error.to_string())?;
+        let text = String::from_utf8_lossy(&line);
+        if line.is_empty() && is_first {
+            return Ok(None);
+        }
+        if !text.ends_with('\n') {
+            return Err("stdin ended within a header, or it is too long".to_owned());
+        }
+        is_first = false;
+        let text = text.trim_end();
+        if text.is_empty() {
+            return length.map(Some).ok_or_else(|| "a header has no Content-Length".to_owned());
+        }
+        let Some((name, value)) = text.split_once(':') else {
+            return Err(format!("this is no header: {:?}", text.chars().take(60).collect::<String>()));
+        };
+        if name.trim().eq_ignore_ascii_case("Content-Length") {
+            let number = value.trim().parse();
+            length = Some(number.map_err(|_| format!("Content-Length is no length: {:?}", value.trim()))?);
+        }
+    }
+}
+
+/// The message of a frame.
+fn message(bytes: Vec<u8>) -> Received {
+    let text = String::from_utf8(bytes).map_err(|_| "the message is not UTF-8".to_owned());
+    let json = text.and_then(|text| {
+        serde_json::from_str::<Value>(&text)
+            .or_else(|_| serde_json::from_str(&paired(&text)))
+            .map_err(|error| format!("the message is not JSON: {error}"))
+    });
+    let json = match json {
+        Ok(json) => json,
+        Err(why) => return Received::Wrong(refusal(&Value::Null, ErrorCode::ParseError, &why)),
+    };
+    let id = json.get("id").filter(|id| id.is_string() || id.is_number()).cloned().unwrap_or_default();
+    match serde_json::from_value(json) {
+        Ok(message) => Received::Message(message),
+        Err(_) => {
+            Received::Wrong(refusal(&id, ErrorCode::InvalidRequest, "this is no request and no notification"))
+        }
+    }
+}
+
+/// An answer that refuses something. The id is null if it is not known.
+fn refusal(id: &Value, code: ErrorCode, why: &str) -> Value {
+    json!({ "jsonrpc": "2.0", "id": id, "error": { "code": code as i32, "message": why } })
+}
+
+/// JSON in which U+FFFD stands for escaped surrogates without a partner, which editors send while a character is half there.
+fn paired(text: &str) -> String {
+    let surrogate = |at: usize| {
+        let digits = text.get(at..)?.strip_prefix("\\u")?.get(..4)?;
+        u32::from_str_radix(digits, 16).ok().filter(|unit| (0xd800..0xe000).contains(unit))
+    };
+    let mut out = String::with_capacity(text.len());
+    let mut at = 0;
+    while let Some(found) = text.get(at..).and_then(|rest| rest.find('\\')).map(|more| at + more) {
+        out.push_str(&text[at..found]);
+        let (first, second) = (surrogate(found), surrogate(found + 6));
+        let (taken, length) = match (first, second) {
+            (Some(0xd800..0xdc00), Some(0xdc00..)) => (text.get(found..found + 12), 12),
+            (Some(_), _) => (Some("\\ufffd"), 6),
+            // A backslash and what it escapes.
+            (None, _) => {
+                let next = text[found + 1..].chars().next().map_or(0, char::len_utf8);
+                (text.get(found..found + 1 + next), 1 + next)
+            }
+        };
+        out.push_str(taken.unwrap_or_default());
+        at = found + length;
+    }
+    out.push_str(text.get(at..).unwrap_or_default());
+    out
+}
+
+/// The client's end, which threads share.
+#[derive(Clone)]
+pub(super) struct Client(Arc<Mutex<Box<dyn Write + Send>>>);
+
+impl Client {
+    pub(super) fn new(to: impl Write + Send + 'static) -> Self {
+        Self(Arc::new(Mutex::new(Box::new(to))))
+    }
+
+    /// Sends a message. A client that is gone hears nothing.
+    pub(super) fn send(&self, message: &Message) {
+        let _ = message.write(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// Sends the answer to a frame without a message.
+    pub(super) fn refuse(&self, answer: &Value) {
+        let mut to = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let text = answer.to_string();
+        let written: io::Result<()> =
+            write!(to, "Content-Length: {}\r\n\r\n{text}", text.len()).and_then(|()| to.flush());
+        // A client that is gone hears nothing.
+        drop(written);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn surrogates_without_a_partner_become_the_replacement_character() {
+        for (text, wanted) in [
+            (r#""a\ud83db""#, "a\u{fffd}b"),
+            (r#""\ud83d\ude00""#, "😀"),
+            (r#""\ude00\ud83d""#, "\u{fffd}\u{fffd}"),
+            (r#""\\ud83d""#, "\\ud83d"),
+            (r#""\ud83d\ud83d\ude00é\n""#, "\u{fffd}😀é\n"),
+        ] {
+            assert_eq!(serde_json::from_str::<String>(&paired(text)).expect(text), wanted);
+        }
+        assert_eq!(paired("\\"), "\\");
+        assert_eq!(paired("\\u12"), "\\u12");
+    }
+
+    #[test]
+    fn a_length_that_nobody_sends_takes_no_memory() {
+        let mut far = &b"Content-Length: 1000000000000\r\n\r\n{}"[..];
+        assert!(read(&mut far).expect_err("too long").contains("1000000000000 bytes"));
+        let mut cut = &b"Content-Length: 500000000\r\n\r\n{}"[..];
+        assert!(read(&mut cut).expect_err("cut").contains("2 of 500000000 bytes"));
+        assert!(read(&mut &b""[..]).expect("the end").is_none());
+    }
+}
