@@ -87,7 +87,7 @@ fn serve(from: &mut impl BufRead, client: &Client) -> Result<Exit, String> {
             Received::Wrong(answer) => client.refuse(&answer),
             Received::Message(Message::Request(request)) => {
                 let response = server.respond(request, &mut phase);
-                server.send(response.into());
+                server.send(&response.into());
             }
             Received::Message(Message::Notification(one)) => match (one.method.as_str(), phase) {
                 (Exited::METHOD, Phase::ShutDown) => return Ok(Exit::DONE),
@@ -117,8 +117,8 @@ impl Server<'_> {
         self.documents.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn send(&self, message: Message) {
-        self.client.send(&message);
+    fn send(&self, message: &Message) {
+        self.client.send(message);
     }
 
     /// The answer to a request in a phase, which it may change.
@@ -206,7 +206,7 @@ impl Server<'_> {
             DidCloseTextDocument::METHOD => {
                 if let Some(DidCloseTextDocumentParams { text_document }) = read(params) {
                     self.documents().remove(text_document.uri.as_str());
-                    self.send(published(text_document.uri, None, Vec::new()));
+                    self.send(&published(text_document.uri, None, Vec::new()));
                 }
             }
             _ => {}
@@ -216,7 +216,7 @@ impl Server<'_> {
     /// Writes an error into the client's log.
     fn note(&self, message: &str) {
         let params = LogMessageParams { typ: MessageType::ERROR, message: message.to_owned() };
-        self.send(Notification::new(LogMessage::METHOD.to_owned(), params).into());
+        self.send(&Notification::new(LogMessage::METHOD.to_owned(), params).into());
     }
 
     /// Takes a text, and says what is wrong in it.
@@ -224,7 +224,7 @@ impl Server<'_> {
         let document = Document::new(path(uri), version, text);
         let found = diagnostics::of_text(&document);
         self.documents().insert(uri.as_str().to_owned(), document);
-        self.send(published(uri.clone(), Some(version), found));
+        self.send(&published(uri.clone(), Some(version), found));
     }
 
     /// Has the files be read that a text names.
