@@ -23,7 +23,7 @@ engine.window.render_to_image().save("f3d.png")
 """
 
 BLENDER = """
-import bpy, sys
+import bpy, os, sys
 from mathutils import Vector
 bpy.ops.wm.read_factory_settings(use_empty=True)
 name = sys.argv[1]
@@ -51,7 +51,7 @@ scene.render.engine = "CYCLES"
 scene.cycles.samples = 64
 scene.cycles.use_denoising = False
 scene.render.resolution_x = scene.render.resolution_y = 512
-scene.render.filepath = "//blender.png"
+scene.render.filepath = os.path.abspath("blender.png")
 bpy.ops.render.render(write_still=True)
 """
 

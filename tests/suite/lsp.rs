@@ -251,7 +251,7 @@ fn the_server_ends_when_it_is_told_and_when_nobody_is_left() {
     assert_eq!(unknown["error"]["code"], -32601);
 }
 
-/// Sends bytes to a new server; returns its exit code, what it answered and what it said on stderr.
+/// Sends bytes to a new server; returns its exit code, its answers and its stderr.
 fn answers(frames: &[&str]) -> (Option<i32>, String, String) {
     let desk = Desk::new();
     let mut process = desk.glimt("lsp");

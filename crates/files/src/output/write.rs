@@ -74,7 +74,7 @@ pub fn atomic_until(
 }
 
 /// [`atomic_until`] in place of a file with this content alone: if it has another one in the moment of the replacement, it stays,
-/// and the guard is asked again for the reason.
+/// and the guard tells the reason.
 ///
 /// # Errors
 /// As [`atomic_until`].

@@ -62,7 +62,7 @@ pub(super) fn is_model(path: &Path) -> bool {
     is_mesh(path) && start().is_some_and(|bytes| memchr::memmem::find(&bytes, b"[camera]").is_none())
 }
 
-/// Content of a file that is no scene, as its start shows, whatever its name.
+/// Content other than a scene, by the first bytes of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum OtherContent {
     /// A model, with its format and the usual ending of its files.

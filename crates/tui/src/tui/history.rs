@@ -136,7 +136,7 @@ impl History {
         let Some((before, past)) = before.zip(self.past.get(at)) else { return };
         let edits = past.origin.edits(&before.origin);
         let mut keys = past.origin.toggles.differences(&before.origin.toggles);
-        // A camera that was written into the scene is told by the scene's keys.
+        // The scene's keys tell of a camera that `c` wrote into it.
         let is_written = edits.iter().any(|edit| edit.contains("camera."));
         keys.retain(|key| !(is_written && key == "camera of the scene"));
         let changes = [edits, keys];

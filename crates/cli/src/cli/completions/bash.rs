@@ -34,7 +34,7 @@ else
 fi
 "#;
 
-/// The adapter for bash. Its script passes the line up to the cursor, and the end of it that is replaced.
+/// The adapter for bash. Its script passes the line up to the cursor, and the part at its end that a candidate replaces.
 pub(super) struct Bash;
 
 impl EnvCompleter for Bash {
@@ -88,7 +88,7 @@ impl EnvCompleter for Bash {
     }
 }
 
-/// How a place in a line is quoted.
+/// Quotes around a place in a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Quote {
     None,

@@ -87,7 +87,7 @@ fn the_newest_goes_on_and_says_how_far_it_is() {
     desk.press('m');
     desk.press('N');
     desk.press('n');
-    // One that was stopped is told from one that was finished.
+    // The strip marks a picture whose render was stopped.
     desk.press('s');
     desk.finish(BLUE);
     assert!(desk.text().contains("unfinished;"), "{}", desk.text());

@@ -96,7 +96,7 @@ fn change_by(state: &State, report: &StageReport, words: impl Fn(f64, Option<f64
     }
 }
 
-/// The stages that count, and how many were reused; in short where there is no room for units.
+/// The stages that count, and how many were reused; in short if there is no room for units.
 pub(super) fn in_one_line(state: &State, room: u16) -> Line {
     let line = in_one_line_of(state, true);
     if width(&line) <= room { line } else { in_one_line_of(state, false) }

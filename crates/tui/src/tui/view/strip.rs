@@ -26,7 +26,7 @@ const WIDE_ROWS: Rows = Rows { picture: 5, entry: 5, pitch: 6 };
 const WIDE: u16 = 40;
 /// Columns of the words beside a picture.
 const LEAST_WORDS: u16 = 10;
-/// So many of them are enough for all words.
+/// Number of rows that all words need at most.
 const ENOUGH: u16 = 20;
 /// Width of a column of pictures if there are several.
 const COLUMN: u16 = 44;
