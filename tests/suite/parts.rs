@@ -281,7 +281,7 @@ fn a_merge_waits_for_a_part_that_is_not_whole_yet() {
         let mut waiting = merge.stderr(std::process::Stdio::piped()).spawn().expect("it runs");
         for length in [0, 7, 100, whole.len() / 2, whole.len() - 1] {
             desk.write("2.part", &whole[..length]);
-            std::thread::sleep(std::time::Duration::from_millis(300));
+            std::thread::sleep(std::time::Duration::from_millis(600));
             assert!(waiting.try_wait().expect("a child").is_none(), "{length} bytes are there");
         }
         desk.write("2.part", &whole);

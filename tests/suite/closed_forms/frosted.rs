@@ -220,8 +220,8 @@ fn photons_scatter_at_rough_glass_to_both_sides() {
             .depth(depth)
     };
     for depth in [2, 6] {
-        let means = both(&room(depth), depth, [512, 32], (20_000, 0.03));
-        assert_same_light(&format!("depth {depth}"), means, 1.5e-2, 4e-3);
+        let means = both(&room(depth), depth, [512, 48], (20_000, 0.03));
+        assert_same_light(&format!("depth {depth}"), means, 1.2e-2, 4e-3);
     }
 }
 
@@ -380,10 +380,11 @@ fn light_through_a_sheet_on_glass_goes_on_in_the_glass() {
             )),
         ),
     ] {
-        for (mean, error) in both(&build, 8, [128, 64], (2_000, 0.05)) {
-            assert!(error < 0.02 * exact, "{what}: {mean} ± {error} says nothing");
-            assert!((mean - exact).abs() < 4.0 * error + 0.01 * exact, "{what}: {mean} ± {error}, {exact}");
-        }
+        let means = both(&build, 8, [256, 64], (2_000, 0.05));
+        assert!(
+            means.iter().all(|(mean, _)| (mean - exact).abs() < 0.02 * exact),
+            "{what}: {means:?}, {exact}"
+        );
     }
     // Clear glass brings light: all techniques find the same, from above and through the block from below. It gains none.
     for from in [v(0.0, 2.4, 1.5), v(0.2, -2.4, 1.0)] {

@@ -16,13 +16,7 @@ pub(super) fn encode(
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let mut picture = Vec::with_capacity(3 * image.pixels.len());
-    let take = |part: &[u8]| {
-        picture.extend_from_slice(part);
-        Ok(())
-    };
-    let developed = stoppable::developed(image, options, token, take);
-    developed.map_err(|error| OutputError::encoder(Format::Jpeg, &error))?;
+    let picture = stoppable::developed_whole(image, (options, Format::Jpeg), token)?;
     let mut bytes = Stoppable::new(token);
     JpegEncoder::new_with_quality(&mut bytes, QUALITY)
         .encode(&picture, image.width, image.height, ExtendedColorType::Rgb8)

@@ -7,7 +7,7 @@ use std::os::fd::AsFd;
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
-use super::{BitDepth, EncodeOptions, OutputError};
+use super::{BitDepth, EncodeOptions, Format, OutputError};
 use crate::control::{CancelToken, Cancelled};
 use crate::film::RadianceImage;
 use crate::film::tone::{develop, develop16};
@@ -42,6 +42,21 @@ pub(super) fn developed(
         }
     }
     Ok(())
+}
+
+/// Bytes of the developed picture, three for each pixel.
+pub(super) fn developed_whole(
+    image: &RadianceImage,
+    (options, format): (&EncodeOptions, Format),
+    token: &CancelToken,
+) -> Result<Vec<u8>, OutputError> {
+    let mut picture = Vec::with_capacity(3 * image.pixels.len());
+    let take = |part: &[u8]| {
+        picture.extend_from_slice(part);
+        Ok(())
+    };
+    developed(image, options, token, take).map_err(|error| OutputError::encoder(format, &error))?;
+    Ok(picture)
 }
 
 /// A writer into memory that fails once the work is cancelled, so that encoders which do not poll the token end too.

@@ -12,13 +12,7 @@ pub(super) fn encode(
     options: &EncodeOptions,
     token: &CancelToken,
 ) -> Result<Vec<u8>, OutputError> {
-    let mut picture = Vec::with_capacity(3 * image.pixels.len());
-    let take = |part: &[u8]| {
-        picture.extend_from_slice(part);
-        Ok(())
-    };
-    let developed = stoppable::developed(image, options, token, take);
-    developed.map_err(|error| OutputError::encoder(Format::WebP, &error))?;
+    let picture = stoppable::developed_whole(image, (options, Format::WebP), token)?;
     let mut bytes = Stoppable::new(token);
     let mut encoder = WebPEncoder::new(&mut bytes);
     encoder.set_xmp_metadata(packet(options).into_bytes());

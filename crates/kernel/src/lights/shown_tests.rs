@@ -140,7 +140,7 @@ const SIDE: usize = 20;
 /// Squares of a cell along a side; the pdf is evaluated once in each.
 const FINE: usize = 30;
 /// Samples of a light.
-const COUNT: usize = 160_000;
+const COUNT: usize = 400_000;
 
 /// Gaps under lamps, and the points on the floor from which they are sampled.
 const PLACES: [(f64, Vec3); 2] = [(0.02, Vec3::ZERO), (0.8, Vec3::new(0.3, 0.0, -0.2))];

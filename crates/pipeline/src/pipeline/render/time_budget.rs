@@ -219,7 +219,7 @@ mod tests {
     fn samples_that_go_by_the_noise_of_the_other_half_keep_the_mean() {
         let mut next = unit(13);
         let mut mean_of = |by_own| {
-            const RENDERS: u32 = 700;
+            const RENDERS: u32 = 1500;
             let means: Vec<f64> = (0..RENDERS).map(|_| rendered(&mut next, by_own)).collect();
             let mean = means.iter().sum::<f64>() / f64::from(RENDERS);
             let variance = means.iter().map(|one| (one - mean).powi(2)).sum::<f64>() / f64::from(RENDERS);
@@ -227,7 +227,7 @@ mod tests {
         };
         let (mean, error) = mean_of(false);
         let (own, own_error) = mean_of(true);
-        assert!(error.max(own_error) < 0.009, "{error} {own_error}");
+        assert!(error.max(own_error) < 0.006, "{error} {own_error}");
         assert!((mean - 1.0).abs() < 0.02, "{mean} ± {error}");
         assert!(own < 0.95, "the samples tell what goes by itself: {own} ± {own_error}");
     }

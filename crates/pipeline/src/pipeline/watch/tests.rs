@@ -60,15 +60,9 @@ impl Scratch {
     /// Waits for one change and that nothing follows but that the files are quiet.
     #[track_caller]
     fn expect_one(&self) {
-        self.expect_one_first();
-        self.expect_none();
-    }
-
-    /// Waits for one change and for quiet files.
-    #[track_caller]
-    fn expect_one_first(&self) {
         assert!(matches!(self.next(), News::Changed(_)), "it is the first that is said");
         assert!(matches!(self.next(), News::Settled), "a change too many");
+        self.expect_none();
     }
 
     #[track_caller]
@@ -81,9 +75,8 @@ impl Scratch {
     fn three_saves(&self, save: impl Fn(&str)) {
         for content in ["one", "two", "three"] {
             save(content);
-            self.expect_one_first();
+            self.expect_one();
         }
-        self.expect_none();
     }
 }
 

@@ -319,7 +319,8 @@ const MOST: [(f64, f64); 3] = [(0.1, 1.5), (0.25, 0.8), (0.5, 0.5)];
 fn a_quick_terminal_follows_the_render() {
     let kinds = [
         (PreviewKind::HalfBlock, ColorDepth::TrueColor),
-        (PreviewKind::Sextant, ColorDepth::Indexed256),
+        (PreviewKind::Sextant, ColorDepth::TrueColor),
+        (PreviewKind::HalfBlock, ColorDepth::Indexed256),
         (PreviewKind::Pixels(Protocol::Kitty), ColorDepth::TrueColor),
     ];
     for (preview, depth) in kinds {

@@ -21,7 +21,7 @@ fn at_angle(normal: Vec3, degrees: f32) -> Vec3 {
     frame.to_world(Vec3::new(0.8 * sin, -0.6 * sin, cos)).normalize()
 }
 
-const SAMPLES: u32 = 100_000;
+const SAMPLES: u32 = 200_000;
 
 fn sample(lobes: &Lobes, next: &mut impl FnMut() -> f32) -> Vec3 {
     let lobe = next();
