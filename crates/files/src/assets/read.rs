@@ -54,6 +54,14 @@ pub(crate) fn lettered(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<
     bytes_if(path, limit, watch, |start| !start[..start.len().min(3)].contains(&0))
 }
 
+/// Reads the start of a regular file, at most so many bytes.
+pub(crate) fn start(path: &Path, most: u64) -> Result<Vec<u8>, AssetError> {
+    let (file, _) = open(path, u64::MAX)?;
+    let mut bytes = Vec::new();
+    let read = file.take(most).read_to_end(&mut bytes);
+    read.map(|_| bytes).map_err(|error| AssetError::unreadable(path, in_words(&error)))
+}
+
 /// Reads a file that does not begin with zeros alone.
 pub(crate) fn not_blank(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
     bytes_if(path, limit, watch, |start| start.is_empty() || start.iter().any(|byte| *byte != 0))

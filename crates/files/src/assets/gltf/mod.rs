@@ -33,10 +33,45 @@ const FILE_LIMIT: u64 = 4 << 30;
 /// Most bytes of JSON, data URIs included.
 const JSON_LIMIT: usize = 512 << 20;
 
+/// The mark of UTF-8 that some programs write before a text.
+const BOM: &[u8] = b"\xef\xbb\xbf";
+
 /// Whether a file is glTF by its name.
 pub fn is_gltf(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default();
     ending.eq_ignore_ascii_case("glb") || ending.eq_ignore_ascii_case("gltf")
+}
+
+/// Files that a glTF file names: those of its buffers and of its images, used or not. Only the JSON is read.
+///
+/// # Errors
+/// The file cannot be read, or is no glTF.
+pub fn files_named(path: &Path) -> Result<Vec<PathBuf>, AssetError> {
+    /// Bytes of a GLB file before its JSON (4.4.2): the header, then the length and the kind of the first chunk.
+    const BEFORE_JSON: usize = 20;
+    let header = read::start(path, BEFORE_JSON as u64)?;
+    let (before, length) = match header[..] {
+        [b'g', b'l', b'T', b'F', _, _, _, _, _, _, _, _, a, b, c, d, ..] => {
+            (BEFORE_JSON, u32::from_le_bytes([a, b, c, d]) as usize)
+        }
+        _ => (0, JSON_LIMIT),
+    };
+    let bytes = read::start(path, (before + length.min(JSON_LIMIT)) as u64)?;
+    let text = bytes.get(before..).unwrap_or_default();
+    let root: Root = serde_json::from_slice(text.strip_prefix(BOM).unwrap_or(text))
+        .map_err(|error| AssetError::malformed(path, Some(error.line()), "it is no glTF"))?;
+    let mut files = named(path, root.buffers.iter().map(|buffer| &buffer.uri));
+    files.extend(named(path, root.images.iter().map(|image| &image.uri)));
+    Ok(files)
+}
+
+/// Those of some URIs that name files beside a glTF file.
+fn named<'u>(path: &Path, uris: impl Iterator<Item = &'u Option<Uri>>) -> Vec<PathBuf> {
+    let file = |uri: &Option<Uri>| match uri {
+        Some(Uri::File(uri)) => beside(path, uri).ok(),
+        Some(Uri::Data(_)) | None => None,
+    };
+    uris.filter_map(file).collect()
 }
 
 /// A fault of a file: a place in the JSON, and the reason.
@@ -103,7 +138,7 @@ impl Container {
                 "{has} MiB of JSON, more than the {most} that are read; keep the buffers in .glb or .bin files"
             ))));
         }
-        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+        let text = text.strip_prefix(BOM).unwrap_or(text);
         if !text.trim_ascii_start().starts_with(b"{") {
             let reason = if length == 0 {
                 "the file is empty"
@@ -151,11 +186,7 @@ impl Container {
 
     /// Files that its images name, shown or not.
     pub fn pictures(&self) -> Vec<PathBuf> {
-        let file = |number| match self.image_bytes(number) {
-            Ok(ImageBytes::File(path)) => Some(path),
-            Ok(ImageBytes::Inside(_)) | Err(_) => None,
-        };
-        (0..self.root.images.len()).filter_map(file).collect()
+        named(&self.path, self.root.images.iter().map(|image| &image.uri))
     }
 
     /// The bytes of an image, or the file that holds them.

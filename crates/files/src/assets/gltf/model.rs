@@ -234,10 +234,10 @@ impl Walk<'_> {
         colors: &Option<Numbers<'_>>,
     ) {
         let material = &self.scene.materials[material];
-        let has_alpha = colors.as_ref().is_some_and(|colors| {
+        let has_alpha = |colors: &Numbers<'_>| {
             colors.width == 4 && (0..colors.count).any(|vertex| colors.floats::<4>(vertex, 1.0)[3] < 1.0)
-        });
-        if has_alpha && material.alpha != Alpha::Opaque {
+        };
+        if material.alpha != Alpha::Opaque && colors.as_ref().is_some_and(has_alpha) {
             self.notes.add(place, "the alpha of its vertex colours is left out");
         }
         if material.normal.is_some() && primitive.attributes.contains_key("TANGENT") {

@@ -424,3 +424,27 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn the_files_that_it_names_are_known_by_its_json_alone() {
+    let desk = Desk::new();
+    let mut json = square();
+    json["buffers"] = serde_json::json!([{"uri": "deep/a.bin", "byteLength": 9}, {"byteLength": 1, "uri": "data:;base64,AA=="}]);
+    json["images"] = serde_json::json!([{"uri": "a%20b.png"}, {"bufferView": 0}, {"uri": "/etc/passwd"}]);
+    let text = json.to_string();
+    let files = |name: &str, bytes: &[u8]| {
+        // Its buffers are not there.
+        assert!(desk.open(name, bytes).is_err());
+        let path = desk.0.path().join(name);
+        let folder = path.parent().expect("a folder").to_owned();
+        let files = super::files_named(&path).expect("glTF").into_iter();
+        files.map(|file| file.strip_prefix(&folder).expect("beside it").to_owned()).collect::<Vec<_>>()
+    };
+    let named = [std::path::PathBuf::from("deep/a.bin"), "a b.png".into()];
+    assert_eq!(files("a.gltf", text.as_bytes()), named);
+    assert_eq!(files("b.gltf", format!("\u{feff}{text}").as_bytes()), named);
+    // A chunk of numbers that is cut short is not looked at.
+    let whole = glb(&json, &bytes());
+    assert_eq!(files("a.glb", &whole[..whole.len() - 3]), named);
+    assert!(super::files_named(&desk.0.path().join("none.glb")).is_err());
+}

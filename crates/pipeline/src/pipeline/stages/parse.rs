@@ -10,7 +10,7 @@ use super::super::protocol::Failure;
 use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::containers::Containers;
 use super::{Findings, Staged, Stop};
-use crate::assets::gltf::{Container, is_gltf};
+use crate::assets::gltf::{files_named, is_gltf};
 use crate::assets::mesh::load as load_mesh;
 use crate::assets::orbiter::load as load_orbiter;
 use crate::assets::{AssetError, OrbiterCamera};
@@ -159,17 +159,14 @@ fn named(loaded: &scene::Loaded) -> Vec<PathBuf> {
     let mut named = loaded.named.clone();
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
     // What cannot be read names nothing that could be known.
-    let token = CancelToken::new();
     for path in loaded.named.iter().filter(|path| has_material_files(path) && !is_read(path)) {
-        if let Ok(mesh) = load_mesh(path, &unwatched, &token) {
+        if let Ok(mesh) = load_mesh(path, &unwatched, &CancelToken::new()) {
             named.extend(mesh.companions.into_iter().chain(mesh.pictures));
         }
     }
     let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
     for path in textures.into_iter().chain(&loaded.named).filter(|path| is_gltf(path) && !is_read(path)) {
-        if let Ok(container) = Container::open(path, &unwatched, &token) {
-            named.extend(container.companions().iter().cloned().chain(container.pictures()));
-        }
+        named.extend(files_named(path).unwrap_or_default());
     }
     named
 }
