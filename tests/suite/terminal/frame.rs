@@ -97,6 +97,7 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     terminal.settled(vt100::Screen::contents);
     terminal.press("q");
     terminal.code();
+    terminal.wait("the last bytes", |screen| !screen.alternate_screen() && !screen.hide_cursor());
     terminal.bytes()
 }
 
@@ -223,6 +224,7 @@ fn a_terminal_that_says_its_name_later_gets_what_it_has() {
     terminal.wait("reports of the focus", |_| has(&terminal.bytes(), b"\x1b[?1004h"));
     terminal.press("q");
     terminal.code();
+    terminal.wait("the last bytes", |screen| !screen.alternate_screen() && !screen.hide_cursor());
     let bytes = terminal.bytes();
     assert!(
         is_last(&bytes, b"\x1b]2;scene.toml", b"\x1b[23;2t")
