@@ -76,7 +76,7 @@
 //! 3. `transport/packet.rs` intersects a row: `world/geometry.rs`, then the trees of `accel/wide_bvh/`, or `geometry/facets.rs` for few
 //!    triangles.
 //! 4. `packet.rs` puts surfaces of simple materials into rows of sixteen vertices, `transport/batch.rs`; all BSDFs of a row are of
-//!    one kind, `materials/rough.rs`.
+//!    one kind, `materials/rough/mod.rs`.
 //! 5. Others go one by one: `transport/walk.rs` passes parts of one glass (`crossing.rs`), `vertex.rs` prepares the surface.
 //! 6. At mirrors and glass, `transport/interface.rs` makes the rays of the next round.
 //! 7. `direct/queue.rs` lights rows: `all_lights.rs` or `picked.rs` sample lights, `mis.rs` weighs, `shadow_rays.rs` traces.

@@ -1,17 +1,12 @@
 //! Materials: reflection, transmission and emission of surfaces.
 
 pub mod bsdf;
-mod calls;
 pub mod coated;
 pub mod emission;
 pub mod footprint;
 pub mod fresnel;
-pub mod frosted;
 pub mod glass;
 pub mod lobe_albedo;
-#[cfg(test)]
-mod lobe_tests;
-pub mod metal;
 pub mod microfacet;
 pub mod mipmaps;
 pub mod mirror;
@@ -19,9 +14,6 @@ pub mod normal_map;
 pub mod number;
 pub mod opacity;
 pub mod pane;
-pub mod phong;
-pub mod plastic;
-pub mod principled;
 pub mod relief;
 pub mod rough;
 pub mod texels;
@@ -30,20 +22,15 @@ pub mod texture;
 pub use coated::Coated;
 pub use emission::{Emission, EmissionSides};
 pub use footprint::{Footprint, SecondPoint, TexturePoint, UvSet};
-pub use frosted::GlassPoint;
 pub use glass::Glass;
-pub use metal::{Metal, MetalFresnel};
 pub use mipmaps::Mipmaps;
 pub use mirror::Mirror;
 pub use normal_map::NormalMap;
 pub use number::{Channel, Number, PixelNumber};
 pub use opacity::Opacity;
 pub use pane::Pane;
-pub use phong::Phong;
-pub use plastic::Plastic;
-pub use principled::{EmissionCoat, Principled, PrincipledInputs};
 pub use relief::{Bump, Relief};
-pub use rough::{BsdfRow, Rough, RoughBsdf, RoughKind};
+pub use rough::*;
 
 use crate::math::Vec3;
 

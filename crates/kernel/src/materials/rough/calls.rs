@@ -1,6 +1,6 @@
 //! Functions of rows, in the place that calls them or once for each instruction set, as [`RoughRow::IS_COPIED`] says.
 
-use super::bsdf::{BsdfValues, LobeSet, RoughRow};
+use crate::materials::bsdf::{BsdfValues, LobeSet, RoughRow};
 use crate::math::lanes::{Folds, Lanes, Lanes3, Loops};
 
 /// The functions of [`RoughRow`] that are large, for all kinds.

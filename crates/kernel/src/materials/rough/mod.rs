@@ -1,19 +1,34 @@
 //! The table of rough BSDFs, and the sum of them all: an enum for a material, for a point, and for a row.
 
-use super::bsdf::{
+mod calls;
+pub mod frosted;
+#[cfg(test)]
+mod lobe_tests;
+pub mod metal;
+pub mod phong;
+pub mod plastic;
+pub mod principled;
+
+pub use frosted::GlassPoint;
+pub use metal::{Metal, MetalFresnel};
+pub use phong::Phong;
+pub use plastic::Plastic;
+pub use principled::{EmissionCoat, Principled, PrincipledInputs};
+
+use crate::materials::bsdf::{
     BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughPoint, RoughRow, ShownLobes,
     UvRow,
 };
-use super::calls::RoughCalls;
-use super::footprint::TexturePoint;
-use super::frosted::GlassRow;
-use super::metal::{BrushedMetalRow, Metal, RoundMetalRow};
-use super::phong::{Phong, PhongRow};
-use super::plastic::{Plastic, PlasticRow};
-use super::principled::{Principled, PrincipledRow};
-use super::texture::Texture;
+use crate::materials::footprint::TexturePoint;
+use crate::materials::texture::Texture;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, Lanes, Lanes3, Truths};
+use calls::RoughCalls;
+use frosted::GlassRow;
+use metal::{BrushedMetalRow, RoundMetalRow};
+use phong::PhongRow;
+use plastic::PlasticRow;
+use principled::PrincipledRow;
 
 /// Makes the sums over all kinds of the traits, whose functions have the same meaning. Kinds that `materials` lists are those of
 /// whole materials; `parts` lists kinds that surfaces of other materials have for a part of their light. `kept` is how a [`BsdfRow`]

@@ -8,16 +8,16 @@ mod row;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::Arc;
 
-use super::bsdf::{RoughMaterial, RoughPoint};
-use super::footprint::TexturePoint;
-use super::lobe_albedo::{AlbedoTable, LobeAlbedo, dielectric, under_coat};
-use super::microfacet;
-use super::number::Number;
-use super::texture::{Color, Texture};
+use crate::materials::bsdf::{RoughMaterial, RoughPoint};
+use crate::materials::footprint::TexturePoint;
+use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedo, dielectric, under_coat};
+use crate::materials::microfacet;
+use crate::materials::number::Number;
+use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
 pub use row::PlasticRow;
 
-/// A diffuse base under a coat. Under a smooth coat, this is the base alone; see [`super::Coated`].
+/// A diffuse base under a coat. Under a smooth coat, this is the base alone; see [`crate::materials::Coated`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plastic {
     diffuse: Color,

@@ -5,12 +5,12 @@ mod row;
 
 use std::sync::Arc;
 
-use super::bsdf::{RoughMaterial, RoughPoint};
-use super::footprint::TexturePoint;
-use super::fresnel::{conductor, schlick_weight};
-use super::microfacet;
-use super::number::Number;
-use super::texture::{Color, Texture};
+use crate::materials::bsdf::{RoughMaterial, RoughPoint};
+use crate::materials::footprint::TexturePoint;
+use crate::materials::fresnel::{conductor, schlick_weight};
+use crate::materials::microfacet;
+use crate::materials::number::Number;
+use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
 pub use row::MetalRow;
 

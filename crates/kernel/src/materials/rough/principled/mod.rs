@@ -5,7 +5,7 @@
 //! - Diffuse lobe: (1 − metallic)(1 − transmission) · color/π · (1 − E(μᵢ))(1 − E(μₒ))/(1 − Ē), with the albedo E of the dielectric
 //!   lobe.
 //! - Transmission of a thin sheet: the specular lobe, mirrored to the other side, (1 − metallic) · transmission · color · (1 − F) with
-//!   the dielectric's F. Surfaces that transmit are two vertices, as [`bsdf`](super::bsdf) says.
+//!   the dielectric's F. Surfaces that transmit are two vertices, as [`bsdf`](crate::materials::bsdf) says.
 //! - Clear coat c: everything below by (1 − c·E_c(μ)) for each of the two directions, and c times a lobe of F0 = .04.
 
 mod row;
@@ -13,12 +13,12 @@ mod row;
 use std::f32::consts::FRAC_1_PI;
 use std::sync::{Arc, LazyLock};
 
-use super::bsdf::{RoughMaterial, RoughPoint};
-use super::footprint::TexturePoint;
-use super::lobe_albedo::{AlbedoTable, LobeAlbedo};
-use super::microfacet;
-use super::number::Number;
-use super::texture::{Color, Texture};
+use crate::materials::bsdf::{RoughMaterial, RoughPoint};
+use crate::materials::footprint::TexturePoint;
+use crate::materials::lobe_albedo::{AlbedoTable, LobeAlbedo};
+use crate::materials::microfacet;
+use crate::materials::number::Number;
+use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
 pub use row::PrincipledRow;
 

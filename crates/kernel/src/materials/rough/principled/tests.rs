@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::materials::bsdf::LobeSet;
-use crate::materials::lobe_tests::{
+use crate::materials::rough::lobe_tests::{
     ALPHAS, COSINES, Light, Subject, check_neighbours, check_neighbours_lit, check_values, direction,
     reference,
 };

@@ -4,7 +4,7 @@ use super::elements::Element;
 use super::*;
 use crate::choice::Choice;
 use crate::materials::bsdf::LobeSet;
-use crate::materials::lobe_tests::{
+use crate::materials::rough::lobe_tests::{
     ALPHAS, COSINES, Subject, check_neighbours, check_values, direction, reference,
 };
 use crate::math::DVec3;

@@ -7,9 +7,9 @@ mod row;
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 
-use super::bsdf::{RoughMaterial, RoughPoint};
-use super::footprint::TexturePoint;
-use super::texture::{Color, Texture};
+use crate::materials::bsdf::{RoughMaterial, RoughPoint};
+use crate::materials::footprint::TexturePoint;
+use crate::materials::texture::{Color, Texture};
 use crate::math::Vec3;
 use lobes::{Lobes, gloss};
 pub use row::PhongRow;

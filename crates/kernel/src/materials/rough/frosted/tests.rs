@@ -3,7 +3,7 @@
 use super::*;
 use crate::materials::bsdf::{LobeSet, RoughRow};
 use crate::materials::fresnel::dielectric;
-use crate::materials::lobe_tests::{
+use crate::materials::rough::lobe_tests::{
     ALPHAS, COSINES, Light, Subject, check_neighbours, check_neighbours_lit, direction, reference,
 };
 use crate::math::DVec3;

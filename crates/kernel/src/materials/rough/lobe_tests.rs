@@ -1,6 +1,6 @@
 //! Checks of lobes of microfacets, for the tests of each kind: against a reference in `f64`, of samples against pdfs, and of albedos.
 
-use super::bsdf::{LobeSet, Place, RoughRow, ShownLobes};
+use crate::materials::bsdf::{LobeSet, Place, RoughRow, ShownLobes};
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::math::random::unit as random;
 use crate::math::{DVec3, Vec3};

@@ -7,12 +7,12 @@
 //! - transmission f = |o·h| |i·h| (1 − F)·D·G·nᵢ²/(cosθᵢ cosθₒ |nₒ o + nᵢ i|²), with h along nₒ o + nᵢ i. Light is basic radiance,
 //!   L/n², so that nᵢ² stands where radiance has nₒ², and f/nᵢ² is the same in both directions.
 //!
-//! A surface is two vertices, as [`bsdf`](super::bsdf) says. Both sample the same facet; of its reflection and its refraction, chance
+//! A surface is two vertices, as [`bsdf`](crate::materials::bsdf) says. Both sample the same facet; of its reflection and its refraction, chance
 //! takes one, by F. So f·cosθᵢ over the pdf is G/G₁ for each.
 
 mod row;
 
-use super::bsdf::RoughPoint;
+use crate::materials::bsdf::RoughPoint;
 use crate::math::Vec3;
 pub use row::GlassRow;
 
