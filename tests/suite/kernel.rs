@@ -253,8 +253,8 @@ fn crossing(ray: &Ray, corners: &[Vec3; 3]) -> Option<(f64, f64)> {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3() - ray.origin.as_dvec3());
     let (direction, normal) = (ray.direction.as_dvec3(), (b - a).cross(c - a));
     let weights = [b.cross(c), c.cross(a), a.cross(b)].map(|normal| normal.dot(direction));
-    let sum: f64 = weights.iter().sum();
-    let least = weights.iter().map(|weight| weight / sum).fold(f64::INFINITY, f64::min);
+    let sum = weights[0] + weights[1] + weights[2];
+    let least = (weights[0] / sum).min(weights[1] / sum).min(weights[2] / sum);
     (sum != 0.0).then(|| (normal.dot(a) / normal.dot(direction), least))
 }
 
@@ -284,10 +284,11 @@ fn hits_right_at_the_start_of_a_ray_are_found() {
         let side = if i % 3 == 0 { -1.0 } else { 1.0 };
         let origin = a + (b - a) * u + (c - a) * v - direction * (distance * side);
         let ray = Ray { t_max: 2.0 * distance, ..Ray::new(origin, direction) };
-        let all = || slivers.iter().filter_map(|corners| crossing(&ray, corners));
-        let end = f64::from(ray.t_max);
-        let is_hit = all().any(|(t, least)| t > 1e-9 && t < 0.99 * end && least > 0.02);
-        let is_free = all().all(|(t, least)| t < -1e-9 || t > 1.01 * end || least < -0.02);
+        let (end, mut is_hit, mut is_free) = (f64::from(ray.t_max), false, true);
+        for (t, least) in slivers.iter().filter_map(|corners| crossing(&ray, corners)) {
+            is_hit |= t > 1e-9 && t < 0.99 * end && least > 0.02;
+            is_free &= t < -1e-9 || t > 1.01 * end || least < -0.02;
+        }
         before += u32::from(is_hit);
         behind += u32::from(is_free);
         let (rays, mut hits) = ([ray; PACKET], [None; PACKET]);
