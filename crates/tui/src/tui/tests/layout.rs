@@ -41,6 +41,7 @@ fn show(desk: &mut Desk, size: (u32, u32)) {
         range: None,
         section: None,
         lacks_photons: false,
+        source: None,
     });
 }
 

@@ -352,6 +352,7 @@ fn while_the_scene_is_broken_steps_of_the_camera_wait_for_their_pictures() {
         range: None,
         section: None,
         lacks_photons: false,
+        source: None,
     });
     assert!(request(&effects).is_some(), "the newest step follows");
 }

@@ -58,7 +58,7 @@ pub(in crate::tui) fn goes_on(state: &State) -> Option<&RenderProgress> {
 /// Draws the bar of the loading asset or of the render.
 fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.under;
-    let time = state.work.running_for(state.now).map_or(String::new(), running);
+    let time = state.work.rendering_for(state.now).map_or(String::new(), running);
     let name = at_work(state).unwrap_or_default();
     let (fraction, words) = match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
