@@ -26,6 +26,7 @@ mod soak;
 mod strip;
 mod switches;
 mod thin_line;
+mod typos;
 
 use std::fs;
 

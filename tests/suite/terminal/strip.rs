@@ -60,7 +60,7 @@ fn the_last_pictures_stand_beside_the_newest_with_what_changed() {
     terminal.wait("a strip", |screen| {
         let beside = beside(screen, PANEL.into());
         beside.contains("the last pictures n N")
-            && beside.contains("▸3 materials. board.diffuse [0.02, 0.8,")
+            && beside.contains("▸3 materials. board.diffuse → [0.02, 0.02, 0.8]")
             && beside.contains("1 first")
     });
     // A picture of each colour, the newest at the top.
@@ -109,7 +109,7 @@ fn an_entry_tells_what_changed_since_the_picture_before_it_and_nothing_else() {
     terminal.wait_for("done");
     terminal.press("c");
     terminal.wait("what c wrote", |screen| {
-        is_told(screen, " camera. position [") && screen.contents().contains("✓ done")
+        is_told(screen, " camera. position → [") && screen.contents().contains("✓ done")
     });
     let kept = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     folder.write("scene.toml", "[render");

@@ -13,7 +13,7 @@ use crate::pipeline::start;
 use crate::pipeline::watch::{Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
-use crate::scene::{NO_SUCH_FILE, text_now};
+use crate::scene::{NO_SUCH_FILE, NO_SUCH_MODEL, text_now};
 use crate::system::threads::not_started;
 use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 
@@ -114,7 +114,12 @@ fn absent(scene: &Path) -> Option<Diagnostic> {
     if scene.symlink_metadata().is_ok() {
         return None;
     }
-    text_now(scene).err().map(|problem| *problem).filter(|problem| problem.message == NO_SUCH_FILE)
+    text_now(scene).err().map(|problem| *problem).filter(is_absence)
+}
+
+/// Whether a problem is that the scene or the model is not there.
+fn is_absence(problem: &Diagnostic) -> bool {
+    [NO_SUCH_FILE, NO_SUCH_MODEL].contains(&problem.message.as_str())
 }
 
 /// Outcomes of writing pictures.
@@ -238,7 +243,7 @@ fn tap(events: &Receiver<Event>, watcher: &Watcher, writes: &Writes, forward: im
 
 /// A scene that is not there may come (back): what watches it needs no other way out.
 fn await_scene(problem: &mut Diagnostic) {
-    if problem.message == NO_SUCH_FILE {
+    if is_absence(problem) {
         let typo = problem.help.take().filter(|help| help.starts_with("did you mean"));
         let typo = typo.map_or(String::new(), |typo| format!("; {typo}"));
         problem.help = Some(match missing_folder(&problem.path) {

@@ -4,6 +4,7 @@
 use crate::film::Rect;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::math::DVec3;
+use crate::pipeline::plan::Plan;
 use crate::scene::description::{Accel, Camera, Render, Scene};
 use crate::scene::fingerprint::{Fingerprint, Key, Referents};
 
@@ -145,6 +146,19 @@ pub(in crate::pipeline) fn render(world: Key, settings: &RenderSettings, crop: O
     key.key(&world).add(settings, &Referents::default());
     if let Some(rect) = crop {
         key.u64(rect.x.into()).u64(rect.y.into()).u64(rect.width.into()).u64(rect.height.into());
+    }
+    key.finish()
+}
+
+/// Key of the image that a film becomes, as it is shown. Films under a budget of time differ in their noise: `film_number` tells
+/// them apart.
+pub(in crate::pipeline) fn image(film: Key, plan: &Plan, film_number: u64) -> Key {
+    let Render { samples, error, .. } = plan.settings.render;
+    let mut key = Fingerprint::new("image");
+    key.key(&film).u64(samples.into()).f32(error);
+    key.choice(plan.settings.view).f32(plan.tone.exposure_stops).choice(plan.tone.curve);
+    if let Some(seconds) = plan.time_seconds {
+        key.f64(seconds).u64(film_number);
     }
     key.finish()
 }

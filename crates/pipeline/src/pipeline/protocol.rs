@@ -21,6 +21,7 @@ use super::watch::content::FileRead;
 use crate::film::Picture;
 pub use crate::scene::description::Viewpoint;
 use crate::scene::diagnostic::Diagnostic;
+use crate::scene::fingerprint::Key;
 
 /// From a front end to the worker.
 #[derive(Clone, Debug)]
@@ -327,6 +328,8 @@ pub struct RenderProgress {
     pub fraction: f64,
     /// Seconds since the render stage began.
     pub elapsed_seconds: f64,
+    /// Seconds in which earlier requests rendered the samples that this one goes on from.
+    pub earlier_seconds: f64,
     /// Expected seconds until the end. `None` until the rate is known.
     pub eta_seconds: Option<f64>,
     /// Samples per pixel so far, on average.
@@ -365,4 +368,15 @@ pub struct LatestPreview {
     pub section: Option<Section>,
     /// Whether it lacks the light that photons bring, since they are still being traced.
     pub lacks_photons: bool,
+    /// The image that it shows. `None` if it lacks the light of photons.
+    pub source: Option<PreviewSource>,
+}
+
+/// The image that a preview shows, and how far its render is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PreviewSource {
+    /// Previews with the same key show the same image, at any size and with any number of its samples.
+    pub image: Key,
+    /// Whether the image has all its samples.
+    pub is_finished: bool,
 }

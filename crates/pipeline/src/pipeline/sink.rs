@@ -7,7 +7,8 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, CheckpointNews, Event, LatestPreview, PreviewSlot, RenderProgress, Section, StageReport,
+    AssetProgress, CheckpointNews, Event, LatestPreview, PreviewSlot, PreviewSource, RenderProgress, Section,
+    StageReport,
 };
 use super::watch::content::FileRead;
 use crate::film::Picture;
@@ -70,15 +71,22 @@ impl Sink {
         self.send(Event::Refused { generation: self.generation, conflicts });
     }
 
-    pub(super) fn preview(&self, picture: Picture, range: Option<[f32; 2]>, section: Option<Section>) {
-        let (generation, picture) = (self.generation, Arc::new(picture));
-        self.put(LatestPreview { generation, picture, range, section, lacks_photons: false });
+    pub(super) fn preview(
+        &self,
+        picture: Picture,
+        range: Option<[f32; 2]>,
+        section: Option<Section>,
+        source: PreviewSource,
+    ) {
+        let (generation, picture, source) = (self.generation, Arc::new(picture), Some(source));
+        self.put(LatestPreview { generation, picture, range, section, lacks_photons: false, source });
     }
 
     /// A picture that lacks the light of photons, before there are any.
     pub(super) fn preview_without_photons(&self, picture: Picture) {
         let (generation, picture) = (self.generation, Arc::new(picture));
-        self.put(LatestPreview { generation, picture, range: None, section: None, lacks_photons: true });
+        let (range, section, source) = (None, None, None);
+        self.put(LatestPreview { generation, picture, range, section, lacks_photons: true, source });
     }
 
     fn put(&self, latest: LatestPreview) {

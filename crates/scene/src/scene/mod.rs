@@ -34,6 +34,8 @@ pub const MAX_FILE_BYTES: u64 = 128 << 20;
 
 /// The message where a scene file is not there.
 pub const NO_SUCH_FILE: &str = "there is no such scene file";
+/// Message about a file that is not there and is named like a model.
+pub const NO_SUCH_MODEL: &str = "there is no such file";
 
 /// Scene files of more parts are refused, as each takes many times its bytes in memory: brackets, `=`, `,` and lines. A
 /// million spheres have half as many.
@@ -191,6 +193,20 @@ pub fn is_model(path: &Path) -> bool {
 /// Whether a file is a mesh by its name.
 pub fn is_mesh(path: &Path) -> bool {
     document::is_mesh(path)
+}
+
+/// Whether a text has a key in one of its tables.
+pub fn has_key(text: &str, table: &str, key: &str) -> bool {
+    let (document, _) = toml::parse(text);
+    document.root().get(table).is_some_and(|found| match found.value.item() {
+        toml::Item::Table(entries) => entries.get(key).is_some(),
+        toml::Item::Array(_)
+        | toml::Item::String(_)
+        | toml::Item::Integer { .. }
+        | toml::Item::Float(_)
+        | toml::Item::Boolean(_)
+        | toml::Item::Datetime => false,
+    })
 }
 
 /// The commented scene that a new file starts with.

@@ -8,7 +8,7 @@ use super::diagnostic::{Diagnostic, Place, Severity};
 use super::document::is_mesh;
 use super::nearest::nearest;
 use super::sanitize::visible;
-use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE};
+use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE, NO_SUCH_MODEL};
 use crate::system::file::{self, Kind};
 use crate::system::in_words;
 
@@ -191,12 +191,17 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
     if error.kind() == io::ErrorKind::NotFound {
         let shown = |path: &Path| visible(&path.to_string_lossy()).into_owned();
         let missing = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
-        let help = match (missing, neighbour(path, may_be_scene)) {
-            (Some(folder), _) => format!("the folder {} does not exist", shown(folder)),
-            (None, Some(near)) => format!("did you mean {}?", shown(&near)),
-            (None, None) => "`glimt new FILE` writes a scene to start from".to_owned(),
+        let is_model = is_mesh(path);
+        let near = neighbour(path, if is_model { is_mesh } else { may_be_scene });
+        let help = match (missing, near) {
+            (Some(folder), _) => Some(format!("the folder {} does not exist", shown(folder))),
+            (None, Some(near)) => Some(format!("did you mean {}?", shown(&near))),
+            // A model is not what glimt writes.
+            (None, None) if is_model => None,
+            (None, None) => Some("`glimt new FILE` writes a scene to start from".to_owned()),
         };
-        return (NO_SUCH_FILE.to_owned(), Some(help));
+        let message = if is_model { NO_SUCH_MODEL } else { NO_SUCH_FILE };
+        return (message.to_owned(), help);
     }
     (format!("cannot read the scene file: {}", in_words(error)), None)
 }
@@ -282,6 +287,16 @@ mod tests {
         std::fs::write(folder.path().join("my_hall.png"), "").expect("written");
         let picture = message(&folder.path().join("my_hall.toml"));
         assert!(picture.help.expect("a way out").contains("glimt new"));
+        // A model is none that glimt writes.
+        std::fs::write(folder.path().join("knot.obj"), "").expect("written");
+        for (name, help) in [("know.obj", Some("knot.obj")), ("nothing.glb", None), ("cornell.ply", None)] {
+            let model = message(&folder.path().join(name));
+            assert_eq!(model.message, "there is no such file");
+            assert_eq!(model.help.is_some(), help.is_some(), "{name}: {:?}", model.help);
+            assert!(
+                model.help.is_none_or(|words| words.contains("did you mean") && words.contains("knot.obj"))
+            );
+        }
         let lonely = message(&folder.path().join("zebra"));
         assert!(lonely.help.expect("a way out").contains("glimt new"));
     }

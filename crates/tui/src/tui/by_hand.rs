@@ -104,13 +104,20 @@ fn pretend(
         if let Some(size) = request.preview {
             let height = (size.width * 3 / 4).min(size.height).max(1);
             let picture = Arc::new(pretty(height * 4 / 3, height, step + text.len() as u32 * 20));
-            *slot.lock().expect("a slot") =
-                Some(LatestPreview { generation, picture, range: None, section: None, lacks_photons: false });
+            *slot.lock().expect("a slot") = Some(LatestPreview {
+                generation,
+                picture,
+                range: None,
+                section: None,
+                lacks_photons: false,
+                source: None,
+            });
             say(Event::Preview { generation });
         }
         let progress = RenderProgress {
             fraction: f64::from(step) / 20.0,
             elapsed_seconds: start.elapsed().as_secs_f64(),
+            earlier_seconds: 0.0,
             eta_seconds: Some(f64::from(20 - step) * 0.1),
             samples: step * 3,
             total_samples: 60,

@@ -10,7 +10,7 @@ use crossterm::event::{KeyCode, KeyModifiers};
 use super::known::Answer;
 use super::options::{Changed, News};
 use crate::film::Picture;
-use crate::pipeline::protocol::{self, Section};
+use crate::pipeline::protocol::{self, PreviewSource, Section};
 
 /// One thing that happened.
 #[derive(Clone, Debug)]
@@ -41,6 +41,7 @@ pub(super) enum Event {
         range: Option<[f32; 2]>,
         section: Option<Section>,
         lacks_photons: bool,
+        source: Option<PreviewSource>,
     },
     /// A file that the scene depends on was written.
     Changed(Changed),

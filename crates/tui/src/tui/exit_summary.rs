@@ -162,6 +162,7 @@ mod tests {
         desk.worker(Event::Started { generation });
         desk.worker(done_as(generation, |report| {
             (report.settings.view, report.seconds, report.image.render_seconds) = (View::Normal, 0.5, 0.4);
+            report.stages[Stage::Render as usize].seconds = 0.4;
             (report.image.path, report.image.paths) = (None, Vec::new());
         }));
         assert_eq!(words(&desk.state), own, "that is what is written");

@@ -113,6 +113,7 @@ impl Desk {
             range: None,
             section: None,
             lacks_photons: false,
+            source: None,
         });
         self.worker(done(generation, Vec::new(), false));
     }
@@ -192,7 +193,15 @@ pub(super) fn asset(name: &str, done: u64, total: u64) -> AssetProgress {
 
 pub(super) fn progress(fraction: f64, eta_seconds: Option<f64>) -> RenderProgress {
     let samples = (fraction * 64.0) as u32;
-    RenderProgress { fraction, elapsed_seconds: 1.0, eta_seconds, samples, total_samples: 64, noise: None }
+    RenderProgress {
+        fraction,
+        elapsed_seconds: 1.0,
+        earlier_seconds: 0.0,
+        eta_seconds,
+        samples,
+        total_samples: 64,
+        noise: None,
+    }
 }
 
 pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) -> protocol::Event {
@@ -203,7 +212,7 @@ pub(super) fn done(generation: u64, warnings: Vec<Diagnostic>, unchanged: bool) 
         height: 480,
         samples: SampleCounts { min: 64, mean: 64.0, max: 64 },
         error: Some(0.0081),
-        render_seconds: 1.5,
+        render_seconds: 0.25,
         complete: true,
         range: None,
     };

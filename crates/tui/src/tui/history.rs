@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::film::Picture;
-use crate::pipeline::protocol::Section;
+use crate::pipeline::protocol::{PreviewSource, Section};
 use crate::tui::rescale::resized;
 use crate::tui::state::Origin;
 
@@ -14,6 +14,11 @@ use crate::tui::state::Origin;
 const MOST_BYTES: usize = 16 << 20;
 /// Columns and rows of a small picture.
 const SMALL: f32 = 64.0;
+
+/// Change of a picture that differs from the one before in nothing but its noise.
+const AGAIN: &str = "rendered again";
+/// Mark of a picture whose render was stopped.
+const UNFINISHED: &str = "unfinished";
 
 /// A picture and the request that it shows.
 #[derive(Clone, Debug)]
@@ -26,6 +31,21 @@ pub(in crate::tui) struct Shown {
     pub section: Option<Section>,
     /// Whether it lacks the light of photons, which are still being traced.
     pub lacks_photons: bool,
+    /// The image that it shows. `None` if that is not known.
+    pub source: Option<PreviewSource>,
+}
+
+impl Shown {
+    /// Whether both show the same image, whatever their samples and their size.
+    pub(in crate::tui) fn is_of_same_image(&self, other: &Self) -> bool {
+        let images = self.source.zip(other.source);
+        images.is_some_and(|(own, other)| own.image == other.image)
+    }
+
+    /// Whether it has all samples of its image, as far as that is known.
+    pub(in crate::tui) fn is_finished(&self) -> bool {
+        self.source.is_some_and(|source| source.is_finished)
+    }
 }
 
 /// The last pictures, and which of them is looked at.
@@ -35,6 +55,8 @@ pub(super) struct History {
     past: VecDeque<Past>,
     /// Edits of the scene so far.
     edits: u64,
+    /// The last edit whose scene could be read and may have changed the picture.
+    read_edits: u64,
     /// Index of the picture that is looked at, and the newest picture meanwhile.
     open: Option<(usize, Shown)>,
 }
@@ -43,18 +65,31 @@ pub(super) struct History {
 struct Past {
     shown: Shown,
     time: Instant,
+    /// The last edit that it is after.
     edits: u64,
     origin: Origin,
-    /// Changes since the picture before: of files, then by keys.
-    changes: [Vec<String>; 2],
+    /// Number of the run that finished it. `None` if none has.
+    run: Option<u64>,
+    /// Changes since the picture before: of files, then by keys. `None` for the first picture.
+    changes: Option<[Vec<String>; 2]>,
     /// The small picture of the strip, made at its first use.
     small: OnceCell<Picture>,
 }
 
 impl History {
-    /// The scene was edited: what is recorded from now on is after that.
+    /// The scene was edited. Pictures are after that once the scene could be read.
     pub(super) fn edited(&mut self) {
         self.edits += 1;
+    }
+
+    /// The scene could be read: pictures that are recorded from now on are after the last edit.
+    pub(super) fn read(&mut self) {
+        self.read_edits = self.edits;
+    }
+
+    /// The scene is broken after all: pictures go on being of the one before.
+    pub(super) fn broken(&mut self) {
+        self.read_edits = self.past.back().map_or(self.read_edits, |newest| newest.edits);
     }
 
     /// Changes of files from the picture that is looked at to the newest one.
@@ -64,23 +99,25 @@ impl History {
         edits.unwrap_or_default().join("; ")
     }
 
-    /// Changes of files from the picture before to the one that is looked at.
-    pub(super) fn edits_of_open(&self) -> String {
-        let open = self.open.as_ref().filter(|(at, _)| *at > 0).and_then(|(at, _)| self.past.get(*at));
-        open.map_or(String::new(), |past| past.changes[0].join("; "))
+    /// Changes from the picture before to the one that is looked at, in words for a line.
+    pub(super) fn reason_of_open(&self) -> String {
+        let Some((at, _)) = &self.open else { return String::new() };
+        let Some(past) = self.past.get(*at) else { return String::new() };
+        let words = match past.changes.as_ref().map(|changes| changes.concat()) {
+            None => "the first picture".to_owned(),
+            Some(changes) if changes.is_empty() => AGAIN.to_owned(),
+            Some(changes) => format!("after {}", changes.join("; ")),
+        };
+        past.marked(words)
     }
 
     /// The camera that keys had moved since this request was written into the scene: an edit, which its pictures are after.
     pub(super) fn kept_camera(&mut self, since: u64) {
         self.edits += 1;
+        self.read_edits = self.edits;
         for past in self.past.iter_mut().filter(|past| past.shown.generation >= since) {
             past.edits = self.edits;
         }
-    }
-
-    /// Forgets the last edit, which changed nothing visible.
-    pub(super) fn edited_nothing(&mut self) {
-        self.edits = self.edits.saturating_sub(1);
     }
 
     /// The next request is the same picture as this one, shown otherwise: it takes its place.
@@ -90,36 +127,98 @@ impl History {
         }
     }
 
-    /// Keeps a picture, in place of an earlier one of the same request.
+    /// Keeps a picture, in place of an earlier one of the same request, and of the last one if both show the same image.
     pub(super) fn record(&mut self, shown: Shown, time: Instant, origin: Origin) {
-        let is_same = |past: &Past| past.shown.picture == shown.picture;
-        let last = self.past.len().wrapping_sub(1);
         let known = self.past.iter().position(|past| past.shown.generation == shown.generation);
-        match known.or_else(|| self.past.get(last).is_some_and(is_same).then_some(last)) {
+        let last = self.past.len().checked_sub(1);
+        let is_last = |last: &usize| self.past.get(*last).is_some_and(|past| past.is_same(&shown, &origin));
+        match known.or_else(|| last.filter(is_last)) {
             Some(at) => {
-                let past = &mut self.past[at];
-                if past.shown.picture != shown.picture {
-                    past.small = OnceCell::new();
+                if known.is_none() {
+                    // What was edited since has changed nothing visible.
+                    self.read_edits = self.past[at].edits;
                 }
-                let is_other = past.origin != origin;
-                (past.shown, past.origin) = (shown, origin);
-                if is_other {
-                    self.compare(at);
-                    self.compare(at + 1);
-                }
+                self.replace(at, shown, origin);
+                self.unite(at);
             }
             None => {
-                let (small, changes) = (OnceCell::new(), Default::default());
-                self.past.push_back(Past { shown, time, edits: self.edits, origin, changes, small });
+                let edits = self.read_edits;
+                let (run, changes, small) = (None, None, OnceCell::new());
+                self.past.push_back(Past { shown, time, edits, origin, run, changes, small });
                 self.compare(self.past.len() - 1);
             }
         }
         while self.past.len() > 1 && self.bytes() > MOST_BYTES {
-            self.past.pop_front();
-            if let Some((at, _)) = &mut self.open {
-                *at = at.saturating_sub(1);
-            }
+            self.remove(0);
         }
+    }
+
+    /// Puts a picture in the place of another one of its request or of its image.
+    fn replace(&mut self, at: usize, shown: Shown, origin: Origin) {
+        let Some(past) = self.past.get_mut(at) else { return };
+        if past.shown.picture != shown.picture {
+            past.small = OnceCell::new();
+        }
+        let is_other = past.origin != origin;
+        (past.shown, past.origin) = (shown, origin);
+        if is_other {
+            self.compare(at);
+            self.compare(at + 1);
+        }
+    }
+
+    /// Makes one of a finished picture and the one before it if both show the same image.
+    fn unite(&mut self, at: usize) {
+        let Some(before) = at.checked_sub(1) else { return };
+        let is_open = self.open.as_ref().is_some_and(|(open, _)| *open == before);
+        let Some((earlier, past)) = self.past.get(before).zip(self.past.get(at)) else { return };
+        if is_open || past.origin.is_unfinished || !earlier.is_same(&past.shown, &past.origin) {
+            return;
+        }
+        let (edits, run) = (earlier.edits, past.run.or(earlier.run));
+        self.remove(before);
+        if let Some(past) = self.past.get_mut(before) {
+            (past.edits, past.run) = (edits, run);
+        }
+        self.read_edits = edits;
+        // The first picture stays the first.
+        if before == 0
+            && let Some(past) = self.past.get_mut(0)
+        {
+            past.changes = None;
+        }
+        self.compare(before);
+    }
+
+    fn remove(&mut self, at: usize) {
+        self.past.remove(at);
+        if let Some((open, _)) = &mut self.open
+            && *open > at
+        {
+            *open -= 1;
+        }
+    }
+
+    /// The newest picture was finished by this run.
+    pub(super) fn finish(&mut self, run: u64) {
+        if let Some(newest) = self.past.back_mut() {
+            newest.run = Some(run);
+        }
+    }
+
+    /// Whether the newest picture is of this request.
+    pub(super) fn is_newest(&self, generation: u64) -> bool {
+        self.past.back().is_some_and(|newest| newest.shown.generation == generation)
+    }
+
+    /// Whether no run has finished the newest picture.
+    pub(super) fn awaits_run(&self) -> bool {
+        self.past.back().is_some_and(|newest| newest.run.is_none())
+    }
+
+    /// Number of the run that finished a picture. `None` if none has.
+    pub(super) fn run(&self, at: usize) -> Option<u64> {
+        self.past.get(at)?.run
     }
 
     /// Bytes of the pictures and of their scenes' texts, which pictures of one scene share.
@@ -135,13 +234,11 @@ impl History {
         let before = at.checked_sub(1).and_then(|before| self.past.get(before));
         let Some((before, past)) = before.zip(self.past.get(at)) else { return };
         let edits = past.origin.edits(&before.origin);
-        let mut keys = past.origin.toggles.differences(&before.origin.toggles);
         // The scene's keys tell of a camera that `c` wrote into it.
         let is_written = edits.iter().any(|edit| edit.contains("camera."));
-        keys.retain(|key| !(is_written && key == "camera of the scene"));
-        let changes = [edits, keys];
+        let keys = past.origin.toggles.differences(&before.origin.toggles, is_written);
         if let Some(past) = self.past.get_mut(at) {
-            past.changes = changes;
+            past.changes = Some([edits, keys]);
         }
     }
 
@@ -187,9 +284,10 @@ impl History {
         place.is_some_and(|place| place + 1 >= self.past.len())
     }
 
-    /// The last picture from before the last edit.
+    /// The last picture from before the last edit that changed the picture.
     pub(super) fn before_edit(&mut self, newest: Shown) -> Option<Shown> {
-        let at = self.past.iter().rposition(|past| past.edits < self.edits)?;
+        let last = self.past.back()?.edits;
+        let at = self.past.iter().rposition(|past| past.edits < last)?;
         self.look_at(at, newest)
     }
 
@@ -209,16 +307,16 @@ impl History {
         Some(past.small.get_or_init(|| small(&past.shown.picture)))
     }
 
-    /// Changes from the picture before to this one: by edits, by keys.
-    pub(super) fn change(&self, at: usize) -> String {
-        let Some(past) = self.past.get(at) else { return String::new() };
-        let changes = past.changes.concat();
-        let changes = match changes.as_slice() {
-            _ if at == 0 => "first".to_owned(),
-            [] => "rendered again".to_owned(),
-            _ => changes.join("; "),
+    /// Changes from the picture before to this one, each in words: by edits, by keys.
+    pub(super) fn changes(&self, at: usize) -> Vec<String> {
+        let Some(past) = self.past.get(at) else { return Vec::new() };
+        let words = match past.changes.as_ref().map(|changes| changes.concat()) {
+            None => vec!["first".to_owned()],
+            Some(changes) if changes.is_empty() => vec![AGAIN.to_owned()],
+            Some(changes) => changes,
         };
-        if past.origin.is_unfinished { format!("unfinished; {changes}") } else { changes }
+        let unfinished = past.origin.is_unfinished.then(|| UNFINISHED.to_owned());
+        unfinished.into_iter().chain(words).collect()
     }
 
     /// One of the pictures that are kept.
@@ -237,14 +335,26 @@ impl History {
         self.open.take().map(|(_, newest)| newest)
     }
 
-    /// The number of the picture that is looked at, of how many, and when it was made.
-    pub(super) fn place(&self) -> Option<(usize, usize, Instant)> {
+    /// The run of the picture that is looked at, if it is an older one, and the time when it was made.
+    pub(super) fn place(&self) -> Option<(Option<u64>, Instant)> {
         let (at, _) = self.open.as_ref()?;
-        Some((at + 1, self.past.len(), self.past.get(*at)?.time))
+        self.past.get(*at).map(|past| (past.run, past.time))
     }
 }
 
 impl Past {
+    /// Whether another picture is the same one. A picture in progress is not the finished one that it will be.
+    fn is_same(&self, shown: &Shown, origin: &Origin) -> bool {
+        let is_of_image =
+            self.shown.is_of_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
+        is_of_image || self.shown.picture == shown.picture
+    }
+
+    /// Words about it, with a mark if its render was stopped.
+    fn marked(&self, words: String) -> String {
+        if self.origin.is_unfinished { format!("{UNFINISHED}; {words}") } else { words }
+    }
+
     fn bytes(&self) -> usize {
         self.shown.picture.pixels.len() * size_of::<[u8; 3]>()
     }
@@ -271,6 +381,7 @@ mod tests {
     use super::*;
     use crate::pipeline::settings::{CameraChange, View};
     use crate::pipeline::{Content, FileRead};
+    use crate::scene::fingerprint::Fingerprint;
     use crate::tui::fixtures::plain_picture;
     use crate::tui::state::Toggles;
 
@@ -281,6 +392,7 @@ mod tests {
             range: None,
             section: None,
             lacks_photons: false,
+            source: None,
         }
     }
 
@@ -326,12 +438,90 @@ mod tests {
     fn an_edit_that_changed_nothing_is_none_to_look_back_over() {
         let mut history = History::default();
         history.record(shown(1, 10), Instant::now(), Origin::default());
-        history.edited();
+        edit(&mut history);
+        history.record(shown(2, 20), Instant::now(), Origin::default());
+        // A scene that is broken, and mended.
+        edit(&mut history);
+        history.broken();
+        edit(&mut history);
+        history.record(shown(4, 20), Instant::now(), Origin::default());
+        let before = history.before_edit(shown(4, 20)).expect("a picture");
+        assert_eq!(before.generation, 1);
+        // Pictures by keys are after the same edit.
+        history.close();
+        history.record(shown(5, 30), Instant::now(), Origin::default());
+        let before = history.before_edit(shown(5, 30)).expect("a picture");
+        assert_eq!(before.generation, 1);
+    }
+
+    #[test]
+    fn pictures_of_the_last_good_scene_are_not_after_the_edit_that_broke_it() {
+        let mut history = History::default();
+        history.record(shown(1, 10), Instant::now(), Origin::default());
+        edit(&mut history);
         history.record(shown(2, 20), Instant::now(), Origin::default());
         history.edited();
-        history.edited_nothing();
-        let before = history.before_edit(shown(2, 20)).expect("a picture");
-        assert_eq!(before.generation, 1);
+        history.broken();
+        history.record(shown(3, 30), Instant::now(), Origin::default());
+        assert_eq!(history.before_edit(shown(3, 30)).expect("a picture").generation, 1);
+    }
+
+    /// A picture of an image, whose samples are there in part or all.
+    fn of_image(generation: u64, name: &str, is_finished: bool) -> (Shown, Origin) {
+        let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
+        // No two previews are alike to the bit.
+        let picture = plain_picture(10, 10, [generation as u8, u8::from(is_finished), 0]);
+        let origin = Origin { is_unfinished: !is_finished, ..Origin::default() };
+        (Shown { source, picture, ..shown(generation, 10) }, origin)
+    }
+
+    #[test]
+    fn an_image_has_one_picture_however_often_its_render_is_interrupted() {
+        let mut history = History::default();
+        let record = |history: &mut History, generation, name, is_finished| {
+            let (shown, origin) = of_image(generation, name, is_finished);
+            history.record(shown, Instant::now(), origin);
+            history.len()
+        };
+        assert_eq!(record(&mut history, 1, "first", true), 1);
+        // A comment: the same image again.
+        edit(&mut history);
+        assert_eq!(record(&mut history, 2, "first", true), 1);
+        // Rendered again, interrupted by a typo, and finished from the samples that it had.
+        assert_eq!(record(&mut history, 3, "first", false), 2);
+        assert_eq!(record(&mut history, 4, "first", false), 2);
+        assert_eq!(record(&mut history, 5, "first", true), 1);
+        assert_eq!(changes(&history), ["first"]);
+        // An edit takes the samples: what there was of the image stays, once.
+        edit(&mut history);
+        assert_eq!(record(&mut history, 6, "second", false), 2);
+        assert_eq!(record(&mut history, 7, "second", false), 2);
+        edit(&mut history);
+        assert_eq!(record(&mut history, 8, "third", true), 3);
+        assert_eq!(changes(&history), ["first", "unfinished; rendered again", "rendered again"]);
+    }
+
+    #[test]
+    fn pictures_are_numbered_by_the_runs_that_finished_them() {
+        let mut history = History::default();
+        for (generation, run) in [(1, Some(1)), (2, None), (3, Some(2))] {
+            let (shown, origin) = of_image(generation, &generation.to_string(), run.is_some());
+            history.record(shown, Instant::now(), origin);
+            assert!(history.is_newest(generation) && history.awaits_run());
+            run.into_iter().for_each(|run| history.finish(run));
+        }
+        assert_eq!([0, 1, 2].map(|at| history.run(at)), [Some(1), None, Some(2)]);
+        // Found again by a later run.
+        let (shown, origin) = of_image(4, "3", true);
+        history.record(shown, Instant::now(), origin);
+        assert!(!history.awaits_run());
+        history.finish(5);
+        assert_eq!((history.len(), history.run(2)), (3, Some(5)));
+    }
+
+    fn edit(history: &mut History) {
+        history.edited();
+        history.read();
     }
 
     #[test]
@@ -360,7 +550,7 @@ mod tests {
     }
 
     fn changes(history: &History) -> Vec<String> {
-        (0..history.len()).map(|at| history.change(at)).collect()
+        (0..history.len()).map(|at| history.changes(at).join("; ")).collect()
     }
 
     #[test]
@@ -379,7 +569,13 @@ mod tests {
         history.record(shown(5, 50), Instant::now(), origin(seed, None));
         assert_eq!(
             changes(&history),
-            ["first", "camera.fov 40 → 30", "view normal", "+ seed = 1; view of the scene", "rendered again",]
+            [
+                "first",
+                "camera.fov 40 → 30",
+                "view normal",
+                "+ seed = 1; back to the scene's view",
+                "rendered again",
+            ]
         );
         assert_eq!((history.len(), history.looked_at()), (5, Some(4)));
     }
@@ -400,7 +596,7 @@ mod tests {
             "camera moved",
             "camera.fov 40 → 30",
             "camera.fov 30 → 40; camera moved",
-            "camera of the scene",
+            "back to the scene's camera",
         ];
         assert_eq!(changes(&history), words);
     }

@@ -96,7 +96,13 @@ pub(super) const KEYMAP: &[Binding] = &[
         "inspect the object there",
         "",
     ),
-    binding(&[KeyPress::plain('y')], "y", Action::Copy, "copy what was clicked, with the pixel's value", ""),
+    binding(
+        &[KeyPress::plain('y')],
+        "y",
+        Action::Copy,
+        "copy what a click said: radiance too, and the pixel's place",
+        "",
+    ),
     binding(
         &[KeyPress::plain('o')],
         "o",

@@ -122,8 +122,8 @@ impl Presenter {
     fn take_preview(&mut self) -> Option<Event> {
         self.drawn.is_old = false;
         let latest = self.previews.lock().unwrap_or_else(PoisonError::into_inner).take()?;
-        let LatestPreview { generation, picture, range, section, lacks_photons } = latest;
-        Some(Event::Picture { generation, picture, range, section, lacks_photons })
+        let LatestPreview { generation, picture, range, section, lacks_photons, source } = latest;
+        Some(Event::Picture { generation, picture, range, section, lacks_photons, source })
     }
 
     /// Looks again after a frame's time: somebody else has the screen.

@@ -117,6 +117,7 @@ mod tests {
         RenderProgress {
             fraction: 0.25,
             elapsed_seconds: 2.5,
+            earlier_seconds: 0.0,
             eta_seconds: Some(7.5),
             samples: 1000,
             total_samples: 4096,

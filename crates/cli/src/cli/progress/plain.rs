@@ -90,6 +90,7 @@ mod tests {
         let progress = |fraction, samples| RenderProgress {
             fraction,
             elapsed_seconds: 1.0,
+            earlier_seconds: 0.0,
             eta_seconds: None,
             samples,
             total_samples: 100,
@@ -115,6 +116,7 @@ mod tests {
         let progress = RenderProgress {
             fraction: 0.4,
             elapsed_seconds: 1.0,
+            earlier_seconds: 0.0,
             eta_seconds: Some(1.5),
             samples: 25,
             total_samples: 64,

@@ -13,11 +13,13 @@ pub(in crate::pipeline) struct FilmCache {
     /// The least recently used first.
     kept: Vec<FilmState>,
     most_kept_bytes: u64,
+    /// Films that were made so far.
+    made: u64,
 }
 
 impl Default for FilmCache {
     fn default() -> Self {
-        Self { current: None, kept: Vec::new(), most_kept_bytes: MOST_KEPT_BYTES }
+        Self { current: None, kept: Vec::new(), most_kept_bytes: MOST_KEPT_BYTES, made: 0 }
     }
 }
 
@@ -57,13 +59,15 @@ impl FilmCache {
         make: impl Fn() -> Result<FilmState, E>,
     ) -> Result<&mut FilmState, E> {
         self.current = None;
-        let canvas = match make() {
+        let mut canvas = match make() {
             Err(_) if !self.kept.is_empty() => {
                 self.kept.clear();
                 make()
             }
             made => made,
         }?;
+        self.made += 1;
+        canvas.number = self.made;
         Ok(self.current.insert(canvas))
     }
 

@@ -21,6 +21,8 @@ use crate::scene::fingerprint::Key;
 #[derive(Debug)]
 pub(in crate::pipeline) struct FilmState {
     pub(in crate::pipeline) key: Key,
+    /// Number of the film among those of its cache.
+    pub(in crate::pipeline) number: u64,
     pub(in crate::pipeline) film: Arc<Film>,
     /// Samples that both halves of each cell have; no more are to come for those without pixels.
     pub(in crate::pipeline) done: Vec<[u32; 2]>,
@@ -96,6 +98,7 @@ impl FilmState {
         let done = (0..film.cell_count()).map(none).collect();
         Ok(Self {
             key,
+            number: 0,
             film: Arc::new(film),
             rays: vec![0; film_cells],
             seconds: 0.0,
@@ -153,6 +156,12 @@ impl FilmState {
         self.halves()
             .filter(|(cell, _)| self.is_in(part, *cell))
             .all(|(tile, half)| self.done[tile][half] >= self.goals.of(tile, half).min(samples))
+    }
+
+    /// Whether the image of a plan has all its samples: as many as it is to have, or as many as its time was enough for.
+    pub(in crate::pipeline) fn is_finished(&self, plan: &Plan) -> bool {
+        let is_over_time = plan.time_seconds.is_some() && self.ended_by == plan.time_seconds;
+        self.is_finished_part || is_over_time || self.is_complete(plan.settings.render.samples)
     }
 
     /// Whether no pixel has more samples than these.
@@ -367,6 +376,7 @@ mod tests {
         let cells = film.cell_count();
         FilmState {
             key: Fingerprint::new("test").finish(),
+            number: 0,
             film: Arc::new(film),
             done: vec![[0; 2]; cells],
             rays: vec![0; cells],

@@ -9,8 +9,9 @@ use crate::control::CancelToken;
 use crate::film::stretch::Stretch;
 use crate::film::tone::{ToneMapping, develop};
 use crate::film::{Previewer, Quantity, RadianceImage, Rect};
+use crate::pipeline::keys;
 use crate::pipeline::plan::Plan;
-use crate::pipeline::protocol::{PreviewSize, Section, Spot};
+use crate::pipeline::protocol::{PreviewSize, PreviewSource, Section, Spot};
 use crate::pipeline::sink::Sink;
 
 /// The longest that a film is taken up without a look at the orders.
@@ -66,7 +67,7 @@ impl Screen<'_> {
             // The first coarse picture has none of the numbers about samples.
             let base = canvas.base.as_ref().filter(|_| previewer.quantity() == Quantity::Radiance);
             let image = previewer.picture(base);
-            self.send(&image, &self.tone(canvas, &image, has_time), None);
+            self.send(canvas, &image, &self.tone(canvas, &image, has_time), None);
         }
     }
 
@@ -78,7 +79,7 @@ impl Screen<'_> {
         let render = &self.plan.settings.render;
         let section = Section::of(rect, (render.width, render.height));
         let image = canvas.film.section(quantity, rect, base);
-        self.send(&image, &self.tone(canvas, &image, has_time), Some(section));
+        self.send(canvas, &image, &self.tone(canvas, &image, has_time), Some(section));
         true
     }
 
@@ -88,9 +89,13 @@ impl Screen<'_> {
         self.sink.preview_without_photons(develop(image, &self.plan.tone.of_picture(image)));
     }
 
-    fn send(&self, image: &RadianceImage, tone: &ToneMapping, section: Option<Section>) {
+    fn send(&self, canvas: &FilmState, image: &RadianceImage, tone: &ToneMapping, section: Option<Section>) {
         let range = tone.stretch.range().map(|range| range.ends());
-        self.sink.preview(develop(image, tone), range, section);
+        let source = PreviewSource {
+            image: keys::image(canvas.key, self.plan, canvas.number),
+            is_finished: canvas.is_finished(self.plan),
+        };
+        self.sink.preview(develop(image, tone), range, section, source);
     }
 
     /// Tone mapping of a preview. Numbers are stretched by the range of the image that is written, since pixels of a preview

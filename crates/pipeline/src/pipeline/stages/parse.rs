@@ -143,7 +143,7 @@ pub(in crate::pipeline) fn parse(
     let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
     findings.warnings.extend(notes.iter().chain(&loaded.warnings).cloned());
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == orbiter_content) {
-        return Ok(Staged::reused(parsed, "the file did not change"));
+        return Ok(Staged::reused(parsed, "the scene is as it was"));
     }
     let named = named(&loaded);
     let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, notes, orbiter_content });

@@ -45,7 +45,7 @@ pub(in crate::pipeline) fn render(
     let Some(state) = films.current_mut() else { return Err(Stop::work("the film is gone")) };
     let budget = rendering.plan.time_seconds;
     let is_part = state.is_finished_part;
-    let finished = is_part || state.is_complete(wanted) || (budget.is_some() && state.ended_by == budget);
+    let finished = state.is_finished(rendering.plan);
     let had = state.samples(wanted);
     let is_resumed = state.before.seconds > 0.0;
     let mut scheduler = Scheduler::new(state, rendering);

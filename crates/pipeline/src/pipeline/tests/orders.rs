@@ -537,6 +537,37 @@ fn a_picture_that_is_found_again_tells_what_it_took() {
 }
 
 #[test]
+fn a_render_that_goes_on_tells_the_seconds_of_all_its_samples() {
+    // Some hundred tiles: seconds.
+    let large =
+        SCENE.replace("width = 40\nheight = 30\nsamples = 4", "width = 400\nheight = 300\nsamples = 64");
+    let mut bench = Bench::with(&large, leisurely);
+    bench.send();
+    let is_on_its_way = |event: &Event, of: u64| {
+        matches!(event, Event::Progress { progress, generation }
+            if *generation == of && progress.samples > 0 && progress.fraction < 1.0)
+    };
+    while !is_on_its_way(&bench.next(), 1) {}
+    // A typo: the render goes on. Its mend goes on from what is there.
+    bench.edit("samples = 64", "samples = ");
+    bench.send();
+    while !is_on_its_way(&bench.next(), 2) {}
+    bench.edit("samples = ", "samples = 64");
+    let of = bench.send();
+    let mut events = bench.until_end(of);
+    let Some(Event::Done { report, .. }) = events.pop() else { panic!("it is done") };
+    let stage = report.stages[Stage::Render as usize].seconds;
+    let earlier = report.image.render_seconds - stage;
+    assert!(earlier > 0.005, "{} {stage}", report.image.render_seconds);
+    let said = events.iter().filter_map(|event| match event {
+        Event::Progress { progress, generation } if *generation == of => Some(progress.earlier_seconds),
+        _ => None,
+    });
+    let said: Vec<f64> = said.collect();
+    assert!(!said.is_empty() && said.iter().all(|said| (said - earlier).abs() < 0.05), "{said:?} {earlier}");
+}
+
+#[test]
 fn a_request_tells_what_the_scene_itself_says() {
     let mut bench = Bench::new(&SCENE.replace("exposure = 0.0", "exposure = 0.5"));
     bench.overrides.exposure = Some(2.0);

@@ -46,6 +46,60 @@ fn a_close_up_has_the_picture_s_own_pixels() {
 }
 
 #[test]
+fn previews_say_which_image_they_show_and_whether_it_is_finished() {
+    let mut bench = Bench::new(SCENE);
+    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
+    let source = |bench: &mut Bench| {
+        bench.done();
+        let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
+        let source = latest.source.expect("a source");
+        assert!(source.is_finished);
+        source.image
+    };
+    let own = source(&mut bench);
+    // Neither its size nor a comment nor a render from the beginning makes it another one.
+    bench.preview = Some(PreviewSize { width: 20, height: 30, around: None });
+    assert!(source(&mut bench) == own);
+    bench.edit("[camera]", "# the eye\n[camera]");
+    assert!(source(&mut bench) == own);
+    bench.force = true;
+    assert!(source(&mut bench) == own);
+    bench.force = false;
+    for (from, to) in [
+        ("samples = 4", "samples = 8"),
+        ("exposure = 0.0", "exposure = 1.0"),
+        ("exposure = 1.0", "exposure = 1.0\ntonemap = \"agx\""),
+        ("radius = 0.5", "radius = 0.4"),
+    ] {
+        let before = source(&mut bench);
+        bench.edit(from, to);
+        assert!(source(&mut bench) != before, "{to}");
+    }
+    bench.overrides.view = Some(View::Normal);
+    assert!(source(&mut bench) != own);
+}
+
+#[test]
+fn under_a_budget_of_time_each_render_is_an_image_of_its_own() {
+    let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
+    bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });
+    bench.overrides.time_seconds = Some(0.2);
+    let mut images = Vec::new();
+    for force in [false, false, true] {
+        bench.force = force;
+        bench.done();
+        // What is shown during the render is not known to be the end.
+        bench.worker.send(Command::Preview(bench.preview));
+        while !matches!(bench.next(), Event::Preview { .. }) {}
+        let latest = bench.worker.previews.lock().expect("not poisoned").clone().expect("a preview");
+        let source = latest.source.expect("a source");
+        assert!(source.is_finished);
+        images.push(source.image);
+    }
+    assert!(images[0] == images[1] && images[1] != images[2]);
+}
+
+#[test]
 fn another_size_of_the_preview_interrupts_nothing() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 1000000"), slow);
     bench.preview = Some(PreviewSize { width: 12, height: 12, around: None });

@@ -10,7 +10,7 @@ use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
 use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
 use crate::scene::description::{Integrator, Shadows};
 use crate::scene::sanitize::visible;
-use crate::scene::{changes, is_mesh};
+use crate::scene::{changes, has_key, is_mesh};
 
 /// Settings that keys changed, on top of the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,30 +25,26 @@ pub(in crate::tui) struct Toggles {
 }
 
 impl Toggles {
-    /// Settings that differ from those before, in words.
-    pub(in crate::tui) fn differences(&self, before: &Self) -> Vec<String> {
-        let said = |name: &str, differs: bool, now: Option<String>| {
-            let now = now.unwrap_or_else(|| "of the scene".to_owned());
-            differs.then(|| format!("{name} {now}"))
-        };
+    /// Settings that differ from those before, in words; without a camera that the scene has by now, if `is_camera_written`.
+    pub(in crate::tui) fn differences(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
         let camera = self.camera.is_any().then(|| "moved".to_owned());
-        [
-            said("shadows", self.shadows != before.shadows, self.shadows.map(|it| it.name().to_owned())),
-            said(
-                "integrator",
-                self.integrator != before.integrator,
-                self.integrator.map(|it| it.name().to_owned()),
-            ),
-            said("dof", self.dof != before.dof, self.dof.map(on_off)),
-            said("photons", self.photons != before.photons, self.photons.map(on_off)),
-            said("view", self.view != before.view, self.view.map(|it| it.name().to_owned())),
-            said("camera", self.camera != before.camera, camera),
-            said("exposure", self.exposure != before.exposure, self.exposure.map(signed_stops)),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        let name = |name: &str| name.to_owned();
+        let all = [
+            ("shadows", self.shadows != before.shadows, self.shadows.map(|it| name(it.name()))),
+            ("integrator", self.integrator != before.integrator, self.integrator.map(|it| name(it.name()))),
+            ("dof", self.dof != before.dof, self.dof.map(on_off)),
+            ("photons", self.photons != before.photons, self.photons.map(on_off)),
+            ("view", self.view != before.view, self.view.map(|it| name(it.name()))),
+            ("camera", self.camera != before.camera && !(is_camera_written && camera.is_none()), camera),
+            ("exposure", self.exposure != before.exposure, self.exposure.map(signed_stops)),
+        ];
+        let differing = || all.iter().filter(|(_, differs, _)| *differs);
+        let now = differing().filter_map(|(name, _, now)| Some(format!("{name} {}", now.as_ref()?)));
+        // Settings that are the scene's own again stand together.
+        let back: Vec<&str> = differing().filter(|it| it.2.is_none()).map(|it| it.0).collect();
+        let back = (!back.is_empty()).then(|| format!("back to the scene's {}", back.join(", ")));
+        now.chain(back).collect()
     }
 }
 
@@ -192,6 +188,17 @@ impl RequestState {
     /// The camera as the keys have it. `None` until a scene has been understood.
     pub(in crate::tui) fn viewpoint(&self) -> Option<Viewpoint> {
         self.camera.map(|camera| camera.changed(&self.toggles.camera))
+    }
+
+    /// Reason why the scene has no depth of field, in words.
+    pub(in crate::tui) fn why_pinhole(&self) -> &'static str {
+        let is_set = self.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera.aperture"));
+        let is_written = || self.text.as_ref().is_some_and(|text| has_key(text, "camera", "aperture"));
+        if is_set || is_written() {
+            "the camera's `aperture` is 0"
+        } else {
+            "the scene's camera has no `aperture`"
+        }
     }
 
     /// Changes by keys that the picture alone does not show, in words.

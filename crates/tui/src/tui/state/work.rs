@@ -110,6 +110,13 @@ impl WorkState {
         }
     }
 
+    /// The same, with the seconds in which earlier requests rendered the samples that it goes on from.
+    pub(in crate::tui) fn rendering_for(&self, now: Instant) -> Option<Duration> {
+        let earlier = self.progress.map_or(0.0, |progress| progress.earlier_seconds);
+        let earlier = Duration::try_from_secs_f64(earlier).unwrap_or_default();
+        self.running_for(now).map(|time| time.saturating_add(earlier))
+    }
+
     /// Stops the clock of the request, or lets it go on.
     pub(in crate::tui) fn set_paused(&mut self, paused: bool, now: Instant) {
         self.paused = paused;

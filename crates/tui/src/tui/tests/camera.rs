@@ -18,6 +18,7 @@ fn show(desk: &mut Desk) -> Vec<crate::tui::event::Effect> {
         range: None,
         section: None,
         lacks_photons: false,
+        source: None,
     })
 }
 

@@ -32,6 +32,7 @@ fn pictures_of_older_generations_are_dropped() {
         range: None,
         section: None,
         lacks_photons: false,
+        source: None,
     });
     desk.worker(protocol::Event::Progress { generation: old, progress: progress(0.5, None) });
     desk.worker(protocol::Event::Failed { generation: old, failure: Failure::Work("old".to_owned()) });
@@ -57,6 +58,7 @@ fn the_first_change_is_measured_from_the_save_to_the_frame() {
         range: None,
         section: None,
         lacks_photons: false,
+        source: None,
     });
     desk.now += Duration::from_millis(20);
     desk.event(Event::Shown { generation: 2 });
@@ -78,6 +80,7 @@ fn only_the_first_picture_of_a_request_does_not_wait_for_its_turn() {
             range: None,
             section: None,
             lacks_photons: false,
+            source: None,
         });
         desk.state.urgent
     };
@@ -135,6 +138,7 @@ fn another_window_asks_for_another_preview_once_it_is_quiet() {
         range: None,
         section: None,
         lacks_photons: false,
+        source: None,
     });
     assert!(cells_of(&mut desk, BLUE) > 0, "the same request shows its picture again");
     desk.finish(RED);

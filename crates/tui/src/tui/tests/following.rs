@@ -273,8 +273,14 @@ impl Watch {
     fn put_picture(&mut self, samples: f64) {
         let generation = self.desk.state.request.generation;
         let picture = Arc::new(picture(self.size, samples, self.turn));
-        *self.slot.lock().expect("whole") =
-            Some(LatestPreview { generation, picture, range: None, section: None, lacks_photons: false });
+        *self.slot.lock().expect("whole") = Some(LatestPreview {
+            generation,
+            picture,
+            range: None,
+            section: None,
+            lacks_photons: false,
+            source: None,
+        });
         if let Some(event) = self.presenter.preview(generation, &self.desk.state, self.desk.now) {
             self.happen(event);
         }

@@ -35,7 +35,14 @@ fn show(desk: &mut Desk, size: (u32, u32)) {
     let generation = desk.state.request.generation;
     let (width, height) = previewed(size, desk.state.request.preview_size.expect("a preview"));
     let picture = plain_picture(width, height, RED);
-    desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });
+    desk.event(Event::Picture {
+        generation,
+        picture,
+        range: None,
+        section: None,
+        lacks_photons: false,
+        source: None,
+    });
 }
 
 /// Cells of the largest picture that a window could hold beside one line of words.
@@ -178,13 +185,13 @@ fn times_are_told_against_those_of_the_last_render() {
     assert!(!desk.text().contains("1.42 s −") && !desk.text().contains("1.42 s +"));
     desk.event(Event::Changed(Changed { noticed: desk.now }));
     render(&mut desk, 1.12);
-    assert!(desk.text().contains("render    1.12 s −.3"), "{}", desk.text());
+    assert!(desk.text().contains("render   1.12 s −.3 s"), "{}", desk.text());
     desk.press('r');
     desk.worker(protocol::Event::Started { generation: desk.state.request.generation });
     desk.press('r');
     render(&mut desk, 2.24);
     assert!(
-        desk.text().contains("render    2.24 s +1.1"),
+        desk.text().contains("render  2.24 s +1.1 s"),
         "one that was cancelled does not count: {}",
         desk.text()
     );

@@ -1,6 +1,7 @@
 //! The front end driven by scripted events, on a screen without a terminal.
 
 mod camera;
+mod edits;
 mod flow;
 mod following;
 mod keys;

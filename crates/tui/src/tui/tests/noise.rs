@@ -13,7 +13,7 @@ fn the_noise_is_told_as_it_falls() {
     let progress = RenderProgress { noise, ..progress(0.5, Some(20.0)) };
     desk.worker(protocol::Event::Progress { generation: 1, progress });
     for (columns, rows, words) in [
-        (80, 24, "noise 2.1 %, 1 % in 14.0 s · 32/64 samples"),
+        (80, 24, "noise 2.1 %, 1 % in about 14 s · 32/64 samples"),
         (54, 20, "noise 2.1 % · 32/64 samples"),
         (36, 20, "32/64 samples"),
     ] {

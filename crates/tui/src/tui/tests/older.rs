@@ -79,7 +79,14 @@ fn the_newest_goes_on_and_says_how_far_it_is() {
     let generation = desk.state.request.generation;
     desk.worker(WorkerEvent::Started { generation });
     let picture = plain_picture(50, 38, RED);
-    desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });
+    desk.event(Event::Picture {
+        generation,
+        picture,
+        range: None,
+        section: None,
+        lacks_photons: false,
+        source: None,
+    });
     desk.worker(WorkerEvent::Progress { generation, progress: progress(0.25, Some(3.0)) });
     desk.press('n');
     let words = "picture 2 of 3, 0 s ago  newest 25 %  ETA 3.0 s";

@@ -3,6 +3,7 @@
 use crossterm::event::KeyCode;
 
 use super::{RED, cells_of};
+use crate::choice::Choice;
 use crate::pipeline::protocol::{self, Failure};
 use crate::pipeline::settings::{Effective, View};
 use crate::scene::diagnostic::{Diagnostic, Place, Severity};
@@ -11,7 +12,7 @@ use crate::tui::fixtures::*;
 use crate::tui::keymap::{KEYMAP, OVERLAY};
 
 /// Number of views.
-const VIEWS: u16 = <View as crate::choice::Choice>::ALL.len() as u16;
+const VIEWS: u16 = View::ALL.len() as u16;
 
 const ESCAPE: KeyPress = KeyPress::special(KeyCode::Esc);
 
@@ -155,7 +156,6 @@ fn views_are_listed_and_chosen_by_digits() {
 
 #[test]
 fn keys_walk_the_list_of_views_while_it_is_open_and_the_camera_else() {
-    use crate::choice::Choice;
     for (columns, rows) in [(80, 24), (120, 40), (200, 60), (30, 8)] {
         let mut desk = Desk::with(state(columns, rows));
         desk.finish(RED);
@@ -240,6 +240,42 @@ fn the_list_of_views_goes_by_itself() {
     assert_eq!(desk.state.next_tick(), None);
 }
 
+#[test]
+fn a_list_of_views_that_is_cut_off_says_so_and_lies_over_no_message() {
+    for (columns, rows, is_cut) in [(40, 10, true), (30, 8, true), (40, 16, false)] {
+        let mut desk = Desk::with(state(columns, rows));
+        desk.finish(RED);
+        desk.press('v');
+        let text = desk.text();
+        assert!(text.contains('▾') == is_cut && !text.contains('▴'), "{columns}×{rows}\n{text}");
+        assert!(text.contains("1-9 choose"), "{columns}×{rows}\n{text}");
+        let words = ["view normal:", "shown, not", "writes it"];
+        assert!(!words.iter().any(|words| text.contains(words)), "{columns}×{rows}\n{text}");
+        // The mark scrolls with the view.
+        for _ in 0..View::ALL.len() {
+            desk.press('j');
+        }
+        let text = desk.text();
+        assert!(text.contains('▴') == is_cut && !text.contains('▾'), "{columns}×{rows}\n{text}");
+        desk.key(ESCAPE);
+        assert!(desk.text().contains("shown, not"), "{columns}×{rows}\n{}", desk.text());
+    }
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    desk.press('v');
+    let text = desk.text();
+    assert!(!text.contains(['▴', '▾']) && text.contains("view normal: shown, not written"), "{text}");
+}
+
+#[test]
+fn of_a_fault_in_many_places_ten_are_told() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.fail((1..=20).map(|line| at(Severity::Error, "no material is named `wal`", line)).collect());
+    let text = desk.text();
+    let words = "also in 19 places: 2:1, 3:1, 4:1, 5:1, 6:1, 7:1, 8:1, 9:1, 10:1 and 10 more";
+    assert!(text.split_whitespace().collect::<Vec<_>>().join(" ").contains(words), "{text}");
+}
+
 fn at(severity: Severity, message: &str, line: usize) -> Diagnostic {
     let source: std::sync::Arc<str> = std::sync::Arc::from("first = 1\n".repeat(20));
     let place = Place { source, span: line * 10 - 10..line * 10 - 5, label: String::new() };
@@ -310,8 +346,14 @@ fn while_the_scene_is_broken_steps_of_the_camera_wait_for_their_pictures() {
     assert!(request(&desk.press('h')).is_none(), "the first has no picture yet");
     let generation = desk.state.request.generation;
     let picture = plain_picture(50, 38, RED);
-    let effects =
-        desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });
+    let effects = desk.event(Event::Picture {
+        generation,
+        picture,
+        range: None,
+        section: None,
+        lacks_photons: false,
+        source: None,
+    });
     assert!(request(&effects).is_some(), "the newest step follows");
 }
 

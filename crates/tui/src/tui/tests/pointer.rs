@@ -259,6 +259,7 @@ fn older_pictures_wait_for_no_newer_one_and_a_render_ends_them() {
         range: None,
         section: None,
         lacks_photons: false,
+        source: None,
     });
     assert!(super::cells_of(&mut desk, RED) > 0, "the older one stays");
     desk.press('N');
@@ -330,7 +331,14 @@ fn a_close_up_is_drawn_pixel_by_pixel_and_clicks_know_where_they_are() {
     let section = Some(Section { left: 0.2, top: 0.4, width: 0.1, height: 0.2 });
     let generation = desk.state.request.generation;
     let picture = plain_picture(20, 10, BLUE);
-    desk.event(Event::Picture { generation, picture, range: None, section, lacks_photons: false });
+    desk.event(Event::Picture {
+        generation,
+        picture,
+        range: None,
+        section,
+        lacks_photons: false,
+        source: None,
+    });
     assert_eq!(super::cells_of(&mut desk, BLUE), 20 * 5, "{}", desk.text());
     assert!(desk.text().contains("cornell.toml  1:1"), "{}", desk.text());
     // The area has 56 × 21 cells from (0, 1) on: the picture begins at (18, 9).
@@ -461,14 +469,15 @@ fn an_older_picture_says_what_its_edit_changed() {
         desk.finish(color);
     }
     desk.press('n');
-    assert!(desk.text().contains("picture 2 of 3, after r 1 → 2; n older, N newer"), "{}", desk.text());
-    desk.press('n');
-    assert!(desk.text().contains("picture 1 of 3; N newer"), "the first is of no edit: {}", desk.text());
-    desk.press('b');
-    desk.press('b');
     assert!(
-        desk.text().contains("before the last edit, fov 40 → 30; b shows the newest picture"),
+        desk.text().contains("picture 2 of 3, 0 s ago")
+            && desk.text().contains("\nafter r 1 → 2; n older, N newer"),
         "{}",
         desk.text()
     );
+    desk.press('n');
+    assert!(desk.text().contains("\nthe first picture; N newer"), "it is of no edit: {}", desk.text());
+    desk.press('b');
+    desk.press('b');
+    assert!(desk.text().contains("\nbefore the last edit, fov 40 → 30  "), "{}", desk.text());
 }

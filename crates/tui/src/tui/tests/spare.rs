@@ -28,7 +28,14 @@ fn rendered(desk: &mut Desk, error: f32) {
         exposure: 0.0,
     });
     let picture = plain_picture(90, 68, RED);
-    desk.event(Event::Picture { generation, picture, range: None, section: None, lacks_photons: false });
+    desk.event(Event::Picture {
+        generation,
+        picture,
+        range: None,
+        section: None,
+        lacks_photons: false,
+        source: None,
+    });
     for step in 0..=40 {
         let seconds = 10_f64.powf(f64::from(step) / 20.0);
         let noise = Some(NoiseProgress { now: 0.1 / seconds.sqrt(), seconds, next: None });

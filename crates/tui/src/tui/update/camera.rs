@@ -159,6 +159,9 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
 pub(super) fn undo(state: &mut State) -> Vec<Effect> {
     match state.saving.camera_edits.last() {
         Some(edit) => vec![Effect::Send(Command::UndoCamera(edit.clone()))],
+        None if state.saving.camera_of_model.is_some() => {
+            notify(state, "the scene that c wrote beside the model stays: there is nothing in it to undo")
+        }
         None => notify(state, "c has written no camera into the scene file: there is nothing to undo"),
     }
 }

@@ -14,7 +14,7 @@ pub(super) fn record(state: &mut State) {
         state.picture.shown.clone()
     };
     if let Some(shown) = newest.filter(|shown| shown.generation == state.request.generation) {
-        let origin = state.request.origin(state.work.activity != Activity::Done);
+        let origin = state.request.origin(state.work.activity != Activity::Done && !shown.is_finished());
         state.picture.history.record(shown, state.now, origin);
     }
 }
@@ -57,7 +57,7 @@ pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
             let effects = look_at(state, shown);
             let edits = state.picture.history.edits_since_open();
             let edits = if edits.is_empty() { edits } else { format!(", {edits}") };
-            say(state, format!("before the last edit{edits}; b shows the newest picture"));
+            say(state, format!("before the last edit{edits}"));
             effects
         }
         None => notify(state, "there is no picture from before an edit"),
@@ -79,13 +79,9 @@ fn newest(state: &State) -> Option<crate::tui::history::Shown> {
 
 fn look_at(state: &mut State, shown: crate::tui::history::Shown) -> Vec<Effect> {
     state.picture.shown = Some(shown);
-    // The first line says how old it is, which goes on.
-    let place = state.picture.history.place().map_or(String::new(), |(number, count, _)| {
-        let edits = state.picture.history.edits_of_open();
-        let edits = if edits.is_empty() { edits } else { format!(", after {edits}") };
-        let older = if number > 1 { "n older, " } else { "" };
-        format!("picture {number} of {count}{edits}; {older}N newer")
-    });
-    say(state, place);
+    // The first line says which one it is, and how old, which goes on.
+    let older = if state.picture.history.is_oldest_open() { "" } else { "n older, " };
+    let words = format!("{}; {older}N newer", state.picture.history.reason_of_open());
+    say(state, words);
     Vec::new()
 }

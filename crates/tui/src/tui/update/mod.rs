@@ -63,8 +63,8 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         }
         Event::Resize(window) => resize(state, window),
         Event::Worker(event) => worker::update(state, event),
-        Event::Picture { generation, picture, range, section, lacks_photons } => {
-            show(state, Shown { generation, picture, range, section, lacks_photons })
+        Event::Picture { generation, picture, range, section, lacks_photons, source } => {
+            show(state, Shown { generation, picture, range, section, lacks_photons, source })
         }
         Event::Changed(Changed { noticed }) => {
             // It may be glimt's own save, or one that kept glimt from its own: the message about that stays.
@@ -120,7 +120,8 @@ fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
             return Vec::new();
         }
         state.urgent |= state.picture.shown.as_ref().is_none_or(|last| last.generation != shown.generation);
-        let last = state.picture.shown.take().filter(|last| last.generation == shown.generation);
+        let is_its = |last: &Shown| last.generation == shown.generation || last.is_of_same_image(&shown);
+        let last = state.picture.shown.take().filter(is_its);
         state.picture.shown = Some(match last {
             Some(last) if state.display.mixes_colors() => steadied(shown, &last),
             Some(_) | None => shown,

@@ -52,8 +52,10 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             let pinhole = state.request.overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
             mended(state);
+            state.picture.history.read();
             if pinhole {
-                say(state, "no depth of field: the scene's camera has no `aperture`");
+                let why = state.request.why_pinhole();
+                say(state, format!("no depth of field: {why}"));
             }
             // A picture of another shape has another place.
             return resized_preview(state);
@@ -61,7 +63,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Warnings { warnings, .. } => warn(state, warnings),
         Event::Progress { progress, .. } => {
             if let Some(noise) = progress.noise {
-                state.work.curve.note(noise.seconds, noise.now);
+                state.work.curve.note(progress.earlier_seconds + noise.seconds, noise.now);
             }
             state.work.progress = Some(progress);
         }
@@ -107,12 +109,12 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             say(state, "the image is written as soon as every pixel has a sample");
         }
         Event::Done { report, warnings, unchanged, .. } => {
-            let time = state.work.running_for(state.now);
+            let time = state.work.rendering_for(state.now);
             done(state, report, warnings, unchanged);
             return notice(state, time);
         }
         Event::Failed { failure, .. } => {
-            let time = state.work.running_for(state.now);
+            let time = state.work.rendering_for(state.now);
             failed(state, failure);
             return notice(state, time);
         }
@@ -175,6 +177,10 @@ fn started(state: &mut State) {
 }
 
 fn record(state: &mut State, stage: StageReport) {
+    // The bars of a stage go with it.
+    if stage.status != Status::Running {
+        state.work.assets.clear();
+    }
     if let Some(slot) = state.work.stages.get_mut(stage.name as usize) {
         *slot = Some(stage);
     }
@@ -246,7 +252,8 @@ fn mended(state: &mut State) {
     }
 }
 
-fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
+fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
+    add_earlier_seconds(&mut report);
     state.overlays.message.take_if(|message| message.starts_with(GOING_ON));
     mended(state);
     for stage in &report.stages {
@@ -255,7 +262,7 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     state.request.effective = Some(report.settings.clone());
     state.work.activity = Activity::Done;
     state.set_paused(false);
-    state.work.assets.retain(|asset| asset.finished.is_some());
+    state.work.assets.clear();
     // The picture of this request is on disk: none is missing any more.
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
     if state.request.is_written() && is_on_disk && state.saving.unwritten.is_none() {
@@ -265,18 +272,40 @@ fn done(state: &mut State, report: Box<Report>, warnings: Vec<Diagnostic>, uncha
     describe(state, state.request.generation, &report);
     state.work.report = Some(report);
     state.work.unchanged = unchanged;
-    state.work.renders += u64::from(!unchanged && !state.request.is_exposure_only);
     warn(state, warnings);
     history::record(state);
+    count(state, unchanged);
     if !unchanged {
         state.saving.last_visible_edit = state.saving.last_edit.or(state.saving.last_visible_edit);
     }
-    if unchanged && state.saving.last_edit.take_if(|edit| *edit == state.request.generation).is_some() {
-        state.picture.history.edited_nothing();
+    if unchanged {
+        state.saving.last_edit.take_if(|edit| *edit == state.request.generation);
     }
     if unchanged && state.saving.change.is_some_and(|change| change.generation == state.request.generation) {
         state.saving.change = None;
         state.saving.first_change = None;
+    }
+}
+
+/// Counts the seconds in which earlier requests rendered samples of this image to its render, whose samples they are.
+fn add_earlier_seconds(report: &mut Report) {
+    let all = report.image.render_seconds;
+    let render = &mut report.stages[Stage::Render as usize];
+    if render.status == Status::Done && all > render.seconds {
+        report.seconds += all - render.seconds;
+        render.seconds = all;
+    }
+}
+
+/// Counts a finished run, unless it found the newest picture as another run had left it.
+fn count(state: &mut State, unchanged: bool) {
+    let is_new = !unchanged && !state.request.is_exposure_only;
+    let is_shown = state.picture.history.is_newest(state.request.generation);
+    if is_new || is_shown && state.picture.history.awaits_run() {
+        state.work.renders += 1;
+        if is_shown {
+            state.picture.history.finish(state.work.renders);
+        }
     }
 }
 
@@ -310,6 +339,9 @@ fn failed(state: &mut State, failure: Failure) {
     state.set_paused(false);
     state.work.assets.clear();
     state.saving.change = None;
+    if matches!(failure, Failure::Scene(_)) {
+        state.picture.history.broken();
+    }
     match failure {
         Failure::Scene(diagnostics) if !state.saving.is_settled => {
             state.work.activity = Activity::Waiting;

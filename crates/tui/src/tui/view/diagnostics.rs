@@ -17,6 +17,9 @@ use crate::tui::state::State;
 /// Faults that are shown; who mends them sees the next ones.
 const MOST: usize = 100;
 
+/// Places of one fault that are shown.
+const MOST_PLACES: usize = 10;
+
 /// Draws it, from the line that the person scrolled to.
 pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     let area = area.intersection(buffer.area);
@@ -127,7 +130,13 @@ fn one_fault(fault: &[&Diagnostic], width: usize) -> Vec<Line> {
     let mut lines: Vec<Line> = lines.into_iter().map(line).collect();
     let places: Vec<String> = fault[1..].iter().filter_map(|one| place(one)).collect();
     if !places.is_empty() {
-        let text = format!("  = also in {}: {}", counted(places.len(), "place"), places.join(", "));
+        let shown = places.len().min(MOST_PLACES - 1);
+        let more = match places.len() - shown {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let number = counted(places.len(), "place");
+        let text = format!("  = also in {number}: {}{more}", places[..shown].join(", "));
         lines.extend(toned(&text, width, Tone::Plain));
     }
     lines.push(Line::new());

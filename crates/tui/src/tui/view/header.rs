@@ -143,16 +143,22 @@ fn close_up(state: &State) -> String {
 
 /// Progress or result, in full and in short.
 fn figures(state: &State) -> Vec<String> {
-    if let Some((number, count, time)) = state.picture.history.place() {
-        let place = format!("{number} of {count}");
+    if let Some((run, time)) = state.picture.history.place() {
+        let (place, words) = match run {
+            Some(run) => {
+                let place = format!("{run} of {}", last_run(state));
+                (place.clone(), format!("picture {place}"))
+            }
+            None => ("unfinished".to_owned(), "unfinished picture".to_owned()),
+        };
         let age = ago(state.now.saturating_duration_since(time));
-        let mut figures = vec![format!("picture {place}, {age}"), place.clone()];
+        let mut figures = vec![format!("{words}, {age}"), place.clone()];
         // The newest one is at work meanwhile.
         if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_running()) {
             let done = format!("newest {} %", percent(progress.fraction));
             let eta = eta(state, progress);
             figures = [
-                format!("picture {place}, {age}  {done}{eta}"),
+                format!("{words}, {age}  {done}{eta}"),
                 format!("{place}  {done}{eta}"),
                 format!("{place}  {done}"),
                 place,
@@ -185,10 +191,22 @@ fn figures(state: &State) -> Vec<String> {
     }
 }
 
+/// Number of the newest run; of the one under way, if it has a picture.
+fn last_run(state: &State) -> u64 {
+    let is_under_way = state.work.is_running() && state.picture.history.awaits_run();
+    state.work.renders + u64::from(is_under_way)
+}
+
 /// Time until the end, unless the render is paused.
 fn eta(state: &State, progress: &RenderProgress) -> String {
+    /// Less than that rounds to no time at all.
+    const LEAST: Duration = Duration::from_millis(50);
     let eta = progress.eta_seconds.and_then(|eta| Duration::try_from_secs_f64(eta).ok());
-    let eta = eta.map_or("…".to_owned(), running);
+    let eta = match eta {
+        None => "…".to_owned(),
+        Some(eta) if eta < LEAST => "under 1 s".to_owned(),
+        Some(eta) => running(eta),
+    };
     if state.work.paused { String::new() } else { format!("  ETA {eta}") }
 }
 

@@ -12,12 +12,12 @@ use crate::tui::state::State;
 /// Notes about the rest of the screen.
 const NOTES: &[(&str, &str)] = &[
     ("saved → seen", "from a save to the first changed cell"),
-    ("31 kB 150 ms", "sent for this render, and the terminal's time to answer"),
+    ("31 kB sent", "since this render began; the terminal's time to answer"),
     ("noise 2 % in all", "against the brightness of the whole picture"),
     ("asked 1 % a tile", "each tile against its own brightness; ✓ all are there"),
     ("bold", "what the last edit or a key has changed"),
-    ("render 1 s −.3", "the time of a stage, and against the last time"),
-    ("run 3", "pictures that were finished so far, old ones found again too"),
+    ("render 1 s −.3 s", "the time of a stage, and against the last time"),
+    ("run 3", "finished pictures so far; strip and n N have the same number"),
 ];
 
 /// In the middle of the screen.

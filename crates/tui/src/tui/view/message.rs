@@ -56,8 +56,14 @@ fn words(state: &State, layout: &Layout) -> Option<(String, Tone)> {
         return Some((facts.join(" · "), Tone::Strong));
     }
     let message = state.overlays.message.as_ref().filter(|message| !message.is_empty())?;
+    let message = visible(message).into_owned();
+    // The list of views lies where a long one would, and its keys where a short one would without a line of its own.
+    let has_place = !layout.under.is_empty() && columns(&message) <= layout.under.width;
+    if state.overlays.views.is_some() && !has_place {
+        return None;
+    }
     let tone = if message.starts_with("error") { Tone::Error } else { Tone::Strong };
-    Some((visible(message).into_owned(), tone))
+    Some((message, tone))
 }
 
 /// The line that a short one takes.

@@ -15,6 +15,7 @@ pub(super) mod ramp;
 mod spare;
 mod stages;
 mod strip;
+mod strip_words;
 pub(super) mod text;
 pub(super) mod under;
 pub(super) mod views;

@@ -90,11 +90,12 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Li
         let of = |stage| if is_in_full { stages::lines } else { stages::short }(state, stage, width);
         lines.extend(Stage::ALL.into_iter().flat_map(of));
     }
-    lines.extend(state.work.assets.iter().map(|asset| asset_line(state, asset, width)));
     if is_done {
         lines.extend(results(state));
     }
     lines.extend(hint(state, column));
+    // Bars come and go: nothing is below them.
+    lines.extend(state.work.assets.iter().map(|asset| asset_line(state, asset, width)));
     lines
 }
 

@@ -1,6 +1,6 @@
 //! The stages: a line for each while they are at work, one for all of them when they are done.
 
-use super::text::{Tone, columns, counted, delta, delta_with_unit, seconds, shortened, wrapped};
+use super::text::{Tone, columns, counted, delta, seconds, shortened, wrapped};
 use crate::pipeline::protocol::{Stage, StageReport, Status};
 use crate::scene::sanitize::visible;
 use crate::tui::state::{AssetBar, State};
@@ -10,6 +10,8 @@ pub(super) type Line = Vec<(String, Tone)>;
 
 /// Stages that took less of the whole time than this are left out of the one line.
 const SMALL: f64 = 0.02;
+/// Columns of a name and a time with the gap between them.
+const TIME_ENDS: u16 = 16;
 /// Fewer columns of a reason say nothing.
 const LEAST_WHY: u16 = 12;
 
@@ -65,13 +67,22 @@ fn figures(state: &State, stage: Stage, room: u16) -> Line {
         Some((Status::Reused, _)) => ("=", Tone::Faint, "reused".to_owned()),
         Some((Status::Skipped, _)) => ("-", Tone::Faint, "skipped".to_owned()),
     };
-    let text = format!(" {:<8} {time:>7}", stage.name());
     let text_tone = if tone == Tone::Faint { Tone::Faint } else { weight(state, report) };
-    let mut line = vec![(sign.to_owned(), tone), (text, text_tone)];
+    let line = |gap: u16| {
+        let (name, gap) = (stage.name(), usize::from(gap));
+        vec![(sign.to_owned(), tone), (format!(" {name}{:gap$}{time}", ""), text_tone)]
+    };
+    // The time ends in the same column everywhere, unless the change needs the gap.
+    let used = columns(stage.name()) + columns(&time);
+    let usual = TIME_ENDS.saturating_sub(used).max(1);
     let change = report.map_or(String::new(), |report| change(state, report));
-    if !change.is_empty() && width(&line) + 1 + columns(&change) <= room {
-        line.push((format!(" {change}"), Tone::Strong));
+    let change = if change.is_empty() { change } else { format!(" {change}") };
+    let least = 2 + used + 1 + columns(&change);
+    if change.is_empty() || least > room {
+        return line(usual);
     }
+    let mut line = line(usual.min(1 + room - least));
+    line.push((change, Tone::Strong));
     line
 }
 
@@ -83,20 +94,15 @@ fn weight(state: &State, report: Option<&StageReport>) -> Tone {
 
 /// Against the last time that the stage was at work.
 fn change(state: &State, report: &StageReport) -> String {
-    change_by(state, report, delta)
-}
-
-/// The same in words of the caller's choice.
-fn change_by(state: &State, report: &StageReport, words: impl Fn(f64, Option<f64>) -> String) -> String {
     match report.status {
         Status::Done => {
-            words(report.seconds, state.work.last_seconds.get(report.name as usize).copied().flatten())
+            delta(report.seconds, state.work.last_seconds.get(report.name as usize).copied().flatten())
         }
         Status::Running | Status::Reused | Status::Skipped => String::new(),
     }
 }
 
-/// The stages that count, and how many were reused; in short if there is no room for units.
+/// The stages that count, and how many were reused; in short if there is no room.
 pub(super) fn in_one_line(state: &State, room: u16) -> Line {
     let line = in_one_line_of(state, true);
     if width(&line) <= room { line } else { in_one_line_of(state, false) }
@@ -115,7 +121,7 @@ fn in_one_line_of(state: &State, is_long: bool) -> Line {
                 format!("{comma}{} {}", report.name.name(), seconds(report.seconds)),
                 weight(state, Some(report)),
             ));
-            let change = change_by(state, report, if is_long { delta_with_unit } else { delta });
+            let change = change(state, report);
             if !change.is_empty() {
                 line.push((format!(" {change}"), Tone::Strong));
             }

@@ -1,15 +1,14 @@
 //! The last pictures as a strip, the newest at its top, each with what changed since the one before.
 
-use ratatui::buffer::Buffer;
-use ratatui::layout::Rect;
-use unicode_width::UnicodeWidthStr;
-
 use super::preview;
-use super::text::{Tone, put, row};
+use super::strip_words::{Words, fitting};
+use super::text::{Tone, put, rest, row};
 use crate::film::Picture;
 use crate::tui::action::Action;
 use crate::tui::keymap;
 use crate::tui::state::State;
+use ratatui::buffer::Buffer;
+use ratatui::layout::Rect;
 
 /// Rows of an entry: of its picture, of all of it, and up to the next one.
 #[derive(Clone, Copy)]
@@ -19,15 +18,13 @@ struct Rows {
     pitch: u16,
 }
 
-/// In a narrow strip, words go on below the picture.
+/// In a narrow strip, a row stays free below the picture, unless the words need it.
 const NARROW_ROWS: Rows = Rows { picture: 3, entry: 4, pitch: 4 };
 const WIDE_ROWS: Rows = Rows { picture: 5, entry: 5, pitch: 6 };
 /// A strip of so many columns is wide.
 const WIDE: u16 = 40;
 /// Columns of the words beside a picture.
 const LEAST_WORDS: u16 = 10;
-/// Number of rows that all words need at most.
-const ENOUGH: u16 = 20;
 /// Width of a column of pictures if there are several.
 const COLUMN: u16 = 44;
 
@@ -63,41 +60,23 @@ fn draw_item(state: &State, Item { index, cells, rows }: &Item, buffer: &mut Buf
     let place = Rect { height: rows.picture, ..*cells };
     let place = Rect { width: width(state, picture, place), ..place };
     preview::draw_small(state, picture, place, buffer);
-    let (mark, tone) =
-        if history.looked_at() == Some(*index) { ("▸", Tone::Strong) } else { ("", Tone::Plain) };
-    let words = format!("{mark}{} {}", index + 1, history.change(*index));
-    let beside = super::text::rest(*cells, place.width + 1);
-    // Where words have room beside the picture, none go on below it.
-    let is_beside = |y: u16| y < rows.picture || beside.width >= ENOUGH;
-    let room = |y: u16| row(if is_beside(y) { beside } else { *cells }, y);
-    let lines = filled(&words, rows.entry, |y| usize::from(room(y).width));
-    for (y, line) in (0..).zip(&lines) {
-        put(buffer, room(y), &[(line, tone)], state.display.depth);
+    let is_looked_at = history.looked_at() == Some(*index);
+    let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
+    // The words stand beside the picture alone, and in the same columns with and without a mark.
+    let words = Words { head: format!("{mark}{} ", number(state, *index)), changes: history.changes(*index) };
+    let beside = rest(*cells, place.width + 1);
+    let lines = fitting(&words, usize::from(beside.width), [rows.picture, rows.entry].map(usize::from));
+    for (y, line) in (0..rows.entry).zip(&lines) {
+        put(buffer, row(beside, y), &[(line, tone)], state.display.depth);
     }
 }
 
-/// Words in so many lines, each of its own width, broken between words, and in long names behind a point. The last line has
-/// the rest, however long.
-fn filled(words: &str, count: u16, width: impl Fn(u16) -> usize) -> Vec<String> {
-    let narrow = (0..count).map(&width).min().unwrap_or(0);
-    let mut lines = vec![String::new()];
-    for word in words.split(' ') {
-        let parts: Vec<&str> =
-            if word.width() > narrow { word.split_inclusive('.').collect() } else { vec![word] };
-        for (number, part) in parts.into_iter().enumerate() {
-            let is_last = lines.len() == usize::from(count);
-            let room = width(lines.len() as u16 - 1);
-            let Some(line) = lines.last_mut() else { return lines };
-            let space = if number == 0 && !line.is_empty() { " " } else { "" };
-            if is_last || line.is_empty() || line.width() + space.len() + part.width() <= room {
-                *line += space;
-                *line += part;
-            } else {
-                lines.push(part.to_owned());
-            }
-        }
-    }
-    lines
+/// Number of the run that made a picture, or that is making it; a dash if it was stopped.
+fn number(state: &State, index: usize) -> String {
+    let history = &state.picture.history;
+    let is_under_way = state.work.is_running() && index + 1 == history.len();
+    let under_way = is_under_way.then_some(state.work.renders + 1);
+    history.run(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
 }
 
 /// Columns of a picture of this height, so that words have room beside it.
@@ -146,18 +125,4 @@ fn items(state: &State, area: Rect) -> Vec<Item> {
 pub(super) fn at(state: &State, area: Rect, (column, row): (u16, u16)) -> Option<usize> {
     let is_there = |item: &Item| item.cells.contains((column, row).into());
     items(state, area).into_iter().find(is_there).map(|item| item.index)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_names_are_broken_behind_a_point_and_the_rest_is_in_the_last_line() {
-        let words = "3 materials.board.diffuse [0.8, 0.02, 0.02] → [0.02, 0.8, 0.02]";
-        let lines = filled(words, 4, |y| if y < 3 { 14 } else { 23 });
-        assert_eq!(lines, ["3 materials.", "board.diffuse", "[0.8, 0.02,", "0.02] → [0.02, 0.8, 0.02]"]);
-        assert_eq!(filled("2 camera.fov 40 → 30", 4, |_| 14), ["2 camera.fov", "40 → 30"]);
-        assert_eq!(filled("2 a", 4, |_| 0), ["2", "a"]);
-    }
 }

@@ -173,14 +173,23 @@ pub(super) fn bytes(bytes: u64) -> String {
     }
 }
 
-/// Change of a stage's time: a number in the unit of its time, or with a unit of its own if the change is far greater; empty if
-/// it means nothing.
+/// A time that is expected, with two digits at most: `about 9 s`.
+pub(super) fn about(seconds: f64) -> String {
+    match seconds {
+        x if x < 1.0 => "under 1 s".to_owned(),
+        x if x < 99.5 => format!("about {x:.0} s"),
+        x if x < 99.5 * 60.0 => format!("about {:.0} min", x / 60.0),
+        x => format!("about {:.0} h", x / 3600.0),
+    }
+}
+
+/// Change of a stage's time, in the unit of the time unless the change is far greater; empty if it means nothing.
 pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
     /// Times of the same work differ by so much.
     const NOISE: f64 = 0.05;
     let Some(before) = before else { return String::new() };
     let change = seconds - before;
-    let in_units = if seconds < 0.999_5 { change * 1e3 } else { change };
+    let (in_units, unit) = if seconds < 0.999_5 { (change * 1e3, "ms") } else { (change, "s") };
     let amount = match in_units.abs() {
         x if x >= 9.95 => format!("{x:.0}"),
         x => format!("{x:.1}"),
@@ -191,15 +200,11 @@ pub(super) fn delta(seconds: f64, before: Option<f64>) -> String {
     }
     let sign = if change < 0.0 { "−" } else { "+" };
     let is_far_more = seconds < 0.999_5 && change.abs() >= 0.999_5;
-    if is_far_more { format!("{sign}{}", self::seconds(change.abs())) } else { format!("{sign}{amount}") }
-}
-
-/// The same with the unit of the time.
-pub(super) fn delta_with_unit(seconds: f64, before: Option<f64>) -> String {
-    let change = delta(seconds, before);
-    let has_unit = change.is_empty() || change.ends_with('s');
-    let unit = if seconds < 0.999_5 { "ms" } else { "s" };
-    if has_unit { change } else { format!("{change} {unit}") }
+    if is_far_more {
+        format!("{sign}{}", self::seconds(change.abs()))
+    } else {
+        format!("{sign}{amount} {unit}")
+    }
 }
 
 /// A thin bar: its filled part and the rest, together of this many columns.
@@ -277,23 +282,37 @@ mod tests {
     #[test]
     fn the_change_of_a_time_is_told_in_its_unit() {
         for (seconds, before, words) in [
-            (1.12, Some(1.42), "−.3"),
+            (1.12, Some(1.42), "−.3 s"),
             (1.12, Some(1.10), ""),
-            (0.023, Some(0.019), "+4.0"),
+            (0.023, Some(0.019), "+4.0 ms"),
             (0.5, Some(1.5), "−1.00 s"),
             (0.985, Some(4.635), "−3.65 s"),
             (0.02, Some(200.0), "−3 min 20 s"),
-            (0.9, Some(0.1), "+800"),
-            (12.0, Some(1.0), "+11"),
+            (0.9, Some(0.1), "+800 ms"),
+            (12.0, Some(1.0), "+11 s"),
             (2.0, Some(1.96), ""),
             (0.000_02, Some(0.000_01), ""),
             (1.0, None, ""),
         ] {
             assert_eq!(delta(seconds, before), words, "{seconds} {before:?}");
         }
-        let with_units = [(1.12, 1.42), (0.023, 0.019), (0.02, 200.0), (2.0, 1.96)];
-        let words = with_units.map(|(seconds, before)| delta_with_unit(seconds, Some(before)));
-        assert_eq!(words, ["−.3 s", "+4.0 ms", "−3 min 20 s", ""]);
+    }
+
+    #[test]
+    fn an_expected_time_has_two_digits() {
+        let times = [0.3, 1.0, 9.46, 14.2, 99.4, 100.0, 754.0, 5970.0, 90_000.0].map(about);
+        let words = [
+            "under 1 s",
+            "about 1 s",
+            "about 9 s",
+            "about 14 s",
+            "about 99 s",
+            "about 2 min",
+            "about 13 min",
+            "about 2 h",
+            "about 25 h",
+        ];
+        assert_eq!(times, words);
     }
 
     #[test]

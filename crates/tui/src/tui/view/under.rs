@@ -1,7 +1,5 @@
 //! The line under the picture: a message; else how far the render is; else what it took.
 
-use std::time::Duration;
-
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
@@ -10,7 +8,9 @@ use super::header::at_work;
 use super::layout::Layout;
 use super::message;
 use super::stages;
-use super::text::{Tone, bytes, columns, duration, gauge, percent, put, put_right, rest, running, share};
+use super::text::{
+    Tone, about, bytes, columns, duration, gauge, percent, put, put_right, rest, running, share,
+};
 use crate::pipeline::protocol::{NoiseProgress, RenderProgress};
 use crate::scene::sanitize::visible;
 use crate::tui::event::Written;
@@ -58,7 +58,7 @@ pub(in crate::tui) fn goes_on(state: &State) -> Option<&RenderProgress> {
 /// Draws the bar of the loading asset or of the render.
 fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
     let area = layout.under;
-    let time = state.work.running_for(state.now).map_or(String::new(), running);
+    let time = state.work.rendering_for(state.now).map_or(String::new(), running);
     let name = at_work(state).unwrap_or_default();
     let (fraction, words) = match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
@@ -93,12 +93,10 @@ fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
     put(buffer, area, &pieces, state.display.depth);
 }
 
-/// `noise 2.1 %, 1 % in 14 s`, or shorter: called noise, as what is free of it may still be far from right.
+/// `noise 2.1 %, 1 % in about 14 s`, or shorter: called noise, as what is free of it may still be far from right.
 fn noise_words(noise: &NoiseProgress) -> [String; 2] {
     let now = format!("noise {}", share(noise.now));
-    let next = noise.next.map(|(level, seconds)| {
-        format!("{now}, {} in {}", share(level), duration(Duration::from_secs_f64(seconds)))
-    });
+    let next = noise.next.map(|(level, seconds)| format!("{now}, {} in {}", share(level), about(seconds)));
     [next.unwrap_or_else(|| now.clone()), now]
 }
 
@@ -106,6 +104,7 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
 fn summary(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Drawn) {
     let area = layout.under;
     let mut pieces = stages::in_one_line(state, area.width);
+    let comma = if pieces.is_empty() { "" } else { ", " };
     let mut is_room = |more: Vec<(String, Tone)>| {
         let width: u16 = pieces.iter().chain(&more).map(|(text, _)| columns(text)).sum();
         if width <= area.width {
@@ -114,7 +113,7 @@ fn summary(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Draw
     };
     if layout.panel.is_empty() {
         if is_in_no_file(state) {
-            is_room(vec![(" unwritten: w writes it".to_owned(), Tone::Faint)]);
+            is_room(vec![(format!("{comma}unwritten: w writes it"), Tone::Faint)]);
         }
         for written in files(state) {
             let name = visible(&written.path.to_string_lossy()).into_owned();
@@ -156,9 +155,9 @@ pub(super) fn seen(state: &State) -> Option<String> {
     state.saving.first_change.map(|time| format!("saved → seen {}", duration(time)))
 }
 
-/// A hint for a person who has not saved yet.
+/// A hint for a person who has not saved yet, unless there is nothing to save.
 pub(super) fn hint(state: &State) -> String {
-    if state.saving.edits > 0 {
+    if state.saving.edits > 0 || is_unreadable(state) {
         return String::new();
     }
     let name =
@@ -167,12 +166,19 @@ pub(super) fn hint(state: &State) -> String {
     format!("save {} to render{again}", visible(&name))
 }
 
-/// Cost of the last picture on its way: the bytes since its render began, and the terminal's time to answer; in full and in short.
+/// Whether what is wrong with the scene is no text in it: it is a folder, or it is not there.
+fn is_unreadable(state: &State) -> bool {
+    let overlays = &state.overlays;
+    let found = overlays.problems.as_ref().filter(|problems| problems.work.is_none());
+    let diagnostics = found.map(|problems| &problems.diagnostics).or(overlays.unconfirmed.as_ref());
+    diagnostics.is_some_and(|all| all.iter().all(|one| one.place.is_none()))
+}
+
+/// Cost of the last picture on its way: the bytes since its render began, and the terminal's time to answer; then the bytes alone.
 fn frame(state: &State) -> Vec<String> {
     let Some(frame) = state.display.frame else { return Vec::new() };
-    let size = format!("{} kB", frame.bytes.div_ceil(1000));
-    match frame.round_trip.map(|time| time.as_millis().max(1)) {
-        Some(time) => vec![format!("{size} sent, answered in {time} ms"), format!("{size} {time} ms"), size],
-        None => vec![format!("{size} sent"), size],
-    }
+    let size = format!("{} kB sent", frame.bytes.div_ceil(1000));
+    let time = frame.round_trip.map(|time| time.as_millis().max(1));
+    let both = time.map(|time| format!("{size}, answered in {time} ms"));
+    both.into_iter().chain([size]).collect()
 }

@@ -32,7 +32,15 @@ pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer) {
         let (column, row) = ((index / rows) as u16, (index % rows) as u16);
         let place =
             Rect { x: area.x + column * WIDTH, y: area.y + row, width: WIDTH.min(area.width), height: 1 };
-        line(state, number, current, place, buffer);
+        let is_cut = index == 0 && first > 0 || index + 1 == shown && number + 1 < View::ALL.len();
+        let more = if !is_cut {
+            ""
+        } else if index == 0 {
+            "▴"
+        } else {
+            "▾"
+        };
+        line(state, number, (current, more), place, buffer);
     }
 }
 
@@ -41,13 +49,15 @@ pub(in crate::tui) fn rows(state: &State) -> usize {
     usize::from(area(&Layout::of(state)).height).max(1)
 }
 
-fn line(state: &State, number: usize, current: usize, place: Rect, buffer: &mut Buffer) {
+/// A view with its digit, and a mark if there are more above or below.
+fn line(state: &State, number: usize, (current, more): (usize, &str), place: Rect, buffer: &mut Buffer) {
     let digit = if number < DIGITS { (number + 1).to_string() } else { " ".to_owned() };
     let is_current = number == current;
     let sign = if is_current { "▸" } else { " " };
     let name = format!(" {:<11}", View::ALL[number].name());
     let tone = if is_current { Tone::Chosen } else { Tone::Plain };
-    let pieces = [(sign, Tone::Strong), (&*digit, Tone::Strong), (&*name, tone)];
+    let more = format!(" {more}");
+    let pieces = [(sign, Tone::Strong), (&*digit, Tone::Strong), (&*name, tone), (&*more, Tone::Strong)];
     put(buffer, place, &pieces, state.display.depth);
 }
 

@@ -132,6 +132,7 @@ impl Forecast {
         RenderProgress {
             fraction: self.fraction,
             elapsed_seconds,
+            earlier_seconds: moment.state.render_seconds,
             eta_seconds: if moment.is_last { Some(0.0) } else { eta_seconds },
             samples: (moment.units / pixels) as u32,
             total_samples: self.total_units.div_ceil(pixels) as u32,

@@ -1,0 +1,239 @@
+//! Tests of edits, typos among them: which pictures are before them, how they are numbered, and what a render took.
+
+use super::{BLUE, RED, cells_of};
+use crate::pipeline::protocol::{self, Kept, PreviewSource, Stage, Status};
+use crate::pipeline::settings::Effective;
+use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::fingerprint::Fingerprint;
+use crate::tui::Changed;
+use crate::tui::event::{Event, FrameReport};
+use crate::tui::fixtures::*;
+
+const GREEN: [u8; 3] = [10, 200, 20];
+
+/// A save of this text, which is being read.
+fn save(desk: &mut Desk, text: &str) {
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::Text { generation, text: text.into() });
+}
+
+/// A save that breaks the scene.
+fn typo(desk: &mut Desk) {
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
+    desk.event(Event::Settled);
+}
+
+/// Preview of an image, all samples of which are there or only some.
+fn preview(desk: &mut Desk, name: &str, color: [u8; 3], is_finished: bool) {
+    let generation = desk.state.request.generation;
+    let source = Some(PreviewSource { image: Fingerprint::new(name).finish(), is_finished });
+    let picture = plain_picture(50, 38, color);
+    let (range, section, lacks_photons) = (None, None, false);
+    desk.event(Event::Picture { generation, picture, range, section, lacks_photons, source });
+}
+
+/// The scene could be read.
+fn read(desk: &mut Desk) {
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::Started { generation });
+    let (settings, camera) = (Box::new(settings()), camera());
+    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0 });
+}
+
+/// The end of a request: its render stage took so many seconds, and its image all these.
+fn end(desk: &mut Desk, unchanged: bool, seconds: f64, of_image: f64) {
+    let generation = desk.state.request.generation;
+    let mut event = done(generation, Vec::new(), unchanged);
+    if let protocol::Event::Done { report, .. } = &mut event {
+        let render = &mut report.stages[Stage::Render as usize];
+        render.status = if unchanged { Status::Reused } else { Status::Done };
+        (render.seconds, report.image.render_seconds, report.seconds) = (seconds, of_image, seconds);
+    }
+    desk.worker(event);
+}
+
+#[test]
+fn a_typo_and_its_mend_are_no_edit_to_look_back_over() {
+    let mut desk = Desk::with(state(120, 40));
+    save(&mut desk, "shininess = 60");
+    desk.finish(RED);
+    save(&mut desk, "shininess = 6");
+    read(&mut desk);
+    preview(&mut desk, "dull", BLUE, true);
+    end(&mut desk, false, 1.0, 1.0);
+    typo(&mut desk);
+    // The last good scene is shown again, where colours are mixed by other cells.
+    preview(&mut desk, "dull", GREEN, true);
+    save(&mut desk, "shininess = 6");
+    read(&mut desk);
+    preview(&mut desk, "dull", GREEN, true);
+    end(&mut desk, true, 0.0, 1.0);
+    assert!(desk.text().contains("unchanged · run 2"), "{}", desk.text());
+    assert!(
+        desk.text().contains("▸2 shininess") && !desk.text().contains("rendered again"),
+        "{}",
+        desk.text()
+    );
+    desk.press('b');
+    assert!(cells_of(&mut desk, RED) > 500, "{}", desk.text());
+    let text = desk.text();
+    assert!(text.contains("picture 1 of 2, 0 s ago"), "{text}");
+    assert!(text.contains("\nbefore the last edit, shininess 60 → 6  "), "{text}");
+    assert!(text.contains("b newest") && !text.contains("b shows"), "{text}");
+}
+
+#[test]
+fn an_edit_of_a_comment_adds_no_picture_and_no_run() {
+    let mut desk = Desk::with(state(120, 40));
+    save(&mut desk, "a = 1 # one");
+    read(&mut desk);
+    preview(&mut desk, "first", RED, true);
+    end(&mut desk, false, 1.0, 1.0);
+    save(&mut desk, "a = 1 # two");
+    read(&mut desk);
+    preview(&mut desk, "first", BLUE, true);
+    end(&mut desk, true, 0.0, 1.0);
+    assert_eq!((desk.state.picture.history.len(), desk.state.work.renders), (1, 1));
+    desk.press('b');
+    assert!(desk.text().contains("there is no picture from before an edit"), "{}", desk.text());
+}
+
+#[test]
+fn a_render_that_goes_on_counts_all_seconds_of_its_samples_and_is_one_picture() {
+    let mut desk = Desk::with(state(120, 40));
+    save(&mut desk, "a = 1");
+    read(&mut desk);
+    preview(&mut desk, "first", RED, true);
+    end(&mut desk, false, 5.8, 5.8);
+    desk.press('r');
+    read(&mut desk);
+    preview(&mut desk, "first", BLUE, false);
+    typo(&mut desk);
+    preview(&mut desk, "first", GREEN, false);
+    save(&mut desk, "a = 1");
+    read(&mut desk);
+    preview(&mut desk, "first", GREEN, false);
+    let generation = desk.state.request.generation;
+    let progress = protocol::RenderProgress { earlier_seconds: 4.5, ..progress(0.5, None) };
+    desk.worker(protocol::Event::Progress { generation, progress });
+    assert!(desk.text().contains("32/64 samples · 4.5 s"), "the clock goes on: {}", desk.text());
+    preview(&mut desk, "first", BLUE, true);
+    end(&mut desk, false, 4.23, 8.73);
+    let text = desk.text();
+    assert!(text.contains("render 8.73 s +2.9 s"), "{text}");
+    assert!(text.contains("8.73 s · run 2"), "{text}");
+    assert_eq!(desk.state.picture.history.len(), 1, "{text}");
+}
+
+#[test]
+fn the_number_of_a_picture_is_that_of_its_run() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    // A render that is stopped is no run.
+    desk.press('s');
+    read(&mut desk);
+    preview(&mut desk, "hard", GREEN, false);
+    desk.press('s');
+    desk.finish(BLUE);
+    let text = desk.text();
+    assert!(text.contains("· run 2") && text.contains("▸2 shadows off"), "{text}");
+    assert!(text.contains("– unfinished;") && text.contains(" 1 first"), "{text}");
+    desk.press('n');
+    assert!(desk.text().contains("unfinished picture, 0 s ago"), "{}", desk.text());
+    assert!(desk.text().contains("unfinished; after shadows hard; n older, N newer"), "{}", desk.text());
+    desk.press('n');
+    assert!(desk.text().contains("picture 1 of 2, 0 s ago"), "{}", desk.text());
+}
+
+#[test]
+fn settings_of_the_scene_again_stand_together() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    desk.press('s');
+    desk.press('p');
+    desk.finish(BLUE);
+    desk.press('0');
+    desk.finish(GREEN);
+    desk.press('s');
+    desk.finish(RED);
+    desk.press('n');
+    let words = "after back to the scene's shadows, photons; n older, N newer";
+    assert!(!desk.text().contains("of the scene") && desk.text().contains(words), "{}", desk.text());
+}
+
+#[test]
+fn a_pinhole_is_told_apart_from_a_camera_without_an_aperture() {
+    for (text, words) in [
+        ("[camera]\nfov = 40", "the scene's camera has no `aperture`"),
+        ("[camera]\naperture = 0.0", "the camera's `aperture` is 0"),
+        ("[camera]\n# aperture = 0.0", "the scene's camera has no `aperture`"),
+    ] {
+        let mut desk = Desk::new();
+        save(&mut desk, text);
+        read(&mut desk);
+        desk.state.request.effective = Some(Effective { dof: false, ..settings() });
+        desk.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
+        desk.press('d');
+        assert!(desk.text().contains(&format!("no depth of field: {words}")), "{}", desk.text());
+        desk.press('f');
+        assert!(desk.text().contains(&format!("everything is in focus: {words}")), "{}", desk.text());
+    }
+}
+
+#[test]
+fn a_scene_that_c_wrote_beside_a_model_stays() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let (path, edit) = ("assets/knot.toml".into(), None);
+    let kept = Kept { path, is_new: true, is_own: false, of_model: true, edit };
+    desk.worker(protocol::Event::CameraKept { generation: 1, outcome: Ok(kept) });
+    desk.press('u');
+    let words = "the scene that c wrote beside the model stays: there is nothing in it to undo";
+    assert!(desk.text().contains(words), "{}", desk.text());
+}
+
+#[test]
+fn nobody_is_asked_to_save_what_is_no_text() {
+    let mut desk = Desk::new();
+    let folder = Diagnostic { place: None, ..diagnostic(Severity::Error, "this is a folder") };
+    desk.fail(vec![folder]);
+    assert!(!desk.text().contains("save "), "{}", desk.text());
+    desk.event(Event::Settled);
+    assert!(desk.text().contains("this is a folder") && !desk.text().contains("save "), "{}", desk.text());
+    let mut desk = Desk::new();
+    desk.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
+    desk.event(Event::Settled);
+    assert!(desk.text().contains("save cornell.toml"), "{}", desk.text());
+}
+
+#[test]
+fn the_end_is_never_no_time_away() {
+    for (seconds, words) in [(0.0, "ETA under 1 s"), (0.04, "ETA under 1 s"), (0.06, "ETA 0.1 s")] {
+        let mut desk = Desk::new();
+        desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, Some(seconds)) });
+        assert!(desk.text().contains(words), "{seconds}: {}", desk.text());
+    }
+}
+
+#[test]
+fn facts_of_the_folded_line_are_apart() {
+    let mut desk = Desk::with(state(80, 24));
+    desk.finish(RED);
+    desk.press('l');
+    desk.finish(BLUE);
+    let settings = desk.state.request.effective.as_mut().expect("settings");
+    (settings.width, settings.height) = (320, 180);
+    let reused = |name| stage(name, Status::Reused, 0.0, "");
+    for name in [Stage::Parse, Stage::Meshes, Stage::Lights] {
+        desk.state.work.stages[name as usize] = Some(reused(name));
+    }
+    for name in [Stage::Textures, Stage::Accel, Stage::Photons, Stage::Write] {
+        desk.state.work.stages[name as usize] = None;
+    }
+    desk.state.display.frame = Some(FrameReport { bytes: 131_000, round_trip: None });
+    desk.press('m');
+    desk.state.overlays.message = None;
+    assert!(desk.text().contains("3 stages reused, unwritten: w writes it"), "{}", desk.text());
+}
