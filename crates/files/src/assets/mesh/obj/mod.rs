@@ -13,7 +13,7 @@ use super::{AssetError, LoadedMesh, Source};
 use crate::assets::FileMaterial;
 use crate::assets::contain::contain;
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
-use fault::{first_fault, open_corner};
+use fault::first_fault;
 use input::{Chunks, Survey};
 use libraries::{Found, Libraries};
 
@@ -27,9 +27,6 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
 
 fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     let survey = Survey::of(source.bytes, source.watch.token)?;
-    if let Some(slash) = survey.open_corner {
-        return Err(open_corner(source, slash));
-    }
     let used = &survey.used_materials;
     let libraries = Libraries { source, used, found: RefCell::default(), failed: RefCell::default() };
     let mut reader = Chunks::new(source, &survey.text);
