@@ -376,7 +376,7 @@ fn chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), Wrong> {
         let start = at + 8;
         let Some(end) = end_of(at) else {
             // Bytes behind the length that the header declares are no chunk.
-            if at >= declared && json.is_some() {
+            if at >= declared && json.is_some() && !matches!(kind, JSON | BINARY) {
                 break;
             }
             let has = bytes.len() - start;

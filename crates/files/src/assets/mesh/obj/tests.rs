@@ -236,6 +236,24 @@ fn a_corner_that_ends_with_a_slash_leaves_numbers_out() {
 }
 
 #[test]
+fn a_missing_picture_is_a_warning_as_a_missing_library_is() {
+    let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\n");
+    let library = b"newmtl red\nKd 1 0 0\nmap_Kd none.png\nmap_Ks none.png\nmap_Pr none.png\nnewmtl unused\nmap_Kd no.png\n";
+    let loaded = read_with(&[("a.obj", text.as_bytes()), ("a.mtl", library)]).expect("whole");
+    let material = &loaded.materials[0];
+    assert_eq!(
+        (material.diffuse, &material.diffuse_texture, &material.specular_texture),
+        (Vec3::X, &None, &None)
+    );
+    let [warning] = &loaded.material_warnings[..] else { panic!("one: {:?}", loaded.material_warnings) };
+    assert!(
+        warning.ends_with("none.png: no such file or directory; the material \"red\" is shown without it"),
+        "{warning}"
+    );
+    assert!(loaded.companions.iter().any(|file| file.ends_with("none.png")));
+}
+
+#[test]
 fn a_usemtl_without_a_name_ends_the_material() {
     for none in ["usemtl", "usemtl ", "  usemtl\t", "usemtl\r"] {
         let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\n{none}\nf 1 3 4\n");
