@@ -472,6 +472,47 @@ fn a_small_model_far_from_the_origin_is_framed_as_at_the_origin() {
 }
 
 #[test]
+fn what_an_import_would_copy_damaged_is_refused_with_the_name_of_the_image() {
+    let desk = Desk::new();
+    let mut damaged = checker();
+    let place = damaged.len() - 20;
+    damaged[place] ^= 255;
+    desk.write("a.glb", cubes(&damaged));
+    for call in ["check a.glb", "import a.glb"] {
+        let said = desk.expect(call, 2);
+        assert!(said.contains("it claims"), "{call}: {said}");
+    }
+    let said = desk.expect("import a.glb", 2);
+    assert!(said.contains("a.glb: images[0]: it claims"), "{said}");
+}
+
+#[test]
+fn models_that_cannot_be_shown_are_named_by_what_is_wrong() {
+    let desk = Desk::new();
+    for ending in ["obj", "off"] {
+        let text = match ending {
+            "obj" => "v 1e20 0 0\nv 1 0 0\nv 0 1e20 0\nf 1 2 3\n",
+            _ => "OFF\n3 1 0\n1e20 0 0\n1 0 0\n0 1e20 0\n3 0 1 2\n",
+        };
+        desk.write(&format!("far.{ending}"), text);
+        let said = desk.expect(&format!("check far.{ending}"), 2);
+        let reach = said.split_once("its coordinates reach to ").map(|(_, rest)| rest);
+        let reach = reach.and_then(|rest| rest.split(',').next()?.parse::<f64>().ok());
+        assert!(reach.is_some_and(|reach| (reach / 1e20 - 1.0).abs() < 1e-6), "{said}");
+        assert!(said.contains("must stay below 1e17") && !said.contains("position"), "{said}");
+    }
+    desk.write("a.fbx", "Kaydara FBX Binary");
+    let said = desk.expect("check a.fbx", 2);
+    assert!(said.contains("a format that glimt does not read: .fbx"), "{said}");
+    assert!(said.contains(".obj") && said.contains(".glb") && said.contains(".gltf"), "{said}");
+    let said = desk.expect("check none.stl", 2);
+    assert!(!said.contains("glimt new"), "{said}");
+    fs::create_dir(desk.path("folder.ply")).expect("a folder");
+    let said = desk.expect("check folder.ply", 2);
+    assert!(said.contains("this is a folder, not a model") && !said.contains("scene.toml"), "{said}");
+}
+
+#[test]
 fn messages_about_a_model_name_no_line_of_a_scene_that_nobody_wrote() {
     let desk = Desk::new();
     let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl q\nf 1 2 3\n";
@@ -482,7 +523,7 @@ fn messages_about_a_model_name_no_line_of_a_scene_that_nobody_wrote() {
         assert!(said.contains("cannot read a.mtl"), "{call}: {said}");
     }
     desk.write("a.mtl", "newmtl q\nmap_Kd nope.png\n");
-    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 2);
+    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 0);
     assert!(said.contains("nope.png") && said.contains("--> a.obj\n"), "{said}");
     desk.write("nope.png", checker());
     let said = desk.expect(&format!("a.obj {SMALL} -o nope.png"), 2);

@@ -72,6 +72,16 @@ pub(crate) fn bytes(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>
     bytes_if(path, limit, watch, |_| true)
 }
 
+/// Whether a file begins as text in UTF-16 does: two letters, each beside a byte 0, behind a mark or not.
+fn is_utf16(start: &[u8]) -> bool {
+    let start = start.strip_prefix(b"\xff\xfe").or(start.strip_prefix(b"\xfe\xff")).unwrap_or(start);
+    let is_letter = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
+    match start {
+        [a, 0, b, 0, ..] | [0, a, 0, b, ..] => is_letter(a) && is_letter(b),
+        _ => false,
+    }
+}
+
 /// Reads a regular file if its first [`START`] bytes are accepted. Progress counts bytes out of `2·length`: the second
 /// half is the parser's.
 fn bytes_if(
@@ -84,6 +94,10 @@ fn bytes_if(
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
     let mut start = Vec::new();
     (&mut file).take(START as u64).read_to_end(&mut start).map_err(unreadable)?;
+    if is_utf16(&start) {
+        let reason = "this is text in UTF-16; save it as UTF-8";
+        return Err(AssetError::malformed(path, Some(1), reason));
+    }
     if !accept(&start) {
         return Err(AssetError::malformed(path, Some(1), "this is a binary file of another kind"));
     }
@@ -141,6 +155,25 @@ mod tests {
         assert_eq!(lettered(&path, 100, watch(&token)).expect("read"), b"ply\n\0");
         fs::write(&path, b"").expect("written");
         assert_eq!(text(&path, 100, watch(&token)).expect("read"), b"");
+    }
+
+    #[test]
+    fn text_in_utf16_is_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let token = CancelToken::new();
+        let path = folder.path().join("wide");
+        for mark in ["", "\u{feff}"] {
+            let words = || format!("{mark}v 0 0 0\n");
+            let little: Vec<u8> = words().encode_utf16().flat_map(u16::to_le_bytes).collect();
+            let big: Vec<u8> = words().encode_utf16().flat_map(u16::to_be_bytes).collect();
+            for bytes in [little, big] {
+                fs::write(&path, bytes).expect("written");
+                for read in [text, lettered, not_blank] {
+                    let error = read(&path, u64::MAX, watch(&token)).expect_err("refused").to_string();
+                    assert!(error.ends_with("wide:1: this is text in UTF-16; save it as UTF-8"), "{error}");
+                }
+            }
+        }
     }
 
     #[cfg(unix)]

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::diagnostic::{Diagnostic, Place, Severity};
 use super::document::is_mesh;
+use super::keys::endings::MESHES;
 use super::nearest::nearest;
 use super::sanitize::visible;
 use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE, NO_SUCH_MODEL};
@@ -16,6 +17,12 @@ use crate::system::in_words;
 pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
     if is_model(path) {
         return Err(mesh(path));
+    }
+    if is_other_model(path) {
+        let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let message = format!("this is a model of a format that glimt does not read: .{ending}");
+        let help = format!("export it as one of these: .{}", MESHES.join(", ."));
+        return Err(problem(path, message, Some(help), None));
     }
     let bytes = bytes(path).map_err(|(message, help)| problem(path, message, help, None))?;
     if let Some(content) = OtherContent::of(&bytes) {
@@ -52,6 +59,23 @@ fn mesh(path: &Path) -> Box<Diagnostic> {
 
 /// Whether a file is named like a mesh and is no scene all the same, as its start shows. What cannot be read is none.
 pub(super) fn is_model(path: &Path) -> bool {
+    is_mesh(path) && lacks_camera(path)
+}
+
+/// Endings of models that glimt does not read.
+const OTHER_MODELS: [&str; 22] = [
+    "3dm", "3ds", "3mf", "abc", "blend", "c4d", "dae", "fbx", "iges", "igs", "lwo", "ma", "max", "mb",
+    "step", "stp", "usd", "usda", "usdc", "usdz", "wrl", "x3d",
+];
+
+/// Whether a file is named like a model of another format and is no scene all the same.
+fn is_other_model(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    OTHER_MODELS.contains(&ending.as_str()) && lacks_camera(path)
+}
+
+/// Whether the start of a file has no camera of a scene. What cannot be read has none, and is no file either.
+fn lacks_camera(path: &Path) -> bool {
     const START: u64 = 1 << 16;
     let start = || {
         let (file, _) = file::open(path).ok()?.ok()?;
@@ -59,7 +83,7 @@ pub(super) fn is_model(path: &Path) -> bool {
         file.take(START).read_to_end(&mut bytes).ok()?;
         Some(bytes)
     };
-    is_mesh(path) && start().is_some_and(|bytes| memchr::memmem::find(&bytes, b"[camera]").is_none())
+    start().is_some_and(|bytes| memchr::memmem::find(&bytes, b"[camera]").is_none())
 }
 
 /// Content other than a scene, by the first bytes of a file.
@@ -146,7 +170,7 @@ type Refusal = (String, Option<String>);
 
 fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
     let unreadable = |error: io::Error| unreadable(path, &error);
-    let (file, metadata) = file::open(path).map_err(unreadable)?.map_err(not_regular)?;
+    let (file, metadata) = file::open(path).map_err(unreadable)?.map_err(|kind| not_regular(path, kind))?;
     if metadata.len() > MAX_FILE_BYTES {
         return Err(too_large());
     }
@@ -166,7 +190,10 @@ fn parts(text: &[u8]) -> usize {
     text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
 
-fn not_regular(kind: Kind) -> Refusal {
+fn not_regular(path: &Path, kind: Kind) -> Refusal {
+    if is_mesh(path) {
+        return (format!("this is {}, not a model", kind.words()), None);
+    }
     let help = match kind {
         Kind::Folder => "name a scene file, such as scene.toml",
         Kind::Regular | Kind::Special | Kind::Kernel => {
@@ -192,8 +219,8 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
         let shown = |path: &Path| visible(&path.to_string_lossy()).into_owned();
         let missing = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let is_model = is_mesh(path);
-        let near = neighbour(path, if is_model { is_mesh } else { may_be_scene });
-        let help = match (missing, near) {
+        let may_be_meant = |found: &Path| may_be_scene(found) || is_model && is_mesh(found);
+        let help = match (missing, neighbour(path, may_be_meant)) {
             (Some(folder), _) => Some(format!("the folder {} does not exist", shown(folder))),
             (None, Some(near)) => Some(format!("did you mean {}?", shown(&near))),
             // A model is not what glimt writes.

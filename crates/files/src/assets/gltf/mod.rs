@@ -16,7 +16,7 @@ mod model;
 mod part;
 mod whole;
 
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 pub use self::description::{
@@ -25,6 +25,7 @@ pub use self::description::{
 };
 use self::json::{Root, Uri};
 use super::AssetError;
+use super::image::{self, ImageEncoding, ImageLimits, ImageWithin};
 use super::read::{self, Watch};
 use crate::control::{CancelToken, Progress, unwatched};
 
@@ -107,6 +108,8 @@ pub struct Container {
     buffers: Vec<Vec<u8>>,
     /// Files that hold its buffers, read.
     companions: Vec<PathBuf>,
+    /// For each part the first one with the same mesh, which is built for all of them.
+    built_as: Vec<usize>,
 }
 
 /// The bytes of an image.
@@ -150,12 +153,15 @@ impl Container {
             return Err(AssetError::malformed(path, None, reason));
         }
         let mut root: Root = serde_json::from_slice(text).map_err(|error| {
+            if let Some(version) = old_version(text) {
+                return wrong(Wrong::new(format!("it is glTF {}; version 2 is read", shown(&version))));
+            }
             let what = error.to_string();
-            let what = what.split(" at line ").next().unwrap_or_default();
+            let what = in_words_of_json(what.split(" at line ").next().unwrap_or_default());
             AssetError::malformed(
                 path,
                 Some(error.line()),
-                format!("column {}: {}", error.column(), shown_long(what)),
+                format!("column {}: {}", error.column(), shown_long(&what)),
             )
         })?;
         check_version(&root).map_err(wrong)?;
@@ -168,8 +174,8 @@ impl Container {
             bytes
         });
         let (buffers, companions) = buffers(path, &mut root, binary, watch)?;
-        let container = Self { path: path.to_owned(), root, buffers, companions };
-        container.check_corners().map_err(wrong)?;
+        let mut container = Self { path: path.to_owned(), root, buffers, companions, built_as: Vec::new() };
+        container.built_as = container.shared_parts().map_err(wrong)?;
         watch.tick(2 * length, 2 * length)?;
         Ok(container)
     }
@@ -227,26 +233,120 @@ impl Container {
         AssetError::malformed(&self.path, None, wrong.0)
     }
 
-    /// Refuses files whose primitives share bytes so often that the meshes would take many times the file's size.
-    fn check_corners(&self) -> Result<(), Wrong> {
-        let mut known = HashSet::new();
+    /// The part that is built for a part: the first one with the same mesh.
+    pub(super) fn built_as(&self, part: usize) -> usize {
+        self.built_as.get(part).copied().unwrap_or(part)
+    }
+
+    /// Finds for each part the first one with the same mesh. Refuses files whose other meshes share bytes so often that they
+    /// would take many times the file's size.
+    fn shared_parts(&self) -> Result<Vec<usize>, Wrong> {
+        /// Corners that any file may have.
+        const FREE: u64 = 1 << 20;
+        let mut first = HashMap::new();
+        let mut built_as = Vec::new();
         let mut corners: u64 = 0;
         for primitive in self.root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
-            let list = primitive.indices.or_else(|| primitive.attributes.get("POSITION").copied());
-            if known.insert((list, &primitive.attributes)) {
-                let accessor = list.and_then(|list| self.root.accessors.get(list));
-                corners = corners.saturating_add(accessor.map_or(0, |accessor| accessor.count));
+            let part = built_as.len();
+            let is_compressed = primitive.extensions.contains_key(DRACO);
+            let sets = self.coordinate_sets(primitive);
+            let mesh = (primitive.indices, primitive.mode, is_compressed, sets, &primitive.attributes);
+            let first = *first.entry(mesh).or_insert(part);
+            built_as.push(first);
+            if first == part {
+                let list = primitive.indices.or_else(|| primitive.attributes.get("POSITION").copied());
+                let count = list.and_then(|list| self.root.accessors.get(list)).map_or(0, |list| list.count);
+                corners = corners.saturating_add(primitive.corners_built(count));
             }
         }
         let bytes: u64 = self.buffers.iter().map(|buffer| buffer.len() as u64).sum();
-        let most = bytes + (1 << 20);
+        let most = bytes + FREE;
         if corners > most {
             return Err(Wrong::new(format!(
-                "its primitives claim {corners} corners, more than its {bytes} bytes can hold"
+                "its primitives claim {corners} corners of triangles, and its {bytes} bytes of buffers may have \
+                 {most}: one a byte, and {FREE} more"
             )));
         }
-        Ok(())
+        Ok(built_as)
     }
+
+    /// An error about an image, which names the image and this file.
+    fn about_image(&self, number: usize, error: AssetError) -> AssetError {
+        let place = format!("images[{number}]");
+        match error {
+            AssetError::Malformed { path, reason, .. } if path == self.path => {
+                self.wrong(Wrong::new(reason).inside(place))
+            }
+            error @ (AssetError::Malformed { .. } | AssetError::Unreadable { .. }) => {
+                self.wrong(Wrong::new(error.to_string()).inside(place))
+            }
+            other @ (AssetError::OutOfMemory { .. } | AssetError::Cancelled(_)) => other,
+        }
+    }
+
+    /// Refuses an image whose header is wrong, or that is not there.
+    ///
+    /// # Errors
+    /// [`AssetError::Malformed`] with the index of the image; [`AssetError::Cancelled`].
+    pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
+        let limits = ImageLimits::default();
+        let size = match self.image(number)? {
+            ImageBytes::File(file) => image::size(&file, limits, token),
+            ImageBytes::Inside(bytes) => {
+                image::size_within(ImageWithin { path: &self.path, bytes: bytes.into() }, limits, token)
+            }
+        };
+        size.map(drop).map_err(|error| self.about_image(number, error))
+    }
+
+    /// Refuses an image that cannot be decoded.
+    ///
+    /// # Errors
+    /// As for [`Container::check_image_header`].
+    pub fn check_image(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
+        let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
+        let texels = match self.image(number)? {
+            ImageBytes::File(file) => image::load(&file, encoding, limits, &unwatched, token),
+            ImageBytes::Inside(bytes) => {
+                let image = ImageWithin { path: &self.path, bytes: bytes.into() };
+                image::load_within(image, encoding, limits, &unwatched, token)
+            }
+        };
+        texels.map(drop).map_err(|error| self.about_image(number, error))
+    }
+}
+
+/// The compression of meshes that is not read.
+const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// The version of a file before glTF 2.0, whose JSON has objects in place of lists. `None` for another file.
+fn old_version(text: &[u8]) -> Option<String> {
+    #[derive(serde::Deserialize)]
+    struct Old {
+        asset: json::Asset,
+    }
+    let Old { asset } = serde_json::from_slice(text).ok()?;
+    let is_old = asset.version.starts_with("1.") || asset.version.starts_with("0.");
+    is_old.then_some(asset.version)
+}
+
+/// A message of the JSON parser with the words of JSON in place of those of Rust.
+fn in_words_of_json(message: &str) -> String {
+    let Some((before, expected)) = message.rsplit_once(", expected ") else { return message.to_owned() };
+    let before = match before.strip_prefix("invalid type: ") {
+        Some("map") => "invalid type: object".to_owned(),
+        Some("sequence") => "invalid type: array".to_owned(),
+        Some(_) | None => before.to_owned(),
+    };
+    let expected = match expected {
+        "usize" | "u64" | "u32" => "a whole number from 0",
+        "f64" => "a number",
+        "a sequence" => "an array",
+        "a map" => "an object",
+        other if other.starts_with("struct ") => "an object",
+        other => other,
+    };
+    format!("{before}, expected {expected}")
 }
 
 /// A longer text of a parser in a message.
@@ -268,11 +368,17 @@ fn chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), Wrong> {
         }
         None => return Err(Wrong::new("the file ends in its header")),
     }
+    let declared = word(8).map_or(0, |length| length as usize);
+    let end_of = |at: usize| (at + 8).checked_add(word(at)? as usize).filter(|end| *end <= bytes.len());
+    let is_chunk = |at: usize| matches!(word(at + 4), Some(JSON | BINARY)) && end_of(at).is_some();
     let (mut json, mut binary, mut at) = (None, None, 12);
     while let (Some(length), Some(kind)) = (word(at), word(at + 4)) {
         let start = at + 8;
-        let end = start.checked_add(length as usize).filter(|end| *end <= bytes.len());
-        let Some(end) = end else {
+        let Some(end) = end_of(at) else {
+            // Bytes behind the length that the header declares are no chunk.
+            if at >= declared && json.is_some() && !matches!(kind, JSON | BINARY) {
+                break;
+            }
             let has = bytes.len() - start;
             return Err(Wrong::new(format!(
                 "the chunk at byte {at} claims {length} bytes, and the file has {has} more"
@@ -283,7 +389,9 @@ fn chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), Wrong> {
             BINARY if binary.is_none() => binary = Some(start..end),
             _ => {}
         }
-        at = end.next_multiple_of(4);
+        // Some programs write chunks without the bytes that fill them up to a multiple of four.
+        let next = end.next_multiple_of(4);
+        at = if !is_chunk(next) && is_chunk(end) { end } else { next };
     }
     Ok((json.ok_or_else(|| Wrong::new("it has no JSON"))?, binary))
 }
@@ -298,18 +406,49 @@ fn check_version(root: &Root) -> Result<(), Wrong> {
 
 /// Extensions without which a file has no meshes or no pictures, and the way out.
 const MISSING: [(&str, &str); 5] = [
-    ("KHR_draco_mesh_compression", "export it without Draco compression"),
+    (DRACO, "export it without Draco compression"),
     ("EXT_meshopt_compression", "export it without meshopt compression"),
     ("KHR_meshopt_compression", "export it without meshopt compression"),
     ("KHR_texture_basisu", "export it with PNG or JPEG textures in place of Basis ones"),
     ("EXT_mesh_gpu_instancing", "export it with a node for each instance"),
 ];
 
-/// Refuses files that cannot be read without what glimt does not have.
+/// Extensions that are read, or whose loss a note states.
+const KNOWN: [&str; 20] = [
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_iridescence",
+    "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_variants",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    // Data about the file, which no picture shows.
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+];
+
+/// Refuses files that cannot be read without what glimt does not have (3.12).
 fn check_required(root: &Root) -> Result<(), Wrong> {
     for name in &root.extensions_required {
         if let Some((_, help)) = MISSING.iter().find(|(known, _)| known == name) {
             return Err(Wrong::new(format!("it needs {name}, which this version does not read; {help}")));
+        }
+        if !KNOWN.contains(&name.as_str()) {
+            return Err(Wrong::new(format!(
+                "it requires the extension {}, which this version does not read (extensionsRequired)",
+                shown(name)
+            )));
         }
     }
     Ok(())

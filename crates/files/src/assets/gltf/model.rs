@@ -215,7 +215,7 @@ impl Walk<'_> {
             self.scene.instances.push(ModelInstance {
                 name: name.clone(),
                 node: number,
-                part: first + index,
+                part: container.built_as(first + index),
                 placed,
                 material,
                 has_normals: primitive.attributes.contains_key("NORMAL"),

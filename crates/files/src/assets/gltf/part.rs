@@ -20,6 +20,15 @@ impl Primitive {
     pub(super) fn has_faces(&self) -> bool {
         [TRIANGLES, STRIP, FAN].contains(&self.mode)
     }
+
+    /// Corners of the triangles that a list of so many corners makes in its mode.
+    pub(super) fn corners_built(&self, count: u64) -> u64 {
+        match self.mode {
+            TRIANGLES => count,
+            STRIP | FAN => count.saturating_sub(2).saturating_mul(3),
+            _ => 0,
+        }
+    }
 }
 
 impl Container {
@@ -66,7 +75,7 @@ impl Container {
     }
 
     fn parsed(&self, primitive: &Primitive) -> Result<Parsed, Wrong> {
-        if primitive.extensions.contains_key("KHR_draco_mesh_compression") {
+        if primitive.extensions.contains_key(super::DRACO) {
             return Err(Wrong::new("its faces are compressed by Draco, which this version does not read"));
         }
         if !primitive.has_faces() {
@@ -75,6 +84,11 @@ impl Container {
         // Find the vertices of the corners.
         let positions = self.attribute(primitive, "POSITION")?;
         let positions = positions.ok_or_else(|| Wrong::new("it has no positions"))?;
+        if positions.width != 3 {
+            let width = positions.width;
+            let reason = format!("a position has three numbers (VEC3), and here {width}");
+            return Err(Wrong::new(reason).inside("POSITION"));
+        }
         let (corners, vertices) = self.corners(primitive, positions.count)?;
         // Read what the vertices have.
         let is_whole = |numbers: &Numbers<'_>| numbers.count >= positions.count;

@@ -383,6 +383,137 @@ fn shared_bytes_are_bounded() {
     assert!(says(&json).contains("its primitives claim 419430400 corners"), "{}", says(&json));
 }
 
+/// A mesh that many primitives have is built once, with the coordinates that their materials ask for.
+#[test]
+fn primitives_with_the_same_mesh_are_one_part() {
+    let mut json = square();
+    let primitive = json["meshes"][0]["primitives"][0].clone();
+    let mut primitives = vec![primitive.clone(); 100_000];
+    let mut strip = primitive;
+    strip["mode"] = json!(5);
+    primitives.push(strip);
+    json["meshes"] = json!([{"primitives": primitives}, {"primitives": primitives[..1]}]);
+    json["nodes"] = json!([{"mesh": 0}, {"mesh": 1}]);
+    json["scenes"] = json!([{"nodes": [0, 1]}]);
+    let container = open_json(&json).expect("read");
+    let scene = scene(&container).expect("a scene");
+    let mut parts: Vec<usize> = scene.instances.iter().map(|instance| instance.part).collect();
+    assert_eq!(parts.len(), 100_002);
+    parts.sort_unstable();
+    parts.dedup();
+    assert_eq!(parts, [0, 100_000]);
+}
+
+/// Primitives that differ in what nobody reads are built each, and count each, as the triangles that their modes make of them.
+#[test]
+fn every_primitive_that_is_built_is_counted() {
+    let mut json = square();
+    json["accessors"][1] = json!({"componentType": 5121, "count": 10_000, "type": "SCALAR"});
+    let primitives = |mode: u32| -> Vec<Value> {
+        let one =
+            |unread: u32| json!({"attributes": {"POSITION": 0, "_A": unread}, "indices": 1, "mode": mode});
+        (0..40).map(one).collect()
+    };
+    json["meshes"][0]["primitives"] = json!(primitives(4));
+    assert!(open_json(&json).is_ok());
+    json["meshes"][0]["primitives"] = json!(primitives(5));
+    let said = says(&json);
+    let words = "its primitives claim 1199760 corners of triangles, and its 92 bytes of buffers may have 1048668: one a byte, \
+                 and 1048576 more";
+    assert!(said.contains(words), "{said}");
+}
+
+#[test]
+fn a_required_extension_that_is_unknown_is_refused_by_its_name() {
+    let mut json = square();
+    json["extensionsRequired"] =
+        json!(["KHR_texture_transform", "KHR_materials_sheen", "KHR_mesh_quantization"]);
+    assert!(open_json(&json).is_ok());
+    json["extensionsRequired"] = json!(["KHR_texture_transform", "FOO_bar"]);
+    assert!(says(&json).contains("it requires the extension FOO_bar, which this version does not read"));
+}
+
+#[test]
+fn old_versions_and_wrong_types_are_named_in_words_of_json() {
+    let old = json!({"asset": {"version": "1.0"}, "nodes": {"a": {}}, "meshes": {}});
+    assert!(says(&old).contains(": it is glTF 1.0; version 2 is read"), "{}", says(&old));
+    for (pointer, value, words) in [
+        ("/nodes/0/mesh", json!("a"), "invalid type: string \"a\", expected a whole number from 0"),
+        ("/nodes/0/mesh", json!(-1), "invalid value: integer `-1`, expected a whole number from 0"),
+        ("/nodes/0/translation/0", json!("a"), "invalid type: string \"a\", expected a number"),
+        ("/nodes", json!({}), "invalid type: object, expected an array"),
+        ("/nodes/0", json!(7), "invalid type: integer `7`, expected an object"),
+    ] {
+        let mut json = square();
+        *json.pointer_mut(pointer).expect("a place") = value;
+        assert!(says(&json).contains(words), "{pointer}: {}", says(&json));
+    }
+    let mut flat = square();
+    flat["accessors"][0]["type"] = json!("VEC2");
+    assert!(
+        says(&flat).contains("POSITION: a position has three numbers (VEC3), and here 2"),
+        "{}",
+        says(&flat)
+    );
+}
+
+/// Chunks as some programs write them: without the bytes up to a multiple of four; and bytes behind the file's own end.
+#[test]
+fn a_glb_may_have_chunks_of_any_length_and_bytes_behind_its_end() {
+    let desk = Desk::new();
+    let mut json = square();
+    json["buffers"][0].as_object_mut().expect("an object").remove("uri");
+    let expected = part(&desk.open("a.glb", &glb(&json, &bytes())).expect("read"), 0).expect("a mesh").mesh;
+    let text = json.to_string();
+    for blanks in 0..4 {
+        let text = format!("{text}{}", " ".repeat(blanks));
+        let mut file = b"glTF\x02\0\0\0\0\0\0\0".to_vec();
+        for (kind, chunk) in [(b"JSON", text.as_bytes()), (b"BIN\0", &bytes())] {
+            file.extend((chunk.len() as u32).to_le_bytes());
+            file.extend(kind);
+            file.extend(chunk);
+        }
+        let length = (file.len() as u32).to_le_bytes();
+        file[8..12].copy_from_slice(&length);
+        let mesh = |file: &[u8]| part(&desk.open("a.glb", file)?, 0).map(|loaded| loaded.mesh);
+        assert_eq!(mesh(&file).expect("read"), expected, "{blanks}");
+        file.extend(b"trailing");
+        assert_eq!(mesh(&file).expect("read"), expected, "{blanks}");
+    }
+}
+
+/// An image that is not there, or damaged behind its header, is named by its index in this file.
+#[test]
+fn an_image_that_is_wrong_is_named_by_its_index() {
+    let desk = Desk::new();
+    let mut json = square();
+    let mut png = Vec::new();
+    let pixels = ::image::RgbImage::from_fn(8, 8, |x, y| ::image::Rgb([x as u8 * 9, y as u8 * 7, 3]));
+    pixels.write_to(&mut std::io::Cursor::new(&mut png), ::image::ImageFormat::Png).expect("written");
+    desk.write("whole", &png);
+    let end = png.len() - 20;
+    png[end] ^= 255;
+    desk.write("damaged.png", &png);
+    json["images"] = json!([
+        {"uri": "none.png"}, {"uri": "damaged.png"}, {"uri": coded(&png)}, {"uri": "whole"}, {"bufferView": 0}
+    ]);
+    let container = desk.open("a.gltf", json.to_string().as_bytes()).expect("read");
+    let token = CancelToken::new();
+    let says = |number, words: &str| {
+        let said = container.check_image(number, &token).expect_err("refused").to_string();
+        assert!(said.contains(&format!("a.gltf: images[{number}]: ")) && said.contains(words), "{said}");
+        assert!(!said.contains("ChunkType"), "{said}");
+    };
+    says(0, "none.png: no such file or directory");
+    says(1, "damaged.png: it claims 8 × 8 pixels");
+    says(2, "images[2]: it claims 8 × 8 pixels");
+    says(4, "its content is no image that can be read");
+    assert!(container.check_image(3, &token).is_ok());
+    assert!(
+        container.check_image_header(1, &token).is_ok() && container.check_image_header(0, &token).is_err()
+    );
+}
+
 #[test]
 fn a_glb_that_is_cut_or_foreign_is_an_error() {
     let desk = Desk::new();

@@ -383,9 +383,18 @@ fn reason(error: &ImageError) -> String {
         ImageError::Limits(error) if error.kind() == LimitErrorKind::InsufficientMemory => {
             "it takes more memory than an image may take".to_owned()
         }
-        _ => error.to_string(),
+        _ => without_types(&error.to_string()),
     };
     if words.chars().count() <= MOST { words } else { words.chars().take(MOST).chain(['…']).collect() }
+}
+
+/// A decoder's words with the name of a chunk in place of all that the decoder knows of it.
+fn without_types(words: &str) -> String {
+    const OPENING: &str = "ChunkType { type: ";
+    let Some((before, rest)) = words.split_once(OPENING) else { return words.to_owned() };
+    let Some((chunk, after)) = rest.split_once(" }") else { return words.to_owned() };
+    let name = chunk.split(',').next().unwrap_or_default();
+    format!("{before}{name}{after}")
 }
 
 #[cfg(test)]

@@ -67,6 +67,10 @@ fn binary(source: &Source<'_>) -> Result<Parsed, AssetError> {
         return Err(source
             .wrong(format!("the header claims {claimed} facets, and the file ends after {found} of them")));
     }
+    if found == 0 {
+        return Err(source
+            .wrong(format!("the header claims 0 facets, and {behind} bytes follow; a facet takes {FACET}")));
+    }
     // A count of 0 is that of programs which do not know it yet when they begin to write.
     let (count, mut warnings) = (if claimed == 0 { found } else { claimed }, Vec::new());
     if claimed != 0 && (found > claimed || behind > 0) {

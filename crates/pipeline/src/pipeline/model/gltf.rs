@@ -1,6 +1,6 @@
 //! Scenes of glTF files.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
 use std::path::Path;
 
@@ -71,10 +71,14 @@ pub(super) fn text(
         files: Unique::default(),
         assets: Vec::new(),
         names: HashMap::new(),
+        images: BTreeSet::new(),
         image_names: scene.images.clone(),
     };
     writer.write(&scene, bounds, show);
-    let Writer { toml, assets, .. } = writer;
+    let Writer { toml, assets, images, .. } = writer;
+    for image in images {
+        container.check_image_header(image, token)?;
+    }
     let ModelScene { notes, .. } = scene;
     Ok(ModelText { text: toml.finish(), companions: container.companions().to_vec(), notes, assets })
 }
@@ -88,6 +92,8 @@ struct Writer<'a> {
     files: Unique,
     assets: Vec<Asset>,
     names: HashMap<Content, String>,
+    /// Images that materials show.
+    images: BTreeSet<usize>,
     image_names: Vec<String>,
 }
 
@@ -251,16 +257,16 @@ impl super::materials::Files for Writer<'_> {
     }
 
     fn image(&mut self, image: usize) -> TextureFile {
+        self.images.insert(image);
         let bytes = self.container.image(image);
         match (self.naming, bytes) {
-            (Naming::Inside, Ok(ImageBytes::File(file))) => {
+            (Naming::Inside, Ok(ImageBytes::File(file))) if has_ending(&file) => {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
                 let name = file.strip_prefix(folder).unwrap_or(&file);
                 TextureFile { file: name.to_string_lossy().into_owned(), image: None }
             }
-            (Naming::Inside, Ok(ImageBytes::Inside(_)) | Err(_)) => {
-                TextureFile { file: file_name(self.path), image: Some(image) }
-            }
+            // A file without an ending is known by its content, as an image inside is.
+            (Naming::Inside, _) => TextureFile { file: file_name(self.path), image: Some(image) },
             (Naming::Folder(_), bytes) => {
                 let ending = match &bytes {
                     Ok(ImageBytes::Inside(bytes)) => ending(bytes).to_owned(),
@@ -277,6 +283,12 @@ impl super::materials::Files for Writer<'_> {
             }
         }
     }
+}
+
+/// Whether a file has the ending of an image.
+fn has_ending(file: &Path) -> bool {
+    let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    MAPS.contains(&ending.as_str())
 }
 
 /// Whether a material may throw light on others as a mirror does. A texture may have any number up to its factor.

@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use super::gltf::{Content, Naming};
 use super::{ModelText, Show, in_its_scene};
 use crate::assets::AssetError;
-use crate::assets::gltf::{Container, ImageBytes, is_gltf};
-use crate::assets::image::{ImageLimits, ImageWithin, size, size_within};
+use crate::assets::gltf::is_gltf;
 use crate::assets::mesh::ply::write;
 use crate::control::{CancelToken, unwatched};
 use crate::pipeline::stages::containers::Containers;
@@ -44,7 +43,8 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
             let bytes = match asset.content {
                 Content::Part(part) => write::bytes(&container.part(part, &unwatched, token)?.mesh),
                 Content::Image(image) => {
-                    check_image(&container, image, token)?;
+                    // Files from anywhere could be copied under the name of an image.
+                    container.check_image(image, token)?;
                     container.image_content(image, token)?
                 }
             };
@@ -63,21 +63,4 @@ fn check_scene(path: &Path, containers: &Containers, token: &CancelToken) -> Res
     let counts = |one: &&Diagnostic| one.severity == Severity::Error && !one.message.contains("`file`");
     let Some(first) = errors.into_iter().find(|one| counts(&one)) else { return Ok(()) };
     Err(AssetError::Malformed { path: path.to_owned(), line: None, reason: in_its_scene(first).message })
-}
-
-/// Refuses what is no image: files from anywhere could be copied under the name of one.
-fn check_image(container: &Container, image: usize, token: &CancelToken) -> Result<(), AssetError> {
-    let limits = ImageLimits::default();
-    let size = match container.image(image)? {
-        ImageBytes::File(file) => size(&file, limits, token),
-        ImageBytes::Inside(bytes) => {
-            size_within(ImageWithin { path: container.path(), bytes: bytes.into() }, limits, token)
-        }
-    };
-    size.map(drop).map_err(|error| match error {
-        AssetError::Malformed { path, line, reason } => {
-            AssetError::Malformed { path, line, reason: format!("{reason} (images[{image}])") }
-        }
-        other => other,
-    })
 }

@@ -23,6 +23,9 @@ fn usual_up(path: &Path) -> UpAxis {
     if has("stl") || has("ply") && is_by_blender(path) { UpAxis::Z } else { UpAxis::Y }
 }
 
+/// Most that a coordinate may be: scenes take less than 10¹⁸, and cameras stand some sizes of the model away.
+const MOST: f64 = 1e17;
+
 /// Whether the header of a PLY file names Blender, which leaves its axes as they are.
 fn is_by_blender(path: &Path) -> bool {
     const START: usize = 256;
@@ -85,6 +88,11 @@ pub(super) fn text(
             reason: "no usable face".to_owned(),
         });
     };
+    let farthest = least.abs().max(greatest.abs()).max_element();
+    if farthest >= MOST {
+        let reason = format!("its coordinates reach to {:e}, and must stay below {MOST:e}", farthest as f32);
+        return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
+    }
     let up = show.up.unwrap_or_else(|| usual_up(path));
     let upright = |at: DVec3| up.upright(at);
     let (a, b) = (upright(least), upright(greatest));

@@ -1,5 +1,6 @@
 //! Mesh files, several at once, each read only when its content changed.
 
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 use std::time::SystemTime;
@@ -80,7 +81,7 @@ pub(in crate::pipeline) fn meshes(
     })?;
     let mut meshes = Vec::new();
     let mut counts = Counts::default();
-    let mut warnings = Vec::new();
+    let mut warnings = Warnings::default();
     let own_materials = with_own_materials(&loaded.scene);
     for ((file, asset), uses_own) in files.iter().zip(assets).zip(own_materials) {
         let content = asset.files[0].content;
@@ -89,8 +90,7 @@ pub(in crate::pipeline) fn meshes(
             Ok((mesh, was_kept)) => {
                 counts.kept += usize::from(was_kept);
                 counts.loaded += usize::from(!was_kept);
-                let said = warnings_of(&mesh.mesh, uses_own);
-                warnings.extend(said.map(|said| (file, format!("{}: {said}", file.value.display()))));
+                warnings.add(file, &mesh.mesh, uses_own);
                 let bytes = mesh.mesh.mesh.memory_bytes();
                 cache.insert(name(file), file_key(file, content), (mesh.clone(), bytes));
                 mesh
@@ -106,7 +106,7 @@ pub(in crate::pipeline) fn meshes(
         };
         meshes.push(mesh);
     }
-    warn(loaded, warnings, findings);
+    warn(loaded, warnings.in_words(), findings);
     for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
         if let Some(mesh) = object.shape.mesh()
             && meshes[mesh.file].mesh.lacks_materials()
@@ -260,10 +260,59 @@ fn with_own_materials(scene: &Scene) -> Vec<bool> {
     shown
 }
 
-/// Warnings about a file. Those about its own materials count only if an object shows these.
-fn warnings_of(mesh: &LoadedMesh, uses_own: bool) -> impl Iterator<Item = String> {
-    let of_materials = mesh.material_warnings.iter().filter(move |_| uses_own);
-    dropped(&mesh.dropped).into_iter().chain(mesh.warnings.iter().chain(of_materials).cloned())
+/// Warnings about mesh files, each said once. The faces that parts of a file leave out are counted together.
+#[derive(Default)]
+struct Warnings<'a> {
+    all: Vec<(&'a MeshFile, Warning)>,
+    /// Place in the list of the faces that a file leaves out.
+    dropped: HashMap<&'a Path, usize>,
+    known: HashSet<String>,
+}
+
+enum Warning {
+    /// Faces left out by so many parts.
+    Dropped(Dropped, usize),
+    Words(String),
+}
+
+impl<'a> Warnings<'a> {
+    /// Adds those of a file. Those about its own materials count only if an object shows these.
+    fn add(&mut self, file: &'a MeshFile, mesh: &LoadedMesh, uses_own: bool) {
+        if mesh.dropped != Dropped::default() {
+            let place = *self.dropped.entry(&file.value).or_insert(self.all.len());
+            match self.all.get_mut(place) {
+                Some((_, Warning::Dropped(all, parts))) => {
+                    all.non_finite += mesh.dropped.non_finite;
+                    all.degenerate += mesh.dropped.degenerate;
+                    *parts += 1;
+                }
+                Some((_, Warning::Words(_))) | None => {
+                    self.all.push((file, Warning::Dropped(mesh.dropped, 1)));
+                }
+            }
+        }
+        let of_materials = mesh.material_warnings.iter().filter(move |_| uses_own);
+        for said in mesh.warnings.iter().chain(of_materials) {
+            let words = format!("{}: {said}", file.value.display());
+            if self.known.insert(words.clone()) {
+                self.all.push((file, Warning::Words(words)));
+            }
+        }
+    }
+
+    fn in_words(self) -> Vec<(&'a MeshFile, String)> {
+        let words = |(file, warning): (&'a MeshFile, Warning)| {
+            let words = match warning {
+                Warning::Words(words) => words,
+                Warning::Dropped(faces, parts) => {
+                    let of_parts = if parts > 1 { format!(" in {parts} parts") } else { String::new() };
+                    format!("{}: {}{of_parts}", file.value.display(), dropped(&faces)?)
+                }
+            };
+            Some((file, words))
+        };
+        self.all.into_iter().filter_map(words).collect()
+    }
 }
 
 /// Most warnings of all mesh files.
@@ -466,6 +515,29 @@ mod tests {
         let mesh = asset.result.expect("a mesh").0;
         assert_eq!(asset.files[1].content, desk.hash("a.mtl"));
         assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0, "the mesh has what the file is said to hold");
+    }
+
+    #[test]
+    fn a_warning_about_many_parts_of_a_file_is_said_once() {
+        let part = |part| MeshFile { value: PathBuf::from("a.glb"), part: Some(part), span: 0..0 };
+        let (files, other) =
+            ([part(0), part(1), part(2)], MeshFile { value: "b.ply".into(), part: None, span: 0..0 });
+        let mesh = |degenerate, warning: &str| LoadedMesh {
+            dropped: Dropped { non_finite: 0, degenerate },
+            warnings: vec![warning.to_owned()],
+            ..LoadedMesh::default()
+        };
+        let mut warnings = Warnings::default();
+        files.iter().for_each(|file| warnings.add(file, &mesh(149, "odd"), true));
+        warnings.add(&other, &mesh(1, "odd"), true);
+        let said: Vec<String> = warnings.in_words().into_iter().map(|(_, said)| said).collect();
+        let expected = [
+            "a.glb: left out 447 faces without area in 3 parts",
+            "a.glb: odd",
+            "b.ply: left out 1 face without area",
+            "b.ply: odd",
+        ];
+        assert_eq!(said, expected);
     }
 
     #[test]

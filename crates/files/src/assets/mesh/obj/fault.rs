@@ -14,7 +14,6 @@ pub(super) fn first_fault(source: &Source<'_>) -> Option<AssetError> {
             b"vt" => counted(&mut cursor, &mut counts[1], 2, "texture coordinates"),
             b"vn" => counted(&mut cursor, &mut counts[2], 3, "normal coordinates"),
             b"f" => face_fault(&mut cursor, counts),
-            b"usemtl" if !cursor.skip_in_line() => Some("`usemtl` is followed by a name".to_owned()),
             _ => None,
         };
         if let Some(reason) = reason {
@@ -29,17 +28,22 @@ fn counted(cursor: &mut Cursor<'_>, count: &mut i64, wanted: usize, what: &str) 
     *count += 1;
     let mut found = 0;
     let mut last = 1.0;
+    let mut all_finite = true;
     while skip_in_statement(cursor) {
         let mut start = *cursor;
         let Some(number) = cursor.float() else {
             return Some(format!("expected {wanted} {what}, found {}", shown(start.word())));
         };
         last = number;
+        all_finite &= found < wanted || number.is_finite();
         found += 1;
     }
     match found {
         4 if what == "coordinates" && last == 0.0 => Some("the weight of a vertex is 0".to_owned()),
         4 if wanted == 3 => None,
+        6 if what == "coordinates" && !all_finite => {
+            Some("the colours of a vertex are finite numbers".to_owned())
+        }
         5 if what == "coordinates" => {
             Some("coordinates are followed by one weight or three colours".to_owned())
         }
@@ -61,13 +65,6 @@ fn skip_in_statement(cursor: &mut Cursor<'_>) -> bool {
         *cursor = ahead;
     }
     false
-}
-
-/// An error for the corner that ends with this slash.
-pub(super) fn open_corner(source: &Source<'_>, slash: usize) -> AssetError {
-    let until = &source.bytes[..=slash];
-    let corner = until.rsplit(u8::is_ascii_whitespace).next().unwrap_or(until);
-    source.wrong_at(slash, format!("expected a corner like 1/2/3, found {}", shown(corner)))
 }
 
 fn face_fault(cursor: &mut Cursor<'_>, counts: [i64; 3]) -> Option<String> {

@@ -13,9 +13,6 @@ use crate::control::{CancelToken, Cancelled};
 pub(super) struct Survey<'a> {
     pub(super) text: Cow<'a, [u8]>,
     pub(super) used_materials: BTreeSet<String>,
-    /// Place of a slash that ends the first such corner of a face, with its number missing; `tobj` takes the corner for one
-    /// without a slash.
-    pub(super) open_corner: Option<usize>,
     /// Number of vertices, and the places of the colours among them.
     vertices: usize,
     colors: Vec<Range<usize>>,
@@ -24,7 +21,8 @@ pub(super) struct Survey<'a> {
 impl<'a> Survey<'a> {
     /// Prepares the text of an OBJ. It blanks comments behind numbers, colours unless all vertices have one, and lines that `tobj`
     /// mistakes for faces (`l`, `p`). It joins lines that continue behind a backslash, moves keywords before names to
-    /// the start of their line, replaces bytes beyond UTF-8, and adds a second texture coordinate of 0 to single ones.
+    /// the start of their line, replaces bytes beyond UTF-8, drops slashes that end corners, and adds a second texture coordinate of 0
+    /// to single ones and a name to `usemtl` without one.
     ///
     /// # Errors
     /// [`Cancelled`] if the token is cancelled.
@@ -32,12 +30,11 @@ impl<'a> Survey<'a> {
         let mut survey = Self {
             text: Cow::Borrowed(bytes),
             used_materials: BTreeSet::new(),
-            open_corner: None,
             vertices: 0,
             colors: Vec::new(),
         };
         let mut unfinished = None;
-        let mut lone = Vec::new();
+        let mut inserted = Vec::new();
         let mut start = 0;
         for end in memchr::memchr_iter(b'\n', bytes).chain([bytes.len()]) {
             token.check()?;
@@ -45,13 +42,16 @@ impl<'a> Survey<'a> {
             let (statement, words) =
                 unfinished.take().unwrap_or_else(|| (Statement::of(line.trim_ascii_start()), 0));
             let Line { goes_on, content } = survey.line(start, line, statement);
-            if survey.open_corner.is_none() && statement.is_face() {
-                survey.open_corner = open_corner(content).map(|slash| start + slash);
+            if statement.is_face() {
+                open_slashes(content).for_each(|place| survey.blank(start + place.start..start + place.end));
+            }
+            if let Some(place) = unnamed_material(line) {
+                inserted.push((start + place, NO_MATERIAL));
             }
             if statement.is_texture() {
                 let words = words + words_of(content).take(LONE_TEXTURE_WORDS + 1).count();
                 if !goes_on && words == LONE_TEXTURE_WORDS {
-                    lone.push(start + content.len());
+                    inserted.push((start + content.len(), SECOND));
                 }
                 unfinished = goes_on.then_some((statement, words));
             } else {
@@ -62,24 +62,24 @@ impl<'a> Survey<'a> {
         if survey.colors.len() < survey.vertices {
             std::mem::take(&mut survey.colors).into_iter().for_each(|place| survey.blank(place));
         }
-        survey.complete(&lone);
+        survey.insert(&inserted);
         if !survey.text.is_ascii() && std::str::from_utf8(&survey.text).is_err() {
             survey.text = Cow::Owned(String::from_utf8_lossy(&survey.text).into_owned().into_bytes());
         }
         Ok(survey)
     }
 
-    /// Adds a second coordinate at these places.
-    fn complete(&mut self, places: &[usize]) {
-        if places.is_empty() {
+    /// Adds words at places in rising order.
+    fn insert(&mut self, words: &[(usize, &[u8])]) {
+        if words.is_empty() {
             return;
         }
-        const SECOND: &[u8] = b" 0";
-        let mut text = Vec::with_capacity(self.text.len() + SECOND.len() * places.len());
+        let more: usize = words.iter().map(|(_, word)| word.len()).sum();
+        let mut text = Vec::with_capacity(self.text.len() + more);
         let mut start = 0;
-        for &place in places {
+        for &(place, word) in words {
             text.extend_from_slice(&self.text[start..place]);
-            text.extend_from_slice(SECOND);
+            text.extend_from_slice(word);
             start = place;
         }
         text.extend_from_slice(&self.text[start..]);
@@ -130,7 +130,7 @@ impl<'a> Survey<'a> {
     fn named(&mut self, start: usize, line: &[u8]) {
         let statement = line.trim_ascii();
         let keyword = statement.iter().position(u8::is_ascii_whitespace).unwrap_or(statement.len());
-        if statement.starts_with(b"usemtl") {
+        if statement.starts_with(b"usemtl") && keyword < statement.len() {
             self.used_materials.insert(String::from_utf8_lossy(&statement[keyword..]).trim().to_owned());
         }
         if line.len() > keyword && (!line.starts_with(statement) || line[keyword] != b' ') {
@@ -222,10 +222,29 @@ impl Statement {
     }
 }
 
-/// Finds the first slash that ends a word.
-fn open_corner(content: &[u8]) -> Option<usize> {
+/// The second coordinate of a `vt` with one.
+const SECOND: &[u8] = b" 0";
+/// The name that stands for none: a control character, which no program writes.
+const NO_MATERIAL: &[u8] = b" \x01";
+
+/// Place of the name that a `usemtl` lacks, once the keyword begins its line. `None` for other lines.
+fn unnamed_material(line: &[u8]) -> Option<usize> {
+    let keyword = line.trim_ascii();
+    (keyword == b"usemtl").then_some(keyword.len())
+}
+
+/// Places of the slashes that end a corner, behind which programs leave out numbers: `1//` and `2/2/`. `tobj` would take the
+/// corner for one without any slash.
+fn open_slashes(content: &[u8]) -> impl Iterator<Item = Range<usize>> {
     let ends_word = |slash: &usize| content.get(slash + 1).is_none_or(u8::is_ascii_whitespace);
-    memchr::memchr_iter(b'/', content).find(ends_word)
+    memchr::memchr_iter(b'/', content).filter(ends_word).filter_map(|last| {
+        let before = &content[..=last];
+        let start = before.iter().rposition(u8::is_ascii_whitespace).map_or(0, |blank| blank + 1);
+        let word = &before[start..];
+        let number = word.iter().rposition(|byte| *byte != b'/')?;
+        let slashes = word.iter().filter(|byte| **byte == b'/').count();
+        (slashes <= 2).then_some(start + number + 1..last + 1)
+    })
 }
 
 /// Place of the three colours of a vertex; `tobj` requires them of all vertices or of none.

@@ -6,6 +6,7 @@ mod input;
 mod libraries;
 
 use std::cell::RefCell;
+use std::path::PathBuf;
 
 use super::assemble::{Parsed, assemble, color_bytes};
 use super::text::with_line_feeds;
@@ -13,7 +14,7 @@ use super::{AssetError, LoadedMesh, Source};
 use crate::assets::FileMaterial;
 use crate::assets::contain::contain;
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
-use fault::{first_fault, open_corner};
+use fault::first_fault;
 use input::{Chunks, Survey};
 use libraries::{Found, Libraries};
 
@@ -27,9 +28,6 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
 
 fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     let survey = Survey::of(source.bytes, source.watch.token)?;
-    if let Some(slash) = survey.open_corner {
-        return Err(open_corner(source, slash));
-    }
     let used = &survey.used_materials;
     let libraries = Libraries { source, used, found: RefCell::default(), failed: RefCell::default() };
     let mut reader = Chunks::new(source, &survey.text);
@@ -46,11 +44,12 @@ fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
         };
         return Err(first_fault(source).unwrap_or_else(|| source.wrong(reason)));
     };
-    let Found { materials: known, resolved, warnings: mut material_warnings, missing, files, pictures } =
+    let Found { materials: known, resolved, warnings: mut material_warnings, missing, mut files, pictures } =
         libraries.found.into_inner();
-    let materials: Vec<FileMaterial> = materials.map_or(Vec::new(), |found| {
+    let mut materials: Vec<FileMaterial> = materials.map_or(Vec::new(), |found| {
         found.iter().filter_map(|material| known.get(&material.name).cloned()).collect()
     });
+    leave_out_missing(&mut materials, &mut files, &mut material_warnings);
     if !missing {
         let unknown = used.difference(&resolved);
         material_warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
@@ -59,6 +58,25 @@ fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
         Parsed { materials, material_warnings, companions: files, pictures, ..Parsed::default() };
     join(&models, &mut parsed);
     assemble(source, parsed)
+}
+
+/// Takes textures whose files do not exist from their materials, which then have their plain values, and warns of them. The
+/// files join those that the mesh depends on, so that their coming is noticed.
+fn leave_out_missing(materials: &mut [FileMaterial], files: &mut Vec<PathBuf>, warnings: &mut Vec<String>) {
+    for material in materials {
+        let name = material.name.clone();
+        for texture in material.textures_mut() {
+            let Some(path) = texture.take_if(|path| !path.exists()) else { continue };
+            let warning = format!(
+                "cannot read {}: no such file or directory; the material {name:?} is shown without it",
+                path.display()
+            );
+            if !warnings.contains(&warning) {
+                warnings.push(warning);
+                files.push(path);
+            }
+        }
+    }
 }
 
 /// Joins the models (one for each object, group and material) into one mesh.

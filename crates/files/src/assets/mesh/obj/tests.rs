@@ -207,35 +207,71 @@ fn lines_may_end_in_carriage_returns_alone() {
 }
 
 #[test]
-fn a_corner_that_ends_with_a_slash_lacks_a_number() {
-    let head = format!("{SQUARE}vt 0 0\nvn 0 0 1\n");
-    for (faces, found) in [
-        ("f 1// 2/ 3/", "1//"),
-        ("f 1 2 3/", "3/"),
-        ("f 1 \\\n 2 \\\r\n 3/\t4", "3/"),
-        ("f 1 2/1/ 3\r", "2/1/"),
-        ("f 1 2 3/ # x", "3/"),
-        ("f 1 2 3/# x", "3/"),
+fn a_corner_that_ends_with_a_slash_leaves_numbers_out() {
+    let head = format!("{SQUARE}vt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\n");
+    let mesh = |faces: &str| read(&format!("{head}{faces}\n")).expect(faces).mesh;
+    let (plain, textured) = (mesh("f 1 2 3"), mesh("f 1/1 2/2 3/3"));
+    for faces in [
+        "f 1// 2// 3//",
+        "f 1/ 2/ 3/",
+        "f 1// 2/ 3 # x",
+        "f 1 \\\n 2/ \\\r\n 3/\t",
+        "f 1 2 3/# x",
+        "f 1 2 3//\r",
     ] {
-        let line = 7 + faces.matches('\\').count();
-        let said = format!(":{line}: expected a corner like 1/2/3, found {found:?}");
-        assert_eq!(says(&format!("{head}{faces}\n")), said, "{faces}");
-        assert_eq!(says(&format!("{head}{faces}")), said, "{faces}");
+        assert_eq!(mesh(faces), plain, "{faces}");
     }
-    assert!(
-        says(&format!("{head}# note \\\nf 1 2 3/\n")).contains("found \"3/\""),
-        "a comment ends with its line"
+    for faces in ["f 1/1/ 2/2/ 3/3/", "f 1/1 2/2/ 3/3", "f 1/1/ 2/2/ 3/3/\r"] {
+        assert_eq!(mesh(faces), textured, "{faces}");
+    }
+    for faces in ["f 1 2 3/1/1/", "f 1 2 3 /", "f 1 2 //", "f 1 2 /1/"] {
+        let said = says(&format!("{head}{faces}\n"));
+        assert!(said.starts_with(":9: expected a corner like 1/2/3"), "{faces}: {said}");
+    }
+    for whole in
+        ["g here/\nf 1 2 3", "# f 1/\nf 1 2 3", "mtllib f/ 1/\nf 1 2 3", "f 1 2 3 \\\n\ng here/ there"]
+    {
+        assert_eq!(mesh(whole), plain, "{whole}");
+    }
+}
+
+#[test]
+fn a_missing_picture_is_a_warning_as_a_missing_library_is() {
+    let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\n");
+    let library = b"newmtl red\nKd 1 0 0\nmap_Kd none.png\nmap_Ks none.png\nmap_Pr none.png\nnewmtl unused\nmap_Kd no.png\n";
+    let loaded = read_with(&[("a.obj", text.as_bytes()), ("a.mtl", library)]).expect("whole");
+    let material = &loaded.materials[0];
+    assert_eq!(
+        (material.diffuse, &material.diffuse_texture, &material.specular_texture),
+        (Vec3::X, &None, &None)
     );
-    for whole in [
-        "f 1/1/1 2/1/1 3/1/1 # 4/ 5/",
-        "g here/\nf 1 2 3",
-        "# f 1/\nf 1 2 3",
-        "mtllib f/ 1/\nf 1 2 3",
-        // The empty line belongs to the face; the line after it does not.
-        "f 1 2 3 \\\n\ng here/ there",
-    ] {
-        assert!(read(&format!("{head}{whole}\n")).is_ok(), "{whole}");
+    let [warning] = &loaded.material_warnings[..] else { panic!("one: {:?}", loaded.material_warnings) };
+    assert!(
+        warning.ends_with("none.png: no such file or directory; the material \"red\" is shown without it"),
+        "{warning}"
+    );
+    assert!(loaded.companions.iter().any(|file| file.ends_with("none.png")));
+}
+
+#[test]
+fn a_usemtl_without_a_name_ends_the_material() {
+    for none in ["usemtl", "usemtl ", "  usemtl\t", "usemtl\r"] {
+        let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\n{none}\nf 1 3 4\n");
+        let files = [("a.obj", text.as_bytes()), ("a.mtl", &b"newmtl red\nKd 1 0 0\n"[..])];
+        let loaded = read_with(&files).expect("whole");
+        assert_eq!(loaded.mesh.materials, [0, u32::MAX], "{none:?}");
+        assert!(loaded.material_warnings.is_empty(), "{none:?}: {:?}", loaded.material_warnings);
+        assert_eq!(
+            says(&format!("{SQUARE}{none}\nf 1 2 9\n")),
+            ":6: vertex 9 is out of range: there are 4, from 1"
+        );
     }
+}
+
+#[test]
+fn a_colour_that_is_no_number_has_its_line() {
+    let said = says("v 0 0 0 1 1 1\nv 1 0 0 nan nan nan\nv 0 1 0 1 1 1\nf 1 2 3\n");
+    assert_eq!(said, ":2: the colours of a vertex are finite numbers");
 }
 
 #[test]

@@ -160,7 +160,12 @@ fn statement(
         }
         ["property", ref words @ ..] => {
             let element = elements.last_mut().ok_or("a property before the first element")?;
-            element.properties.push(property(words)?);
+            let property = property(words)?;
+            if element.properties.iter().any(|known| known.name == property.name) {
+                let (name, of) = (shown(property.name.as_bytes()), shown(element.name.as_bytes()));
+                return Err(format!("the property {name} of {of} is there twice"));
+            }
+            element.properties.push(property);
         }
         [first, ..] => return Err(format!("{} is no statement of a PLY header", shown(first.as_bytes()))),
     }
