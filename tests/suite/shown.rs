@@ -499,7 +499,7 @@ fn models_that_cannot_be_shown_are_named_by_what_is_wrong() {
         let reach = said.split_once("its coordinates reach to ").map(|(_, rest)| rest);
         let reach = reach.and_then(|rest| rest.split(',').next()?.parse::<f64>().ok());
         assert!(reach.is_some_and(|reach| (reach / 1e20 - 1.0).abs() < 1e-6), "{said}");
-        assert!(said.contains("must stay below 1e17") && !said.contains("position"), "{said}");
+        assert!(said.contains("must stay below 1e18") && !said.contains("position"), "{said}");
     }
     desk.write("a.fbx", "Kaydara FBX Binary");
     let said = desk.expect("check a.fbx", 2);

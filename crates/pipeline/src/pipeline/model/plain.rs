@@ -12,6 +12,7 @@ use super::{
 use crate::assets::{AssetError, FileMaterial};
 use crate::control::{CancelToken, unwatched};
 use crate::math::DVec3;
+use crate::math::limits::LARGEST;
 use crate::pipeline::settings::{Side, UpAxis};
 use crate::pipeline::stages::containers::Containers;
 use crate::scene::quoted;
@@ -22,9 +23,6 @@ fn usual_up(path: &Path) -> UpAxis {
     let has = |ending: &str| path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending));
     if has("stl") || has("ply") && is_by_blender(path) { UpAxis::Z } else { UpAxis::Y }
 }
-
-/// Most that a coordinate may be: scenes take less than 10¹⁸, and cameras stand some sizes of the model away.
-const MOST: f64 = 1e17;
 
 /// Whether the header of a PLY file names Blender, which leaves its axes as they are.
 fn is_by_blender(path: &Path) -> bool {
@@ -88,11 +86,6 @@ pub(super) fn text(
             reason: "no usable face".to_owned(),
         });
     };
-    let farthest = least.abs().max(greatest.abs()).max_element();
-    if farthest >= MOST {
-        let reason = format!("its coordinates reach to {:e}, and must stay below {MOST:e}", farthest as f32);
-        return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
-    }
     let up = show.up.unwrap_or_else(|| usual_up(path));
     let upright = |at: DVec3| up.upright(at);
     let (a, b) = (upright(least), upright(greatest));
@@ -104,6 +97,15 @@ pub(super) fn text(
         (show.from.unwrap_or(Side::Iso), show.turns),
         show.aspect.unwrap_or(SIZE[0] / SIZE[1]),
     );
+    // Name the coordinates of the file, not those of a camera that nobody wrote.
+    let eye_reach = eye.position.abs().max(eye.look_at.abs()).max_element();
+    if eye_reach >= LARGEST {
+        let farthest = least.abs().max(greatest.abs()).max_element() as f32;
+        let reason = format!(
+            "its coordinates reach to {farthest:e}, so that its camera would reach to {eye_reach:.0e}: it must stay below {LARGEST:e}"
+        );
+        return Err(AssetError::Malformed { path: path.to_owned(), line: None, reason });
+    }
     let (mut toml, mut names) = (Toml::default(), Unique::default());
     toml.comment(&format!("{}, as glimt shows it.", file_name(path)));
     let lighting = Lighting::Ours { is_polished: loaded.materials.iter().any(is_polished) };
