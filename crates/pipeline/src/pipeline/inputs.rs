@@ -69,10 +69,12 @@ impl Inputs {
                 self.0.push(Input { path: path.clone(), role, place });
             };
             let kind = if is_gltf(&file.value) { "buffer" } else { "material file" };
-            for companion in &kept.mesh.companions {
+            // A picture that is missing is a companion too.
+            let pictures = &kept.mesh.pictures;
+            for companion in kept.mesh.companions.iter().filter(|file| !pictures.contains(file)) {
                 add(companion, format!("a {kind} of {name}"));
             }
-            for picture in &kept.mesh.pictures {
+            for picture in pictures {
                 add(picture, format!("a picture that {name} or its materials name"));
             }
         }

@@ -242,8 +242,7 @@ fn open_slashes(content: &[u8]) -> impl Iterator<Item = Range<usize>> {
         let start = before.iter().rposition(u8::is_ascii_whitespace).map_or(0, |blank| blank + 1);
         let word = &before[start..];
         let number = word.iter().rposition(|byte| *byte != b'/')?;
-        let slashes = word.iter().filter(|byte| **byte == b'/').count();
-        (slashes <= 2).then_some(start + number + 1..last + 1)
+        Some(start + number + 1..last + 1)
     })
 }
 

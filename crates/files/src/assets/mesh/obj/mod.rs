@@ -6,7 +6,7 @@ mod input;
 mod libraries;
 
 use std::cell::RefCell;
-use std::path::PathBuf;
+use std::collections::HashSet;
 
 use super::assemble::{Parsed, assemble, color_bytes};
 use super::text::with_line_feeds;
@@ -44,12 +44,11 @@ fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
         };
         return Err(first_fault(source).unwrap_or_else(|| source.wrong(reason)));
     };
-    let Found { materials: known, resolved, warnings: mut material_warnings, missing, mut files, pictures } =
+    let Found { materials: known, resolved, warnings: mut material_warnings, missing, files, pictures } =
         libraries.found.into_inner();
-    let mut materials: Vec<FileMaterial> = materials.map_or(Vec::new(), |found| {
+    let materials: Vec<FileMaterial> = materials.map_or(Vec::new(), |found| {
         found.iter().filter_map(|material| known.get(&material.name).cloned()).collect()
     });
-    leave_out_missing(&mut materials, &mut files, &mut material_warnings);
     if !missing {
         let unknown = used.difference(&resolved);
         material_warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
@@ -57,25 +56,31 @@ fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     let mut parsed =
         Parsed { materials, material_warnings, companions: files, pictures, ..Parsed::default() };
     join(&models, &mut parsed);
+    leave_out_missing(&mut parsed);
     assemble(source, parsed)
 }
 
-/// Takes textures whose files do not exist from their materials, which then have their plain values, and warns of them. The
-/// files join those that the mesh depends on, so that their coming is noticed.
-fn leave_out_missing(materials: &mut [FileMaterial], files: &mut Vec<PathBuf>, warnings: &mut Vec<String>) {
-    for material in materials {
+/// Takes textures whose files do not exist from their materials, which then have their plain values, and warns of those that faces
+/// would show. The files join those that the mesh depends on, so that their coming is noticed.
+fn leave_out_missing(parsed: &mut Parsed) {
+    let used: HashSet<u32> = parsed.face_materials.iter().copied().collect();
+    for (index, material) in parsed.materials.iter_mut().enumerate() {
         let name = material.name.clone();
+        let mut missing = Vec::new();
         for texture in material.textures_mut() {
             let Some(path) = texture.take_if(|path| !path.exists()) else { continue };
-            let warning = format!(
-                "cannot read {}: no such file or directory; the material {name:?} is shown without it",
-                path.display()
-            );
-            if !warnings.contains(&warning) {
-                warnings.push(warning);
-                files.push(path);
+            if missing.contains(&path) {
+                continue;
             }
+            if used.contains(&(index as u32)) {
+                let path = path.display();
+                parsed.material_warnings.push(format!(
+                    "cannot read {path}: no such file or directory; the material {name:?} is shown without it"
+                ));
+            }
+            missing.push(path);
         }
+        parsed.companions.extend(missing);
     }
 }
 
