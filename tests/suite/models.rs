@@ -138,9 +138,9 @@ fn pictures_of_a_material_file_are_named_with_their_material() {
     desk.write("a.toml", format!("{CAMERA}[[mesh]]\nfile = \"a.obj\"\n"));
     desk.write("heights.pgm", "P2\n2 1\n255\n0 200\n");
     desk.write("a.mtl", "newmtl brick\nmap_Kd lost.png\n");
-    let missing = desk.expect("a.toml --once -o a.png", 0);
+    let missing = desk.expect("a.toml --once -o a.png", 2);
     assert!(
-        missing.contains("lost.png") && missing.contains("the material \"brick\" is shown without it"),
+        missing.contains("lost.png") && missing.contains("the material \"brick\" of a.obj names it"),
         "{missing}"
     );
     desk.write("lost.png", "no picture");

@@ -132,22 +132,6 @@ pub struct FileMaterial {
     pub physical: Option<PhysicalMaterial>,
 }
 
-impl FileMaterial {
-    /// Its textures.
-    fn textures_mut(&mut self) -> impl Iterator<Item = &mut Option<PathBuf>> {
-        let physical = self.physical.as_mut();
-        let physical = physical.map(|one| [&mut one.roughness_texture, &mut one.metallic_texture]);
-        let plain = [
-            &mut self.opacity_texture,
-            &mut self.diffuse_texture,
-            &mut self.specular_texture,
-            &mut self.emission_texture,
-            &mut self.normal_texture,
-        ];
-        plain.into_iter().chain(physical.into_iter().flatten())
-    }
-}
-
 /// The extension of MTL for physically based rendering. Numbers are in [0, 1].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalMaterial {

@@ -12,6 +12,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use crate::math::Vec3;
 use crate::math::elementary::sin_cos;
 use crate::math::frame::Frame;
+use crate::math::lanes::{LANES, Lanes3, Truths, lane, set_lane, take};
 
 /// Least α: of narrower lobes, directions in `f32` have no digits.
 pub const LEAST_ALPHA: f32 = 1e-3;
@@ -40,6 +41,32 @@ pub fn facing(normal: Vec3, to_eye: Vec3) -> Vec3 {
     let turned = turned * (1.0 / turned.length_squared().sqrt());
     let choose = |turned: f32, own: f32| if missing > 0.0 { turned } else { own };
     Vec3::new(choose(turned.x, normal.x), choose(turned.y, normal.y), choose(turned.z, normal.z))
+}
+
+/// Sets the directions to the viewers of a row, given the rays that arrive, turns the normals by [`facing`], and gives them to those
+/// surfaces of the row that `of` names, or to all: [`MaterialRow::orient`](super::bsdf::MaterialRow::orient) of microfacets.
+#[inline(always)]
+pub fn turn_to_viewers(
+    of: Option<&Truths>,
+    normals: &mut Lanes3,
+    directions: &Lanes3,
+    own_normals: &mut Lanes3,
+    to_eyes: &mut Lanes3,
+) {
+    for i in 0..LANES {
+        let to_eye = -lane(directions, i);
+        set_lane(to_eyes, i, to_eye);
+        let turned = facing(lane(normals, i), to_eye);
+        set_lane(normals, i, turned);
+    }
+    match of {
+        Some(of) => {
+            for axis in 0..3 {
+                take(of, &normals[axis], &mut own_normals[axis]);
+            }
+        }
+        None => *own_normals = *normals,
+    }
 }
 
 /// The unnormalised half vector of two unit directions, by a unit normal.

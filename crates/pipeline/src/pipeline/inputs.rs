@@ -69,12 +69,10 @@ impl Inputs {
                 self.0.push(Input { path: path.clone(), role, place });
             };
             let kind = if is_gltf(&file.value) { "buffer" } else { "material file" };
-            // A picture that is missing is a companion too.
-            let pictures = &kept.mesh.pictures;
-            for companion in kept.mesh.companions.iter().filter(|file| !pictures.contains(file)) {
+            for companion in &kept.mesh.companions {
                 add(companion, format!("a {kind} of {name}"));
             }
-            for picture in pictures {
+            for picture in &kept.mesh.pictures {
                 add(picture, format!("a picture that {name} or its materials name"));
             }
         }

@@ -195,20 +195,6 @@ pub fn is_mesh(path: &Path) -> bool {
     document::is_mesh(path)
 }
 
-/// Whether a text has a key in one of its tables.
-pub fn has_key(text: &str, table: &str, key: &str) -> bool {
-    let (document, _) = toml::parse(text);
-    document.root().get(table).is_some_and(|found| match found.value.item() {
-        toml::Item::Table(entries) => entries.get(key).is_some(),
-        toml::Item::Array(_)
-        | toml::Item::String(_)
-        | toml::Item::Integer { .. }
-        | toml::Item::Float(_)
-        | toml::Item::Boolean(_)
-        | toml::Item::Datetime => false,
-    })
-}
-
 /// The commented scene that a new file starts with.
 pub fn starter() -> &'static str {
     include_str!("starter.toml")

@@ -68,13 +68,13 @@ const OTHER_MODELS: [&str; 22] = [
     "step", "stp", "usd", "usda", "usdc", "usdz", "wrl", "x3d",
 ];
 
-/// Whether a file is named like a model of another format and is no scene all the same.
+/// Whether a file is named like a model of another format and does not hold a scene all the same.
 fn is_other_model(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     OTHER_MODELS.contains(&ending.as_str()) && lacks_camera(path)
 }
 
-/// Whether the start of a file has no camera of a scene. What cannot be read has none, and is no file either.
+/// Whether the start of a file lacks the camera of a scene. False for what cannot be read.
 fn lacks_camera(path: &Path) -> bool {
     const START: u64 = 1 << 16;
     let start = || {
@@ -219,8 +219,8 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
         let shown = |path: &Path| visible(&path.to_string_lossy()).into_owned();
         let missing = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
         let is_model = is_mesh(path);
-        let may_be_meant = |found: &Path| may_be_scene(found) || is_model && is_mesh(found);
-        let help = match (missing, neighbour(path, may_be_meant)) {
+        let near = neighbour(path, if is_model { is_mesh } else { may_be_scene });
+        let help = match (missing, near) {
             (Some(folder), _) => Some(format!("the folder {} does not exist", shown(folder))),
             (None, Some(near)) => Some(format!("did you mean {}?", shown(&near))),
             // A model is not what glimt writes.

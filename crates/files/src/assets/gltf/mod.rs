@@ -66,7 +66,7 @@ pub fn files_named(path: &Path) -> Result<Vec<PathBuf>, AssetError> {
     Ok(files)
 }
 
-/// Those of some URIs that name files beside a glTF file.
+/// Files beside a glTF file that some of these URIs name.
 fn named<'u>(path: &Path, uris: impl Iterator<Item = &'u Option<Uri>>) -> Vec<PathBuf> {
     let file = |uri: &Option<Uri>| match uri {
         Some(Uri::File(uri)) => beside(path, uri).ok(),

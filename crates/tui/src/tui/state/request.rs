@@ -10,7 +10,7 @@ use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
 use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
 use crate::scene::description::{Integrator, Shadows};
 use crate::scene::sanitize::visible;
-use crate::scene::{changes, has_key, is_mesh};
+use crate::scene::{changes, is_mesh};
 
 /// Settings that keys changed, on top of the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -188,17 +188,6 @@ impl RequestState {
     /// The camera as the keys have it. `None` until a scene has been understood.
     pub(in crate::tui) fn viewpoint(&self) -> Option<Viewpoint> {
         self.camera.map(|camera| camera.changed(&self.toggles.camera))
-    }
-
-    /// Reason why the scene has no depth of field, in words.
-    pub(in crate::tui) fn why_pinhole(&self) -> &'static str {
-        let is_set = self.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera.aperture"));
-        let is_written = || self.text.as_ref().is_some_and(|text| has_key(text, "camera", "aperture"));
-        if is_set || is_written() {
-            "the camera's `aperture` is 0"
-        } else {
-            "the scene's camera has no `aperture`"
-        }
     }
 
     /// Changes by keys that the picture alone does not show, in words.

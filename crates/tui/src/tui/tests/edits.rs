@@ -164,21 +164,21 @@ fn settings_of_the_scene_again_stand_together() {
 }
 
 #[test]
-fn a_pinhole_is_told_apart_from_a_camera_without_an_aperture() {
-    for (text, words) in [
-        ("[camera]\nfov = 40", "the scene's camera has no `aperture`"),
-        ("[camera]\naperture = 0.0", "the camera's `aperture` is 0"),
-        ("[camera]\n# aperture = 0.0", "the scene's camera has no `aperture`"),
-    ] {
+fn what_is_said_of_a_pinhole_is_true_with_and_without_its_key() {
+    for text in ["[camera]\nfov = 40", "[camera]\naperture = 0.0"] {
         let mut desk = Desk::new();
         save(&mut desk, text);
         read(&mut desk);
         desk.state.request.effective = Some(Effective { dof: false, ..settings() });
         desk.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
         desk.press('d');
-        assert!(desk.text().contains(&format!("no depth of field: {words}")), "{}", desk.text());
+        assert!(desk.text().contains("no depth of field: the camera's `aperture` is 0"), "{}", desk.text());
         desk.press('f');
-        assert!(desk.text().contains(&format!("everything is in focus: {words}")), "{}", desk.text());
+        assert!(
+            desk.text().contains("everything is in focus: the camera's `aperture` is 0"),
+            "{}",
+            desk.text()
+        );
     }
 }
 

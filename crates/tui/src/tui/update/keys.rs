@@ -130,8 +130,7 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
     match &state.request.effective {
         None => return notify(state, "the scene has not been read yet"),
         Some(effective) if !effective.dof && !switched_off => {
-            let why = state.request.why_pinhole();
-            return notify(state, &format!("no depth of field: {why}"));
+            return notify(state, "no depth of field: the camera's `aperture` is 0");
         }
         Some(_) => {}
     }

@@ -19,6 +19,7 @@ use crate::tui::view::preview::spot_at;
 const TURN_ACROSS: f64 = 180.0;
 
 const OLDER: &str = "of an older picture nothing is known but its pixels: b shows the newest one";
+const IN_FOCUS: &str = "everything is in focus: the camera's `aperture` is 0";
 
 /// Reacts to the mouse.
 pub(super) fn update(state: &mut State, mouse: Mouse) -> Vec<Effect> {
@@ -102,7 +103,7 @@ pub(super) fn focus(state: &mut State) -> Vec<Effect> {
     }
     if state.request.viewpoint().is_some_and(|view| view.aperture == 0.0) {
         state.selection.is_focusing = false;
-        return in_focus(state);
+        return notify(state, IN_FOCUS);
     }
     if state.selection.is_mouse_on && !state.selection.is_focusing {
         state.selection.is_focusing = true;
@@ -161,11 +162,6 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
     }
 }
 
-fn in_focus(state: &mut State) -> Vec<Effect> {
-    let why = state.request.why_pinhole();
-    notify(state, &format!("everything is in focus: {why}"))
-}
-
 fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     let distance = rounded(depth, step_at(depth));
     if !(distance > 0.0) {
@@ -173,7 +169,7 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     }
     // The scene may have been edited since.
     if state.request.viewpoint().is_none_or(|view| view.aperture == 0.0) {
-        return in_focus(state);
+        return notify(state, IN_FOCUS);
     }
     state.request.toggles.camera.focus = Some(distance);
     let effects = camera::step_of_camera(state);

@@ -54,8 +54,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             mended(state);
             state.picture.history.read();
             if pinhole {
-                let why = state.request.why_pinhole();
-                say(state, format!("no depth of field: {why}"));
+                say(state, "no depth of field: the camera's `aperture` is 0");
             }
             // A picture of another shape has another place.
             return resized_preview(state);

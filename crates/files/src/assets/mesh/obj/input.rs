@@ -42,13 +42,15 @@ impl<'a> Survey<'a> {
             let (statement, words) =
                 unfinished.take().unwrap_or_else(|| (Statement::of(line.trim_ascii_start()), 0));
             let Line { goes_on, content } = survey.line(start, line, statement);
-            if statement.is_face() {
+            if statement == Statement::Face {
                 open_slashes(content).for_each(|place| survey.blank(start + place.start..start + place.end));
             }
-            if let Some(place) = unnamed_material(line) {
+            if statement == Statement::Named
+                && let Some(place) = unnamed_material(line)
+            {
                 inserted.push((start + place, NO_MATERIAL));
             }
-            if statement.is_texture() {
+            if statement == Statement::Texture {
                 let words = words + words_of(content).take(LONE_TEXTURE_WORDS + 1).count();
                 if !goes_on && words == LONE_TEXTURE_WORDS {
                     inserted.push((start + content.len(), SECOND));
@@ -164,7 +166,7 @@ fn words_of(content: &[u8]) -> impl Iterator<Item = &[u8]> {
 }
 
 /// Kind of a line, as far as kinds are read differently.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum Statement {
     Comment,
     Vertex,
@@ -181,32 +183,6 @@ enum Statement {
 }
 
 impl Statement {
-    fn is_texture(self) -> bool {
-        match self {
-            Self::Texture => true,
-            Self::Comment
-            | Self::Vertex
-            | Self::Face
-            | Self::Numbers
-            | Self::Skipped
-            | Self::Named
-            | Self::Other => false,
-        }
-    }
-
-    fn is_face(self) -> bool {
-        match self {
-            Self::Face => true,
-            Self::Comment
-            | Self::Vertex
-            | Self::Texture
-            | Self::Numbers
-            | Self::Skipped
-            | Self::Named
-            | Self::Other => false,
-        }
-    }
-
     fn of(line: &[u8]) -> Self {
         let keyword = line.iter().position(u8::is_ascii_whitespace).map_or(line, |end| &line[..end]);
         match keyword {

@@ -6,7 +6,6 @@ mod input;
 mod libraries;
 
 use std::cell::RefCell;
-use std::collections::HashSet;
 
 use super::assemble::{Parsed, assemble, color_bytes};
 use super::text::with_line_feeds;
@@ -56,32 +55,7 @@ fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     let mut parsed =
         Parsed { materials, material_warnings, companions: files, pictures, ..Parsed::default() };
     join(&models, &mut parsed);
-    leave_out_missing(&mut parsed);
     assemble(source, parsed)
-}
-
-/// Takes textures whose files do not exist from their materials, which then have their plain values, and warns of those that faces
-/// would show. The files join those that the mesh depends on, so that their coming is noticed.
-fn leave_out_missing(parsed: &mut Parsed) {
-    let used: HashSet<u32> = parsed.face_materials.iter().copied().collect();
-    for (index, material) in parsed.materials.iter_mut().enumerate() {
-        let name = material.name.clone();
-        let mut missing = Vec::new();
-        for texture in material.textures_mut() {
-            let Some(path) = texture.take_if(|path| !path.exists()) else { continue };
-            if missing.contains(&path) {
-                continue;
-            }
-            if used.contains(&(index as u32)) {
-                let path = path.display();
-                parsed.material_warnings.push(format!(
-                    "cannot read {path}: no such file or directory; the material {name:?} is shown without it"
-                ));
-            }
-            missing.push(path);
-        }
-        parsed.companions.extend(missing);
-    }
 }
 
 /// Joins the models (one for each object, group and material) into one mesh.

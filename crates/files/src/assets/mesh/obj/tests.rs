@@ -218,10 +218,18 @@ fn a_corner_that_ends_with_a_slash_leaves_numbers_out() {
         "f 1 \\\n 2/ \\\r\n 3/\t",
         "f 1 2 3/# x",
         "f 1 2 3//\r",
+        // A comment ends with its line.
+        "# note \\\nf 1 2 3/",
     ] {
         assert_eq!(mesh(faces), plain, "{faces}");
     }
-    for faces in ["f 1/1/ 2/2/ 3/3/", "f 1/1// 2/2 3/3", "f 1/1 2/2/ 3/3", "f 1/1/ 2/2/ 3/3/\r"] {
+    for faces in [
+        "f 1/1/ 2/2/ 3/3/",
+        "f 1/1 2/2 3/3 # 4/ 5/",
+        "f 1/1// 2/2 3/3",
+        "f 1/1 2/2/ 3/3",
+        "f 1/1/ 2/2/ 3/3/\r",
+    ] {
         assert_eq!(mesh(faces), textured, "{faces}");
     }
     for faces in ["f 1 2 3 /", "f 1 2 //", "f 1 2 /1/"] {
@@ -233,24 +241,6 @@ fn a_corner_that_ends_with_a_slash_leaves_numbers_out() {
     {
         assert_eq!(mesh(whole), plain, "{whole}");
     }
-}
-
-#[test]
-fn a_missing_picture_is_a_warning_as_a_missing_library_is() {
-    let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\n");
-    let library = b"newmtl red\nKd 1 0 0\nmap_Kd none.png\nmap_Ks none.png\nmap_Pr none.png\nnewmtl unused\nmap_Kd no.png\n";
-    let loaded = read_with(&[("a.obj", text.as_bytes()), ("a.mtl", library)]).expect("whole");
-    let material = &loaded.materials[0];
-    assert_eq!(
-        (material.diffuse, &material.diffuse_texture, &material.specular_texture),
-        (Vec3::X, &None, &None)
-    );
-    let [warning] = &loaded.material_warnings[..] else { panic!("one: {:?}", loaded.material_warnings) };
-    assert!(
-        warning.ends_with("none.png: no such file or directory; the material \"red\" is shown without it"),
-        "{warning}"
-    );
-    assert!(loaded.companions.iter().any(|file| file.ends_with("none.png")));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use crate::materials::bsdf::{
     BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
 };
 use crate::materials::fresnel::schlick_weight;
-use crate::materials::microfacet::{Half, Leg, facing, frame_along, mirrored};
+use crate::materials::microfacet::{Half, Leg, facing, frame_along, mirrored, turn_to_viewers};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Truths, lane, set_lane, take, truths};
@@ -274,19 +274,6 @@ impl<const BRUSHED: bool> MaterialRow for MetalRow<BRUSHED> {
 
     #[inline(always)]
     fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
-        for i in 0..LANES {
-            let to_eye = -lane(directions, i);
-            set_lane(&mut self.to_eye, i, to_eye);
-            let turned = Self::turned(lane(normals, i), to_eye);
-            set_lane(normals, i, turned);
-        }
-        match of {
-            Some(of) => {
-                for axis in 0..3 {
-                    take(of, &normals[axis], &mut self.normal[axis]);
-                }
-            }
-            None => self.normal = *normals,
-        }
+        turn_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
     }
 }

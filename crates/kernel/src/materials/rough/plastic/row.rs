@@ -8,7 +8,7 @@ use crate::materials::bsdf::{
 };
 use crate::materials::fresnel::dielectric_outside;
 use crate::materials::lobe_albedo::{TERMS, evaluate, under_coat};
-use crate::materials::microfacet::{Half, Leg, facing, mirrored};
+use crate::materials::microfacet::{Half, Leg, facing, mirrored, turn_to_viewers};
 use crate::materials::phong::lobes::about;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -385,20 +385,7 @@ impl MaterialRow for PlasticRow {
 
     #[inline(always)]
     fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
-        for i in 0..LANES {
-            let to_eye = -lane(directions, i);
-            set_lane(&mut self.to_eye, i, to_eye);
-            let turned = Self::turned(lane(normals, i), to_eye);
-            set_lane(normals, i, turned);
-        }
-        match of {
-            Some(of) => {
-                for axis in 0..3 {
-                    take(of, &normals[axis], &mut self.normal[axis]);
-                }
-            }
-            None => self.normal = *normals,
-        }
+        turn_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
         for i in 0..LANES {
             self.look(i);
         }

@@ -8,7 +8,7 @@ use crate::materials::bsdf::{
 };
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate};
-use crate::materials::microfacet::{Half, Leg, facing, mirrored};
+use crate::materials::microfacet::{Half, Leg, facing, mirrored, turn_to_viewers};
 use crate::materials::phong::lobes::about;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -483,20 +483,7 @@ impl MaterialRow for PrincipledRow<false> {
 
     #[inline(always)]
     fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
-        for i in 0..LANES {
-            let to_eye = -lane(directions, i);
-            set_lane(&mut self.to_eye, i, to_eye);
-            let turned = Self::turned(lane(normals, i), to_eye);
-            set_lane(normals, i, turned);
-        }
-        match of {
-            Some(of) => {
-                for axis in 0..3 {
-                    take(of, &normals[axis], &mut self.normal[axis]);
-                }
-            }
-            None => self.normal = *normals,
-        }
+        turn_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
         for i in 0..LANES {
             self.look(i);
         }
