@@ -328,7 +328,7 @@ fn depth_of_field_of_a_pinhole_is_explained() {
         exposure: 0.0,
     });
     assert!(desk.press('d').is_empty());
-    assert!(desk.text().contains("no `aperture`"));
+    assert!(desk.text().contains("the camera's `aperture` is 0"));
 
     let base = Overrides { dof: Some(false), ..Overrides::default() };
     let state = state_with(80, 24, PreviewKind::HalfBlock, ColorDepth::TrueColor, base);
@@ -346,7 +346,7 @@ fn depth_of_field_of_a_pinhole_is_explained() {
         camera: camera(),
         exposure: 0.0,
     });
-    assert!(desk.text().contains("no `aperture`"));
+    assert!(desk.text().contains("the camera's `aperture` is 0"));
 }
 
 #[test]

@@ -132,7 +132,7 @@ fn a_click_after_f_focuses_there() {
     desk.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
     desk.press('f');
     assert!(answer(&mut desk, Some(thing())).is_empty());
-    assert!(desk.text().contains("no `aperture`"));
+    assert!(desk.text().contains("the camera's `aperture` is 0"));
 }
 
 fn kept(desk: &mut Desk, is_new: bool, is_own: bool) -> Vec<Effect> {
@@ -434,7 +434,7 @@ fn without_an_aperture_f_refuses_at_once() {
     let mut desk = desk();
     desk.state.request.camera.as_mut().expect("a camera").aperture = 0.0;
     assert!(desk.press('f').is_empty());
-    assert!(desk.text().contains("no `aperture`"), "{}", desk.text());
+    assert!(desk.text().contains("the camera's `aperture` is 0"), "{}", desk.text());
     assert!(!desk.state.selection.is_focusing, "the next click is no focus");
 }
 
