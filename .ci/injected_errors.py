@@ -32,11 +32,11 @@ MANY = "closed_forms::many_lights::"
 PHOTONS = "closed_forms::photons::"
 CAUSTICS = "closed_forms::caustics::"
 MICROFACETS = "closed_forms::microfacets::"
-METAL = "materials::metal::tests::"
-PLASTIC = "materials::plastic::tests::"
-PRINCIPLED = "materials::principled::tests::"
+METAL = "materials::rough::metal::tests::"
+PLASTIC = "materials::rough::plastic::tests::"
+PRINCIPLED = "materials::rough::principled::tests::"
 FROSTED = "closed_forms::frosted::"
-ROUGH_GLASS = "materials::frosted::tests::"
+ROUGH_GLASS = "materials::rough::frosted::tests::"
 STRAIGHT = "closed_forms::straight::"
 TWO_SIDED = "closed_forms::two_sided::"
 
@@ -112,7 +112,7 @@ FAULTS = [
     ("glass reflects too much", "integrators/transport/walk.rs", "Decision::Choice).x < ⟦reflectance⟧\n",
      "reflectance + 0.05", GLOBAL + "mirrors_and_glass_are_followed_as_by_whitted"),
     ("a glossy density off by a factor", "materials/rough/phong/lobes.rs", "let glossy = ⟦(self.shininess + 1.0) * (0.5 * FRAC_1_PI)⟧ * gloss;",
-     "(self.shininess + 2.0) * (0.5 * FRAC_1_PI)", "materials::phong::lobes::tests::the_glossy_lobe_is_drawn_by_its_density_however_narrow"),
+     "(self.shininess + 2.0) * (0.5 * FRAC_1_PI)", "materials::rough::phong::lobes::tests::the_glossy_lobe_is_drawn_by_its_density_however_narrow"),
     ("a pane that reflects as one side", "materials/pane.rs", "⟦2.0 * side / (1.0 + side)⟧", "side",
      STRAIGHT + "a_pane_before_a_lamp_by_angle"),
     ("a veil that stops shadow rays", "materials/mod.rs", "through * there + ⟦Vec3::splat(1.0 - there)⟧", "Vec3::ZERO",
@@ -124,13 +124,13 @@ FAULTS = [
     ("textures turned the other way", "materials/texture.rs", "DVec2::new(⟦by.x * cos - by.y * sin⟧,",
      "by.x * cos + by.y * sin", "materials::texture::tests::coordinates_are_repeated_then_turned_then_moved"),
     ("1 % too much of a lobe", "materials/rough/phong/lobes.rs", "1.0 / (⟦f64::from(self.shininess) + 1.0⟧)",
-     "f64::from(self.shininess) * 0.99 + 1.0", "materials::phong::lobes::tests::the_glossy_lobe_is_drawn_by_its_density_however_narrow"),
+     "f64::from(self.shininess) * 0.99 + 1.0", "materials::rough::phong::lobes::tests::the_glossy_lobe_is_drawn_by_its_density_however_narrow"),
     ("the wrong side of a lobe", "materials/rough/phong/lobes.rs", "let local = ⟦Vec3::new(sine * cos_phi, sine * sin_phi, cosine)⟧;",
-     "Vec3::new(sine * cos_phi, sine * sin_phi, -cosine)", "materials::phong::lobes::tests::both_lobes_together_are_drawn_by_their_density"),
+     "Vec3::new(sine * cos_phi, sine * sin_phi, -cosine)", "materials::rough::phong::lobes::tests::both_lobes_together_are_drawn_by_their_density"),
     ("the diffuse lobe chosen too often", "materials/rough/phong/lobes.rs", "let is_diffuse = ⟦lobe < self.diffuse_share()⟧;",
-     "lobe < self.diffuse_share() * 1.05", "materials::phong::lobes::tests::both_lobes_together_are_drawn_by_their_density"),
+     "lobe < self.diffuse_share() * 1.05", "materials::rough::phong::lobes::tests::both_lobes_together_are_drawn_by_their_density"),
     ("a lobe's peak without its normaliser", "materials/rough/phong/mod.rs", "self.specular * ⟦((self.shininess + 2.0) / (2.0 * PI))⟧",
-     "1.0", "materials::phong::tests::the_lobe_of_known_value"),
+     "1.0", "materials::rough::phong::tests::the_lobe_of_known_value"),
     ("a rectangle's density off by 1 %", "lights/area/quad.rs", ".map(|spherical| ⟦1.0 / spherical.solid_angle⟧)",
      "1.01 / spherical.solid_angle", "lights::tests::the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds"),
     ("a picked light's probability off by a tenth", "lights/tree/mod.rs", "if total > 0.0 { ⟦((self.0[child] - before) / total) as f32⟧ }",
@@ -282,6 +282,10 @@ def source(file):
 
 
 def copy_with_faults(faults_asked):
+    # What is no longer in the sources goes, what was built stays.
+    for entry in COPY.iterdir() if COPY.is_dir() else []:
+        if entry.name != "target":
+            shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
     tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True)
     for name in filter(None, tracked.stdout.decode().split("\0")):
         if (ROOT / name).is_file():
