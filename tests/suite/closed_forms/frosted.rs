@@ -332,6 +332,10 @@ fn only_closed_bodies_without_a_lamp_are_dark_within() {
     assert_eq!(dark(&lamp_around), [false, false], "it may be anywhere in its box");
     let point = rough.clone().point_light(second + v(0.2, 0.0, 0.0), 1.0, Falloff::Square);
     assert_eq!(dark(&point), [true, false]);
+    let flat = rough.clone().quad(v(-4.0, -3.0, -5.8), v(8.0, 0.0, 0.0), v(0.0, 6.0, 0.0), emitter(1.0));
+    assert_eq!(dark(&flat), [true, true], "the ball around a flat lamp is larger than its box");
+    let through = rough.clone().quad(v(-4.0, -3.0, -5.3), v(8.0, 0.0, 0.0), v(0.0, 6.0, 0.0), emitter(1.0));
+    assert_eq!(dark(&through), [false, false]);
     assert_eq!(dark(&rough.environment(1.0)), [true, true]);
     let open = scene().quad(v(-1.0, -1.0, -5.0), v(2.0, 0.0, 0.0), v(0.0, 2.0, 0.0), frosted(1.5, 0.4));
     assert!(!open.world().is_dark_body(0), "an open body");

@@ -97,6 +97,11 @@ impl Cuboid {
         SurfacePoint::exact(point, outwards, uv, self.axes * (u * width), self.axes * (v * height), reach)
     }
 
+    /// [`Cuboid::surface`] without texture coordinates and tangents.
+    pub fn bare_surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
+        self.exact(ray, hit).bare()
+    }
+
     /// Texture coordinates of a point of the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         let local = self.axes.transpose() * (point - self.center);
@@ -109,6 +114,19 @@ impl Cuboid {
     fn chart(&self, face: u32) -> Chart {
         let (u, v) = flat_axes(face_normal(face).1);
         Chart { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
+    }
+
+    /// Whether all but one of the faces are farther than this from a point of the surface.
+    pub fn is_on_one_face(&self, point: DVec3, margin: f64) -> bool {
+        let from_center = point - self.center;
+        let along = DVec3::new(
+            self.axes.x_axis.dot(from_center),
+            self.axes.y_axis.dot(from_center),
+            self.axes.z_axis.dot(from_center),
+        );
+        let left = self.half - along.abs();
+        let are_far = [left.x, left.y, left.z].map(|left| left > margin);
+        are_far.into_iter().filter(|&is_far| is_far).count() == 2 && 2.0 * self.half.min_element() > margin
     }
 
     /// Position of a hit along the box's axes, from the centre, put onto the face.

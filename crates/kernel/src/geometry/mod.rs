@@ -161,6 +161,7 @@ impl Shape {
     pub fn asked_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         match self {
             Self::Sphere(sphere) if !asked.uv => sphere.bare_surface(ray, hit),
+            Self::Box(cuboid) if !asked.uv => cuboid.bare_surface(ray, hit),
             shape => shape.surface(ray, hit),
         }
     }

@@ -80,8 +80,7 @@ impl Sphere {
 
     /// [`Sphere::surface`] without texture coordinates.
     pub fn bare_surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let ExactPoint { point, normal, reach } = self.exact(ray, hit);
-        SurfacePoint::exact(point, normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, reach)
+        self.exact(ray, hit).bare()
     }
 
     /// Texture coordinates of a point of the surface.

@@ -2,9 +2,9 @@
 
 use super::rows::{HitRows, PACKET, RayRows, lanes};
 use super::surface::error;
-use super::{RayF64, Shape, ShapeHit};
+use super::{RayF64, Shape, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Lanes3, set_lane, take, truths};
-use crate::math::{DVec2, DVec3};
+use crate::math::{DVec2, DVec3, Vec2};
 
 /// Parts of [`SurfacePoint`](super::SurfacePoint)s that lights need, side by side.
 #[derive(Clone, Debug)]
@@ -33,6 +33,13 @@ pub struct ExactPoint {
     pub normal: DVec3,
     /// The greatest length that the point is computed from.
     pub reach: f64,
+}
+
+impl ExactPoint {
+    /// The surface without texture coordinates and tangents.
+    pub fn bare(&self) -> SurfacePoint {
+        SurfacePoint::exact(self.point, self.normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, self.reach)
+    }
 }
 
 /// A shape whose surface is computed without branches.

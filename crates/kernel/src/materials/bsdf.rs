@@ -5,7 +5,8 @@
 //!
 //! A row has the light of one side. A surface that also lets light through is two vertices, whose BSDFs are of two kinds: one is lit
 //! from the viewer's side, the other from behind, with its shading normal there. Both take the same random numbers, by which
-//! [`RoughRow::sample`] goes on at exactly one of them; the pdfs are those of one ray from both.
+//! [`RoughRow::sample`] goes on at exactly one of them; the pdfs are those of one ray from both. Where light samples find nothing on
+//! one of its sides, the vertex of the other stands for both: its paths go on by [`SideSamples`].
 //!
 //! A kind may have a narrow lobe beside its wide ones, whose light has rays of its own: see [`LobeSet::Narrow`].
 
@@ -55,6 +56,21 @@ pub struct BsdfValues {
     pub f: Lanes3,
     /// Two numbers for each surface that f, pdf and the parts of f share; each kind has its own.
     pub(super) shared: [Lanes; 2],
+}
+
+/// Directions in which paths go on, on either side of surfaces.
+#[derive(Clone, Debug)]
+pub struct SideSamples {
+    /// Unit directions.
+    pub directions: Lanes3,
+    /// Their pdfs in sr⁻¹; 0 if nothing arrives from there.
+    pub densities: Lanes,
+    /// f·cosθ of the lobe over the pdf.
+    pub shares: Lanes,
+    /// Factors on `shares` for what is shown.
+    pub shown: Lanes,
+    /// Which of them are on the other side than the row's own light.
+    pub beyond: Truths,
 }
 
 /// Directions at a surface.

@@ -43,6 +43,12 @@ pub fn facing(normal: Vec3, to_eye: Vec3) -> Vec3 {
     Vec3::new(choose(turned.x, normal.x), choose(turned.y, normal.y), choose(turned.z, normal.z))
 }
 
+/// [`facing`] of one normal, which seldom turns.
+#[inline(always)]
+pub fn facing_one(normal: Vec3, to_eye: Vec3) -> Vec3 {
+    if normal.dot(to_eye) < LEAST_FACING { facing(normal, to_eye) } else { normal }
+}
+
 /// Sets the directions to the viewers of a row, given the rays that arrive, turns the normals by [`facing`], and gives them to those
 /// surfaces of the row that `of` names, or to all: [`MaterialRow::orient`](super::bsdf::MaterialRow::orient) of microfacets.
 #[inline(always)]

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use super::RayCounters;
-use super::direct::queue::DirectLightQueue;
+use super::direct::queue::{DirectLightQueue, Lit};
 use super::memory::Memory;
 use super::method::Behaviour;
 use super::photons::PhotonMaps;
@@ -432,35 +432,61 @@ impl Wavefront<'_, '_> {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
-        let measure = if path.state.only_specular_before { self.accumulator.measure } else { Measure::ALL };
-        // The share of the light that arrives counts what does not.
-        let is_dark = |medium: Medium| {
-            let is_glass = vertex.material.bsdf.glass().is_some();
-            let body = medium.glass().filter(|_| is_glass && measure != Measure::ArrivingShare);
-            body.is_some_and(|inside| tile.world.is_dark_body(inside.body))
-        };
-        let is_dark_before = is_dark(path.medium);
-        self.direct.push(
-            tile,
-            &ShadingVertex { path, place, vertex, shading, bsdf },
-            measure,
-            is_dark_before,
-        );
+        let measure = self.measure_of(path);
+        let lit = ShadingVertex { path, place, vertex, shading, bsdf };
+        self.direct.push(tile, &lit, measure, Lit::OneSide { is_dark: false });
         // Light that comes through has a vertex of its own; a share of the light that arrives is that of the viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| measure != Measure::ArrivingShare) {
-            let is_glass = vertex.material.bsdf.glass().is_some();
-            let part = if is_glass { 1.0 } else { through_sheet(tile.world, path.medium, far) };
-            let throughput = path.throughput * part;
+            let throughput = path.throughput * through_sheet(tile.world, path.medium, far);
             let (path, vertex) = (&PathRay { medium: far, throughput, ..*path }, &vertex.behind());
             let lit = ShadingVertex { path, place, vertex, shading, bsdf: &bsdf };
-            self.direct.push(tile, &lit, measure, is_dark(far));
+            self.direct.push(tile, &lit, measure, Lit::OneSide { is_dark: false });
         }
     }
 
+    /// Queues the vertices of rough glass: one for each side, or if light samples find nothing on one of them, a single one.
     fn shade_rough_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: GlassPoint, far: Medium) {
-        if self.accumulator.takes_reflected() {
-            self.light_rough(path, vertex, &RoughBsdf::GlassReflection(rough), far);
+        if !self.accumulator.takes_reflected() {
+            return;
         }
+        let (tile, place) = (self.tile, self.place);
+        let shading = vertex.shading(self.counters);
+        let measure = self.measure_of(path);
+        let near = path.medium;
+        let reflection = RoughBsdf::GlassReflection(rough);
+        let transmission = RoughBsdf::GlassTransmission(rough);
+        // The share of the light that arrives is that of the viewer's side, and counts what does not arrive.
+        if measure == Measure::ArrivingShare {
+            let lit = ShadingVertex { path, place, vertex, shading, bsdf: &reflection };
+            return self.direct.push(tile, &lit, measure, Lit::OneSide { is_dark: false });
+        }
+        let is_dark =
+            |medium: Medium| medium.glass().is_some_and(|inside| tile.world.is_dark_body(inside.body));
+        let dark = [near, far].map(is_dark);
+        // Photons land on both sides.
+        let is_one = dark != [false; 2] && !tile.behaviour.gathers && vertex.beyond().is_some();
+        let is_behind = is_one && dark == [true, false];
+        let sides = |vertex: &Vertex<'_>, is_dark: bool, medium: Medium| match vertex.beyond() {
+            Some(beyond) if is_one => Lit::TwoSides { is_dark, beyond, medium },
+            Some(_) | None => Lit::OneSide { is_dark },
+        };
+        // Queue the viewer's side, unless the vertex of the other one stands for it.
+        let behind = (!is_one || is_behind).then(|| (vertex.behind(), shading.behind()));
+        if !is_behind {
+            let lit = ShadingVertex { path, place, vertex, shading, bsdf: &reflection };
+            self.direct.push(tile, &lit, measure, sides(vertex, dark[0], far));
+        }
+        // Queue the other side likewise.
+        if let Some((vertex, shading)) = behind {
+            let path = &PathRay { medium: far, ..*path };
+            let lit = ShadingVertex { path, place, vertex: &vertex, shading, bsdf: &transmission };
+            self.direct.push(tile, &lit, measure, sides(&vertex, dark[1], near));
+        }
+    }
+
+    /// What is shown of the light at a path's vertex.
+    fn measure_of(&self, path: &PathRay) -> Measure {
+        if path.state.only_specular_before { self.accumulator.measure } else { Measure::ALL }
     }
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {

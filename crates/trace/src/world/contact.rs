@@ -90,8 +90,8 @@ impl World {
     pub fn contact(&self, at: &Meeting, memory: &mut NearMemory, visit: impl FnMut(Near)) -> Sides {
         let margin = self.geometry.margin(at);
         let error = if self.geometry.is_isolated(&at.hit, &at.surface, margin) {
-            if self.is_large_ball(at.hit.object, margin) {
-                return self.contact_of_ball(at, visit);
+            if self.is_far_side_away(at, margin) {
+                return self.contact_of_one_side(at, visit);
             }
             self.geometry.only(at, memory)
         } else {
@@ -100,17 +100,29 @@ impl World {
         self.contact_of(at, (memory, error), visit)
     }
 
-    /// Whether an object is a sphere whose other side is far from the surfaces near a point of it.
-    fn is_large_ball(&self, object: u32, margin: Vec3) -> bool {
-        let Object::Shape(Shape::Sphere(sphere)) = &self.geometry.objects()[object as usize] else {
-            return false;
+    /// Whether a hit is that of a ball or a box of glass whose other sides are far from the surfaces near the point.
+    fn is_far_side_away(&self, at: &Meeting, margin: Vec3) -> bool {
+        let far = 8.0 * f64::from(margin.max_element());
+        let is_away = match &self.geometry.objects()[at.hit.object as usize] {
+            Object::Shape(Shape::Sphere(sphere)) => sphere.radius > far,
+            Object::Shape(Shape::Box(cuboid)) => cuboid.is_on_one_face(at.surface.point.as_dvec3(), far),
+            Object::Shape(
+                Shape::Quad(_)
+                | Shape::Plane(_)
+                | Shape::Triangle(_)
+                | Shape::Disk(_)
+                | Shape::Cylinder(_)
+                | Shape::Cone(_)
+                | Shape::Torus(_),
+            )
+            | Object::Mesh(_) => false,
         };
-        sphere.radius > 8.0 * f64::from(margin.max_element())
+        is_away && self.is_glass(self.material_index(&at.hit) as u32)
     }
 
-    /// [`World::contact_of`] for a large ball of glass with nothing else near: the side from which the ray comes decides
+    /// [`World::contact_of`] where [`World::is_far_side_away`], with nothing else near: the side from which the ray comes decides
     /// everything.
-    fn contact_of_ball(&self, at: &Meeting, mut visit: impl FnMut(Near)) -> Sides {
+    fn contact_of_one_side(&self, at: &Meeting, mut visit: impl FnMut(Near)) -> Sides {
         let SurfacePoint { point, error, normal, .. } = at.surface;
         let object = at.hit.object;
         if normal.dot(at.normal) > 0.0 {

@@ -13,19 +13,23 @@ impl World {
         if !self.has_rough_glass() {
             return Box::default();
         }
-        let lamps: Vec<Aabb> = self
+        let objects = self.geometry.objects();
+        let everywhere = Aabb::around([Vec3::NEG_INFINITY, Vec3::INFINITY]);
+        // A lamp is within the sphere around it, and within the box around its object.
+        let lamps: Vec<[Aabb; 2]> = self
             .lights
             .iter()
             .filter_map(|(_, light)| {
                 let bounds = light.bounds().filter(|_| !light.is_beyond())?;
                 let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
-                let room = radius + ROUNDING * (radius + center.abs().max_element());
-                Some(Aabb::around([center - Vec3::splat(room), center + Vec3::splat(room)]))
+                let room = ROUNDING * (radius + center.abs().max_element());
+                let around = Vec3::splat(radius + room);
+                let object = light.as_area().and_then(|area| objects[area.object as usize].bounds());
+                let of_object = object.map_or(everywhere, |own| own.grown(Vec3::splat(room)));
+                Some([Aabb::around([center - around, center + around]), of_object])
             })
             .collect();
         // Join the boxes of each body's objects.
-        let objects = self.geometry.objects();
-        let everywhere = Aabb::around([Vec3::NEG_INFINITY, Vec3::INFINITY]);
         let mut boxes: Vec<Option<Aabb>> = vec![None; objects.len()];
         for (id, object) in (0_u32..).zip(objects) {
             if self.materials_of(id).any(|material| material.bsdf.glass().is_some()) {
@@ -35,7 +39,8 @@ impl World {
             }
         }
         // Leave out those that a lamp may be in, and those that rays may leave.
-        let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.meets(bounds));
+        let holds_lamp =
+            |bounds: &Aabb| lamps.iter().any(|boxes| boxes.iter().all(|lamp| lamp.meets(bounds)));
         let is_dark = |(body, bounds): (u32, &Option<Aabb>)| {
             let closed = bounds.as_ref().filter(|bounds| bounds.extent().is_finite() && !self.is_open(body));
             closed.is_some_and(|bounds| !holds_lamp(bounds))

@@ -155,6 +155,34 @@ fn scenes(random: &mut Random) -> Vec<(World, Vec<DVec3>)> {
                 .shape(cube(-1.7, 1.4), 1),
             corners(1.0),
         ),
+        // A turned box, one that is thin, and one that stands in a corner of the first.
+        (
+            Build::new()
+                .shape(Shape::Box { center: DVec3::ZERO, size: v(1.2, 0.8, 1.0), rotate: turned }, 1)
+                .shape(
+                    Shape::Box { center: v(0.0, 0.0, 1.5), size: v(2.0, 2.0, 1e-6), rotate: DVec3::ZERO },
+                    2,
+                )
+                .shape(
+                    Shape::Box {
+                        center: rotated * v(0.6, 0.4, 0.5),
+                        size: DVec3::splat(0.3),
+                        rotate: turned,
+                    },
+                    2,
+                ),
+            (0..8)
+                .map(|i| {
+                    rotated
+                        * v(
+                            f64::from(i & 1) * 1.2 - 0.6,
+                            f64::from(i >> 1 & 1) * 0.8 - 0.4,
+                            f64::from(i >> 2) - 0.5,
+                        )
+                })
+                .chain([v(0.0, 0.0, 1.5), v(1.0, 0.0, 1.5)])
+                .collect(),
+        ),
         // A ball of triangles in a ball and in a room; a patch of paper on it.
         (
             Build::new()

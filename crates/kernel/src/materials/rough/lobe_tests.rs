@@ -1,6 +1,6 @@
 //! Checks of lobes of microfacets, for the tests of each kind: against a reference in `f64`, of samples against pdfs, and of albedos.
 
-use crate::materials::bsdf::{LobeSet, Place, RoughRow, ShownLobes};
+use crate::materials::bsdf::{LobeSet, Place, RoughRow, ShownLobes, SideSamples};
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::math::random::unit as random;
 use crate::math::{DVec3, Vec3};
@@ -54,6 +54,36 @@ impl Light {
             Self::Refracted(_) | Self::Through => -1.0,
         }
     }
+}
+
+/// Choices of lobes and numbers for directions, in rows: a grid of `side` × `side` cells.
+fn grid(side: u32) -> impl Iterator<Item = (Lanes, [Lanes; 2])> {
+    let mut next = random(5);
+    (0..side * side).step_by(LANES).map(move |first| {
+        let (mut choices, mut u): (Lanes, [Lanes; 2]) = ([0.0; LANES], [[0.0; LANES]; 2]);
+        let place = |i: u32, next: f32| ((i as f32 + next) / side as f32).min(1.0 - f32::EPSILON);
+        for i in 0..LANES as u32 {
+            let number = first + i;
+            // Golden ratio: the choices are spread over the cells as well.
+            let choice = (f64::from(number) * 0.618_033_988_749_894_9).fract();
+            choices[i as usize] = choice as f32;
+            u[0][i as usize] = place(number % side, next());
+            u[1][i as usize] = place(number / side % side, next());
+        }
+        (choices, u)
+    })
+}
+
+/// A sample on either side of a surface.
+pub struct SideSample {
+    /// Unit direction.
+    pub direction: DVec3,
+    /// Its pdf in sr⁻¹.
+    pub density: f64,
+    /// f·cosθ over the pdf.
+    pub share: f64,
+    /// Whether it is on the other side than the row's light.
+    pub is_beyond: bool,
 }
 
 /// A surface about z, seen from a direction.
@@ -120,24 +150,29 @@ impl<R: RoughRow> Subject<R> {
 
     /// Directions sampled by a grid of numbers, `side` × `side`, each with all choices of lobes in turns.
     pub fn samples(&self, lobes: LobeSet, side: u32) -> Vec<DVec3> {
-        let mut next = random(5);
-        let mut all = Vec::new();
-        let (mut choices, mut u): (Lanes, [Lanes; 2]) = ([0.0; LANES], [[0.0; LANES]; 2]);
-        let place = |i: u32, next: f32| ((i as f32 + next) / side as f32).min(1.0 - f32::EPSILON);
-        let count = side * side;
-        for first in (0..count).step_by(LANES) {
-            for i in 0..LANES as u32 {
-                let number = first + i;
-                // Golden ratio: the choices are spread over the cells as well.
-                let choice = (f64::from(number) * 0.618_033_988_749_894_9).fract();
-                choices[i as usize] = choice as f32;
-                u[0][i as usize] = place(number % side, next());
-                u[1][i as usize] = place(number / side % side, next());
-            }
-            let directions: Lanes3 = self.row.sample(lobes, &self.normals(), &choices, &u);
-            all.extend((0..LANES).map(|i| lane(&directions, i).as_dvec3()));
-        }
-        all.truncate(count as usize);
+        let rows = grid(side).map(|(choices, u)| self.row.sample(lobes, &self.normals(), &choices, &u));
+        let mut all: Vec<DVec3> =
+            rows.flat_map(|row| (0..LANES).map(move |i| lane(&row, i).as_dvec3())).collect();
+        all.truncate((side * side) as usize);
+        all
+    }
+
+    /// Samples on either side, by the numbers of [`Subject::samples`].
+    pub fn side_samples(
+        &self,
+        side: u32,
+        sample: impl Fn(&R, &Lanes, &[Lanes; 2]) -> SideSamples,
+    ) -> Vec<SideSample> {
+        let rows = grid(side).map(|(choices, u)| sample(&self.row, &choices, &u));
+        let one = |row: &SideSamples, i: usize| SideSample {
+            direction: lane(&row.directions, i).as_dvec3(),
+            density: f64::from(row.densities[i]),
+            share: f64::from(row.shares[i]),
+            is_beyond: row.beyond[i] != 0,
+        };
+        let mut all: Vec<SideSample> =
+            rows.flat_map(|row| (0..LANES).map(|i| one(&row, i)).collect::<Vec<_>>()).collect();
+        all.truncate((side * side) as usize);
         all
     }
 

@@ -17,7 +17,7 @@ pub use principled::{EmissionCoat, Principled, PrincipledInputs};
 
 use crate::materials::bsdf::{
     BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughPoint, RoughRow, ShownLobes,
-    UvRow,
+    SideSamples, UvRow,
 };
 use crate::materials::footprint::TexturePoint;
 use crate::materials::texture::Texture;
@@ -436,4 +436,20 @@ impl RoughBsdf {
 impl BsdfRow {
     /// A row of any content.
     pub const EMPTY: Self = Self::Phong(PhongRow::EMPTY);
+
+    /// Samples a direction for each surface, on either of its sides, by the numbers of [`RoughRow::sample`]. `None` for kinds that
+    /// have no such samples.
+    #[inline(always)]
+    pub fn sample_sides(&self, choices: &Lanes, u: &[Lanes; 2], folds: impl Folds) -> Option<SideSamples> {
+        match self {
+            Self::GlassReflection(row) => Some(row.call_sides(choices, u, folds)),
+            Self::GlassTransmission(row) => Some(row.call_sides(choices, u, folds)),
+            Self::Phong(_)
+            | Self::Metal(_)
+            | Self::BrushedMetal(_)
+            | Self::Plastic(_)
+            | Self::Principled(_)
+            | Self::PrincipledTransmission(_) => None,
+        }
+    }
 }

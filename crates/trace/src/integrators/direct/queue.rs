@@ -13,7 +13,7 @@ use crate::geometry::rows::{RayRows, lanes, traced};
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::Cone;
-use crate::integrators::transport::medium::Media;
+use crate::integrators::transport::medium::{Media, Medium};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::scatter::{BsdfSampling, Continuation};
 use crate::integrators::transport::tile::TileContext;
@@ -33,9 +33,9 @@ pub struct DirectLightQueue {
     rows: Vec<VertexBatch>,
     /// Rows in use; the others are memory.
     count: usize,
-    /// Index of the row for single vertices of each kind of BSDF, and of dark ones of each kind. If no row in use has this index,
-    /// the row is full or there is none.
-    open: [usize; 2 * RoughKind::ALL.len()],
+    /// Index of the row for single vertices of each kind of BSDF, of dark ones of each kind, and of both kinds with two sides. If no
+    /// row in use has this index, the row is full or there is none.
+    open: [usize; 4 * RoughKind::ALL.len()],
     /// Light of lamps at the vertices of each path of the round.
     arrived: Vec<Vec3>,
     /// Media of the vertices.
@@ -44,6 +44,25 @@ pub struct DirectLightQueue {
     pool: ShadowRayQueue,
     /// Beams at the vertices of the paths of the round, if requested.
     cones: Vec<Cone>,
+}
+
+/// Sides of a vertex. No light sample finds anything from one that is dark.
+#[derive(Clone, Copy)]
+pub enum Lit {
+    /// Its light is that of one side.
+    OneSide {
+        /// Whether it is dark.
+        is_dark: bool,
+    },
+    /// It stands for the other side of its surface too, where no light sample finds anything.
+    TwoSides {
+        /// Whether it is dark.
+        is_dark: bool,
+        /// Origin of rays on the other side.
+        beyond: Vec3,
+        /// The glass around them.
+        medium: Medium,
+    },
 }
 
 /// Rows that are lit together if lights are picked.
@@ -112,9 +131,7 @@ impl DirectLightQueue {
         // Put few vertices together with others of their kind.
         let mut left = row.used;
         let open = &mut self.open[row.bsdf.kind() as usize];
-        if let Some(open) =
-            kept.get_mut(*open).filter(|open| open.bsdf.kind() == row.bsdf.kind() && !open.is_dark)
-        {
+        if let Some(open) = kept.get_mut(*open).filter(|open| open.is_for(row.bsdf.kind(), (false, false))) {
             for lane in lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
                 open.copy(open.used.trailing_ones() as usize, row, lane);
                 left &= !(1 << lane);
@@ -127,26 +144,35 @@ impl DirectLightQueue {
         }
     }
 
-    /// Adds a vertex. No light sample from a dark one finds anything.
+    /// Adds a vertex.
     #[inline(always)]
-    pub fn push(&mut self, tile: &TileContext<'_>, lit: &ShadingVertex<'_>, measure: Measure, is_dark: bool) {
+    pub fn push(&mut self, tile: &TileContext<'_>, lit: &ShadingVertex<'_>, measure: Measure, sides: Lit) {
         self.note_cone(lit.place, lit.vertex.cone);
         let medium = self.media.number(lit.path.medium);
-        let (row, lane) = self.open_row(lit.bsdf.kind(), is_dark);
+        let (row, lane) = match sides {
+            Lit::OneSide { is_dark } => self.open_row(lit.bsdf.kind(), (is_dark, false)),
+            Lit::TwoSides { is_dark, beyond, medium } => {
+                let medium = self.media.number(medium);
+                let (row, lane) = self.open_row(lit.bsdf.kind(), (is_dark, true));
+                row.put_beyond(lane, beyond, medium);
+                (row, lane)
+            }
+        };
         row.put(lane, tile, lit, measure, medium);
     }
 
-    /// A row of this kind with a free lane, of dark vertices or of others.
-    fn open_row(&mut self, kind: RoughKind, is_dark: bool) -> (&mut VertexBatch, usize) {
-        let place = kind as usize + if is_dark { RoughKind::ALL.len() } else { 0 };
+    /// A row of this kind with a free lane, of dark vertices or of others, with two sides or one.
+    fn open_row(&mut self, kind: RoughKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
+        let (is_dark, has_two_sides) = which;
+        let table = usize::from(is_dark) + 2 * usize::from(has_two_sides);
+        let place = kind as usize + table * RoughKind::ALL.len();
         let mut number = self.open[place];
-        let is_open =
-            |row: &VertexBatch| row.used != ALL && row.bsdf.kind() == kind && row.is_dark == is_dark;
+        let is_open = |row: &VertexBatch| row.used != ALL && row.is_for(kind, which);
         if number >= self.count || !is_open(&self.rows[number]) {
             let row = self.spare();
             row.reset();
             row.bsdf.prepare(kind);
-            row.is_dark = is_dark;
+            (row.is_dark, row.has_two_sides) = which;
             number = self.count;
             self.open[place] = number;
             self.count += 1;

@@ -5,8 +5,8 @@ use super::vertex::{Lift, ShadingVertex};
 use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
 use crate::integrators::view::{Measure, Parts};
-use crate::materials::BsdfRow;
 use crate::materials::bsdf::{BsdfValues, Place};
+use crate::materials::{BsdfRow, RoughKind};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane, truths};
 use crate::sampling::SamplerRow;
@@ -63,6 +63,12 @@ pub struct VertexBatch {
     pub is_bent: bool,
     /// Whether light samples find nothing from any vertex.
     pub is_dark: bool,
+    /// Whether the vertices stand for both sides of their surfaces.
+    pub has_two_sides: bool,
+    /// Origins of rays on the other side, and indices of the glass around these, if it has two sides.
+    pub beyond: Lanes3,
+    /// [`VertexBatch::beyond`].
+    pub medium_beyond: [u32; LANES],
 }
 
 /// Value in place of the cosine between two equal normals.
@@ -132,6 +138,9 @@ impl VertexBatch {
         medium: [0; LANES],
         is_bent: false,
         is_dark: false,
+        has_two_sides: false,
+        beyond: [[0.0; LANES]; 3],
+        medium_beyond: [0; LANES],
     };
 
     /// Prepares the row for other vertices, with normals as they are.
@@ -139,9 +148,15 @@ impl VertexBatch {
     pub fn reset(&mut self) {
         (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
         (self.has_facet, self.only_specular_before, self.after_gloss) = (0, 0, 0);
-        (self.is_bent, self.is_dark) = (false, false);
+        (self.is_bent, self.is_dark, self.has_two_sides) = (false, false, false);
         self.bsdf.reset();
         self.bend = [UNBENT; LANES];
+    }
+
+    /// Whether it has vertices of this kind, dark ones or others, with two sides or one.
+    #[inline(always)]
+    pub fn is_for(&self, kind: RoughKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
+        self.bsdf.kind() == kind && self.is_dark == is_dark && self.has_two_sides == has_two_sides
     }
 
     /// Keeps these vertices only.
@@ -152,7 +167,7 @@ impl VertexBatch {
         }
     }
 
-    /// Takes a vertex of another row, whose BSDFs are of the same kind.
+    /// Takes a vertex of another row, whose BSDFs are of the same kind; neither has two sides.
     pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
         for (own, other) in [
             (&mut self.from, &other.from),
@@ -223,6 +238,12 @@ impl VertexBatch {
         self.used |= 1 << i;
     }
 
+    /// Sets the other side of a vertex: the origin of rays there, and the index of the glass around it.
+    pub fn put_beyond(&mut self, i: usize, beyond: Vec3, medium: u32) {
+        set_lane(&mut self.beyond, i, beyond);
+        self.medium_beyond[i] = medium;
+    }
+
     /// Response of the vertices to light from these directions.
     #[inline(always)]
     pub fn response(&self, directions: &Lanes3, folds: impl Folds) -> Response {
@@ -237,6 +258,22 @@ impl VertexBatch {
             }
         }
         Response { bsdf: self.bsdf.f(directions, folds), cosines }
+    }
+
+    /// Terminator factors of light from these directions, on the sides of the vertices where `sides` is 1, on the others where it
+    /// is −1; not above 0 if nothing arrives.
+    #[inline(always)]
+    pub fn softened(&self, directions: &Lanes3, sides: &Lanes) -> Lanes {
+        let mut left = [1.0; LANES];
+        if self.is_bent {
+            for i in 0..LANES {
+                let direction = lane(directions, i) * sides[i];
+                let cosine = lane(&self.normal, i).dot(direction);
+                let smooth = lane(&self.smooth_normal, i).dot(direction);
+                left[i] = terminator(cosine, smooth, self.bend[i]);
+            }
+        }
+        left
     }
 
     /// [`Ray::start`] of rays from the vertices in these directions: none of a ray that goes behind its facet.

@@ -8,8 +8,9 @@ use super::ray::{PathRay, PathState};
 use super::tile::TileContext;
 use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
-use crate::materials::bsdf::LobeSet;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
+use crate::materials::bsdf::{LobeSet, SideSamples};
+use crate::math::Vec3;
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
 use crate::sampling::Decision;
 use crate::world::Loops;
 
@@ -78,6 +79,8 @@ pub struct Scattered {
     directions: Lanes3,
     /// [`Ray::start`] of the rays.
     starts: [u32; LANES],
+    /// A bit for each path that goes on at the other side of its surface.
+    beyond: u32,
     /// A bit for each vertex with a narrow lobe.
     narrow: u32,
     /// Their pdfs in sr⁻¹.
@@ -98,16 +101,20 @@ impl BsdfSampling<'_> {
         let of_lobe = |density: f32| move |cone: &Cone| cone.scattered(density);
         // Make a path of each that goes on.
         next.extend(lanes(scattered.alive).map(|i| {
+            let (from, medium, normal) = if scattered.beyond & 1 << i == 0 {
+                (&row.from, row.medium[i], lane(&row.normal, i))
+            } else {
+                (&row.beyond, row.medium_beyond[i], -lane(&row.normal, i))
+            };
             let mut path = PathRay {
-                ray: Ray::new(lane(&row.from, i), lane(&scattered.directions, i))
-                    .leaving(scattered.starts[i]),
+                ray: Ray::new(lane(from, i), lane(&scattered.directions, i)).leaving(scattered.starts[i]),
                 throughput: lane(&row.throughput, i) * lane(&scattered.factors, i),
                 slot: row.slot[i],
                 path: row.path[i],
-                medium: media.get(row.medium[i]),
+                medium: media.get(medium),
                 state: PathState {
                     density: scattered.densities[i],
-                    normal: lane(&row.normal, i),
+                    normal,
                     roulette_throughput: scattered.roulette_throughput[i],
                     only_specular_before: false,
                     one_diffuse_before: row.only_specular_before & 1 << i != 0,
@@ -135,7 +142,34 @@ impl Loops for BsdfSampling<'_> {
         let are_narrow = row.bsdf.has_narrow_lobes();
         let [lobe, _] =
             if are_narrow { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; LANES]; 2] };
-        let directions = row.bsdf.sample(continuation.lobes, &row.normal, &lobe, &u, folds);
+        let sides = if row.has_two_sides { row.bsdf.sample_sides(&lobe, &u, folds) } else { None };
+        let mut scattered = match sides {
+            Some(sides) => self.on_either_side(&sides, folds),
+            None => self.on_own_side(&lobe, &u, folds),
+        };
+        scattered.alive &= used;
+        // Apply Russian roulette.
+        if continuation.is_risked {
+            let [risk, _] = sampler.pairs(&row.path, Decision::Roulette, 0, 1);
+            for i in 0..LANES {
+                let chance = continuation.chance(scattered.roulette_throughput[i]);
+                let bit = 1 << i;
+                scattered.alive &= if risk[i] < chance { !0 } else { !bit };
+                let factor = lane(&scattered.factors, i) / chance;
+                set_lane(&mut scattered.factors, i, factor);
+                scattered.roulette_throughput[i] /= chance;
+            }
+        }
+        scattered
+    }
+}
+
+impl BsdfSampling<'_> {
+    /// Paths that go on on the sides of the vertices.
+    #[inline(always)]
+    fn on_own_side(&self, lobe: &Lanes, u: &[Lanes; 2], folds: impl Folds) -> Scattered {
+        let Self { row, continuation, .. } = *self;
+        let directions = row.bsdf.sample(continuation.lobes, &row.normal, lobe, u, folds);
         // Evaluate the BSDF and the pdf there.
         let Response { bsdf, cosines } = row.response(&directions, folds);
         let densities = row.bsdf.pdf(continuation.lobes, &row.normal, &directions, &bsdf, folds);
@@ -157,21 +191,48 @@ impl Loops for BsdfSampling<'_> {
             alive |= if (cosines[i] > 0.0) & (densities[i] > 0.0) & brings { bit } else { 0 };
         }
         // Drop directions that certainly see nothing.
-        alive &= used & !row.hidden(&directions, folds);
-        // Apply Russian roulette.
-        if continuation.is_risked {
-            let [risk, _] = sampler.pairs(&row.path, Decision::Roulette, 0, 1);
-            for i in 0..LANES {
-                let chance = continuation.chance(roulette_throughput[i]);
-                let bit = 1 << i;
-                alive &= if risk[i] < chance { !0 } else { !bit };
-                let factor = lane(&factors, i) / chance;
-                set_lane(&mut factors, i, factor);
-                roulette_throughput[i] /= chance;
-            }
-        }
+        alive &= !row.hidden(&directions, folds);
         let starts = row.starts(&directions);
         let narrow = row.bsdf.narrow_lobes();
-        Scattered { alive, directions, starts, narrow, densities, factors, roulette_throughput }
+        Scattered { alive, directions, starts, beyond: 0, narrow, densities, factors, roulette_throughput }
+    }
+
+    /// Paths that go on on either side of the surfaces.
+    #[inline(always)]
+    fn on_either_side(&self, samples: &SideSamples, folds: impl Folds) -> Scattered {
+        let row = self.row;
+        let SideSamples { directions, densities, shares, shown, beyond } = samples;
+        // Soften the edges of bent normals, on the side of each direction.
+        let mut sides = [1.0; LANES];
+        for i in 0..LANES {
+            sides[i] = if beyond[i] == 0 { 1.0 } else { -1.0 };
+        }
+        let left = row.softened(directions, &sides);
+        let (mut factors, mut roulette_throughput) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        let mut alive = 0_u32;
+        for i in 0..LANES {
+            let share = shares[i] * left[i];
+            roulette_throughput[i] = row.roulette_throughput[i] * share;
+            let factor = share * shown[i];
+            set_lane(&mut factors, i, Vec3::splat(factor));
+            alive |= if (densities[i] > 0.0) & (factor > 0.0) { 1 << i } else { 0 };
+        }
+        // Drop directions behind the facets; rays between two sides start on none.
+        let mut hidden = [0; LANES];
+        for i in 0..LANES {
+            let cosine = lane(&row.horizon, i).dot(lane(directions, i)) * sides[i];
+            hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
+        }
+        alive &= !(folds.bits(&hidden) & row.is_bounded);
+        Scattered {
+            alive,
+            directions: *directions,
+            starts: [Ray::NO_TRIANGLE; LANES],
+            beyond: folds.bits(beyond),
+            narrow: row.bsdf.narrow_lobes(),
+            densities: *densities,
+            factors,
+            roulette_throughput,
+        }
     }
 }

@@ -227,6 +227,11 @@ impl<'a> Vertex<'a> {
         if self.has_coordinates { self.surface.dpdu } else { Vec3::ZERO }
     }
 
+    /// Origin of rays on the other side, where the starts of rays are known on both.
+    pub fn beyond(&self) -> Option<Vec3> {
+        self.sides.map(|sides| sides.beyond)
+    }
+
     /// A ray that starts here.
     pub fn leaving(&self, direction: Vec3) -> Ray {
         let SurfacePoint { point, error, normal, .. } = self.surface;

@@ -218,11 +218,9 @@ fn rough<'a, W: Walker<'a>>(
     let boundary = tile.boundary(hit, [path.medium, far], walker.crossing())?;
     let glass = tile.world.materials[boundary.material as usize].bsdf.glass()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
-    let at = match touching {
-        Some(other) => Vertex::touching(tile, path, (sides, &other), hit.shape.t).texture_point,
-        None => vertex.texture_point.clone(),
-    };
-    let alpha = glass.alpha(&at, walker.lookups())?;
+    let touching = touching.map(|other| Vertex::touching(tile, path, (sides, &other), hit.shape.t));
+    let at = touching.as_ref().map_or(&vertex.texture_point, |other| &other.texture_point);
+    let alpha = glass.alpha(at, walker.lookups())?;
     Some(GlassPoint { near: indices[0], far: indices[1], alpha })
 }
 

@@ -1,12 +1,12 @@
 //! Surfaces of rough glass in rows of sixteen.
 
 use super::GlassPoint;
-use crate::materials::bsdf::{BsdfValues, LobeSet, NarrowLobe, Place, RoughRow, ShownLobes};
+use crate::materials::bsdf::{BsdfValues, LobeSet, NarrowLobe, Place, RoughRow, ShownLobes, SideSamples};
 use crate::materials::fresnel::{dielectric_either, transmittance};
-use crate::materials::microfacet::{Half, Leg, facet, facing, mirrored_at, refracted_at};
+use crate::materials::microfacet::{Half, Leg, facet, facing_one, mirrored_at, refracted_at};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Loops, TRUE, lane, set_lane};
 
 /// Surfaces of rough glass, side by side: their reflection, or their transmission. The values of f that are shared are f of the lobe,
 /// whatever is shown, twice.
@@ -71,6 +71,81 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
     }
 }
 
+impl<const THROUGH: bool> GlassRow<THROUGH> {
+    /// [`BsdfRow::sample_sides`](super::super::BsdfRow::sample_sides).
+    #[inline(always)]
+    pub(in super::super) fn call_sides(
+        &self,
+        choices: &Lanes,
+        u: &[Lanes; 2],
+        folds: impl Folds,
+    ) -> SideSamples {
+        folds.call(SideSampling { row: self, choices, u })
+    }
+
+    /// Samples a facet of each surface, and by chance its reflection or its refraction. All formulas are by the facet's normal, which
+    /// is the half vector of both directions.
+    #[inline(always)]
+    pub(super) fn sample_sides(&self, choices: &Lanes, u: &[Lanes; 2]) -> SideSamples {
+        let (mut directions, mut beyond) = ([[0.0; LANES]; 3], [0; LANES]);
+        let (mut densities, mut shares) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let (normal, to_eye, alpha) = (lane(&self.normal, i), lane(&self.to_eye, i), self.alpha[i]);
+            let half = facet(&Frame::from_normal(normal), to_eye, [alpha; 2], [u[0][i], u[1][i]]);
+            let indices = [self.near[i], self.far[i]];
+            let eta = indices[1] / indices[0];
+            let cosine = half.dot(to_eye);
+            let reflectance = dielectric_either(cosine, eta);
+            let is_mirrored = choices[i] < reflectance;
+            let choose = |mirrored: f32, refracted: f32| if is_mirrored { mirrored } else { refracted };
+            let (mirrored, refracted) = (mirrored_at(half, to_eye), refracted_at(half, to_eye, eta));
+            let direction = Vec3::new(
+                choose(mirrored.x, refracted.x),
+                choose(mirrored.y, refracted.y),
+                choose(mirrored.z, refracted.z),
+            );
+            set_lane(&mut directions, i, direction);
+            beyond[i] = if is_mirrored == THROUGH { TRUE } else { 0 };
+            // Weigh the facet by what it sends there, per solid angle.
+            let behind = -half.dot(refracted);
+            let sum = indices[0] * cosine - indices[1] * behind;
+            let through = 4.0 * (cosine * behind * transmittance([cosine, behind], indices) / (sum * sum));
+            let by_facet = choose(reflectance, through * (indices[1] * indices[1]));
+            let is_through = (cosine > LEAST_COSINE) & (behind > LEAST_COSINE);
+            // The light is on the facet's side of the surface, or nothing arrives.
+            let eye = Leg::isotropic(normal, to_eye, alpha);
+            let side = choose(1.0, -1.0);
+            let light = Leg::isotropic(normal * side, direction, alpha);
+            let along = normal.dot(half);
+            let half = Half { squared: 1.0, along, across: half - normal * along };
+            let density = by_facet * eye.density(half.isotropic(alpha));
+            let is_seen =
+                light.is_ahead() & eye.is_ahead() & (is_mirrored | is_through) & (density < f32::MAX);
+            densities[i] = if is_seen { density } else { 0.0 };
+            let share = light.cosine * (eye.cosine + eye.slope)
+                / (eye.cosine * light.slope + light.cosine * eye.slope);
+            shares[i] = if is_seen { share } else { 0.0 };
+        }
+        SideSamples { directions, densities, shares, shown: self.shown, beyond }
+    }
+}
+
+/// A call of [`GlassRow::sample_sides`].
+struct SideSampling<'a, const THROUGH: bool> {
+    row: &'a GlassRow<THROUGH>,
+    choices: &'a Lanes,
+    u: &'a [Lanes; 2],
+}
+
+impl<const THROUGH: bool> Loops for SideSampling<'_, THROUGH> {
+    type Done = SideSamples;
+
+    #[inline(always)]
+    fn run(self, _: impl Folds) -> SideSamples {
+        self.row.sample_sides(self.choices, self.u)
+    }
+}
+
 /// Least cosine between a facet's normal and a direction.
 const LEAST_COSINE: f32 = 1e-6;
 
@@ -91,7 +166,7 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
 
     #[inline(always)]
     fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        if THROUGH { -facing(-normal, to_eye) } else { facing(normal, to_eye) }
+        if THROUGH { -facing_one(-normal, to_eye) } else { facing_one(normal, to_eye) }
     }
 
     #[inline(always)]

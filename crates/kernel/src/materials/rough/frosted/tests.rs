@@ -4,7 +4,7 @@ use super::*;
 use crate::materials::bsdf::{LobeSet, RoughRow};
 use crate::materials::fresnel::dielectric;
 use crate::materials::rough::lobe_tests::{
-    ALPHAS, COSINES, Light, Subject, check_neighbours, check_neighbours_lit, direction, reference,
+    ALPHAS, COSINES, Light, SideSample, Subject, check_neighbours, check_neighbours_lit, direction, reference,
 };
 use crate::math::DVec3;
 use crate::math::random::unit as random;
@@ -206,6 +206,58 @@ fn a_path_goes_on_at_exactly_one_side() {
             reflected += u32::from(goes_on[0]);
         }
         assert!(reflected > 0 && reflected < 1024, "{indices:?}: {reflected}");
+    }
+}
+
+#[test]
+fn one_vertex_for_both_sides_goes_on_as_two_do() {
+    for (indices, alpha) in INDICES.iter().flat_map(|one| ALPHAS.map(|alpha| (*one, alpha))) {
+        for cosine in COSINES {
+            let point = glass(indices, alpha);
+            let (reflection, transmission) = parts(&point, direction(cosine, 0.3));
+            let alone = [reflection.samples(LobeSet::All, 16), transmission.samples(LobeSet::All, 16)];
+            let rows: [Vec<SideSample>; 2] = [
+                reflection.side_samples(16, GlassRow::sample_sides),
+                transmission.side_samples(16, GlassRow::sample_sides),
+            ];
+            for (i, (up, down)) in rows[0].iter().zip(&rows[1]).enumerate() {
+                let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}, sample {i}");
+                // The vertices of both sides go on alike: at one of them, on its own side.
+                assert_eq!((up.direction, up.density, up.share), (down.direction, down.density, down.share));
+                assert_ne!(up.is_beyond, down.is_beyond, "{what}");
+                let side = usize::from(up.is_beyond);
+                assert_eq!(up.direction, alone[side][i], "{what}");
+                let (f, pdf, height) = if side == 0 {
+                    let (f, _, pdf) = reflection.values(LobeSet::All, &[up.direction])[0];
+                    (f.x, pdf, up.direction.z)
+                } else {
+                    let (f, _, pdf) = transmission.values(LobeSet::All, &[up.direction])[0];
+                    (f.x, pdf, -up.direction.z)
+                };
+                // The lobe by the directions has less digits where it is narrow, where indices are close, and just before total
+                // reflection at the facet.
+                let least = f64::from((indices[0] - indices[1]).abs()).min(0.5);
+                let there = if side == 0 { indices[0] } else { indices[1] };
+                let half = (direction(cosine, 0.3) * f64::from(indices[0]) + up.direction * f64::from(there))
+                    .normalize();
+                let (eta, at_facet) =
+                    (f64::from(indices[1]) / f64::from(indices[0]), direction(cosine, 0.3).dot(half));
+                let refracted = (eta * eta - 1.0 + at_facet * at_facet).abs();
+                let rounding = 2.0 * f64::from(f32::EPSILON) / refracted.max(1e-9);
+                let error = 0.5 / least * (1e-4 + 3e-6 / f64::from(alpha) + rounding);
+                if height < 0.02 || pdf == 0.0 || up.density == 0.0 {
+                    assert!(
+                        height < 0.02 || pdf == 0.0 && up.density == 0.0,
+                        "{what}: {pdf}, {}",
+                        up.density
+                    );
+                    continue;
+                }
+                assert!((up.density - pdf).abs() < error * pdf, "{what}: {} is not {pdf}", up.density);
+                let share = f * height / pdf;
+                assert!((up.share - share).abs() < 1e-4 * share, "{what}: {} is not {share}", up.share);
+            }
+        }
     }
 }
 

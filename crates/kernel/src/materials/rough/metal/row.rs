@@ -5,7 +5,7 @@ use crate::materials::bsdf::{
     BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughMaterial, RoughRow, ShownLobes, UvRow,
 };
 use crate::materials::fresnel::schlick_weight;
-use crate::materials::microfacet::{Half, Leg, facing, frame_along, mirrored, turn_to_viewers};
+use crate::materials::microfacet::{Half, Leg, facing_one, frame_along, mirrored, turn_to_viewers};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Truths, lane, set_lane, take, truths};
@@ -105,7 +105,7 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
 
     #[inline(always)]
     fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        facing(normal, to_eye)
+        facing_one(normal, to_eye)
     }
 
     #[inline(always)]

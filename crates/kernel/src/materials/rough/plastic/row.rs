@@ -8,7 +8,7 @@ use crate::materials::bsdf::{
 };
 use crate::materials::fresnel::dielectric_outside;
 use crate::materials::lobe_albedo::{TERMS, evaluate, under_coat};
-use crate::materials::microfacet::{Half, Leg, facing, mirrored, turn_to_viewers};
+use crate::materials::microfacet::{Half, Leg, facing_one, mirrored, turn_to_viewers};
 use crate::materials::phong::lobes::about;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -153,7 +153,7 @@ impl RoughRow for PlasticRow {
 
     #[inline(always)]
     fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        facing(normal, to_eye)
+        facing_one(normal, to_eye)
     }
 
     #[inline(always)]

@@ -8,7 +8,7 @@ use crate::materials::bsdf::{
 };
 use crate::materials::fresnel::schlick_weight;
 use crate::materials::lobe_albedo::{TERMS, evaluate};
-use crate::materials::microfacet::{Half, Leg, facing, mirrored, turn_to_viewers};
+use crate::materials::microfacet::{Half, Leg, facing_one, mirrored, turn_to_viewers};
 use crate::materials::phong::lobes::about;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
@@ -227,7 +227,7 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
 
     #[inline(always)]
     fn turned(normal: Vec3, to_eye: Vec3) -> Vec3 {
-        if THROUGH { -facing(-normal, to_eye) } else { facing(normal, to_eye) }
+        if THROUGH { -facing_one(-normal, to_eye) } else { facing_one(normal, to_eye) }
     }
 
     #[inline(always)]
