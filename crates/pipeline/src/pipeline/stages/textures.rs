@@ -447,8 +447,8 @@ mod tests {
     fn the_images_of_a_scene_share_their_memory() {
         let over = over_budget(&[600, 400, 0, 25, 1], 1001);
         assert_eq!(over.iter().map(Option::is_some).collect::<Vec<_>>(), [false, false, false, true, false]);
-        // Three pictures of 16000 × 16000: 732.4 MiB each by their headers; there is nothing behind those.
-        let table = |name: &str| format!("[textures.{name}]\nfile = \"{name}.ppm\"\n");
+        // Three pictures of 15999 × 15999, packed: 732.3 MiB each by their headers, behind which few pixels follow.
+        let table = |name: &str| format!("[textures.{name}]\nfile = \"{name}.tga\"\n");
         let ball = |name: &str| {
             format!(
                 "[materials.{name}]\ndiffuse = {{ texture = \"{name}\" }}\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n\
@@ -458,14 +458,15 @@ mod tests {
         let names = ["one", "two", "three"];
         let tables: String = names.iter().map(|name| table(name) + &ball(name)).collect();
         let mut bench = Bench::new(&format!("{SCENE}{tables}"));
+        let header = "\0\0\x0a\0\0\0\0\0\0\0\0\0\x7f\x3e\x7f\x3e\x18\0";
         for name in names {
-            // As long as a file of so many pixels is at the least, a bit for each.
-            bench.write(&format!("{name}.ppm"), &format!("P4 16000 16000\n{}", " ".repeat(16_000 * 2000)));
+            // As long as a file of so many pixels is at the least, 128 in a run.
+            bench.write(&format!("{name}.tga"), &format!("{header}{}", "\0".repeat(3 << 20)));
         }
         let Failure::Scene(errors) = bench.failed() else { panic!("errors in the scene") };
         let over: Vec<_> = errors.iter().filter(|error| error.message.contains("together")).collect();
         assert_eq!(over.len(), 1, "{errors:?}");
-        assert!(over[0].message.contains("three.ppm: it takes 733 MiB"), "{}", over[0].message);
+        assert!(over[0].message.contains("three.tga: it takes 733 MiB"), "{}", over[0].message);
         assert!(over[0].message.contains("the images before it 1465 MiB"), "{}", over[0].message);
         assert!(over[0].message.contains("make some of them smaller"), "{}", over[0].message);
     }
