@@ -69,7 +69,7 @@ pub struct SideSamples {
     pub shares: Lanes,
     /// Factors on `shares` for what is shown.
     pub shown: Lanes,
-    /// Which of them are on the other side than the row's own light.
+    /// Directions on the other side than the row's own light.
     pub beyond: Truths,
 }
 

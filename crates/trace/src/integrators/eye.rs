@@ -484,7 +484,7 @@ impl Wavefront<'_, '_> {
         }
     }
 
-    /// What is shown of the light at a path's vertex.
+    /// Part of the light at a path's vertex that the view shows.
     fn measure_of(&self, path: &PathRay) -> Measure {
         if path.state.only_specular_before { self.accumulator.measure } else { Measure::ALL }
     }

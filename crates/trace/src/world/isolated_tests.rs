@@ -155,7 +155,7 @@ fn scenes(random: &mut Random) -> Vec<(World, Vec<DVec3>)> {
                 .shape(cube(-1.7, 1.4), 1),
             corners(1.0),
         ),
-        // A turned box, one that is thin, and one that stands in a corner of the first.
+        // A turned box, a thin box, and a small box in a corner of the first.
         (
             Build::new()
                 .shape(Shape::Box { center: DVec3::ZERO, size: v(1.2, 0.8, 1.0), rotate: turned }, 1)

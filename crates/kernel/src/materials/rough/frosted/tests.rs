@@ -234,8 +234,8 @@ fn one_vertex_for_both_sides_goes_on_as_two_do() {
                     let (f, _, pdf) = transmission.values(LobeSet::All, &[up.direction])[0];
                     (f.x, pdf, -up.direction.z)
                 };
-                // The lobe by the directions has less digits where it is narrow, where indices are close, and just before total
-                // reflection at the facet.
+                // By the directions, a narrow lobe has less digits; so have close indices, and facets just before total
+                // reflection.
                 let least = f64::from((indices[0] - indices[1]).abs()).min(0.5);
                 let there = if side == 0 { indices[0] } else { indices[1] };
                 let half = (direction(cosine, 0.3) * f64::from(indices[0]) + up.direction * f64::from(there))
