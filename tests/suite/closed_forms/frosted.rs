@@ -344,6 +344,23 @@ fn only_closed_bodies_without_a_lamp_are_dark_within() {
 }
 
 #[test]
+fn without_shadows_lamps_shine_into_rough_glass() {
+    // A spark in the glass is no light to speak of, but light samples from within count then.
+    let ball = scene()
+        .sphere(v(0.0, 0.0, -5.0), 1.0, frosted(1.5, 0.9))
+        .quad(v(-4.0, 3.0, -9.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, 8.0), emitter(8.0))
+        .depth(2)
+        .with(|scene| scene.render.shadows = Shadows::Off)
+        .pictured(v(0.0, 0.0, 0.0), v(0.0, 0.0, -5.0), 18.0, 12, 12);
+    let spark = ball.clone().point_light(v(0.0, 0.0, -5.0), 1e-6, Falloff::Square);
+    assert_eq!([&ball, &spark].map(|build| build.world().is_dark_body(0)), [true, false]);
+    let [dark, lit] = [&ball, &spark].map(|build| mean_and_error(&build.values(8192, 16)));
+    let error = dark.1.hypot(lit.1);
+    assert!(error < 0.01 * lit.0, "{dark:?}, {lit:?}");
+    assert!((dark.0 - lit.0).abs() < 4.0 * error, "{dark:?}, {lit:?}");
+}
+
+#[test]
 fn a_lamp_in_rough_glass_lights_its_inside() {
     // With a wide lamp in its middle, light samples, lobes and paths find the same through the wall.
     let build = scene()

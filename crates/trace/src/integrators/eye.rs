@@ -460,9 +460,11 @@ impl Wavefront<'_, '_> {
             let lit = ShadingVertex { path, place, vertex, shading, bsdf: &reflection };
             return self.direct.push(tile, &lit, measure, Lit::OneSide { is_dark: false });
         }
+        // Without shadows, lamps shine into any body.
+        let has_shadows = tile.settings.render.shadows != Shadows::Off;
         let is_dark =
             |medium: Medium| medium.glass().is_some_and(|inside| tile.world.is_dark_body(inside.body));
-        let dark = [near, far].map(is_dark);
+        let dark = [near, far].map(|medium| has_shadows && is_dark(medium));
         // Photons land on both sides.
         let is_one = dark != [false; 2] && !tile.behaviour.gathers && vertex.beyond().is_some();
         let is_behind = is_one && dark == [true, false];
