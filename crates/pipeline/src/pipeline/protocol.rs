@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
-pub use super::answers::{CameraEdit, Kept, Picked, Section, Spot, Thing};
+pub use super::answers::{CameraEdit, Kept, MovedCamera, Picked, Section, Spot, Thing};
 pub use super::report::{
     Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts,
 };
@@ -33,7 +33,7 @@ pub enum Command {
     /// Previews are to have this size from now on; the picture at hand is shown again. What is rendered goes on.
     Preview(Option<PreviewSize>),
     /// Put this camera into the scene file; [`Event::CameraKept`] says what came of it. What is rendered goes on.
-    KeepCamera(Viewpoint),
+    KeepCamera(MovedCamera),
     /// Put the scene file back as it was before this edit, if nobody changed it since; [`Event::CameraUndone`] says what came of
     /// it. What is rendered goes on.
     UndoCamera(CameraEdit),

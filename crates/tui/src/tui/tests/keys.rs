@@ -111,7 +111,7 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             desk.press('l');
             let wanted = desk.state.request.viewpoint().expect("a camera");
             assert!(
-                matches!(desk.key(key)[..], [Effect::Send(Command::KeepCamera(camera))] if camera == wanted)
+                matches!(desk.key(key)[..], [Effect::Send(Command::KeepCamera(moved))] if moved.camera == wanted && moved.own == camera())
             );
         }
         Action::Inspect => {
