@@ -41,7 +41,8 @@ pub enum Command {
     Pick(Spot),
     /// Stop the render under way.
     Cancel,
-    /// Stop the render under way, and keep a checkpoint of it.
+    /// Stop the render under way, and keep a checkpoint of it. A picture that is being written becomes whole, unless
+    /// [`Command::Cancel`] comes too: then a checkpoint takes its place.
     Suspend,
     /// Hold the work, or let it go on: that of the newest request, whether it has begun or not. A request that comes
     /// later is not held.

@@ -554,7 +554,11 @@ impl Engine {
             };
             let rendered = render(key, &mut films, &rendering)?;
             if let Some(state) = films.current().filter(|_| request.write != Writing::No) {
-                images = layers::layers(state, &rendering, wanted)?;
+                let made = layers::layers(state, &rendering, wanted);
+                if let (Err(_), Some(keeping)) = (&made, keeping) {
+                    keeping.finish(state, rendered.value, false);
+                }
+                images = made?;
             }
             Ok(rendered)
         });
