@@ -177,6 +177,8 @@ pub enum Event {
     WriteFailed {
         /// Number of the request.
         generation: u64,
+        /// The picture's file, if the failure is of one alone: nobody knows what it holds now.
+        path: Option<PathBuf>,
         /// The file and the reason.
         message: String,
     },

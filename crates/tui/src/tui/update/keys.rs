@@ -216,7 +216,7 @@ fn scene_settings(state: &mut State) -> Vec<Effect> {
 }
 
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
-    if state.overlays.problems.is_none() && state.overlays.warnings.is_empty() {
+    if state.overlays.problems.is_none() && state.reported().is_empty() {
         let is_read = state.overlays.are_warnings_known || !state.work.is_running();
         return notify(
             state,
