@@ -122,6 +122,9 @@ impl AtHand {
         }
         let read = loaded.source.text();
         let changed = "the scene file has changed since it was read: the camera is not written into it";
+        if is_gone(&path) {
+            return Err("the scene file is gone: the camera is not written".to_owned());
+        }
         if !has_text(&path, read) {
             return Err(changed.to_owned());
         }
@@ -147,11 +150,19 @@ impl AtHand {
 fn undo(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
     let CameraEdit { path, before, after } = edit;
     let changed = format!("{} has changed since c wrote it: it is left as it is", path.display());
+    if is_gone(path) {
+        return Err(format!("{} is gone: there is nothing to undo in it", path.display()));
+    }
     if !has_text(path, after) {
         return Err(changed);
     }
     replace(path, (after, before), inputs, (&changed, "it is left as it is"))?;
     Ok(path.clone())
+}
+
+/// Whether there is no file of this name any more.
+fn is_gone(path: &Path) -> bool {
+    path.metadata().is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
 }
 
 /// Whether this is what the file holds.

@@ -202,6 +202,20 @@ fn a_kept_camera_is_taken_back_to_the_byte() {
 }
 
 #[test]
+fn a_scene_file_that_is_gone_is_said_to_be_gone() {
+    let mut bench = Bench::new(SCENE);
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    let edit = keep(&mut bench, camera).expect("written").edit.expect("an edit");
+    fs::remove_file(bench.path("scene.toml")).expect("removed");
+    let why = undo(&mut bench, edit).expect_err("refused");
+    assert!(why.ends_with("scene.toml is gone: there is nothing to undo in it"), "{why}");
+    let why = keep(&mut bench, camera).expect_err("refused");
+    assert_eq!(why, "the scene file is gone: the camera is not written");
+    assert!(!bench.path("scene.toml").exists());
+}
+
+#[test]
 fn a_kept_camera_follows_links_and_keeps_permissions() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let mut bench = Bench::new(SCENE);
