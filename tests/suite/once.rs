@@ -342,6 +342,12 @@ fn new_writes_a_scene_that_renders_and_never_overwrites() {
     assert!(stderr.contains("ball.toml exists"), "{stderr}");
     assert_eq!(fs::read_to_string(desk.path("ball.toml")).expect("there"), SCENE);
     desk.expect("new nowhere/x.toml", 1);
+    // A folder of that name is there already, however it is written.
+    fs::create_dir(desk.path("sub")).expect("a folder");
+    for name in ["sub", "sub/"] {
+        let stderr = desk.expect(&format!("new {name}"), 2);
+        assert_eq!(stderr, format!("error: {name} exists already, and is left as it is\n"));
+    }
 }
 
 /// Starts a render, and sends it so many signals once it writes its picture. Returns its exit code and what it said.

@@ -39,7 +39,7 @@ pub(super) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
             ));
             Exit::DONE
         }
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists || file.is_dir() => {
             let dangles = !file.exists();
             let what =
                 if dangles { "is a symbolic link to a file that does not exist" } else { "exists already" };
@@ -68,7 +68,9 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
                 let name = path.display();
                 Err((
                     Exit::WRONG,
-                    format!("{name} is another file, and is left as it is: remove it, or leave out --schema"),
+                    format!(
+                        "{name} is not the schema of this glimt, and is left as it is: remove it, or leave out --schema"
+                    ),
                 ))
             }
         },
