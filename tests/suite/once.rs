@@ -506,6 +506,13 @@ fn new_writes_to_stdout_where_the_file_is_a_dash() {
     assert!(!desk.path("-").exists());
     desk.expect("new ./-", 0);
     assert_eq!(desk.bytes("-"), glimt::scene::starter().as_bytes());
+    // A scene on stdout has no place beside it: whoever asked for a schema there hears how to get it.
+    let output = desk.run("new --schema -");
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stdout.starts_with(b"#:schema glimt.schema.json\n"));
+    let said = String::from_utf8(output.stderr).expect("UTF-8");
+    let words = "note: glimt.schema.json is not written: glimt schema > glimt.schema.json writes it beside the scene\n";
+    assert_eq!(said, words);
 }
 
 /// Waits until the process prints such a line to stderr; later output is read and dropped.

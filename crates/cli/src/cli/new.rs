@@ -13,6 +13,12 @@ use crate::scene::{is_mesh, starter};
 pub(super) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     let text = if with_schema { format!("{}{}", schema::LINE, starter()) } else { starter().to_owned() };
     if file == Path::new("-") {
+        if with_schema {
+            let name = schema::FILE;
+            console.say(&format!(
+                "note: {name} is not written: glimt schema > {name} writes it beside the scene"
+            ));
+        }
         console.text(&text);
         return Exit::DONE;
     }
