@@ -350,6 +350,24 @@ fn new_writes_a_scene_that_renders_and_never_overwrites() {
     }
 }
 
+#[test]
+fn a_name_that_no_command_line_shows_is_in_no_advice() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let desk = Desk::new();
+    for name in ["new\nline.toml".as_bytes(), b"\xff.toml", "a\u{202e}b.toml".as_bytes()] {
+        let output = desk.glimt("new").arg(OsStr::from_bytes(name)).output().expect("it runs");
+        let said = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        assert!(said.starts_with("wrote ") && !said.contains("glimt "), "{said}");
+        let picture = [&name[..name.len() - 4], b"png"].concat();
+        let output = desk.glimt("new").arg(OsStr::from_bytes(&picture)).output().expect("it runs");
+        let said = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("is the name of a picture; scenes end in .toml\n"), "{said}");
+    }
+}
+
 /// Starts a render, and sends it so many signals once it writes its picture. Returns its exit code and what it said.
 fn ended_in_the_write(desk: &Desk, line: &str, signals: usize) -> (Option<i32>, String) {
     let stderr = fs::File::create(desk.path("stderr")).expect("a file");
