@@ -142,6 +142,57 @@ fn the_last_pictures_say_what_changed_and_a_click_shows_them() {
     assert!(panel(&mut desk).contains("▸3") && cells_of(&mut desk, RED) > 500);
 }
 
+/// The request under way has a picture.
+fn show(desk: &mut Desk, color: [u8; 3]) {
+    let (generation, picture) = (desk.state.request.generation, plain_picture(50, 38, color));
+    let picture = Event::Picture {
+        generation,
+        picture,
+        range: None,
+        section: None,
+        lacks_photons: false,
+        source: None,
+    };
+    desk.event(picture);
+}
+
+#[test]
+fn errors_over_the_strip_leave_no_heading_behind() {
+    // A panel too narrow for errors, one too low for them, and one that holds them.
+    for (width, height) in [(640, 400), (640, 320), (640, 480)] {
+        let mut desk = Desk::with(state(200, 60));
+        desk.state.request.effective = Some(Effective { width, height, ..settings() });
+        desk.event(Event::Resize(window(200, 60)));
+        for (number, color) in [RED, BLUE, [1, 2, 3]].into_iter().enumerate() {
+            desk.event(Event::Changed(Changed { noticed: desk.now }));
+            let generation = desk.state.request.generation;
+            desk.worker(protocol::Event::Started { generation });
+            desk.worker(protocol::Event::Text { generation, text: format!("seed = {number}").into() });
+            show(&mut desk, color);
+            let mut event = done(generation, Vec::new(), false);
+            if let protocol::Event::Done { report, .. } = &mut event {
+                (report.settings.width, report.settings.height) = (width, height);
+            }
+            desk.worker(event);
+        }
+        let entries = |text: &str| {
+            ["1 first", "2 seed", "3 seed"].into_iter().filter(|words| text.contains(words)).count()
+        };
+        let has_heading = |text: &str| text.contains("the last pictures");
+        let text = desk.text();
+        assert!(has_heading(&text) && entries(&text) == 3, "{text}");
+        for count in 1..8 {
+            let errors = (0..count)
+                .map(|number| diagnostic(crate::scene::diagnostic::Severity::Error, &format!("{number}")));
+            desk.fail(errors.collect());
+            desk.event(Event::Settled);
+            let text = desk.text();
+            assert!(text.contains("error: 0"), "{text}");
+            assert_eq!(has_heading(&text), entries(&text) > 1, "{width}×{height}, {count} errors:\n{text}");
+        }
+    }
+}
+
 /// Whatever the window, the colours and the kind of picture: all is in the panel, and what waits for the picture is not in it.
 #[test]
 fn it_fits_into_every_window() {

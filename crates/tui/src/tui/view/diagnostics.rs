@@ -35,6 +35,16 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
+/// The cells that it lies over. Empty while it is closed.
+pub(super) fn covered(state: &State) -> Rect {
+    let Layout { pane, panel, .. } = Layout::of(state);
+    if state.overlays.diagnostics.open {
+        fitting(pane, text(state, pane).len(), pane == panel)
+    } else {
+        Rect::ZERO
+    }
+}
+
 /// The lower part of an area that these lines and their title need; all of a panel.
 fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
     if is_panel {
