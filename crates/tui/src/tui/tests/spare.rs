@@ -157,6 +157,24 @@ fn show(desk: &mut Desk, color: [u8; 3]) {
 }
 
 #[test]
+fn no_line_ends_between_a_number_and_its_unit() {
+    for columns in 120..200 {
+        let mut desk = Desk::with(state(columns, 40));
+        rendered(&mut desk, 0.01);
+        let panel = Layout::of(&desk.state).panel;
+        let buffer = desk.screen();
+        let line = |y: u16| {
+            (panel.left()..panel.right()).map(|x| buffer[(x, y)].symbol().to_owned()).collect::<String>()
+        };
+        let caption = (panel.top()..panel.bottom()).map(line).filter(|line| line.contains("after"));
+        for line in caption {
+            let last = line.split_whitespace().last().unwrap_or_default();
+            assert!(last.parse::<f64>().is_err(), "{columns}: {line}");
+        }
+    }
+}
+
+#[test]
 fn errors_over_the_strip_leave_no_heading_behind() {
     // A panel too narrow for errors, one too low for them, and one that holds them.
     for (width, height) in [(640, 400), (640, 320), (640, 480)] {
