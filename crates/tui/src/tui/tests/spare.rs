@@ -157,6 +157,26 @@ fn show(desk: &mut Desk, color: [u8; 3]) {
 }
 
 #[test]
+fn a_picture_that_is_as_it_was_keeps_its_curve() {
+    let mut desk = Desk::with(state(120, 40));
+    rendered(&mut desk, 0.01);
+    // A typo, which is mended: the picture is unchanged.
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.fail(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
+    desk.event(Event::Settled);
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::Started { generation });
+    let mut event = done(generation, Vec::new(), true);
+    if let protocol::Event::Done { report, .. } = &mut event {
+        report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
+    }
+    desk.worker(event);
+    assert!(desk.text().contains("unchanged"), "{}", desk.text());
+    assert!(panel(&mut desk).contains("noise while it rendered"), "{}", desk.text());
+}
+
+#[test]
 fn no_line_ends_between_a_number_and_its_unit() {
     for columns in 120..200 {
         let mut desk = Desk::with(state(columns, 40));

@@ -15,6 +15,7 @@ use crate::scene::sanitize::visible;
 use crate::tui::chrome;
 use crate::tui::event::{Effect, Unwritten, Written};
 use crate::tui::exit_summary;
+use crate::tui::noise_curve::NoiseCurve;
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
 /// Why a picture that is not on disk is not there.
@@ -174,7 +175,7 @@ fn started(state: &mut State) {
     state.work.stages = Default::default();
     state.work.assets.clear();
     state.work.progress = None;
-    state.work.last_curve = std::mem::take(&mut state.work.curve);
+    state.work.curve = NoiseCurve::default();
     state.work.report = None;
     state.saving.unwritten = None;
     close_empty_pane(state);
@@ -328,11 +329,12 @@ fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
             state.work.keep_curve(origin);
         }
         Status::Reused if unchanged || state.request.is_exposure_only => {
-            state.work.curve = std::mem::take(&mut state.work.last_curve);
+            state.work.curve = state.work.last_curve.clone();
         }
         Status::Reused => state.work.find_curve(&origin),
         Status::Running | Status::Skipped => {}
     }
+    state.work.last_curve = state.work.curve.clone();
 }
 
 fn warn(state: &mut State, warnings: Vec<Diagnostic>) {
