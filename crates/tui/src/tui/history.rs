@@ -202,6 +202,14 @@ impl History {
         }
     }
 
+    /// Drops the picture of a request, unless a run has finished it.
+    pub(super) fn drop_unfinished(&mut self, generation: u64) {
+        let is_it = |past: &Past| past.shown.generation == generation && past.run.is_none();
+        if let Some(at) = self.past.iter().position(is_it) {
+            self.remove(at);
+        }
+    }
+
     /// The newest picture was finished by this run.
     pub(super) fn finish(&mut self, run: u64) {
         if let Some(newest) = self.past.back_mut() {
@@ -310,15 +318,21 @@ impl History {
         Some(past.small.get_or_init(|| small(&past.shown.picture)))
     }
 
-    /// Changes from the picture before to this one, each in words: by edits, by keys.
-    pub(super) fn changes(&self, at: usize) -> Vec<String> {
+    /// Whether a picture is of this request.
+    pub(super) fn is_of(&self, at: usize, generation: u64) -> bool {
+        self.past.get(at).is_some_and(|past| past.shown.generation == generation)
+    }
+
+    /// Changes from the picture before to this one, each in words: by edits, by keys. A picture whose render is under way has no
+    /// mark.
+    pub(super) fn changes(&self, at: usize, is_under_way: bool) -> Vec<String> {
         let Some(past) = self.past.get(at) else { return Vec::new() };
         let words = match past.changes.as_ref().map(|changes| changes.concat()) {
             None => vec!["first".to_owned()],
             Some(changes) if changes.is_empty() => vec![AGAIN.to_owned()],
             Some(changes) => changes,
         };
-        let unfinished = past.origin.is_unfinished.then(|| UNFINISHED.to_owned());
+        let unfinished = (past.origin.is_unfinished && !is_under_way).then(|| UNFINISHED.to_owned());
         unfinished.into_iter().chain(words).collect()
     }
 
@@ -553,7 +567,7 @@ mod tests {
     }
 
     fn changes(history: &History) -> Vec<String> {
-        (0..history.len()).map(|at| history.changes(at).join("; ")).collect()
+        (0..history.len()).map(|at| history.changes(at, false).join("; ")).collect()
     }
 
     #[test]

@@ -142,6 +142,17 @@ fn the_last_pictures_say_what_changed_and_a_click_shows_them() {
     assert!(panel(&mut desk).contains("▸3") && cells_of(&mut desk, RED) > 500);
 }
 
+/// A save of the scene whose render has begun and has shown a picture, if it has a colour.
+fn begun(desk: &mut Desk, text: &str, color: Option<[u8; 3]>) {
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::Started { generation });
+    desk.worker(protocol::Event::Text { generation, text: text.into() });
+    let (settings, camera) = (Box::new(settings()), camera());
+    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0 });
+    color.into_iter().for_each(|color| show(desk, color));
+}
+
 /// The request under way has a picture.
 fn show(desk: &mut Desk, color: [u8; 3]) {
     let (generation, picture) = (desk.state.request.generation, plain_picture(50, 38, color));
@@ -154,6 +165,53 @@ fn show(desk: &mut Desk, color: [u8; 3]) {
         source: None,
     };
     desk.event(picture);
+}
+
+#[test]
+fn the_render_under_way_is_the_newest_of_the_last_pictures() {
+    let mut desk = Desk::with(state(120, 40));
+    edited(&mut desk, &[("camera.fov = 40", RED)]);
+    begun(&mut desk, "camera.fov = 30", Some(BLUE));
+    let text = panel(&mut desk);
+    assert!(text.contains("▸2 camera.fov 40 → 30") && text.contains(" 1 first"), "{text}");
+    assert!(!text.contains("unfinished"), "it is not stopped: {text}");
+    // The next save stops it: until that has a picture, the one that is shown is the stopped one, which has no number.
+    begun(&mut desk, "camera.fov = 20", None);
+    let text = panel(&mut desk);
+    assert!(text.contains("▸– unfinished; camera.fov") && !text.contains('2'), "{text}");
+    show(&mut desk, [10, 200, 20]);
+    for keys in ["", "nN", "b", "b"] {
+        keys.chars().for_each(|key| drop(desk.press(key)));
+        let text = panel(&mut desk);
+        assert!(text.contains("2 camera.fov 30 → 20") && text.contains("– unfinished; camera.fov"), "{text}");
+        assert_eq!(text.contains('▸'), text.contains("▸2") || keys == "b", "{keys}: {text}");
+        assert_eq!(text.matches("unfinished").count(), 1, "{text}");
+    }
+    // While an older one is looked at, the one under way is there as well.
+    edited(&mut desk, &[]);
+    let generation = desk.state.request.generation;
+    desk.worker(done(generation, Vec::new(), false));
+    desk.press('n');
+    let before = desk.state.picture.history.len();
+    begun(&mut desk, "camera.fov = 10", None);
+    desk.press('n');
+    desk.press('n');
+    show(&mut desk, [90, 90, 20]);
+    assert_eq!(desk.state.picture.history.len(), before + 1);
+    assert!(panel(&mut desk).contains(" 3 camera.fov 20 → 10"), "{}", desk.text());
+}
+
+#[test]
+fn a_camera_on_its_way_is_one_of_the_last_pictures() {
+    let mut desk = Desk::with(state(120, 40));
+    edited(&mut desk, &[("camera.fov = 40", RED)]);
+    for step in 0..5 {
+        desk.press('l');
+        show(&mut desk, [step, 0, 200]);
+        let text = panel(&mut desk);
+        assert!(text.contains("▸2 camera moved") && text.contains(" 1 first"), "{text}");
+        assert_eq!(desk.state.picture.history.len(), 2, "{text}");
+    }
 }
 
 #[test]
