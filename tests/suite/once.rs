@@ -342,6 +342,93 @@ fn new_writes_a_scene_that_renders_and_never_overwrites() {
     assert!(stderr.contains("ball.toml exists"), "{stderr}");
     assert_eq!(fs::read_to_string(desk.path("ball.toml")).expect("there"), SCENE);
     desk.expect("new nowhere/x.toml", 1);
+    // A folder of that name is there already, however it is written.
+    fs::create_dir(desk.path("sub")).expect("a folder");
+    for name in ["sub", "sub/"] {
+        let stderr = desk.expect(&format!("new {name}"), 2);
+        assert_eq!(stderr, format!("error: {name} exists already, and is left as it is\n"));
+    }
+}
+
+#[test]
+fn a_name_that_no_command_line_shows_is_in_no_advice() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let desk = Desk::new();
+    for name in ["new\nline.toml".as_bytes(), b"\xff.toml", "a\u{202e}b.toml".as_bytes()] {
+        let output = desk.glimt("new").arg(OsStr::from_bytes(name)).output().expect("it runs");
+        let said = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        assert!(said.starts_with("wrote ") && !said.contains("glimt "), "{said}");
+        let picture = [&name[..name.len() - 4], b"png"].concat();
+        let output = desk.glimt("new").arg(OsStr::from_bytes(&picture)).output().expect("it runs");
+        let said = String::from_utf8(output.stderr).expect("UTF-8");
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("is the name of a picture; scenes end in .toml\n"), "{said}");
+    }
+}
+
+/// Starts a render, and sends it so many signals once it writes its picture. Returns its exit code and what it said.
+fn ended_in_the_write(desk: &Desk, line: &str, signals: usize) -> (Option<i32>, String) {
+    let stderr = fs::File::create(desk.path("stderr")).expect("a file");
+    let mut child = desk.glimt(line).stderr(stderr).spawn().expect("it runs");
+    let said = || fs::read_to_string(desk.path("stderr")).expect("there");
+    let start = Instant::now();
+    let is_writing = || said().lines().any(|line| line.contains("\"write\"") && line.contains("running"));
+    while !is_writing() {
+        assert!(start.elapsed() < Duration::from_secs(60), "it does not begin to write: {}", said());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    for _ in 0..signals {
+        // It may have come to its end.
+        let _ = Process::new("kill").arg("-TERM").arg(child.id().to_string()).stderr(Stdio::null()).status();
+        std::thread::sleep(Duration::from_millis(30));
+    }
+    let code = child.wait().expect("it ends").code();
+    (code, said())
+}
+
+#[test]
+fn a_finished_render_is_not_lost_to_a_signal_while_its_picture_is_written() {
+    // One signal leaves time to a picture that is written soon, a second one ends the write. Either way the samples are there.
+    for (size, signals) in [("--width 700 --height 500", 1), ("--width 1600 --height 1200", 2)] {
+        let desk = Desk::new();
+        let render = format!("ball.toml --once -o out.png --samples 1 --progress json {size}");
+        let (code, said) = ended_in_the_write(&desk, &render, signals);
+        let (picture, checkpoint) = (desk.path("out.png"), desk.path("out.png.checkpoint"));
+        assert!(code == Some(143) || code == Some(0) && picture.exists(), "{code:?}: {said}");
+        assert!(picture.exists() != checkpoint.exists(), "{said}");
+        let leftover = |entry: std::io::Result<fs::DirEntry>| {
+            entry.expect("an entry").file_name().to_string_lossy().ends_with(".tmp")
+        };
+        assert!(!fs::read_dir(desk.0.path()).expect("a folder").any(leftover), "no temporary file");
+        if checkpoint.exists() {
+            desk.expect(&render.replace("json", "none --resume"), 0);
+        }
+        desk.expect(&render.replace("json", "none").replace("out.png", "one.png"), 0);
+        assert!(desk.bytes("out.png") == desk.bytes("one.png"), "{size}, {signals} signals");
+    }
+}
+
+#[test]
+fn a_signal_in_the_write_says_that_the_picture_is_written() {
+    let desk = Desk::new();
+    let stderr = fs::File::create(desk.path("stderr")).expect("a file");
+    let line =
+        "ball.toml --once -o out.png --samples 1 --progress plain --width 700 --height 500 --checkpoint 0";
+    let mut child = desk.glimt(line).stderr(stderr).spawn().expect("it runs");
+    let said = || fs::read_to_string(desk.path("stderr")).expect("there");
+    let start = Instant::now();
+    while !said().contains("render   done") {
+        assert!(start.elapsed() < Duration::from_secs(60), "{}", said());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let _ = Process::new("kill").arg("-TERM").arg(child.id().to_string()).stderr(Stdio::null()).status();
+    let code = child.wait().expect("it ends").code();
+    // Without checkpoints nothing else keeps the samples.
+    assert!(desk.path("out.png").exists(), "{code:?}: {}", said());
+    assert!(said().contains("wrote out.png"), "{}", said());
+    assert!(code == Some(0) || said().ends_with("ended by SIGTERM: the picture was written\n"), "{}", said());
 }
 
 #[test]
@@ -437,6 +524,13 @@ fn new_writes_to_stdout_where_the_file_is_a_dash() {
     assert!(!desk.path("-").exists());
     desk.expect("new ./-", 0);
     assert_eq!(desk.bytes("-"), glimt::scene::starter().as_bytes());
+    // A scene on stdout has no place beside it: whoever asked for a schema there hears how to get it.
+    let output = desk.run("new --schema -");
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stdout.starts_with(b"#:schema glimt.schema.json\n"));
+    let said = String::from_utf8(output.stderr).expect("UTF-8");
+    let words = "note: glimt.schema.json is not written: glimt schema > glimt.schema.json writes it beside the scene\n";
+    assert_eq!(said, words);
 }
 
 /// Waits until the process prints such a line to stderr; later output is read and dropped.

@@ -170,7 +170,10 @@ fn a_new_scene_may_have_its_schema_beside_it() {
     // The same schema will do for another scene; another file of that name stays.
     desk.expect("new --schema second.toml", 0);
     desk.write(FILE, "mine");
-    assert!(desk.expect("new --schema third.toml", 2).contains("is another file"));
+    assert!(
+        desk.expect("new --schema third.toml", 2)
+            .contains("glimt.schema.json is not the schema of this glimt, and is left")
+    );
     assert!(!desk.path("third.toml").exists() && desk.bytes(FILE) == b"mine");
     // A scene that is there already gets none.
     let other = Desk::new();

@@ -92,7 +92,7 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     terminal.press("y");
     terminal.wait("an answer", |screen| {
         let text: String = screen.contents().split_whitespace().collect::<Vec<_>>().join(" ");
-        text.contains("copied:") || text.contains("not known to copy")
+        text.contains("copied:") || text.contains("to copy, drag with shift")
     });
     terminal.settled(vt100::Screen::contents);
     terminal.press("q");

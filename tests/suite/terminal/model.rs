@@ -26,7 +26,7 @@ fn a_model_saved_again_is_seen_again_and_c_writes_its_scene_once() {
     assert_ne!(folder.bytes("wall.png"), low);
     assert_eq!(folder.bytes("wall.png"), once(&folder, options), "the picture of the model as it is now");
     terminal.press("o");
-    terminal.wait_for("a model is no text");
+    terminal.wait_for("the editor opens scenes, and this is a model");
     terminal.press("c");
     terminal.wait_for("wrote wall.toml, a scene of this model with this camera");
     let text = fs::read_to_string(folder.path("wall.toml")).expect("a scene");

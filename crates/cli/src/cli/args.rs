@@ -17,6 +17,7 @@ use super::environment;
 use crate::choice;
 use crate::choice::Choice;
 use crate::film::Rect;
+use crate::output::{Format, MovingFormat};
 use crate::pipeline::settings::{Checkpoints, Layer, Overrides, Resume, Side, UpAxis, View};
 use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
@@ -366,9 +367,8 @@ pub struct RenderArgs {
     #[arg(long = "set", add = candidates::sets(), value_name = "TABLE.KEY=VALUE")]
     pub sets: Vec<String>,
 
-    /// Write the picture to this file; may be given several times. The ending chooses the format: png, exr, hdr, jpg,
-    /// ppm. [default: the scene's `output`, which lies beside the scene, else the scene's name with .png]
-    #[arg(short, long = "output", value_name = "FILE", help_heading = "Output")]
+    /// Write the picture to this file.
+    #[arg(short, long = "output", value_name = "FILE", help = outputs_help(), help_heading = "Output")]
     pub outputs: Vec<PathBuf>,
     /// Numbers about each pixel as channels beside the picture in EXR files, with --once: all, or some of albedo, normal,
     /// depth, variance, samples, ambient, diffuse, specular, emission, with commas between them
@@ -578,6 +578,19 @@ fn one_of<C: Choice>() -> impl TypedValueParser<Value = C> {
 }
 
 const UNAVAILABLE: &str = "not available in this version";
+
+/// Help of `--output`, with the endings of all formats that glimt writes.
+fn outputs_help() -> String {
+    // The other spelling of jpg says nothing new.
+    let still: Vec<_> = Format::endings().filter(|ending| *ending != "jpeg").collect();
+    let moving: Vec<_> = MovingFormat::endings().collect();
+    format!(
+        "Write the picture to this file; may be given several times. The ending chooses the format: {}; with --turntable also \
+         {}. [default: the scene's `output`, which lies beside the scene, else the scene's name with .png]",
+        still.join(", "),
+        moving.join(", ")
+    )
+}
 
 fn bit_depth(text: &str) -> Result<u8, String> {
     match text {

@@ -76,12 +76,15 @@ impl Merge<'_> {
     /// Checks before the work that the output can be written, and is none of the parts.
     fn check_output(&self) -> Result<Format, Exit> {
         let out = &self.args.out;
-        let kept = self.args.parts.iter().find(|part| is_one_file(part, out));
-        if kept.is_some() || part::is_part(out) {
-            let message = format!(
-                "cannot write {}: it is a part; name the picture first, then the parts",
-                out.display()
-            );
+        let name = out.display();
+        if part::is_part(out) {
+            let message =
+                format!("cannot write {name}: it is a part; name the picture first, then the parts");
+            return Err(self.console.fail(Exit::WRONG, &message));
+        }
+        if self.args.parts.iter().any(|part| is_one_file(part, out)) {
+            let message =
+                format!("{name} is the picture to write, and is given again as a part: name it once");
             return Err(self.console.fail(Exit::WRONG, &message));
         }
         let format = Format::of(out).map_err(|error| self.console.fail(Exit::WRONG, &error.to_string()))?;

@@ -1,5 +1,6 @@
 //! `glimt new`: a scene to start from, as a file or on stdout.
 
+use std::borrow::Cow;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -8,11 +9,18 @@ use super::console::Console;
 use super::exit::Exit;
 use super::schema;
 use crate::output::{self, Format, OutputError, write};
+use crate::scene::sanitize::visible;
 use crate::scene::{is_mesh, starter};
 
 pub(super) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     let text = if with_schema { format!("{}{}", schema::LINE, starter()) } else { starter().to_owned() };
     if file == Path::new("-") {
+        if with_schema {
+            let name = schema::FILE;
+            console.say(&format!(
+                "note: {name} is not written: glimt schema > {name} writes it beside the scene"
+            ));
+        }
         console.text(&text);
         return Exit::DONE;
     }
@@ -33,13 +41,14 @@ pub(super) fn run(file: &Path, with_schema: bool, console: &Console) -> Exit {
     match write::new_file(file, text.as_bytes()) {
         Ok(()) => {
             console.say(&format!("wrote {name}"));
-            console.say(&format!(
-                "now: glimt {}    (see it, edit it, save it, see it again; ? for help)",
-                quoted(file)
-            ));
+            if let Some(file) = quoted(file) {
+                console.say(&format!(
+                    "now: glimt {file}    (see it, edit it, save it, see it again; ? for help)"
+                ));
+            }
             Exit::DONE
         }
-        Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+        Err(error) if error.kind() == ErrorKind::AlreadyExists || file.is_dir() => {
             let dangles = !file.exists();
             let what =
                 if dangles { "is a symbolic link to a file that does not exist" } else { "exists already" };
@@ -68,7 +77,9 @@ fn write_schema(path: &Path) -> Result<bool, (Exit, String)> {
                 let name = path.display();
                 Err((
                     Exit::WRONG,
-                    format!("{name} is another file, and is left as it is: remove it, or leave out --schema"),
+                    format!(
+                        "{name} is not the schema of this glimt, and is left as it is: remove it, or leave out --schema"
+                    ),
                 ))
             }
         },
@@ -85,21 +96,21 @@ fn misnamed(file: &Path) -> Option<String> {
     } else {
         return None;
     };
-    let scene = file.with_extension("toml");
+    let command = quoted(&file.with_extension("toml")).map(|scene| format!(": glimt new {scene}"));
     Some(format!(
-        "{} is the name of {what}; scenes end in .toml: glimt new {}",
+        "{} is the name of {what}; scenes end in .toml{}",
         file.display(),
-        quoted(&scene)
+        command.unwrap_or_default()
     ))
 }
 
-/// A file as a shell takes it for one word, and glimt for no option and no command.
-fn quoted(file: &Path) -> String {
-    let name = file.to_string_lossy();
+/// A file as a shell takes it for one word, and glimt for no option and no command. `None` if a terminal does not show the name as
+/// it is.
+fn quoted(file: &Path) -> Option<String> {
+    let name = file.to_str().filter(|name| visible(name) == *name)?;
     let is_bare = !name.contains(['/', '.']) || name.starts_with('-');
-    let name = if is_bare { format!("./{name}") } else { name.into_owned() };
-    // A name with a zero in it is no name of a file.
-    shlex::try_quote(&name).map_or(name.clone(), |quoted| quoted.into_owned())
+    let name = if is_bare { format!("./{name}") } else { name.to_owned() };
+    shlex::try_quote(&name).ok().map(Cow::into_owned)
 }
 
 /// Whether a name is that of a picture, of a format that glimt writes.
@@ -116,10 +127,16 @@ mod tests {
         for name in
             ["ball.toml", "my scene.toml", "it's.toml", "a \"b\" $HOME `c`.toml", "a;b.toml", "tilde~.toml"]
         {
-            assert_eq!(shlex::split(&quoted(Path::new(name))), Some(vec![name.to_owned()]), "{name}");
+            let words = quoted(Path::new(name)).and_then(|word| shlex::split(&word));
+            assert_eq!(words, Some(vec![name.to_owned()]), "{name}");
         }
-        assert_eq!(quoted(Path::new("ball.toml")), "ball.toml");
-        assert_eq!(quoted(Path::new("-b.toml")), "./-b.toml");
-        assert_eq!(quoted(Path::new("check")), "./check");
+        for (name, word) in [
+            ("ball.toml", Some("ball.toml")),
+            ("-b.toml", Some("./-b.toml")),
+            ("check", Some("./check")),
+            ("new\nline.toml", None),
+        ] {
+            assert_eq!(quoted(Path::new(name)).as_deref(), word);
+        }
     }
 }

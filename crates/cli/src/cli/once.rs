@@ -1,6 +1,7 @@
 //! `--once`: render, write, exit; progress on stderr, nothing on stdout.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::{Duration, Instant};
 
@@ -22,6 +23,8 @@ use crate::system::threads::not_started;
 
 /// Longest time that the end may take after a signal.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// Time after a signal in which a picture that is being written may become whole. Then a checkpoint takes its place.
+const WRITING: Duration = Duration::from_secs(1);
 /// Between two looks for a signal.
 const TICK: Duration = Duration::from_millis(50);
 
@@ -33,17 +36,30 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         Err(error) => return console.fail(Exit::FAILED, &not_started("a thread", false, &error)),
     };
     let remote = worker.remote();
+    let is_again = AtomicBool::new(false);
     let ended = match signals::catch(move || {
+        // The render ends with a checkpoint. What is being written becomes whole, unless a second signal comes.
         remote.send(Command::Suspend);
-        remote.send(Command::Cancel);
+        if is_again.swap(true, Ordering::Relaxed) {
+            remote.send(Command::Cancel);
+        }
     }) {
         Ok(ended) => ended,
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")),
     };
     let mut deadline = Deadline::default();
     let mut written = Written::default();
-    let mut is_over = || ended.by().is_some() && deadline.is_over(Instant::now());
-    let mut exit = Exit::DONE;
+    let has_checkpoints = order.overrides.checkpoints.seconds > 0.0;
+    let mut is_over = |is_writing: bool| {
+        let now = Instant::now();
+        // Without checkpoints nothing else keeps a picture that is being written.
+        let is_lost = is_writing && !has_checkpoints;
+        if ended.by().is_some() && !is_lost && deadline.stops_writing(now, is_writing) {
+            worker.send(Command::Cancel);
+        }
+        ended.by().is_some() && deadline.is_over(now)
+    };
+    let (mut exit, mut is_whole) = (Exit::DONE, false);
     // One reporter for each picture: what a turntable shows of the one before is cleared.
     let reporter = || progress::reporter(order.progress, order.overrides.time_seconds, console);
     let mut reporter_of_picture = reporter();
@@ -65,6 +81,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
         let reporter = &mut *reporter_of_picture;
         exit = follow(&worker, (order, turn), console, reporter, &mut written, &mut is_over);
         reporter.end();
+        is_whole = exit == Exit::DONE && turn.is_none_or(Turn::is_last);
         if exit != Exit::DONE || ended.by().is_some() {
             break;
         }
@@ -73,7 +90,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
     if !reporter.says_diagnostics()
         && let Some(signal) = ended.by().and_then(signals::name)
     {
-        console.say(&format!("ended by {signal}: {}", outcome(exit, &written)));
+        console.say(&format!("ended by {signal}: {}", outcome(is_whole, &written)));
     }
     worker.finish(deadline.left(Instant::now()));
     ended.by().map_or(exit, Exit::signal)
@@ -88,18 +105,21 @@ fn pictures(overrides: &Overrides) -> impl Iterator<Item = Overrides> {
     })
 }
 
-/// Words about the pictures when a signal ends the program.
-fn outcome(exit: Exit, written: &Written) -> String {
+/// Words about the pictures when a signal ends the program; `is_whole`: all of them are written.
+fn outcome(is_whole: bool, written: &Written) -> String {
     let names: Vec<_> = written.pictures.iter().map(|path| path.display().to_string()).collect();
-    match names.as_slice() {
-        [] => match &written.checkpoint {
-            Some(path) => format!("{} has what was rendered; --resume goes on from it", path.display()),
-            None => "no picture was written".to_owned(),
-        },
-        _ if exit == Exit::DONE => "everything was written before".to_owned(),
+    let kept = written
+        .checkpoint
+        .as_ref()
+        .map(|path| format!("{} has what was rendered; --resume goes on from it", path.display()));
+    let words = match names.as_slice() {
+        [] => return kept.unwrap_or_else(|| "no picture was written".to_owned()),
+        [_] if is_whole => return "the picture was written".to_owned(),
+        _ if is_whole => return "the pictures were written".to_owned(),
         [only] => format!("only {only} was written"),
         [first, .., last] => format!("only {} pictures were written, {first} to {last}", names.len()),
-    }
+    };
+    [words].into_iter().chain(kept).collect::<Vec<_>>().join("; ")
 }
 
 /// Files that were written.
@@ -112,16 +132,34 @@ struct Written {
 
 /// When the program ends whatever the worker is at: [`PATIENCE`] after it was first asked for.
 #[derive(Debug, Default)]
-struct Deadline(Option<Instant>);
+struct Deadline {
+    end: Option<Instant>,
+    /// Whether the picture that was being written is given up.
+    is_write_stopped: bool,
+}
 
 impl Deadline {
     fn is_over(&mut self, now: Instant) -> bool {
-        now >= *self.0.get_or_insert(now + PATIENCE)
+        now >= *self.end.get_or_insert(now + PATIENCE)
+    }
+
+    /// Whether what is being written has had its time. The checkpoint of a picture then has as much as after a signal in the render.
+    /// True once.
+    fn stops_writing(&mut self, now: Instant, is_picture: bool) -> bool {
+        let end = *self.end.get_or_insert(now + PATIENCE);
+        if self.is_write_stopped || now + PATIENCE < end + WRITING {
+            return false;
+        }
+        self.is_write_stopped = true;
+        if is_picture {
+            self.end = Some(now + PATIENCE);
+        }
+        true
     }
 
     /// Time that the worker may still take.
     fn left(&self, now: Instant) -> Duration {
-        self.0.map_or(PATIENCE, |end| end.saturating_duration_since(now))
+        self.end.map_or(PATIENCE, |end| end.saturating_duration_since(now))
     }
 }
 
@@ -132,15 +170,16 @@ fn follow(
     console: &Console,
     reporter: &mut dyn Reporter,
     written: &mut Written,
-    mut is_over: impl FnMut() -> bool,
+    mut is_over: impl FnMut(bool) -> bool,
 ) -> Exit {
+    let mut is_writing = false;
     let mut unwritten: Vec<String> = Vec::new();
     let mut of_call: Vec<Diagnostic> = Vec::new();
     // Warnings about the first picture hold for all.
     let is_first = turn.is_none_or(|turn| turn.number == 0);
     let before = written.pictures.len();
     loop {
-        if is_over() {
+        if is_over(is_writing) {
             return Exit::FAILED;
         }
         let mut event = match worker.events.recv_timeout(TICK) {
@@ -166,6 +205,9 @@ fn follow(
         } else if let Event::Done { warnings, .. } = &mut event {
             warnings.append(&mut of_call);
             warnings.retain(|_| is_first);
+        }
+        if let Event::Stage { stage, .. } = &event {
+            is_writing = stage.name == Stage::Write && stage.status == Status::Running;
         }
         reporter.event(&event);
         match event {
@@ -350,5 +392,17 @@ mod tests {
         assert_eq!(deadline.left(half), PATIENCE / 2);
         assert!(deadline.is_over(signal + PATIENCE));
         assert_eq!(deadline.left(signal + PATIENCE), Duration::ZERO);
+    }
+
+    #[test]
+    fn a_picture_that_is_written_too_slowly_leaves_the_time_of_a_checkpoint() {
+        let signal = Instant::now();
+        for (is_picture, end) in [(true, WRITING + PATIENCE), (false, PATIENCE)] {
+            let mut deadline = Deadline::default();
+            let mut stops = |after| deadline.stops_writing(signal + after, is_picture);
+            assert!(!stops(Duration::ZERO) && !stops(WRITING / 2));
+            assert!(stops(WRITING) && !stops(PATIENCE), "once");
+            assert!(!deadline.is_over(signal + end - TICK) && deadline.is_over(signal + end));
+        }
     }
 }

@@ -128,6 +128,11 @@ pub enum MovingFormat {
 impl MovingFormat {
     const ENDINGS: [(&'static str, Self); 2] = [("gif", Self::Gif), ("apng", Self::Apng)];
 
+    /// All known endings, without the dot.
+    pub fn endings() -> impl Iterator<Item = &'static str> {
+        Self::ENDINGS.iter().map(|(ending, _)| *ending)
+    }
+
     /// The format of a path's ending, in small letters or capitals. `None` if it is not one of moving pictures.
     pub fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?;

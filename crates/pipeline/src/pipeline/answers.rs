@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::film::Rect;
+use crate::scene::description::Viewpoint;
 
 /// A place in a picture: how far it is from the left and from the top, where the whole picture is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,6 +98,15 @@ pub struct Thing {
     pub distance: f64,
     /// From the eye along the view axis.
     pub depth: f64,
+}
+
+/// A camera that keys moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MovedCamera {
+    /// The camera as it is now.
+    pub camera: Viewpoint,
+    /// The scene's own camera that it was moved from.
+    pub own: Viewpoint,
 }
 
 /// A camera that is in its scene file.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::inputs::Inputs;
-use super::protocol::{CameraEdit, Event, Kept, Picked, Spot, Thing, Viewpoint};
+use super::protocol::{CameraEdit, Event, Kept, MovedCamera, Picked, Spot, Thing, Viewpoint};
 use super::render::film_state::FilmState;
 use super::sink::Sink;
 use super::stages::parse::Parsed;
@@ -21,7 +21,7 @@ use crate::world::World;
 /// An order that a person gives.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Errand {
-    KeepCamera(Viewpoint),
+    KeepCamera(MovedCamera),
     UndoCamera(CameraEdit),
     Pick(Spot),
 }
@@ -50,6 +50,8 @@ pub(super) struct AtHand {
     pub(super) sets: Vec<String>,
     pub(super) world: Arc<World>,
     pub(super) settings: RenderSettings,
+    /// The scene's own camera.
+    pub(super) own: Viewpoint,
 }
 
 impl AtHand {
@@ -103,8 +105,13 @@ impl AtHand {
         })
     }
 
-    /// Writes the scene file with this camera, unless it is another one than was read.
-    fn keep_camera(&self, camera: &Viewpoint, inputs: &Inputs) -> Result<Kept, String> {
+    /// Writes the scene file with this camera, unless the file, or the camera that it was moved from, is another one than was
+    /// read.
+    fn keep_camera(
+        &self,
+        MovedCamera { camera, own }: &MovedCamera,
+        inputs: &Inputs,
+    ) -> Result<Kept, String> {
         let loaded = &self.parsed.loaded;
         let path = loaded.path.clone();
         if is_model(&path) {
@@ -115,8 +122,17 @@ impl AtHand {
         }
         let read = loaded.source.text();
         let changed = "the scene file has changed since it was read: the camera is not written into it";
+        if is_gone(&path) {
+            return Err("the scene file is gone: the camera is not written".to_owned());
+        }
         if !has_text(&path, read) {
             return Err(changed.to_owned());
+        }
+        // Numbers that keys did not move are those of the camera from before: they would go over newer ones.
+        if *own != self.own {
+            return Err(
+                "the scene's camera has changed since it was moved: press c again to write it".to_owned()
+            );
         }
         let text = loaded.text_with_camera(camera)?;
         let edit = if text == read {
@@ -134,11 +150,19 @@ impl AtHand {
 fn undo(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
     let CameraEdit { path, before, after } = edit;
     let changed = format!("{} has changed since c wrote it: it is left as it is", path.display());
+    if is_gone(path) {
+        return Err(format!("{} is gone: there is nothing to undo in it", path.display()));
+    }
     if !has_text(path, after) {
         return Err(changed);
     }
     replace(path, (after, before), inputs, (&changed, "it is left as it is"))?;
     Ok(path.clone())
+}
+
+/// Whether there is no file of this name any more.
+fn is_gone(path: &Path) -> bool {
+    path.metadata().is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
 }
 
 /// Whether this is what the file holds.

@@ -134,7 +134,7 @@ fn short(path: &Path, scene: &Path) -> String {
 fn content(file: &FileRead) -> String {
     match file.content {
         Content::Missing => "missing".to_owned(),
-        Content::Unusable => "not readable".to_owned(),
+        Content::Unusable(_) => "not readable".to_owned(),
         Content::Hash(hash) => {
             let known = || hash.iter().map(|byte| format!("{byte:02x}")).collect();
             if file.content.is_by_stamp(&file.path) {

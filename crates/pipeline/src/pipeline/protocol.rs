@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use self::stage::{Stage, StageReport, Status};
-pub use super::answers::{CameraEdit, Kept, Picked, Section, Spot, Thing};
+pub use super::answers::{CameraEdit, Kept, MovedCamera, Picked, Section, Spot, Thing};
 pub use super::report::{
     Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts,
 };
@@ -33,7 +33,7 @@ pub enum Command {
     /// Previews are to have this size from now on; the picture at hand is shown again. What is rendered goes on.
     Preview(Option<PreviewSize>),
     /// Put this camera into the scene file; [`Event::CameraKept`] says what came of it. What is rendered goes on.
-    KeepCamera(Viewpoint),
+    KeepCamera(MovedCamera),
     /// Put the scene file back as it was before this edit, if nobody changed it since; [`Event::CameraUndone`] says what came of
     /// it. What is rendered goes on.
     UndoCamera(CameraEdit),
@@ -41,7 +41,8 @@ pub enum Command {
     Pick(Spot),
     /// Stop the render under way.
     Cancel,
-    /// Stop the render under way, and keep a checkpoint of it.
+    /// Stop the render under way, and keep a checkpoint of it. A picture that is being written becomes whole, unless
+    /// [`Command::Cancel`] comes too: then a checkpoint takes its place.
     Suspend,
     /// Hold the work, or let it go on: that of the newest request, whether it has begun or not. A request that comes
     /// later is not held.
@@ -176,6 +177,8 @@ pub enum Event {
     WriteFailed {
         /// Number of the request.
         generation: u64,
+        /// The picture's file, if the failure is of one alone: nobody knows what it holds now.
+        path: Option<PathBuf>,
         /// The file and the reason.
         message: String,
     },

@@ -55,8 +55,9 @@ impl Sink {
         self.send(Event::Written { generation: self.generation, path: path.to_owned(), bytes });
     }
 
-    pub(super) fn write_failed(&self, message: String) {
-        self.send(Event::WriteFailed { generation: self.generation, message });
+    pub(super) fn write_failed(&self, path: Option<&Path>, message: String) {
+        let path = path.map(Path::to_owned);
+        self.send(Event::WriteFailed { generation: self.generation, path, message });
     }
 
     pub(super) fn not_kept(&self, message: String) {

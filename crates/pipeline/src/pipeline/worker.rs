@@ -177,6 +177,8 @@ impl Remote {
             Command::Suspend => {
                 mailbox.suspended = true;
                 mailbox.token.cancel();
+                let dropped = mailbox.request.take();
+                self.say_cancelled(dropped);
             }
             Command::Pause(paused) => {
                 mailbox.paused = paused;

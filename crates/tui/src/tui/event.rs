@@ -208,6 +208,8 @@ pub(super) struct Unwritten {
     pub why: String,
     /// Number of the request.
     pub generation: u64,
+    /// Whether it is refused, for a reason that is among the errors and warnings.
+    pub is_refused: bool,
 }
 
 /// A picture that was written.
@@ -219,4 +221,6 @@ pub(super) struct Written {
     pub generation: u64,
     /// Description of the file, in words, as far as it is known.
     pub made: String,
+    /// Whether a later picture could not be written there: nobody knows what the file holds.
+    pub is_stale: bool,
 }

@@ -69,7 +69,11 @@ fn unwritten(state: &State, failed: &Unwritten) -> String {
     for written in &state.saving.written {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         let is_new = written.generation >= failed.generation;
-        words += if is_new { "; wrote " } else { "; wrote an earlier one to " };
+        words += match (is_new, written.is_stale) {
+            (true, false) => "; wrote ",
+            (true, true) => "; before that, wrote ",
+            (false, _) => "; wrote an earlier one to ",
+        };
         words += &name;
     }
     words
@@ -203,6 +207,7 @@ mod tests {
             let generation = desk.state.request.generation;
             desk.worker(Event::Started { generation });
             desk.worker(Event::WriteFailed {
+                path: None,
                 generation,
                 message: "cannot write a.png: no space".to_owned(),
             });
@@ -258,7 +263,11 @@ mod tests {
         desk.worker(Event::Started { generation: 3 });
         desk.worker(Event::Progress { generation: 3, progress: progress(0.5, None) });
         assert_eq!(words(&desk.state), format!("{made}; the render after it was stopped at 50 %"));
-        desk.worker(Event::WriteFailed { generation: 3, message: "cannot write b.exr: no space".to_owned() });
+        desk.worker(Event::WriteFailed {
+            generation: 3,
+            path: None,
+            message: "cannot write b.exr: no space".to_owned(),
+        });
         desk.worker(Event::Written { generation: 3, path: "a.png".into(), bytes: 1 });
         desk.worker(done(3, Vec::new(), false));
         let failed =

@@ -134,9 +134,11 @@ impl History {
         let is_last = |last: &usize| self.past.get(*last).is_some_and(|past| past.is_same(&shown, &origin));
         match known.or_else(|| last.filter(is_last)) {
             Some(at) => {
+                let mut origin = origin;
                 if known.is_none() {
                     // What was edited since has changed nothing visible.
                     self.read_edits = self.past[at].edits;
+                    origin = self.past[at].origin.of_same_image(origin);
                 }
                 self.replace(at, shown, origin);
                 self.unite(at);
@@ -176,9 +178,10 @@ impl History {
             return;
         }
         let (edits, run) = (earlier.edits, past.run.or(earlier.run));
+        let origin = earlier.origin.of_same_image(past.origin.clone());
         self.remove(before);
         if let Some(past) = self.past.get_mut(before) {
-            (past.edits, past.run) = (edits, run);
+            (past.edits, past.run, past.origin) = (edits, run, origin);
         }
         self.read_edits = edits;
         // The first picture stays the first.
@@ -196,6 +199,14 @@ impl History {
             && *open > at
         {
             *open -= 1;
+        }
+    }
+
+    /// Drops the picture of a request, unless a run has finished it.
+    pub(super) fn drop_unfinished(&mut self, generation: u64) {
+        let is_it = |past: &Past| past.shown.generation == generation && past.run.is_none();
+        if let Some(at) = self.past.iter().position(is_it) {
+            self.remove(at);
         }
     }
 
@@ -307,15 +318,21 @@ impl History {
         Some(past.small.get_or_init(|| small(&past.shown.picture)))
     }
 
-    /// Changes from the picture before to this one, each in words: by edits, by keys.
-    pub(super) fn changes(&self, at: usize) -> Vec<String> {
+    /// Whether a picture is of this request.
+    pub(super) fn is_of(&self, at: usize, generation: u64) -> bool {
+        self.past.get(at).is_some_and(|past| past.shown.generation == generation)
+    }
+
+    /// Changes from the picture before to this one, each in words: by edits, by keys. A picture whose render is under way has no
+    /// mark.
+    pub(super) fn changes(&self, at: usize, is_under_way: bool) -> Vec<String> {
         let Some(past) = self.past.get(at) else { return Vec::new() };
         let words = match past.changes.as_ref().map(|changes| changes.concat()) {
             None => vec!["first".to_owned()],
             Some(changes) if changes.is_empty() => vec![AGAIN.to_owned()],
             Some(changes) => changes,
         };
-        let unfinished = past.origin.is_unfinished.then(|| UNFINISHED.to_owned());
+        let unfinished = (past.origin.is_unfinished && !is_under_way).then(|| UNFINISHED.to_owned());
         unfinished.into_iter().chain(words).collect()
     }
 
@@ -550,7 +567,7 @@ mod tests {
     }
 
     fn changes(history: &History) -> Vec<String> {
-        (0..history.len()).map(|at| history.changes(at).join("; ")).collect()
+        (0..history.len()).map(|at| history.changes(at, false).join("; ")).collect()
     }
 
     #[test]
@@ -599,6 +616,43 @@ mod tests {
             "back to the scene's camera",
         ];
         assert_eq!(changes(&history), words);
+    }
+
+    #[test]
+    fn a_save_that_changes_no_picture_is_no_cause_of_the_one_before_it() {
+        let mut history = History::default();
+        let record = |history: &mut History, generation, name, is_finished, text: &str, photons| {
+            let (shown, origin) = of_image(generation, name, is_finished);
+            let toggles = Toggles { photons, ..Toggles::default() };
+            history.record(shown, Instant::now(), Origin { toggles, text: Some(text.into()), ..origin });
+        };
+        let (first, second) = ("render.samples = 64", "render.samples = 16");
+        record(&mut history, 1, "on", true, first, None);
+        record(&mut history, 2, "off", true, first, Some(false));
+        record(&mut history, 3, "on", true, first, Some(true));
+        let words = ["first", "photons off", "photons on"];
+        assert_eq!(changes(&history), words);
+        // The call sets another number of samples: the picture is the same. It is found again, or shown on the way.
+        edit(&mut history);
+        record(&mut history, 4, "on", true, second, Some(true));
+        assert_eq!(changes(&history), words);
+        record(&mut history, 5, "on", false, "render.samples = 8", Some(true));
+        record(&mut history, 5, "on", true, "render.samples = 8", Some(true));
+        assert_eq!(changes(&history), words);
+        // The picture after that has the changes of both.
+        edit(&mut history);
+        record(&mut history, 6, "radius", true, "render.samples = 8\nradius = 1", Some(true));
+        assert_eq!(changes(&history)[3], "render.samples 64 → 8, + radius = 1");
+        // A camera that was moved and is in the scene now is told by the scene's keys.
+        let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
+        let text = "render.samples = 8\nradius = 1\ncamera.fov = 30";
+        let (shown, origin) = of_image(7, "fov", true);
+        let moved = Toggles { camera, photons: Some(true), ..Toggles::default() };
+        let before = "render.samples = 8\nradius = 1";
+        history.record(shown, Instant::now(), Origin { toggles: moved, text: Some(before.into()), ..origin });
+        assert_eq!(changes(&history)[4], "camera moved");
+        record(&mut history, 8, "fov", true, text, Some(true));
+        assert_eq!(changes(&history)[4], "+ camera");
     }
 
     #[test]

@@ -313,7 +313,9 @@ impl Engine {
         let asked = (plan.scene.photons.enabled, request.overrides.photons);
         let key =
             |of_photons| keys::photons(&ready.surfaces, ready.origin, &plan.settings.render, of_photons);
+        let own = Eye::new(&plan.scene, ready.parsed.orbiter, &CameraChange::default()).viewpoint();
         let at_hand = AtHand {
+            own,
             parsed: ready.parsed.clone(),
             sets: request.overrides.sets.clone(),
             world: world.clone(),
@@ -552,7 +554,11 @@ impl Engine {
             };
             let rendered = render(key, &mut films, &rendering)?;
             if let Some(state) = films.current().filter(|_| request.write != Writing::No) {
-                images = layers::layers(state, &rendering, wanted)?;
+                let made = layers::layers(state, &rendering, wanted);
+                if let (Err(_), Some(keeping)) = (&made, keeping) {
+                    keeping.finish(state, rendered.value, false);
+                }
+                images = made?;
             }
             Ok(rendered)
         });

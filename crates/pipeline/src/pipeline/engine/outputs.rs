@@ -21,20 +21,21 @@ impl Engine {
     /// Write the picture as it is, outside of a request.
     pub(in crate::pipeline) fn write_now(&mut self, sink: &Sink) {
         let (Some(canvas), Some(plan), Some(pool)) = (self.films.current(), &self.plan, &self.pool) else {
-            return sink.write_failed("there is no picture yet".to_owned());
+            return sink.write_failed(None, "there is no picture yet".to_owned());
         };
         if !canvas.is_covered() {
             let message = "nothing is written: the render was stopped before every pixel had a sample";
-            return sink.write_failed(message.to_owned());
+            return sink.write_failed(None, message.to_owned());
         }
         if self.is_broken
             && let Some(path) = self.written.not_ours(&plan.outputs, &self.contents)
         {
             let path = path.display();
-            return sink.write_failed(format!(
+            let message = format!(
                 "nothing is written: the scene has errors and may name {path}, which was not written by this run; mend \
                  the scene first"
-            ));
+            );
+            return sink.write_failed(None, message);
         }
         let to =
             Destination { plan, layers: &self.layers, inputs: &self.inputs, contents: &self.contents, sink };
@@ -80,11 +81,9 @@ impl Engine {
         let Some(plan) = self.plan.as_ref().filter(|_| findings.conflicts.is_empty()) else { return };
         if let Err(error) = write_report(plan, &self.inputs, report, sink, token) {
             let is_cancelled = matches!(error, OutputError::Cancelled(_));
-            sink.write_failed(if is_cancelled {
-                format!("the report is not written: {error}")
-            } else {
-                error.to_string()
-            });
+            let message =
+                if is_cancelled { format!("the report is not written: {error}") } else { error.to_string() };
+            sink.write_failed(None, message);
         }
     }
 

@@ -236,9 +236,5 @@ pub(in crate::pipeline) fn photons(
     let are_sent = photons.are_sent();
     let store = PhotonStore { photons, kept, sent: Cell::new(sent) };
     cache.set(key, store);
-    Ok(if are_sent {
-        Staged::done((), "")
-    } else {
-        Staged::skipped((), "no light meets mirrors or glass first")
-    })
+    Ok(if are_sent { Staged::done((), "") } else { Staged::skipped((), NOTHING_THROWS_LIGHT) })
 }

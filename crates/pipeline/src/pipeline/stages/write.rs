@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::super::inputs::Inputs;
 use super::super::plan::Plan;
-use super::super::protocol::{Failure, Writing};
+use super::super::protocol::Writing;
 use super::super::render::film_state::FilmState;
 use super::super::render::keeping::head;
 use super::super::sink::Sink;
@@ -73,7 +73,7 @@ pub(in crate::pipeline) fn check_targets(writing: Writing, plan: &Plan, sink: &S
         Writing::Must => find_targets(plan, output::check_target, output::check_place).map_err(Stop::work),
         Writing::Try => {
             if let Err(error) = find_targets(plan, output::look_at_target, output::look_at_place) {
-                sink.write_failed(error.to_string());
+                sink.write_failed(None, error.to_string());
             }
             Ok(())
         }
@@ -113,29 +113,24 @@ pub(in crate::pipeline) fn write_if_wanted(
     written: &mut Written,
     token: &CancelToken,
 ) -> Result<Staged<bool>, Stop> {
-    if writing == Writing::No {
-        return Ok(Staged::skipped(false, "nothing is to be written"));
-    }
-    match write(canvas, to, written, token) {
-        Ok(Staged { status, why, .. }) => Ok(Staged { value: true, status, why }),
-        Err(Stop::Failed(Failure::Work(message))) if writing == Writing::Try => {
-            to.sink.write_failed(message.clone());
-            Ok(Staged::skipped(false, message))
-        }
-        Err(stop) => Err(stop),
+    match writing {
+        Writing::No => Ok(Staged::skipped(false, "nothing is to be written")),
+        Writing::Try | Writing::Must => write(canvas, to, written, token, writing == Writing::Must),
     }
 }
 
-/// Write the film as it is to every output that does not hold it already. All outputs are tried.
+/// Write the film as it is to every output that does not hold it already. All outputs are tried, and failures are reported as events.
+/// Returns whether all outputs hold it.
 ///
 /// # Errors
-/// The last file that could not be written, and why; the other failures are reported as events. Or cancelled.
-pub(in crate::pipeline) fn write(
+/// Cancelled; or, if the picture must be written, the last file that could not be, and why.
+fn write(
     canvas: &FilmState,
     to: Destination<'_>,
     written: &mut Written,
     token: &CancelToken,
-) -> Result<Staged<()>, Stop> {
+    is_must: bool,
+) -> Result<Staged<bool>, Stop> {
     let Destination { plan, contents, sink, .. } = to;
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
@@ -165,20 +160,21 @@ pub(in crate::pipeline) fn write(
                 sink.written(path, bytes);
             }
             Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
-            Err(error) => errors.push(error.to_string()),
+            Err(error) => errors.push((path, error.to_string())),
         }
     }
     written.0.retain(|path, _| plan.outputs.contains(path));
     match (errors.is_empty(), count) {
         (false, _) => {
-            // Report each failure by itself; the last one is the reason why the request fails.
-            let last = errors.pop().unwrap_or_default();
-            errors.into_iter().for_each(|error| sink.write_failed(error));
-            Err(Stop::work(last))
+            // Report each failure by itself, but for the last one if that is the reason why the request fails.
+            let last = errors.last().map(|(_, message)| message.clone()).unwrap_or_default();
+            errors.truncate(errors.len() - usize::from(is_must));
+            errors.into_iter().for_each(|(path, message)| sink.write_failed(Some(path), message));
+            if is_must { Err(Stop::work(last)) } else { Ok(Staged::skipped(false, last)) }
         }
-        (true, 0) => Ok(Staged::reused((), "the picture is on disk")),
-        (true, 1) => Ok(Staged::done((), "")),
-        (true, _) => Ok(Staged::done((), format!("{count} files"))),
+        (true, 0) => Ok(Staged::reused(true, "the picture is on disk")),
+        (true, 1) => Ok(Staged::done(true, "")),
+        (true, _) => Ok(Staged::done(true, format!("{count} files"))),
     }
 }
 
@@ -189,10 +185,8 @@ pub(in crate::pipeline) fn write_by_hand(canvas: &FilmState, to: Destination<'_>
         return to.sink.refused(conflicts);
     }
     written.forget();
-    // Nobody cancels this token: a person ordered this picture.
-    if let Err(Stop::Failed(Failure::Work(message))) = write(canvas, to, written, &CancelToken::new()) {
-        to.sink.write_failed(message);
-    }
+    // Nobody cancels this token: a person ordered this picture. Events tell what came of it.
+    let _ = write(canvas, to, written, &CancelToken::new(), false);
 }
 
 /// Frames of a turntable so far.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::math::DVec3;
-use crate::pipeline::protocol::{CameraEdit, Kept, Picked, Spot};
+use crate::pipeline::protocol::{CameraEdit, Kept, MovedCamera, Picked, Spot};
 use crate::scene::description::{CameraChange, Pose, Viewpoint};
 
 /// A mirror, and photons that it throws.
@@ -98,7 +98,12 @@ fn answer(bench: &mut Bench, command: Command) -> Event {
 }
 
 fn keep(bench: &mut Bench, camera: Viewpoint) -> Result<Kept, String> {
-    match answer(bench, Command::KeepCamera(camera)) {
+    keep_moved_from(bench, camera, bench.own.get().expect("the scene's camera"))
+}
+
+/// The same, of a camera that was moved from this one of the scene.
+fn keep_moved_from(bench: &mut Bench, camera: Viewpoint, own: Viewpoint) -> Result<Kept, String> {
+    match answer(bench, Command::KeepCamera(MovedCamera { camera, own })) {
         Event::CameraKept { outcome, .. } => outcome,
         other => panic!("{other:?}"),
     }
@@ -152,6 +157,26 @@ fn a_file_that_changed_is_not_written_over() {
 }
 
 #[test]
+fn a_camera_of_before_a_save_is_not_written_over_the_camera_of_that_save() {
+    let mut bench = Bench::new(&SCENE.replace("[camera]", "[camera]\nfov = 34"));
+    bench.done();
+    let own = bench.own.get().expect("a camera");
+    let moved = own.changed(&CameraChange { fov: None, ..moved() });
+    // The worker has read the save when it hears of the camera that was moved before.
+    bench.edit("fov = 34", "fov = 20");
+    bench.done();
+    let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
+    let why = keep_moved_from(&mut bench, moved, own).expect_err("refused");
+    assert!(why.contains("camera has changed") && why.contains("press c again"), "{why}");
+    assert_eq!(fs::read_to_string(bench.path("scene.toml")).expect("a scene"), text);
+    // Moved from the camera that the file has now, it is written, and the save stays.
+    let moved = Viewpoint { fov: 20.0, ..moved };
+    assert!(keep(&mut bench, moved).expect("written").is_new);
+    let text = fs::read_to_string(bench.path("scene.toml")).expect("a scene");
+    assert!(text.contains("fov = 20") && text.contains("[0.5, 1.5, 4.25]"), "{text}");
+}
+
+#[test]
 fn a_kept_camera_is_taken_back_to_the_byte() {
     let mut bench = Bench::new(SCENE);
     let text = |bench: &Bench| fs::read_to_string(bench.path("scene.toml")).expect("a scene");
@@ -174,6 +199,20 @@ fn a_kept_camera_is_taken_back_to_the_byte() {
     assert_eq!(text(&bench), SCENE);
     assert!(undo(&mut bench, edit).is_err(), "there is nothing of it left");
     assert_eq!(text(&bench), SCENE);
+}
+
+#[test]
+fn a_scene_file_that_is_gone_is_said_to_be_gone() {
+    let mut bench = Bench::new(SCENE);
+    bench.overrides.camera = moved();
+    let camera = camera(&mut bench);
+    let edit = keep(&mut bench, camera).expect("written").edit.expect("an edit");
+    fs::remove_file(bench.path("scene.toml")).expect("removed");
+    let why = undo(&mut bench, edit).expect_err("refused");
+    assert!(why.ends_with("scene.toml is gone: there is nothing to undo in it"), "{why}");
+    let why = keep(&mut bench, camera).expect_err("refused");
+    assert_eq!(why, "the scene file is gone: the camera is not written");
+    assert!(!bench.path("scene.toml").exists());
 }
 
 #[test]

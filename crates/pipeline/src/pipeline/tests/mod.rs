@@ -9,6 +9,7 @@ mod reuse;
 mod switching;
 mod targets;
 
+use std::cell::Cell;
 use std::fs;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -22,6 +23,7 @@ use crate::pipeline::settings::Overrides;
 use crate::pipeline::trace::Kernel;
 use crate::pipeline::worker::{Handle, start_with};
 use crate::scene::Loaded;
+use crate::scene::description::Viewpoint;
 use crate::scene::diagnostic::Diagnostic;
 
 /// The scene of this text, with a camera added if it has none.
@@ -82,6 +84,8 @@ pub(in crate::pipeline) struct Bench {
     pub(super) force: bool,
     pub(super) first: Option<Section>,
     pub(super) writing: Writing,
+    /// The scene's own camera, as the worker said it last.
+    pub(super) own: Cell<Option<Viewpoint>>,
 }
 
 impl Bench {
@@ -107,6 +111,7 @@ impl Bench {
             force: false,
             first: None,
             writing: Writing::Must,
+            own: Cell::new(None),
         };
         bench.write("scene.toml", scene);
         bench.write("one.obj", OBJ);
@@ -143,7 +148,11 @@ impl Bench {
     }
 
     pub(super) fn next(&self) -> Event {
-        self.worker.events.recv_timeout(Duration::from_secs(60)).expect("the worker speaks")
+        let event = self.worker.events.recv_timeout(Duration::from_secs(60)).expect("the worker speaks");
+        if let Event::Settings { camera, .. } = &event {
+            self.own.set(Some(*camera));
+        }
+        event
     }
 
     /// All events up to the one that ends this generation.

@@ -167,3 +167,18 @@ fn a_kernel_renders_every_tile_also_where_photons_are_gathered() {
     let bytes = picture.rsplitn(2, |byte| *byte == b'\n').next().expect("pixels");
     assert!(WITH.load(Ordering::SeqCst) && bytes.iter().all(|byte| *byte == 0));
 }
+
+#[test]
+fn a_scene_without_photons_has_one_reason_for_that() {
+    let mut bench = Bench::new(&format!("{SCENE}[photons]\nenabled = true\n"));
+    let mut reason = |integrator| {
+        bench.overrides.integrator = integrator;
+        let report = bench.done().0;
+        let stage = &report.stages[Stage::Photons as usize];
+        (stage.status, stage.why.clone())
+    };
+    let first = reason(None);
+    assert_eq!(first, (Status::Skipped, "no mirror or glass throws light".to_owned()));
+    assert_ne!(reason(Some(crate::scene::description::Integrator::Path)), first);
+    assert_eq!(reason(None), first);
+}

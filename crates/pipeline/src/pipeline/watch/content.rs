@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::fs::{self, Metadata};
-use std::io::Read;
+use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -27,9 +27,22 @@ pub enum Content {
     /// There is no such file.
     Missing,
     /// It is no regular file, or may not be read.
-    Unusable,
+    Unusable(Obstacle),
     /// A regular file with this hash, of its bytes or, if it is a very long one, of its time stamps.
     Hash([u8; 32]),
+}
+
+/// What is in the place of a file that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Obstacle {
+    /// A folder.
+    Folder,
+    /// A pipe, a socket or a device.
+    Special,
+    /// A file of the kernel.
+    Kernel,
+    /// Something that cannot be opened or read, for this reason.
+    Error(ErrorKind),
 }
 
 impl Content {
@@ -42,7 +55,7 @@ impl Content {
     pub(in crate::pipeline) fn add_to(self, key: &mut Fingerprint) {
         match self {
             Self::Missing => key.u64(0),
-            Self::Unusable => key.u64(1),
+            Self::Unusable(_) => key.u64(1),
             Self::Hash(hash) => key.u64(2).bytes(&hash),
         };
     }
@@ -149,9 +162,11 @@ impl Contents {
         let now = SystemTime::now();
         let metadata = match file::kind(path) {
             Ok((Kind::Regular, metadata)) => metadata,
-            Ok((Kind::Folder | Kind::Special | Kind::Kernel, _)) => return Ok(Content::Unusable),
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Content::Missing),
-            Err(_) => return Ok(Content::Unusable),
+            Ok((Kind::Folder, _)) => return Ok(Content::Unusable(Obstacle::Folder)),
+            Ok((Kind::Special, _)) => return Ok(Content::Unusable(Obstacle::Special)),
+            Ok((Kind::Kernel, _)) => return Ok(Content::Unusable(Obstacle::Kernel)),
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Content::Missing),
+            Err(error) => return Ok(unreadable(&error)),
         };
         let stamp = Stamp::of(&metadata);
         let known = self.known().get(path).filter(|(known, _)| *known == stamp).map(|(_, content)| *content);
@@ -183,8 +198,19 @@ impl Contents {
     }
 }
 
+fn unreadable(error: &io::Error) -> Content {
+    Content::Unusable(Obstacle::Error(error.kind()))
+}
+
 fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
-    let Ok(Ok((mut file, _))) = file::open(path) else { return Ok(Content::Unusable) };
+    let mut file = match file::open(path) {
+        Ok(Ok((file, _))) => file,
+        // It has been replaced since the last look.
+        Ok(Err(Kind::Folder)) => return Ok(Content::Unusable(Obstacle::Folder)),
+        Ok(Err(Kind::Special)) => return Ok(Content::Unusable(Obstacle::Special)),
+        Ok(Err(Kind::Regular | Kind::Kernel)) => return Ok(Content::Unusable(Obstacle::Kernel)),
+        Err(error) => return Ok(unreadable(&error)),
+    };
     let mut hasher = blake3::Hasher::new();
     let mut buffer = vec![0; CHUNK];
     loop {
@@ -192,8 +218,8 @@ fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
         match file.read(&mut buffer) {
             Ok(0) => return Ok(Content::Hash(*hasher.finalize().as_bytes())),
             Ok(count) => hasher.update(&buffer[..count]),
-            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => continue,
-            Err(_) => return Ok(Content::Unusable),
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(error) => return Ok(unreadable(&error)),
         };
     }
 }
@@ -217,9 +243,9 @@ mod tests {
         assert_ne!(first, second, "the same length within one tick of the clock");
         fs::write(&path, "a").expect("written");
         assert_eq!(contents.read(&path, &token), Ok(first));
-        assert_eq!(contents.read(folder.path(), &token), Ok(Content::Unusable));
+        assert_eq!(contents.read(folder.path(), &token), Ok(Content::Unusable(Obstacle::Folder)));
         #[cfg(target_os = "linux")]
-        assert_eq!(contents.read(Path::new("/proc/kmsg"), &token), Ok(Content::Unusable));
+        assert_eq!(contents.read(Path::new("/proc/kmsg"), &token), Ok(Content::Unusable(Obstacle::Kernel)));
     }
 
     #[test]
@@ -261,8 +287,12 @@ mod tests {
         assert!(!stamp.is_settled(SystemTime::now()));
         assert!(stamp.is_settled(SystemTime::now() + Duration::from_secs(4)));
         let contents = Contents::default();
-        contents.known().insert(path.clone(), (stamp, Content::Unusable));
+        contents.known().insert(path.clone(), (stamp, Content::Unusable(Obstacle::Special)));
         let read = contents.read(&path, &CancelToken::new());
-        assert_eq!(read, Ok(Content::Unusable), "the known answer stands while the stamp is the same");
+        assert_eq!(
+            read,
+            Ok(Content::Unusable(Obstacle::Special)),
+            "the known answer stands while the stamp is the same"
+        );
     }
 }

@@ -235,7 +235,8 @@ impl<F: FnMut(News)> Watch<F> {
     /// Files that do not hold what was last said of them.
     fn differences(&self) -> Vec<FileRead> {
         let token = CancelToken::new();
-        let now = |path: &PathBuf| self.contents.read(path, &token).unwrap_or(Content::Unusable);
+        // Nobody cancels this token.
+        let now = |path: &PathBuf| self.contents.read(path, &token).unwrap_or(Content::Missing);
         let files = self.files.iter();
         let mut found: Vec<FileRead> = files
             .map(|(path, (content, _))| (path, *content, now(path)))

@@ -81,6 +81,22 @@ impl Scratch {
 }
 
 #[test]
+fn another_kind_of_what_is_no_file_is_a_change() {
+    use nix::sys::stat::Mode;
+    let scratch = Scratch::new(false);
+    let path = scratch.path("a.toml");
+    fs::remove_file(&path).expect("removed");
+    fs::create_dir(&path).expect("a folder");
+    scratch.expect_one();
+    fs::remove_dir(&path).expect("removed");
+    nix::unistd::mkfifo(&path, Mode::S_IRWXU).expect("a pipe");
+    scratch.expect_one();
+    fs::remove_file(&path).expect("removed");
+    std::os::unix::fs::symlink("a.toml", &path).expect("a link to itself");
+    scratch.expect_one();
+}
+
+#[test]
 fn truncate_and_write() {
     let scratch = Scratch::new(false);
     scratch.three_saves(|content| fs::write(scratch.path("a.toml"), content).expect("written"));

@@ -24,6 +24,7 @@ use super::known::Ask;
 use super::preview_kind::PreviewKind;
 use super::terminals::Abilities;
 use crate::pipeline::settings::Overrides;
+use crate::scene::diagnostic::{Diagnostic, Severity};
 
 /// Values that the front end starts with.
 pub(super) struct Setup {
@@ -91,6 +92,21 @@ impl State {
         };
         let is_newest = request.camera_step.generation == Some(request.generation);
         is_newest && is_at_work && request.preview_size.is_some() && !is_shown
+    }
+
+    /// Errors and warnings about a scene that could be read, and why its picture is not on disk.
+    pub(super) fn reported(&self) -> Vec<Diagnostic> {
+        let warnings = &self.overlays.warnings;
+        let failed = self.saving.write_failed.as_ref();
+        let failed = failed.filter(|failed| self.saving.unwritten.is_some() && !failed.is_refused);
+        let unwritten = failed.map(|failed| Diagnostic {
+            severity: Severity::Error,
+            message: failed.why.clone(),
+            path: PathBuf::new(),
+            place: None,
+            help: None,
+        });
+        unwritten.into_iter().chain(warnings.iter().cloned()).collect()
     }
 
     /// Whether the scene failed, not the work.

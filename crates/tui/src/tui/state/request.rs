@@ -67,6 +67,15 @@ impl Origin {
         Self { toggles: Toggles { exposure: None, ..self.toggles }, ..self }
     }
 
+    /// Origin of an image that a later request has as well: what has changed since had no part in it. But a camera that keys had
+    /// moved, and that the scene has by now, is the scene's.
+    pub(in crate::tui) fn of_same_image(&self, later: Self) -> Self {
+        if self.toggles.camera.is_any() && !later.toggles.camera.is_any() {
+            return later;
+        }
+        Self { is_unfinished: later.is_unfinished, ..self.clone() }
+    }
+
     /// Changes of the files since another one, in words.
     pub(in crate::tui) fn edits(&self, before: &Self) -> Vec<String> {
         let of_text =

@@ -50,8 +50,9 @@ pub(in crate::tui) struct WorkState {
     pub assets: Vec<AssetBar>,
     pub progress: Option<RenderProgress>,
     pub report: Option<Box<Report>>,
-    /// Noise against the time of this render, and of the one before.
+    /// Noise against the time of this render.
     pub curve: NoiseCurve,
+    /// The same of the last picture that was finished.
     pub last_curve: NoiseCurve,
     /// Curves of the last renders, the newest at the end: a picture that is found again has its curve.
     curves: Vec<(Origin, NoiseCurve)>,

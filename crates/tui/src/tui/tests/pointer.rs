@@ -213,7 +213,11 @@ fn y_copies_what_was_clicked_where_the_terminal_takes_it() {
     answer(&mut desk, Some(thing()));
     assert!(desk.press('y').is_empty());
     let text: String = desk.text().split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(text.contains("pixel 1, 2 · this terminal is not known to copy"), "{text}");
+    assert!(
+        text.contains("to copy, drag with shift (or after m): sphere \"ball\" · cornell.toml:47"),
+        "{text}"
+    );
+    assert!(text.contains("normal (0, 1, 0) · pixel 1, 2"), "{text}");
     desk.state.display.abilities = Terminal { brand: Brand::Kitty, version: [0, 40] }.abilities();
     let effects = desk.press('y');
     let words = "sphere \"ball\" · cornell.toml:47 · glass crystal · 3.9 away · at (0.2, 0.5, -0.3) · \
@@ -291,6 +295,21 @@ fn what_was_clicked_is_told_in_full_in_a_small_window() {
         desk.press('?');
         desk.press('?');
         assert!(!desk.text().contains("crystal"), "until the next key: {}", desk.text());
+    }
+}
+
+#[test]
+fn y_says_how_to_copy_in_small_windows_too() {
+    for (columns, rows) in [(80, 24), (30, 8), (20, 6), (40, 12)] {
+        let mut desk = Desk::with(state(columns, rows));
+        desk.finish(RED);
+        desk.key(crate::tui::event::KeyPress::special(crossterm::event::KeyCode::Enter));
+        answer(&mut desk, Some(thing()));
+        desk.press('y');
+        let text = desk.text();
+        assert!(text.lines().next().is_some_and(|line| line.contains("✓ done")), "the state stays: {text}");
+        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.contains("to copy, drag with shift (or after m): sphere \"ball\""), "{text}");
     }
 }
 

@@ -419,15 +419,85 @@ fn a_picture_that_could_not_be_written_is_not_called_done() {
     let generation = desk.state.request.generation;
     desk.worker(protocol::Event::WriteFailed {
         generation,
+        path: None,
         message: "cannot write a.png: disk full".to_owned(),
     });
     desk.worker(done(generation, Vec::new(), false));
     let first = |desk: &mut Desk| desk.text().lines().next().map(str::to_owned).unwrap_or_default();
     assert!(first(&mut desk).contains("! unwritten") && !desk.text().contains("✓ done"), "{}", desk.text());
     desk.press('y');
-    assert!(desk.text().contains("not written"), "{}", desk.text());
+    assert!(desk.text().contains("not written: e says why"), "{}", desk.text());
+    // The reason can be asked for again.
+    desk.press('e');
+    assert!(
+        desk.text().contains("─ 1 error ─") && desk.text().contains("error: cannot write a.png: disk full")
+    );
+    desk.press('e');
+    assert!(!desk.text().contains("disk full"), "{}", desk.text());
     desk.worker(protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 });
     assert!(first(&mut desk).contains("✓ done"), "{}", desk.text());
+}
+
+/// The screen behind its first line, in one line.
+fn below(desk: &mut Desk) -> String {
+    let text = desk.text();
+    let words = text.lines().skip(1).flat_map(str::split_whitespace);
+    words.filter(|word| !word.starts_with('▀')).collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn a_file_of_another_picture_is_not_named() {
+    for (columns, rows) in [(80, 24), (120, 40), (100, 20)] {
+        let mut desk = Desk::with(state(columns, rows));
+        let written = |generation| protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 };
+        let failed = |generation, message: &str| protocol::Event::WriteFailed {
+            generation,
+            path: Some("a.png".into()),
+            message: message.to_owned(),
+        };
+        desk.worker(written(1));
+        desk.finish(super::RED);
+        assert!(below(&mut desk).contains("→ a.png"), "{}", desk.text());
+        // The next picture cannot be written: the file holds the one before.
+        desk.event(Event::Changed(crate::tui::Changed { noticed: desk.now }));
+        desk.worker(protocol::Event::Started { generation: 2 });
+        desk.worker(failed(2, "cannot write a.png: denied"));
+        desk.worker(done(2, Vec::new(), false));
+        desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+        assert!(!below(&mut desk).contains("→ a.png"), "{}", desk.text());
+        // It can again.
+        desk.press('w');
+        desk.worker(written(2));
+        desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+        assert!(
+            below(&mut desk).contains("→ a.png") && !desk.text().contains("unwritten"),
+            "{}",
+            desk.text()
+        );
+        // Written by a key once more, it fails: nobody knows what is there.
+        desk.press('w');
+        desk.worker(failed(2, "cannot write a.png: gone"));
+        desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+        let first = desk.text().lines().next().map(str::to_owned).unwrap_or_default();
+        assert!(first.contains("! unwritten") && !below(&mut desk).contains("→ a.png"), "{}", desk.text());
+        desk.press('e');
+        assert!(desk.text().contains("cannot write a.png: gone"), "{}", desk.text());
+        let words = "not written: cannot write a.png: gone; before that, wrote a.png";
+        assert_eq!(crate::tui::exit_summary::words(&desk.state), words);
+    }
+}
+
+#[test]
+fn an_order_to_write_that_fails_while_a_render_goes_on_says_nothing_of_its_end() {
+    let mut desk = Desk::new();
+    desk.worker(protocol::Event::Started { generation: 1 });
+    desk.press('w');
+    let message = "cannot write a.png: full".to_owned();
+    desk.worker(protocol::Event::WriteFailed { generation: 1, path: Some("a.png".into()), message });
+    desk.worker(protocol::Event::Written { generation: 1, path: "a.png".into(), bytes: 1 });
+    desk.finish(super::RED);
+    desk.key(KeyPress::special(crossterm::event::KeyCode::Esc));
+    assert!(desk.text().contains("✓ done") && below(&mut desk).contains("→ a.png"), "{}", desk.text());
 }
 
 #[test]

@@ -142,6 +142,153 @@ fn the_last_pictures_say_what_changed_and_a_click_shows_them() {
     assert!(panel(&mut desk).contains("▸3") && cells_of(&mut desk, RED) > 500);
 }
 
+/// A save of the scene whose render has begun and has shown a picture, if it has a colour.
+fn begun(desk: &mut Desk, text: &str, color: Option<[u8; 3]>) {
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::Started { generation });
+    desk.worker(protocol::Event::Text { generation, text: text.into() });
+    let (settings, camera) = (Box::new(settings()), camera());
+    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0 });
+    color.into_iter().for_each(|color| show(desk, color));
+}
+
+/// The request under way has a picture.
+fn show(desk: &mut Desk, color: [u8; 3]) {
+    let (generation, picture) = (desk.state.request.generation, plain_picture(50, 38, color));
+    let picture = Event::Picture {
+        generation,
+        picture,
+        range: None,
+        section: None,
+        lacks_photons: false,
+        source: None,
+    };
+    desk.event(picture);
+}
+
+#[test]
+fn the_render_under_way_is_the_newest_of_the_last_pictures() {
+    let mut desk = Desk::with(state(120, 40));
+    edited(&mut desk, &[("camera.fov = 40", RED)]);
+    begun(&mut desk, "camera.fov = 30", Some(BLUE));
+    let text = panel(&mut desk);
+    assert!(text.contains("▸2 camera.fov 40 → 30") && text.contains(" 1 first"), "{text}");
+    assert!(!text.contains("unfinished"), "it is not stopped: {text}");
+    // The next save stops it: until that has a picture, the one that is shown is the stopped one, which has no number.
+    begun(&mut desk, "camera.fov = 20", None);
+    let text = panel(&mut desk);
+    assert!(text.contains("▸– unfinished; camera.fov") && !text.contains('2'), "{text}");
+    show(&mut desk, [10, 200, 20]);
+    for keys in ["", "nN", "b", "b"] {
+        keys.chars().for_each(|key| drop(desk.press(key)));
+        let text = panel(&mut desk);
+        assert!(text.contains("2 camera.fov 30 → 20") && text.contains("– unfinished; camera.fov"), "{text}");
+        assert_eq!(text.contains('▸'), text.contains("▸2") || keys == "b", "{keys}: {text}");
+        assert_eq!(text.matches("unfinished").count(), 1, "{text}");
+    }
+    // While an older one is looked at, the one under way is there as well.
+    edited(&mut desk, &[]);
+    let generation = desk.state.request.generation;
+    desk.worker(done(generation, Vec::new(), false));
+    desk.press('n');
+    let before = desk.state.picture.history.len();
+    begun(&mut desk, "camera.fov = 10", None);
+    desk.press('n');
+    desk.press('n');
+    show(&mut desk, [90, 90, 20]);
+    assert_eq!(desk.state.picture.history.len(), before + 1);
+    assert!(panel(&mut desk).contains(" 3 camera.fov 20 → 10"), "{}", desk.text());
+}
+
+#[test]
+fn a_camera_on_its_way_is_one_of_the_last_pictures() {
+    let mut desk = Desk::with(state(120, 40));
+    edited(&mut desk, &[("camera.fov = 40", RED)]);
+    for step in 0..5 {
+        desk.press('l');
+        show(&mut desk, [step, 0, 200]);
+        let text = panel(&mut desk);
+        assert!(text.contains("▸2 camera moved") && text.contains(" 1 first"), "{text}");
+        assert_eq!(desk.state.picture.history.len(), 2, "{text}");
+    }
+}
+
+#[test]
+fn a_picture_that_is_as_it_was_keeps_its_curve() {
+    let mut desk = Desk::with(state(120, 40));
+    rendered(&mut desk, 0.01);
+    // A typo, which is mended: the picture is unchanged.
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.fail(vec![diagnostic(crate::scene::diagnostic::Severity::Error, "wrong")]);
+    desk.event(Event::Settled);
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::Started { generation });
+    let mut event = done(generation, Vec::new(), true);
+    if let protocol::Event::Done { report, .. } = &mut event {
+        report.stages[protocol::Stage::Render as usize].status = protocol::Status::Reused;
+    }
+    desk.worker(event);
+    assert!(desk.text().contains("unchanged"), "{}", desk.text());
+    assert!(panel(&mut desk).contains("noise while it rendered"), "{}", desk.text());
+}
+
+#[test]
+fn no_line_ends_between_a_number_and_its_unit() {
+    for columns in 120..200 {
+        let mut desk = Desk::with(state(columns, 40));
+        rendered(&mut desk, 0.01);
+        let panel = Layout::of(&desk.state).panel;
+        let buffer = desk.screen();
+        let line = |y: u16| {
+            (panel.left()..panel.right()).map(|x| buffer[(x, y)].symbol().to_owned()).collect::<String>()
+        };
+        let caption = (panel.top()..panel.bottom()).map(line).filter(|line| line.contains("after"));
+        for line in caption {
+            let last = line.split_whitespace().last().unwrap_or_default();
+            assert!(last.parse::<f64>().is_err(), "{columns}: {line}");
+        }
+    }
+}
+
+#[test]
+fn errors_over_the_strip_leave_no_heading_behind() {
+    // A panel too narrow for errors, one too low for them, and one that holds them.
+    for (width, height) in [(640, 400), (640, 320), (640, 480)] {
+        let mut desk = Desk::with(state(200, 60));
+        desk.state.request.effective = Some(Effective { width, height, ..settings() });
+        desk.event(Event::Resize(window(200, 60)));
+        for (number, color) in [RED, BLUE, [1, 2, 3]].into_iter().enumerate() {
+            desk.event(Event::Changed(Changed { noticed: desk.now }));
+            let generation = desk.state.request.generation;
+            desk.worker(protocol::Event::Started { generation });
+            desk.worker(protocol::Event::Text { generation, text: format!("seed = {number}").into() });
+            show(&mut desk, color);
+            let mut event = done(generation, Vec::new(), false);
+            if let protocol::Event::Done { report, .. } = &mut event {
+                (report.settings.width, report.settings.height) = (width, height);
+            }
+            desk.worker(event);
+        }
+        let entries = |text: &str| {
+            ["1 first", "2 seed", "3 seed"].into_iter().filter(|words| text.contains(words)).count()
+        };
+        let has_heading = |text: &str| text.contains("the last pictures");
+        let text = desk.text();
+        assert!(has_heading(&text) && entries(&text) == 3, "{text}");
+        for count in 1..8 {
+            let errors = (0..count)
+                .map(|number| diagnostic(crate::scene::diagnostic::Severity::Error, &format!("{number}")));
+            desk.fail(errors.collect());
+            desk.event(Event::Settled);
+            let text = desk.text();
+            assert!(text.contains("error: 0"), "{text}");
+            assert_eq!(has_heading(&text), entries(&text) > 1, "{width}×{height}, {count} errors:\n{text}");
+        }
+    }
+}
+
 /// Whatever the window, the colours and the kind of picture: all is in the panel, and what waits for the picture is not in it.
 #[test]
 fn it_fits_into_every_window() {

@@ -18,6 +18,18 @@ fn warnings_are_counted_and_shown_on_demand() {
 }
 
 #[test]
+fn the_count_of_errors_and_warnings_names_its_key_in_a_narrow_panel() {
+    let mut desk = Desk::new();
+    let both = vec![diagnostic(Severity::Error, "wrong"), diagnostic(Severity::Warning, "odd")];
+    desk.worker(done(1, both, false));
+    assert!(desk.text().contains("e: 1 error, 1 warning"), "{}", desk.text());
+    let one = vec![diagnostic(Severity::Warning, "odd")];
+    desk.press('r');
+    desk.worker(done(2, one, false));
+    assert!(desk.text().contains("1 warning: e shows it"), "{}", desk.text());
+}
+
+#[test]
 fn warnings_are_there_while_the_picture_is_rendered() {
     let mut desk = Desk::new();
     desk.worker(protocol::Event::Started { generation: 1 });

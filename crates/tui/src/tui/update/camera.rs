@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::request::render;
 use super::say::{notify, say};
-use crate::pipeline::protocol::{Command, Kept};
+use crate::pipeline::protocol::{Command, Kept, MovedCamera};
 use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
 use crate::scene::is_mesh;
@@ -112,13 +112,15 @@ fn forget_own(state: &mut State) {
 
 /// The camera as it is now is to be put into the scene file.
 pub(super) fn keep(state: &mut State) -> Vec<Effect> {
-    let Some(view) = state.request.viewpoint() else { return unknown(state) };
+    let Some((camera, own)) = state.request.viewpoint().zip(state.request.camera) else {
+        return unknown(state);
+    };
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
     // The scene of a model is worth writing with its own camera, too.
     if !state.request.toggles.camera.is_any() && !is_set && !is_mesh(&state.request.scene) {
         return notify(state, "the camera is where the scene has it: there is nothing to write");
     }
-    vec![Effect::Send(Command::KeepCamera(view))]
+    vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
 }
 
 /// Tells the outcome of keeping the camera. A camera that the file has now does not count as moved by keys.

@@ -19,6 +19,15 @@ pub(super) fn record(state: &mut State) {
     }
 }
 
+/// The picture of a render that is under way is the newest one.
+pub(super) fn record_under_way(state: &mut State) {
+    if state.work.is_running() {
+        let before = state.picture.history.len();
+        record(state);
+        state.dirty |= state.picture.history.len() != before;
+    }
+}
+
 /// Goes so many pictures back; negative: forward.
 pub(super) fn browse(state: &mut State, steps: isize) -> Vec<Effect> {
     record(state);

@@ -69,7 +69,7 @@ pub(super) fn act(state: &mut State, action: Action) -> Vec<Effect> {
         Action::RectangleFirst => rectangle::press(state),
         Action::ToggleMouse => pointer::toggle_mouse(state),
         Action::Edit if is_mesh(&state.request.scene) => {
-            notify(state, "a model is no text; c writes a scene of it")
+            notify(state, "the editor opens scenes, and this is a model; c writes a scene of it")
         }
         Action::Edit => vec![Effect::Edit(places::to_edit(state))],
         Action::BeforeAfter => history::before_and_after(state),
@@ -216,7 +216,7 @@ fn scene_settings(state: &mut State) -> Vec<Effect> {
 }
 
 fn toggle_diagnostics(state: &mut State) -> Vec<Effect> {
-    if state.overlays.problems.is_none() && state.overlays.warnings.is_empty() {
+    if state.overlays.problems.is_none() && state.reported().is_empty() {
         let is_read = state.overlays.are_warnings_known || !state.work.is_running();
         return notify(
             state,

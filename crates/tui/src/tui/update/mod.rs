@@ -117,6 +117,7 @@ fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
         && state.display.kind != PreviewKind::None
     {
         if state.picture.history.holds_back(&shown) {
+            history::record_under_way(state);
             return Vec::new();
         }
         state.urgent |= state.picture.shown.as_ref().is_none_or(|last| last.generation != shown.generation);
@@ -126,6 +127,7 @@ fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
             Some(last) if state.display.mixes_colors() => steadied(shown, &last),
             Some(_) | None => shown,
         });
+        history::record_under_way(state);
         state.dirty = true;
     }
     Vec::new()

@@ -198,12 +198,7 @@ pub(super) fn copy(state: &mut State) -> Vec<Effect> {
     };
     if !state.display.abilities.clipboard {
         // It stands there to be selected.
-        return notify(
-            state,
-            &format!(
-                "{clicked} · this terminal is not known to copy by itself: shift and a drag select it, or m and a drag"
-            ),
-        );
+        return notify(state, &format!("to copy, drag with shift (or after m): {clicked}"));
     }
     say(state, format!("copied: {clicked}"));
     vec![Effect::Aside(chrome::copy(&clicked))]

@@ -9,7 +9,9 @@ use crate::tui::view::layout::Layout;
 /// A new request with the settings that hold now. The table of stages stays until the worker takes it up.
 pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     // A camera on its way has too many pictures.
-    if state.request.camera_step.generation != Some(state.request.generation) {
+    if state.request.camera_step.generation == Some(state.request.generation) {
+        state.picture.history.drop_unfinished(state.request.generation);
+    } else {
         history::record(state);
     }
     state.picture.shown = state.picture.history.close().or_else(|| state.picture.shown.take());

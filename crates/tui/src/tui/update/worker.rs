@@ -15,8 +15,11 @@ use crate::scene::sanitize::visible;
 use crate::tui::chrome;
 use crate::tui::event::{Effect, Unwritten, Written};
 use crate::tui::exit_summary;
+use crate::tui::noise_curve::NoiseCurve;
 use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
 
+/// Why a picture that is not on disk is not there.
+const UNWRITTEN: &str = "not written: e says why";
 /// Message that ends with the render.
 const GOING_ON: &str = "going on from";
 
@@ -72,14 +75,17 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
         Event::Written { path, bytes, generation } => wrote(state, path, bytes, generation),
-        Event::WriteFailed { message, .. } => {
+        Event::WriteFailed { path, message, .. } => {
             let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
-            if !is_by_hand {
-                state.saving.unwritten = Some("not written".to_owned());
+            // What a key asks for during a render tells nothing of the picture at its end.
+            if !is_by_hand || state.work.activity == Activity::Done {
+                state.saving.unwritten = Some(UNWRITTEN.to_owned());
             }
+            let is_it = |written: &&mut Written| Some(&written.path) == path.as_ref();
+            state.saving.written.iter_mut().filter(is_it).for_each(|written| written.is_stale = true);
             say(state, format!("error: {}", visible(&message)));
             state.saving.write_failed =
-                Some(Unwritten { why: message, generation: state.request.generation });
+                Some(Unwritten { why: message, generation: state.request.generation, is_refused: false });
         }
         Event::NotKept { message, .. } => say(state, format!("warning: {}", visible(&message))),
         Event::Checkpoint { news, .. } => match news {
@@ -169,9 +175,10 @@ fn started(state: &mut State) {
     state.work.stages = Default::default();
     state.work.assets.clear();
     state.work.progress = None;
-    state.work.last_curve = std::mem::take(&mut state.work.curve);
+    state.work.curve = NoiseCurve::default();
     state.work.report = None;
     state.saving.unwritten = None;
+    close_empty_pane(state);
     state.work.unchanged = false;
 }
 
@@ -206,6 +213,7 @@ fn wrote(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
     let is_by_hand = state.work.activity == Activity::Done;
     if is_by_hand {
         (state.saving.unwritten, state.saving.write_failed) = (None, None);
+        close_empty_pane(state);
     }
     note(state, path, bytes, generation);
 }
@@ -218,7 +226,7 @@ fn note(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
         None => String::new(),
     };
     state.saving.written.retain(|other| other.path != path);
-    state.saving.written.push(Written { path, bytes, generation, made });
+    state.saving.written.push(Written { path, bytes, generation, made, is_stale: false });
 }
 
 /// Describes the files of a finished request, if it wrote its picture at the end.
@@ -233,10 +241,11 @@ fn describe(state: &mut State, generation: u64, report: &Report) {
 /// Shows new conflicts at once; a pane that a person has closed stays closed.
 fn refused(state: &mut State, conflicts: Vec<Diagnostic>) {
     state.saving.is_write_requested = false;
-    state.saving.unwritten = Some("not written: e says why".to_owned());
+    state.saving.unwritten = Some(UNWRITTEN.to_owned());
     say(state, "nothing is written (e shows why)");
     let why = conflicts.first().map_or(String::new(), |conflict| conflict.message.clone());
-    state.saving.write_failed = Some(Unwritten { why, generation: state.request.generation });
+    let generation = state.request.generation;
+    state.saving.write_failed = Some(Unwritten { why, generation, is_refused: true });
     if !conflicts.iter().all(|conflict| state.overlays.warnings.contains(conflict)) {
         state.overlays.diagnostics = Pane { open: true, scroll: 0 };
     }
@@ -320,17 +329,23 @@ fn note_noise(state: &mut State, report: &Report, unchanged: bool) {
             state.work.keep_curve(origin);
         }
         Status::Reused if unchanged || state.request.is_exposure_only => {
-            state.work.curve = std::mem::take(&mut state.work.last_curve);
+            state.work.curve = state.work.last_curve.clone();
         }
         Status::Reused => state.work.find_curve(&origin),
         Status::Running | Status::Skipped => {}
     }
+    state.work.last_curve = state.work.curve.clone();
 }
 
 fn warn(state: &mut State, warnings: Vec<Diagnostic>) {
-    state.overlays.diagnostics.open &= !warnings.is_empty();
     state.overlays.warnings = warnings;
+    state.overlays.diagnostics.open &= !state.reported().is_empty();
     state.overlays.are_warnings_known = true;
+}
+
+/// Closes the pane of errors if nothing is left in it.
+fn close_empty_pane(state: &mut State) {
+    state.overlays.diagnostics.open &= state.overlays.problems.is_some() || !state.reported().is_empty();
 }
 
 /// Holds back errors in a file that may be half written until they persist.

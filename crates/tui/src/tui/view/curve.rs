@@ -55,18 +55,24 @@ fn target(state: &State) -> Option<f64> {
     state.request.effective.as_ref().map(|it| f64::from(it.error)).filter(|error| *error > 0.0)
 }
 
-/// Caption of the curve, in plain words.
+/// A blank at which no line ends.
+const UNBROKEN: &str = "\u{a0}";
+
+/// Caption of the curve, in plain words; a number stays with its unit.
 fn caption(state: &State, points: &[(f64, f64)], width: u16) -> Vec<String> {
     let ([(first, from), ..], [.., (last, to)]) = (points, points) else { return Vec::new() };
-    let fell = format!("{} after {}, {} after {}", share(*from), seconds(*first), share(*to), seconds(*last));
+    let whole = |amount: String| amount.replace(' ', UNBROKEN);
+    let (from, first) = (whole(share(*from)), whole(seconds(*first)));
+    let (to, last) = (whole(share(*to)), whole(seconds(*last)));
+    let fell = format!("{from} after {first}, {to} after {last}");
     let line = match target(state) {
         Some(target) => format!(
             "; the line is the {} asked of each tile",
-            share(f64::from((target * 1e6).round() as f32) / 1e6)
+            whole(share(f64::from((target * 1e6).round() as f32) / 1e6))
         ),
         None => String::new(),
     };
-    wrapped(&(fell + &line), usize::from(width))
+    wrapped(&(fell + &line), usize::from(width)).iter().map(|line| line.replace(UNBROKEN, " ")).collect()
 }
 
 fn plot(state: &State, points: &[(f64, f64)], area: Rect, buffer: &mut Buffer) {

@@ -35,6 +35,16 @@ pub(super) fn draw(state: &State, area: Rect, buffer: &mut Buffer) {
     }
 }
 
+/// The cells that it lies over. Empty while it is closed.
+pub(super) fn covered(state: &State) -> Rect {
+    let Layout { pane, panel, .. } = Layout::of(state);
+    if state.overlays.diagnostics.open {
+        fitting(pane, text(state, pane).len(), pane == panel)
+    } else {
+        Rect::ZERO
+    }
+}
+
 /// The lower part of an area that these lines and their title need; all of a panel.
 fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
     if is_panel {
@@ -46,13 +56,14 @@ fn fitting(area: Rect, lines: usize, is_panel: bool) -> Rect {
 
 /// A rule with the number of errors, and which lines are in sight where these are not all.
 fn title(state: &State, area: Rect, shown: Option<(usize, usize, usize)>, buffer: &mut Buffer) {
-    let has_error = state.overlays.warnings.iter().any(|one| one.severity == Severity::Error);
+    let reported = state.reported();
+    let has_error = reported.iter().any(|one| one.severity == Severity::Error);
     let tone = if state.overlays.problems.is_some() || has_error { Tone::Error } else { Tone::Warning };
     let rule = "─".repeat(usize::from(area.width));
     put(buffer, area, &[(&rule, tone)], state.display.depth);
     let words = match &state.overlays.problems {
         Some(_) => super::header::errors(state),
-        None => report::summary(&state.overlays.warnings),
+        None => report::summary(&reported),
     };
     let mut room = area;
     if let Some((first, page, all)) = shown {
@@ -77,7 +88,7 @@ fn span(text: &[Line], area: Rect) -> (usize, usize) {
 
 fn text(state: &State, area: Rect) -> Vec<Line> {
     let width = usize::from(area.width);
-    let Some(problems) = &state.overlays.problems else { return reported(&state.overlays.warnings, width) };
+    let Some(problems) = &state.overlays.problems else { return reported(&state.reported(), width) };
     let mut text = Vec::new();
     if let Some(work) = &problems.work {
         text.extend(toned(&format!("error: {}", visible(work)), width, Tone::Error));

@@ -193,7 +193,9 @@ fn figures(state: &State) -> Vec<String> {
 
 /// Number of the newest run; of the one under way, if it has a picture.
 fn last_run(state: &State) -> u64 {
-    let is_under_way = state.work.is_running() && state.picture.history.awaits_run();
+    let history = &state.picture.history;
+    let is_under_way =
+        state.work.is_running() && history.is_newest(state.request.generation) && history.awaits_run();
     state.work.renders + u64::from(is_under_way)
 }
 

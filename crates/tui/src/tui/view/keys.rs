@@ -241,8 +241,10 @@ fn unseen(state: &State) -> Option<Hint> {
     let (words, tone) = match &state.overlays.problems {
         _ if state.overlays.diagnostics.open => return None,
         Some(_) => (super::header::errors(state), activity(state).2),
-        None if state.overlays.warnings.is_empty() => return None,
-        None => (summary(&state.overlays.warnings), Tone::Warning),
+        None => match state.reported() {
+            none if none.is_empty() => return None,
+            reported => (summary(&reported), Tone::Warning),
+        },
     };
     Some(Hint { tone, ..Hint::new(key, words) })
 }

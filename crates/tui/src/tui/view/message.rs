@@ -76,7 +76,9 @@ fn line(layout: &Layout) -> Rect {
 
 /// The rows that a longer one may take, the last of them the lowest.
 fn over_picture(layout: &Layout, line: Rect) -> Rect {
-    let rest = layout.preview.union(layout.panel);
+    // The union with an empty area would reach to its corner.
+    let areas = [layout.preview, layout.panel].into_iter().filter(|area| !area.is_empty());
+    let rest = areas.reduce(Rect::union).unwrap_or(line);
     if line.y == layout.header.y {
         return rest;
     }

@@ -91,7 +91,7 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Li
         lines.extend(Stage::ALL.into_iter().flat_map(of));
     }
     if is_done {
-        lines.extend(results(state));
+        lines.extend(results(state, column));
     }
     lines.extend(hint(state, column));
     // Bars come and go: nothing is below them.
@@ -131,8 +131,8 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
     vec![(name, Tone::Plain), (filled, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
-/// Results: a label and a value in each line.
-fn results(state: &State) -> Vec<Line> {
+/// Results: a label and a value in each line of this width.
+fn results(state: &State, width: u16) -> Vec<Line> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
     let mut lines = Vec::new();
@@ -170,7 +170,10 @@ fn results(state: &State) -> Vec<Line> {
     lines.extend(under::seen(state).map(|words| vec![(words, Tone::Faint)]));
     if !state.overlays.warnings.is_empty() {
         let them = if state.overlays.warnings.len() == 1 { "it" } else { "them" };
-        let words = format!("{}: e shows {them}", summary(&state.overlays.warnings));
+        let all = summary(&state.overlays.warnings);
+        let words = format!("{all}: e shows {them}");
+        // Where that is too long, the key comes first.
+        let words = if columns(&words) > width { format!("e: {all}") } else { words };
         lines.push(vec![(words, Tone::Warning)]);
     }
     lines

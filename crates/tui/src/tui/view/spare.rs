@@ -3,8 +3,8 @@
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
-use super::layout::{ENTRY_WIDTH, Layout};
-use super::{curve, strip};
+use super::layout::ENTRY_WIDTH;
+use super::{curve, diagnostics, strip};
 use crate::tui::state::{Activity, State};
 
 /// Columns of a window from which on there is such room.
@@ -26,17 +26,23 @@ fn is_wide(state: &State) -> bool {
 
 /// The room beside or below the lines of a panel, which take so many rows.
 fn area(state: &State, panel: Rect, lines: u16) -> Rect {
-    let covered = state.overlays.diagnostics.open && Layout::of(state).pane == panel;
-    if !is_wide(state) || covered || state.overlays.views.is_some() {
+    if !is_wide(state) || state.overlays.views.is_some() {
         return Rect::ZERO;
     }
     let used = columns_of_lines(state, panel);
-    if used < panel.width {
-        return super::text::rest(panel, used + 2);
+    let area = if used < panel.width {
+        super::text::rest(panel, used + 2)
+    } else {
+        // A line stays free above.
+        let used = (lines + u16::from(lines > 0)).min(panel.height);
+        Rect { y: panel.y + used, height: panel.height - used, ..panel }
+    };
+    // What lies over it leaves the rows above.
+    let over = diagnostics::covered(state);
+    if over.intersects(area) {
+        return Rect { height: over.y.saturating_sub(area.y), ..area };
     }
-    // A line stays free above.
-    let used = (lines + u16::from(lines > 0)).min(panel.height);
-    Rect { y: panel.y + used, height: panel.height - used, ..panel }
+    area
 }
 
 /// Draws what there is room for. Returns the cells that it takes.

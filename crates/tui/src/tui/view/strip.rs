@@ -63,7 +63,10 @@ fn draw_item(state: &State, Item { index, cells, rows }: &Item, buffer: &mut Buf
     let is_looked_at = history.looked_at() == Some(*index);
     let (mark, tone) = if is_looked_at { ("▸", Tone::Strong) } else { (" ", Tone::Plain) };
     // The words stand beside the picture alone, and in the same columns with and without a mark.
-    let words = Words { head: format!("{mark}{} ", number(state, *index)), changes: history.changes(*index) };
+    let words = Words {
+        head: format!("{mark}{} ", number(state, *index)),
+        changes: history.changes(*index, is_under_way(state, *index)),
+    };
     let beside = rest(*cells, place.width + 1);
     let lines = fitting(&words, usize::from(beside.width), [rows.picture, rows.entry].map(usize::from));
     for (y, line) in (0..rows.entry).zip(&lines) {
@@ -73,10 +76,13 @@ fn draw_item(state: &State, Item { index, cells, rows }: &Item, buffer: &mut Buf
 
 /// Number of the run that made a picture, or that is making it; a dash if it was stopped.
 fn number(state: &State, index: usize) -> String {
-    let history = &state.picture.history;
-    let is_under_way = state.work.is_running() && index + 1 == history.len();
-    let under_way = is_under_way.then_some(state.work.renders + 1);
-    history.run(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
+    let under_way = is_under_way(state, index).then_some(state.work.renders + 1);
+    state.picture.history.run(index).or(under_way).map_or("–".to_owned(), |run| run.to_string())
+}
+
+/// Whether the render of a picture goes on.
+fn is_under_way(state: &State, index: usize) -> bool {
+    state.work.is_running() && state.picture.history.is_of(index, state.request.generation)
 }
 
 /// Columns of a picture of this height, so that words have room beside it.

@@ -138,11 +138,14 @@ fn summary(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Draw
 
 /// The files that hold the picture at hand.
 pub(super) fn files(state: &State) -> impl Iterator<Item = &Written> {
+    // A picture that is written by itself and did not change is in the files of the request before.
+    let of_any_request = state.request.is_written() && state.saving.unwritten.is_none();
     state
         .saving
         .written
         .iter()
-        .filter(|written| state.request.is_written() || written.generation == state.request.generation)
+        .filter(|written| !written.is_stale)
+        .filter(move |written| of_any_request || written.generation == state.request.generation)
 }
 
 /// Whether the current picture is one that only a key writes, and that no key has written.

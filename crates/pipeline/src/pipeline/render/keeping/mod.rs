@@ -331,13 +331,18 @@ impl<'a> Keeping<'a> {
     }
 
     /// Removes the checkpoint of a picture that is written, or writes a last one if checkpoints are kept. If a long render's picture
-    /// could not be written, its samples are kept all the same.
+    /// could not be written, or whoever ended the process did not wait for it, its samples are kept all the same.
     pub(in crate::pipeline) fn finish(&self, state: &FilmState, rays: RayCounters, is_written: bool) {
         let was_long = state.render_seconds >= self.settings.seconds;
+        let is_ended = match (self.around.interruption)() {
+            Interruption::Ended => true,
+            Interruption::Left | Interruption::Replaced => false,
+        };
         match (is_written, self.settings.are_kept) {
-            (false, false) if !was_long => return,
+            (false, false) if !was_long && !is_ended => return,
             (false, _) | (true, true) => {
-                return self.write(state, rays, state.render_seconds, Durability::Power);
+                let durability = if is_ended { Durability::Process } else { Durability::Power };
+                return self.write(state, rays, state.render_seconds, durability);
             }
             (true, false) => {}
         }
