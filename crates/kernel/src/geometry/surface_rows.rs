@@ -6,7 +6,7 @@ use super::{RayF64, Shape, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Lanes3, set_lane, take, truths};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// Parts of [`SurfacePoint`](super::SurfacePoint)s that lights need, side by side.
+/// Parts of [`SurfacePoint`]s that lights need, side by side.
 #[derive(Clone, Debug)]
 pub struct SurfaceRow {
     /// The points.
