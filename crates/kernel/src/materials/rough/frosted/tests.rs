@@ -220,6 +220,11 @@ fn one_vertex_for_both_sides_goes_on_as_two_do() {
                 reflection.side_samples(16, GlassRow::sample_sides),
                 transmission.side_samples(16, GlassRow::sample_sides),
             ];
+            let directions: Vec<DVec3> = rows[0].iter().map(|sample| sample.direction).collect();
+            let by_directions = [
+                reflection.values(LobeSet::All, &directions),
+                transmission.values(LobeSet::All, &directions),
+            ];
             for (i, (up, down)) in rows[0].iter().zip(&rows[1]).enumerate() {
                 let what = format!("α {alpha}, {indices:?} at a cosine of {cosine}, sample {i}");
                 // The vertices of both sides go on alike: at one of them, on its own side.
@@ -227,13 +232,8 @@ fn one_vertex_for_both_sides_goes_on_as_two_do() {
                 assert_ne!(up.is_beyond, down.is_beyond, "{what}");
                 let side = usize::from(up.is_beyond);
                 assert_eq!(up.direction, alone[side][i], "{what}");
-                let (f, pdf, height) = if side == 0 {
-                    let (f, _, pdf) = reflection.values(LobeSet::All, &[up.direction])[0];
-                    (f.x, pdf, up.direction.z)
-                } else {
-                    let (f, _, pdf) = transmission.values(LobeSet::All, &[up.direction])[0];
-                    (f.x, pdf, -up.direction.z)
-                };
+                let (f, _, pdf) = by_directions[side][i];
+                let (f, height) = (f.x, up.direction.z * [1.0, -1.0][side]);
                 // By the directions, a narrow lobe has less digits; so have close indices, and facets just before total
                 // reflection.
                 let least = f64::from((indices[0] - indices[1]).abs()).min(0.5);
