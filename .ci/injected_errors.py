@@ -243,7 +243,7 @@ FAULTS = [
      ROUGH_GLASS + "what_comes_through_is_what_the_formulas_say_and_reciprocal"),
     ("a vertex for both sides that goes on in its own medium", "integrators/transport/scatter.rs",
      "(&row.beyond, ⟦row.medium_beyond[i]⟧, -lane(&row.normal, i))", "row.medium[i]",
-     FROSTED + "every_technique_finds_the_same_light_that_comes_through"),
+     FROSTED + "photons_and_paths_see_the_same_light_through_rough_glass"),
     ("a share by the wrong slope", "materials/rough/frosted/row.rs", "light.cosine * ⟦(eye.cosine + eye.slope)⟧",
      "(eye.cosine + light.slope)", ROUGH_GLASS + "one_vertex_for_both_sides_goes_on_as_two_do"),
     ("edges of a box taken for its faces", "geometry/cuboid.rs", "⟦are_far.into_iter().filter(|&is_far| is_far).count() == 2⟧",
