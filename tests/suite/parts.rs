@@ -209,7 +209,7 @@ fn what_does_not_belong_together_is_named_and_nothing_is_written() {
     // The name of the picture comes first.
     let said = desk.expect("merge 1.part 2.part 3.part out.png --progress none", 2);
     assert!(said.contains("cannot write 1.part: it is a part; name the picture first"), "{said}");
-    // A picture that is named twice is no part.
+    // The second name of the picture is taken for a part.
     fs::copy(desk.path("away.png"), desk.path("twice.png")).expect("copied");
     for name in ["twice.png", "nowhere.png"] {
         let said = desk.expect(&format!("merge {name} ./{name} 2.part 3.part --progress none"), 2);

@@ -345,7 +345,7 @@ fn only_closed_bodies_without_a_lamp_are_dark_within() {
 
 #[test]
 fn without_shadows_lamps_shine_into_rough_glass() {
-    // A spark in the glass is no light to speak of, but light samples from within count then.
+    // A spark in the glass adds almost no light, but with it light samples from within count.
     let ball = scene()
         .sphere(v(0.0, 0.0, -5.0), 1.0, frosted(1.5, 0.9))
         .quad(v(-4.0, 3.0, -9.0), v(8.0, 0.0, 0.0), v(0.0, 0.0, 8.0), emitter(8.0))

@@ -160,7 +160,7 @@ fn undo(edit: &CameraEdit, inputs: &Inputs) -> Result<PathBuf, String> {
     Ok(path.clone())
 }
 
-/// Whether there is no file of this name any more.
+/// Whether a file has vanished.
 fn is_gone(path: &Path) -> bool {
     path.metadata().is_err_and(|error| error.kind() == std::io::ErrorKind::NotFound)
 }

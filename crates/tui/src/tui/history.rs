@@ -643,7 +643,7 @@ mod tests {
         edit(&mut history);
         record(&mut history, 6, "radius", true, "render.samples = 8\nradius = 1", Some(true));
         assert_eq!(changes(&history)[3], "render.samples 64 → 8, + radius = 1");
-        // A camera that was moved and is in the scene now is told by the scene's keys.
+        // The scene's keys tell of a camera that `c` wrote into the scene.
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let text = "render.samples = 8\nradius = 1\ncamera.fov = 30";
         let (shown, origin) = of_image(7, "fov", true);

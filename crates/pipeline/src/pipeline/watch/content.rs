@@ -32,7 +32,7 @@ pub enum Content {
     Hash([u8; 32]),
 }
 
-/// What is in the place of a file that can be read.
+/// Obstacle to reading a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Obstacle {
     /// A folder.

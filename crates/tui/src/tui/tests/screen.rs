@@ -427,7 +427,7 @@ fn a_picture_that_could_not_be_written_is_not_called_done() {
     assert!(first(&mut desk).contains("! unwritten") && !desk.text().contains("✓ done"), "{}", desk.text());
     desk.press('y');
     assert!(desk.text().contains("not written: e says why"), "{}", desk.text());
-    // The reason can be asked for again.
+    // `e` shows the reason again.
     desk.press('e');
     assert!(
         desk.text().contains("─ 1 error ─") && desk.text().contains("error: cannot write a.png: disk full")

@@ -153,7 +153,7 @@ fn begun(desk: &mut Desk, text: &str, color: Option<[u8; 3]>) {
     color.into_iter().for_each(|color| show(desk, color));
 }
 
-/// The request under way has a picture.
+/// The request under way has a picture, which the terminal gets.
 fn show(desk: &mut Desk, color: [u8; 3]) {
     let (generation, picture) = (desk.state.request.generation, plain_picture(50, 38, color));
     let picture = Event::Picture {
@@ -165,6 +165,31 @@ fn show(desk: &mut Desk, color: [u8; 3]) {
         source: None,
     };
     desk.event(picture);
+    // The line has taken its first bytes.
+    desk.event(Event::Shown { generation });
+}
+
+#[test]
+fn the_picture_does_not_wait_for_its_entry_in_the_strip() {
+    let mut desk = Desk::with(state(120, 40));
+    edited(&mut desk, &[("camera.fov = 40", RED)]);
+    begun(&mut desk, "camera.fov = 30", None);
+    let (generation, before) = (desk.state.request.generation, desk.state.picture.history.len());
+    let picture = plain_picture(50, 38, BLUE);
+    desk.event(Event::Picture {
+        generation,
+        picture,
+        range: None,
+        section: None,
+        lacks_photons: false,
+        source: None,
+    });
+    assert!(desk.state.dirty && desk.state.urgent);
+    assert_eq!(desk.state.picture.history.len(), before);
+    desk.state.dirty = false;
+    desk.event(Event::Shown { generation });
+    assert_eq!(desk.state.picture.history.len(), before + 1);
+    assert!(desk.state.dirty, "the strip has a new entry");
 }
 
 #[test]
@@ -175,7 +200,7 @@ fn the_render_under_way_is_the_newest_of_the_last_pictures() {
     let text = panel(&mut desk);
     assert!(text.contains("▸2 camera.fov 40 → 30") && text.contains(" 1 first"), "{text}");
     assert!(!text.contains("unfinished"), "it is not stopped: {text}");
-    // The next save stops it: until that has a picture, the one that is shown is the stopped one, which has no number.
+    // The next save stops it. The stopped picture stays until the new render has one; it has no number.
     begun(&mut desk, "camera.fov = 20", None);
     let text = panel(&mut desk);
     assert!(text.contains("▸– unfinished; camera.fov") && !text.contains('2'), "{text}");

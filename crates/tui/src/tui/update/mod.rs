@@ -93,7 +93,11 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             Vec::new()
         }
         Event::Signal(signal) => vec![signalled(signal)],
-        Event::Shown { generation } => shown(state, generation),
+        Event::Shown { generation } => {
+            // The picture does not wait for its entry in the strip.
+            history::record_under_way(state);
+            shown(state, generation)
+        }
         Event::Tick => tick(state),
         Event::Lost(source) => lost(state, source),
         Event::Back => {
@@ -127,7 +131,6 @@ fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
             Some(last) if state.display.mixes_colors() => steadied(shown, &last),
             Some(_) | None => shown,
         });
-        history::record_under_way(state);
         state.dirty = true;
     }
     Vec::new()
