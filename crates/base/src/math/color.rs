@@ -1,5 +1,7 @@
 //! Colours: linear Rec. 709 RGB as [`Vec3`], and the sRGB curve.
 
+use std::sync::LazyLock;
+
 use glam::Vec3;
 
 use super::elementary::pow;
@@ -40,8 +42,12 @@ pub fn linear_to_srgb8(linear: f32) -> u8 {
 
 /// An sRGB byte triple as a linear colour.
 pub fn srgb8_to_linear(bytes: [u8; 3]) -> Vec3 {
-    Vec3::from_array(bytes.map(|byte| srgb_to_linear(f32::from(byte) / 255.0)))
+    Vec3::from_array(bytes.map(|byte| LINEAR_OF_BYTE[usize::from(byte)]))
 }
+
+/// [`srgb_to_linear`] of each byte.
+static LINEAR_OF_BYTE: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
 
 #[cfg(test)]
 mod tests {
@@ -50,7 +56,9 @@ mod tests {
     #[test]
     fn every_byte_survives_the_round_trip() {
         for byte in 0..=255_u8 {
-            assert_eq!(linear_to_srgb8(srgb_to_linear(f32::from(byte) / 255.0)), byte);
+            let linear = srgb_to_linear(f32::from(byte) / 255.0);
+            assert_eq!(linear_to_srgb8(linear), byte);
+            assert_eq!(srgb8_to_linear([byte, 0, 255]), Vec3::new(linear, 0.0, 1.0));
         }
     }
 

@@ -12,8 +12,8 @@ use crate::tui::state::Origin;
 
 /// Bytes that all of them take, at most.
 const MOST_BYTES: usize = 16 << 20;
-/// Columns and rows of a small picture.
-const SMALL: f32 = 64.0;
+/// Columns and rows of a small picture, at most: as fine as octants draw it.
+const SMALL: f32 = 32.0;
 
 /// Change of a picture that differs from the one before in nothing but its noise.
 const AGAIN: &str = "rendered again";
@@ -675,7 +675,7 @@ mod tests {
         let mut history = History::default();
         history.record(shown(1, 1000), Instant::now(), Origin::default());
         let size = |history: &History| history.small(0).map(|small| (small.width, small.pixels[0]));
-        assert_eq!(size(&history), Some((64, [1, 2, 3])));
+        assert_eq!(size(&history), Some((32, [1, 2, 3])));
         let picture = plain_picture(10, 10, [9, 8, 7]);
         history.record(Shown { picture, ..shown(1, 1) }, Instant::now(), Origin::default());
         assert_eq!(size(&history), Some((10, [9, 8, 7])));
