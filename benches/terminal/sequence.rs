@@ -64,6 +64,7 @@ pub(crate) fn render(
             | Event::NotKept { .. }
             | Event::Checkpoint { .. }
             | Event::WritePostponed { .. }
+            | Event::WriteDone { .. }
             | Event::Text { .. }
             | Event::Warnings { .. }
             | Event::Refused { .. }

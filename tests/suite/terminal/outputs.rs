@@ -106,7 +106,7 @@ fn what_is_written_beside_the_scene_wakes_nobody() {
         terminal.wait_for_render(1);
         for _ in 0..3 {
             terminal.press("w");
-            terminal.wait_for("wrote a.png");
+            terminal.wait_for("wrote a.png, b.ppm");
         }
         wait_a_while();
         terminal.wait_for_render(1);

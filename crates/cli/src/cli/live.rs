@@ -194,6 +194,7 @@ impl Writes {
             | Event::Progress { .. }
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
+            | Event::WriteDone { .. }
             | Event::Checkpoint { .. }
             | Event::Text { .. }
             | Event::CameraKept { .. }

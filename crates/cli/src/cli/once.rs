@@ -244,6 +244,7 @@ fn follow(
             | Event::NotKept { .. }
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
+            | Event::WriteDone { .. }
             | Event::Checkpoint { .. }
             | Event::Text { .. }
             | Event::CameraKept { .. }

@@ -209,6 +209,13 @@ pub enum Event {
         /// Number of the request.
         generation: u64,
     },
+    /// [`Command::Write`] is done, and every file was written.
+    WriteDone {
+        /// Number of the request.
+        generation: u64,
+        /// The files.
+        paths: Vec<PathBuf>,
+    },
     /// Answer to [`Command::KeepCamera`].
     CameraKept {
         /// Number of the request.

@@ -1,6 +1,6 @@
 //! The sink of a request's events: each carries the request's generation.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, PoisonError};
@@ -53,6 +53,10 @@ impl Sink {
 
     pub(super) fn written(&self, path: &Path, bytes: u64) {
         self.send(Event::Written { generation: self.generation, path: path.to_owned(), bytes });
+    }
+
+    pub(super) fn write_done(&self, paths: Vec<PathBuf>) {
+        self.send(Event::WriteDone { generation: self.generation, paths });
     }
 
     pub(super) fn write_failed(&self, path: Option<&Path>, message: String) {

@@ -90,6 +90,7 @@ fn value(event: &Event) -> Option<Value> {
         | Event::NotKept { .. }
         | Event::Refused { .. }
         | Event::WritePostponed { .. }
+        | Event::WriteDone { .. }
         | Event::Text { .. }
         | Event::CameraKept { .. }
         | Event::CameraUndone { .. }

@@ -185,8 +185,11 @@ pub(in crate::pipeline) fn write_by_hand(canvas: &FilmState, to: Destination<'_>
         return to.sink.refused(conflicts);
     }
     written.forget();
-    // Nobody cancels this token: a person ordered this picture. Events tell what came of it.
-    let _ = write(canvas, to, written, &CancelToken::new(), false);
+    // Nobody cancels this token: a person ordered this picture. Events tell what failed.
+    let outcome = write(canvas, to, written, &CancelToken::new(), false);
+    if outcome.is_ok_and(|stage| stage.value) {
+        to.sink.write_done(to.plan.outputs.clone());
+    }
 }
 
 /// Frames of a turntable so far.

@@ -284,6 +284,7 @@ fn write_in_the_first_pass_waits_for_its_end() {
     bench.worker.send(Command::Write);
     while !matches!(bench.next(), Event::WritePostponed { generation } if generation == of) {}
     while !matches!(bench.next(), Event::Written { .. }) {}
+    assert!(matches!(bench.next(), Event::WriteDone { paths, .. } if paths.len() == 1));
     assert_eq!(samples_on_disk(&bench), "1");
     bench.worker.send(Command::Cancel);
     bench.until_end(of);

@@ -146,6 +146,7 @@ fn while_the_scene_is_broken_only_what_this_run_wrote_is_replaced() {
     assert!(matches!(bench.failed(), Failure::Scene(_)));
     bench.worker.send(Command::Write);
     assert!(matches!(bench.next(), Event::Written { .. }), "nothing is lost");
+    assert!(matches!(bench.next(), Event::WriteDone { .. }));
     fs::write(&output, "a picture of somebody else").expect("written");
     bench.worker.send(Command::Write);
     let Event::WriteFailed { message, .. } = bench.next() else { panic!("it is refused") };

@@ -206,7 +206,7 @@ fn a_cancelled_render_says_that_it_stopped() {
 #[test]
 fn whether_the_person_knows_what_came_of_a_write_is_known_at_the_end() {
     let generation = 1;
-    let written = |generation| protocol::Event::Written { generation, path: "a.png".into(), bytes: 1 };
+    let written = |generation| protocol::Event::WriteDone { generation, paths: vec!["a.png".into()] };
     let failed = protocol::Event::WriteFailed { generation, path: None, message: "full".to_owned() };
     let refused = protocol::Event::Refused { generation, conflicts: Vec::new() };
     let postponed = protocol::Event::WritePostponed { generation };

@@ -409,7 +409,7 @@ fn a_picture_that_is_written_later_says_so_and_then_that_it_is() {
     desk.press('w');
     desk.worker(protocol::Event::WritePostponed { generation: 1 });
     assert!(desk.text().contains("as soon as every pixel has a sample"), "{}", desk.text());
-    desk.worker(protocol::Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1 });
+    desk.worker(protocol::Event::WriteDone { generation: 1, paths: vec!["cornell.png".into()] });
     assert!(desk.text().contains("wrote cornell.png"), "{}", desk.text());
 }
 

@@ -66,7 +66,7 @@ fn the_image_that_w_writes_meanwhile_is_the_newest_and_is_called_so() {
     desk.press('w');
     assert!(desk.text().contains("writing the newest image, not the one that is shown"), "{}", desk.text());
     let generation = desk.state.request.generation;
-    desk.worker(WorkerEvent::Written { generation, path: "ow.png".into(), bytes: 1 });
+    desk.worker(WorkerEvent::WriteDone { generation, paths: vec!["ow.png".into()] });
     let words = "wrote ow.png: the newest picture, not the one that is shown";
     assert!(desk.text().contains(words), "{}", desk.text());
 }

@@ -184,9 +184,29 @@ fn a_written_image_is_named_with_its_size() {
         assert!(text.contains(words), "{words:?} is not in\n{text}");
     }
     assert!(!text.contains("wrote"), "the keys stay in sight\n{text}");
+}
+
+#[test]
+fn a_key_that_writes_is_answered_when_all_files_are_written() {
+    let mut desk = Desk::new();
+    desk.finish(RED);
+    let written = |path: &str| protocol::Event::Written { generation: 1, path: path.into(), bytes: 1 };
+    let done = || protocol::Event::WriteDone { generation: 1, paths: vec!["a.png".into(), "b.ppm".into()] };
     desk.press('w');
-    desk.worker(protocol::Event::Written { generation: 1, path: "out/cornell.png".into(), bytes: 1 });
-    assert!(desk.text().contains("wrote out/cornell.png"));
+    desk.worker(written("a.png"));
+    // The same key before the second file of the first order is written.
+    desk.press('w');
+    desk.worker(written("b.ppm"));
+    assert!(!desk.text().contains("wrote"), "{}", desk.text());
+    for _ in 0..2 {
+        desk.worker(done());
+        assert!(desk.text().contains("wrote a.png, b.ppm"), "{}", desk.text());
+    }
+    // A request that came in between does not keep the answer back.
+    desk.press('w');
+    desk.press('r');
+    desk.worker(done());
+    assert!(desk.text().contains("wrote a.png, b.ppm"), "{}", desk.text());
 }
 
 #[test]

@@ -29,6 +29,10 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::CameraKept { outcome, .. } => return camera::kept(state, outcome),
         Event::CameraUndone { outcome, .. } => return camera::undone(state, outcome),
         Event::Picked { picked, .. } => return pointer::picked(state, &picked),
+        Event::WriteDone { paths, .. } => {
+            wrote(state, &paths);
+            return Vec::new();
+        }
         // Files of pictures of before are there all the same.
         Event::Written { path, bytes, generation } if generation != state.request.generation => {
             note(state, path, bytes, generation);
@@ -71,10 +75,11 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         }
         Event::Files { files, .. } => state.request.note_files(files),
         Event::Preview { .. }
+        | Event::WriteDone { .. }
         | Event::CameraKept { .. }
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
-        Event::Written { path, bytes, generation } => wrote(state, path, bytes, generation),
+        Event::Written { path, bytes, generation } => written(state, path, bytes, generation),
         Event::WriteFailed { path, message, .. } => {
             let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
             // What a key asks for during a render tells nothing of the picture at its end.
@@ -156,6 +161,7 @@ fn generation(event: &Event) -> u64 {
         | Event::Refused { generation, .. }
         | Event::Checkpoint { generation, .. }
         | Event::WritePostponed { generation }
+        | Event::WriteDone { generation, .. }
         | Event::Text { generation, .. }
         | Event::Files { generation, .. }
         | Event::CameraKept { generation, .. }
@@ -202,13 +208,17 @@ fn asset(state: &mut State, progress: AssetProgress) {
     }
 }
 
-fn wrote(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
-    // What is written of itself stands beside the picture and does not cover the keys.
-    if std::mem::take(&mut state.saving.is_write_requested) {
-        let is_open = state.picture.history.is_open();
-        let which = if is_open { ": the newest picture, not the one that is shown" } else { "" };
-        say(state, format!("wrote {}{which}", visible(&path.to_string_lossy())));
-    }
+/// The files that a key asked for are there.
+fn wrote(state: &mut State, paths: &[PathBuf]) {
+    state.saving.is_write_requested = false;
+    let is_open = state.picture.history.is_open();
+    let which = if is_open { ": the newest picture, not the one that is shown" } else { "" };
+    let names: Vec<String> = paths.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
+    say(state, format!("wrote {}{which}", names.join(", ")));
+}
+
+/// A file is there. It stands beside the picture: a message about each would cover the keys.
+fn written(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
     // Of several outputs, another one may have failed.
     let is_by_hand = state.work.activity == Activity::Done;
     if is_by_hand {
