@@ -100,7 +100,7 @@ impl SkyMap {
     #[inline(always)]
     pub fn lookup(&self, direction: Vec3, turn: f32) -> (Vec3, f32) {
         let place = self.place(direction, turn);
-        let corners = self.corner_places(place.column, place.row).map(|index| self.texels.at(index));
+        let corners = self.corners(place.column, place.row);
         let density = self.density(place.column, place.row);
         (color(&corners, place.between), density * share(&luminances(&corners), place.along))
     }
@@ -109,7 +109,7 @@ impl SkyMap {
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
         let InGrid { column, row, rest } = self.cells.sample(u);
-        let corners = self.corner_places(column as u32, row as u32).map(|index| self.texels.at(index));
+        let corners = self.corners(column as u32, row as u32);
         let luminances = luminances(&corners);
         let along = warp::bilinear(rest, &luminances);
         let (direction, down) = self.towards(column as f32, row, along, turn);
@@ -233,6 +233,14 @@ impl SkyMap {
         let upper = row.saturating_sub(1) as usize * width;
         let lower = row.min(self.texels.height - 1) as usize * width;
         [upper + column, upper + right, lower + column, lower + right]
+    }
+
+    /// The texels around a cell.
+    #[inline(always)]
+    fn corners(&self, column: u32, row: u32) -> [Vec3; 4] {
+        // Not by `map`, which may stay a call.
+        let [a, b, c, d] = self.corner_places(column, row);
+        [self.texels.at(a), self.texels.at(b), self.texels.at(c), self.texels.at(d)]
     }
 
     /// The texels around cells. Each loop waits only once for memory that is not in the cache.

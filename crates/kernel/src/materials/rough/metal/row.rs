@@ -57,11 +57,13 @@ impl<const BRUSHED: bool> MetalRow<BRUSHED> {
     #[inline(always)]
     fn legs(&self, i: usize, direction: Vec3) -> [Leg; 2] {
         let to_eye = lane(&self.to_eye, i);
+        // Not by `map`, which may stay a call and leave the loops around it scalar.
         if BRUSHED {
-            let frame = self.frame(i);
-            [to_eye, direction].map(|one| Leg::anisotropic(&frame, one, self.alphas(i)))
+            let (frame, alphas) = (self.frame(i), self.alphas(i));
+            [Leg::anisotropic(&frame, to_eye, alphas), Leg::anisotropic(&frame, direction, alphas)]
         } else {
-            [to_eye, direction].map(|one| Leg::isotropic(lane(&self.normal, i), one, self.alphas[0][i]))
+            let (normal, alpha) = (lane(&self.normal, i), self.alphas[0][i]);
+            [Leg::isotropic(normal, to_eye, alpha), Leg::isotropic(normal, direction, alpha)]
         }
     }
 

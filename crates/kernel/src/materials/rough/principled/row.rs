@@ -90,7 +90,9 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
     /// Albedos of the specular lobe by its reflectances at normal incidence and at grazing angles, by a cosine ≥ 0.
     #[inline(always)]
     fn albedos(&self, i: usize, cosine: f32) -> [f32; 2] {
-        [0, 1].map(|which| evaluate(cosine, |number| self.terms[which][number][i]))
+        // Not by `map`, which may stay a call and leave the loops around it scalar.
+        let [normal, grazing] = &self.terms;
+        [evaluate(cosine, |number| normal[number][i]), evaluate(cosine, |number| grazing[number][i])]
     }
 
     /// Part of the light that the dielectric's specular lobe leaves, by a cosine ≥ 0.
