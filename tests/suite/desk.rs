@@ -49,6 +49,15 @@ impl Desk {
         fs::write(self.path(name), content).expect("written");
     }
 
+    /// A copy of the program, for another user, who may not reach where the program is. Another process makes it: in this one,
+    /// the file could still be open for writing in a program that another test just starts, and would not run.
+    pub(crate) fn program(&self) -> PathBuf {
+        let copy = self.path("program");
+        let made = Process::new("cp").arg(self.glimt("").get_program()).arg(&copy).status();
+        assert!(made.expect("cp runs").success(), "a copy");
+        copy
+    }
+
     pub(crate) fn glimt(&self, line: &str) -> Process {
         let mut process = Process::cargo_bin("glimt").expect("the program");
         process.current_dir(self.0.path()).args(line.split_whitespace()).stdin(Stdio::null());

@@ -616,3 +616,19 @@ fn warnings_point_to_what_asked_for_them() {
     let stderr = String::from_utf8(desk.run("check room.toml").stderr).expect("UTF-8");
     assert!(stderr.contains("--> room.toml:6:14") && stderr.contains("--> room.toml:7:9"), "{stderr}");
 }
+
+#[test]
+fn rough_glass_is_warned_of_where_light_goes_straight_through_it() {
+    let desk = Desk::new();
+    for (ior, is_warned) in [("1", true), ("1.5", false)] {
+        let ball = format!(
+            "render = {{ integrator = \"path\" }}\ncamera = {{ position = [0, 1, 4], look_at = [0, 0, 0] }}\n\
+             [materials.g]\ntype = \"glass\"\nior = {ior}\nroughness = 0.5\n[[sphere]]\nmaterial = \"g\"\n\
+             radius = 1\n[[light]]\nposition = [0, 3, 0]\n"
+        );
+        desk.write("ball.toml", ball);
+        let stderr = String::from_utf8(desk.run("check ball.toml").stderr).expect("UTF-8");
+        let is_named = stderr.contains("warning: path finds no light of a [[light]]");
+        assert_eq!(is_named, is_warned, "{ior}: {stderr}");
+    }
+}

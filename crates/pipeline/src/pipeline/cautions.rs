@@ -6,7 +6,7 @@ use super::plan::MOST_PHOTONS;
 use super::settings::{Overrides, View};
 use crate::choice::Choice;
 use crate::integrators::RenderSettings;
-use crate::scene::description::{Light, Scene};
+use crate::scene::description::{Light, MaterialKind, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::{Loaded, is_model};
 
@@ -78,15 +78,22 @@ impl Cause {
 fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
     let RenderSettings { render, photons, .. } = &settings.effective();
     let finds_all_light = render.integrator.method().scatters;
-    let is_specular = |index: usize| scene.materials[index].kind.has_delta();
-    let specular = || scene.objects.iter().filter_map(|object| object.material).any(is_specular);
+    let is_specular = |kind: &MaterialKind| kind.has_delta();
+    // A ray of a light stops at it, and light that goes straight on has no other way to be found.
+    let keeps_direction = |kind: &MaterialKind| kind.has_delta() || kind.is_like_air();
+    let has = |is_one: &dyn Fn(&MaterialKind) -> bool| {
+        let used = scene.objects.iter().filter_map(|object| object.material);
+        used.map(|index| &scene.materials[index].kind).any(is_one)
+    };
     let mut warnings = Vec::new();
-    if finds_all_light && scene.lights.iter().any(Light::sends) && specular() {
+    if finds_all_light && scene.lights.iter().any(Light::sends) && has(&keeps_direction) {
         let message = "path finds no light of a [[light]] without size that passes mirror or glass before it meets a \
                        surface: what they would throw on it stays dark";
         warnings.push((Cause::Integrator, message.to_owned()));
     }
-    if photons.is_some() && specular() && scene.lights.iter().any(|light| light.sends() && light.is_steady())
+    if photons.is_some()
+        && has(&is_specular)
+        && scene.lights.iter().any(|light| light.sends() && light.is_steady())
     {
         let message =
             "photons carry no light of `falloff = \"none\"`: mirrors and glass throw none of it on surfaces";

@@ -187,6 +187,19 @@ impl MaterialKind {
         }
     }
 
+    /// Whether light goes straight on where it borders on air: glass of index 1, however rough.
+    pub fn is_like_air(&self) -> bool {
+        match self {
+            Self::Glass { ior, .. } => *ior == 1.0,
+            Self::Phong { .. }
+            | Self::Mirror { .. }
+            | Self::Pane { .. }
+            | Self::Metal { .. }
+            | Self::Plastic { .. }
+            | Self::Principled { .. } => false,
+        }
+    }
+
     /// Whether it depends on the direction of texture coordinates.
     pub fn has_direction(&self) -> bool {
         match self {

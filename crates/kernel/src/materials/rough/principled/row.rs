@@ -64,6 +64,18 @@ pub struct PrincipledRow<const THROUGH: bool> {
     transmits: bool,
 }
 
+/// What depends on the direction to the viewer.
+struct Seen {
+    /// [`PrincipledRow::left`].
+    left: Vec3,
+    /// [`PrincipledRow::through`].
+    through: f32,
+    /// [`PrincipledRow::shares`].
+    shares: [f32; 2],
+    /// [`PrincipledRow::through_share`].
+    through_share: f32,
+}
+
 /// Factors on the diffuse lobe and the others for what is shown, and f in their place.
 #[inline(always)]
 fn shown_parts(shown: ShownLobes) -> [f32; 3] {
@@ -172,12 +184,10 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
 
     /// Computes what depends on the direction to the viewer.
     #[inline(always)]
-    fn look(&mut self, i: usize) {
+    fn seen(&self, i: usize) -> Seen {
         let cosine = ahead(lane(&self.normal, i).dot(lane(&self.to_eye, i)));
         let coat = self.coat_albedo(i, cosine);
-        self.through[i] = 1.0 - coat;
         let left = self.left_by_specular(i, cosine);
-        set_lane(&mut self.left, i, left);
         let [normal, grazing] = self.albedos(i, cosine);
         let specular = lane(&self.facets, i).max_element() * normal + self.grazing[i] * grazing;
         let diffuse = self.diffuse[i] * left.max_element();
@@ -190,10 +200,36 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
         }
         let below = (1.0 - coat) / all.max(f32::MIN_POSITIVE);
         // The coat has at least its part of the light, and the rest shares what passes it.
-        self.shares[0][i] = below * specular;
-        self.through_share[i] = below * through;
-        let of_coat = 1.0 - below * all;
-        self.shares[1][i] = if self.coat[i] > 0.0 { of_coat } else { 0.0 };
+        let of_coat = if self.coat[i] > 0.0 { 1.0 - below * all } else { 0.0 };
+        Seen {
+            left,
+            through: 1.0 - coat,
+            shares: [below * specular, of_coat],
+            through_share: below * through,
+        }
+    }
+
+    #[inline(always)]
+    fn look(&mut self, i: usize) {
+        let seen = self.seen(i);
+        set_lane(&mut self.left, i, seen.left);
+        (self.through[i], self.through_share[i]) = (seen.through, seen.through_share);
+        [self.shares[0][i], self.shares[1][i]] = seen.shares;
+    }
+
+    /// [`Self::look`] for all surfaces.
+    #[inline(always)]
+    fn look_all(&mut self) {
+        // The loop writes to arrays apart from those that it reads: otherwise it stays scalar.
+        let (mut left, mut shares) = ([[0.0; LANES]; 3], [[0.0; LANES]; 2]);
+        let (mut through, mut through_share) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let seen = self.seen(i);
+            set_lane(&mut left, i, seen.left);
+            (through[i], through_share[i]) = (seen.through, seen.through_share);
+            [shares[0][i], shares[1][i]] = seen.shares;
+        }
+        (self.left, self.through, self.through_share, self.shares) = (left, through, through_share, shares);
     }
 }
 
@@ -486,8 +522,6 @@ impl MaterialRow for PrincipledRow<false> {
     #[inline(always)]
     fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
         turn_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
-        for i in 0..LANES {
-            self.look(i);
-        }
+        self.look_all();
     }
 }
