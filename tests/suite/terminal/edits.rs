@@ -35,7 +35,7 @@ fn folder(text: &str) -> Folder {
 fn terminal(folder: &Folder) -> Terminal {
     let call = [folder.program(), "scene.toml", "--report", "report.json"];
     let mut terminal = folder.terminal_with(&call, &[]);
-    terminal.resize(120, 40);
+    terminal.resize(160, 40);
     terminal
 }
 

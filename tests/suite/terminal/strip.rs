@@ -133,7 +133,7 @@ fn noise_against_time_is_a_curve_with_its_target() {
     let folder = Folder::new();
     let noisy = SCENE.replace("samples = 4", "samples = 10000000\nerror = 0.0001\nintegrator = \"path\"");
     folder.write("scene.toml", &noisy);
-    let command = [folder.program(), "scene.toml", "--time", "3"];
+    let command = [folder.program(), "scene.toml", "--time", "5"];
     let mut terminal = folder.terminal_with(&command, &[]);
     terminal.resize(120, 40);
     terminal.wait_for_render(1);
