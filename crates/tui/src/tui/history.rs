@@ -307,6 +307,11 @@ impl History {
         self.past.len()
     }
 
+    /// The newest of the pictures that are kept.
+    pub(super) fn last_picture(&self) -> Option<&Arc<Picture>> {
+        self.past.back().map(|newest| &newest.shown.picture)
+    }
+
     /// Index of the picture that is looked at: the newest one, unless an older one is.
     pub(super) fn looked_at(&self) -> Option<usize> {
         self.open.as_ref().map(|(at, _)| *at).or_else(|| self.past.len().checked_sub(1))
