@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::choice::Choice;
+use crate::math::DVec3;
 use crate::pipeline::FileRead;
 use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
 use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
-use crate::scene::description::{Integrator, Shadows};
+use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::sanitize::visible;
 use crate::scene::{changes, is_mesh};
 
@@ -130,6 +131,8 @@ pub(in crate::tui) struct RequestState {
     pub camera_step: CameraStep,
     /// First request of a camera that keys have moved.
     pub moved_since: Option<u64>,
+    /// Parts of the camera that keys have changed, as the scene had them when a key first changed them.
+    pub moved_from: CameraChange,
 
     /// Text of the scene file, in the newest request that was understood.
     pub text: Option<Arc<str>>,
@@ -157,6 +160,7 @@ impl RequestState {
             first_section: None,
             camera_step: CameraStep::default(),
             moved_since: None,
+            moved_from: CameraChange::default(),
             text: None,
             files: Arc::default(),
             effective: None,
@@ -197,6 +201,48 @@ impl RequestState {
     /// The camera as the keys have it. `None` until a scene has been understood.
     pub(in crate::tui) fn viewpoint(&self) -> Option<Viewpoint> {
         self.camera.map(|camera| camera.changed(&self.toggles.camera))
+    }
+
+    /// Notes the scene's own camera, in the parts that keys have changed. Parts that were noted before stay as they are.
+    pub(in crate::tui) fn note_moved_parts(&mut self) {
+        let Some(own) = self.camera else { return };
+        let (moved, from) = (&self.toggles.camera, self.moved_from);
+        self.moved_from = CameraChange {
+            pose: moved.pose.and(from.pose.or(Some(own.pose))),
+            fov: moved.fov.and(from.fov.or(Some(own.fov))),
+            focus: moved.focus.and(from.focus.or(Some(own.focus))),
+        };
+    }
+
+    /// Takes the scene's own camera for the one that keys have moved.
+    pub(in crate::tui) fn move_from_own(&mut self) {
+        self.moved_from = CameraChange::default();
+        self.note_moved_parts();
+    }
+
+    /// Keys of the camera that were saved since keys moved them, with the values that the scene has now.
+    pub(in crate::tui) fn saved_since_moved(&self) -> Vec<String> {
+        let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
+        let from = &self.moved_from;
+        let of_pose = |key: &str, of: fn(&Pose) -> DVec3| {
+            let (before, now) = (of(&from.pose?), of(&own.pose));
+            let DVec3 { x, y, z } = now;
+            (before != now && now != of(&moved.pose)).then(|| format!("camera.{key} = [{x}, {y}, {z}]"))
+        };
+        let of_number = |key: &str, before: Option<f64>, now: f64, moved: f64| {
+            let is_saved = before.is_some_and(|before| before != now) && now != moved;
+            is_saved.then(|| format!("camera.{key} = {now}"))
+        };
+        // A plane in focus that goes through `look_at` moves with the camera.
+        let focus = from.focus.filter(|_| !own.is_focused_on_look_at());
+        let all = [
+            of_pose("position", |pose| pose.position),
+            of_pose("look_at", |pose| pose.look_at),
+            of_pose("up", |pose| pose.up),
+            of_number("fov", from.fov, own.fov, moved.fov),
+            of_number("focus", focus, own.focus, moved.focus),
+        ];
+        all.into_iter().flatten().collect()
     }
 
     /// Changes by keys that the picture alone does not show, in words.

@@ -120,6 +120,15 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
     if !state.request.toggles.camera.is_any() && !is_set && !is_mesh(&state.request.scene) {
         return notify(state, "the camera is where the scene has it: there is nothing to write");
     }
+    let saved = state.request.saved_since_moved();
+    // A model has no file in which a camera is saved.
+    if !saved.is_empty() && !is_mesh(&state.request.scene) {
+        // The person knows of it from here on.
+        state.request.move_from_own();
+        let saved = saved.join(", ");
+        let why = "was saved since the keys moved the camera: press c again to write over it";
+        return notify(state, &format!("error: {saved} {why}"));
+    }
     vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
 }
 

@@ -26,6 +26,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     let is_moved = state.request.toggles.camera.is_any();
     state.request.moved_since =
         is_moved.then_some(state.request.moved_since.unwrap_or(state.request.generation));
+    state.request.note_moved_parts();
     state.request.preview_size = Layout::preview_size(state);
     state.request.resize_due = None;
     state.request.camera_step = CameraStep::default();
