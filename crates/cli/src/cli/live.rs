@@ -195,6 +195,7 @@ impl Writes {
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
             | Event::WriteDone { .. }
+            | Event::LastGoodEnded { .. }
             | Event::Checkpoint { .. }
             | Event::Text { .. }
             | Event::CameraKept { .. }

@@ -255,6 +255,14 @@ pub enum Event {
         /// Why.
         failure: Failure,
     },
+    /// The scene of the request could not be read, as [`Event::Failed`] has said, and the last good one took its place: its render
+    /// ended.
+    LastGoodEnded {
+        /// Number of the request.
+        generation: u64,
+        /// How it ended.
+        end: LastGoodEnd,
+    },
     /// The request was stopped by a newer one or by [`Command::Cancel`].
     Cancelled {
         /// Number of the request.
@@ -318,6 +326,18 @@ pub enum Failure {
     Scene(Vec<Diagnostic>),
     /// The work failed (exit code 1): a file that could not be written, a worker that died.
     Work(String),
+}
+
+/// End of a render of the last good scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LastGoodEnd {
+    /// The picture is finished.
+    Finished {
+        /// Whether it was finished before: nothing was rendered or written, and the same picture shown.
+        unchanged: bool,
+    },
+    /// The picture is not finished: the render was stopped, or no scene could be read so far.
+    Stopped,
 }
 
 /// An asset that is loading.

@@ -9,6 +9,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::film::{Pixels, Rect, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::pipeline::engine::Means;
+use crate::pipeline::protocol::LastGoodEnd;
 use crate::pipeline::settings::View;
 use crate::world::World;
 
@@ -140,6 +141,25 @@ pub(super) fn slow(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
+/// End of the render that goes on while the scene of this request is broken.
+fn last_good_end(bench: &Bench, of: u64) -> LastGoodEnd {
+    loop {
+        match bench.next() {
+            Event::LastGoodEnded { generation, end } if generation == of => return end,
+            Event::Preview { .. } | Event::Progress { .. } | Event::WriteDone { .. } => {}
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn without_a_good_scene_nothing_goes_on() {
+    let mut bench = Bench::new(&SCENE.replace("width = 40", "width = = 40"));
+    bench.writing = Writing::Try;
+    assert!(matches!(bench.failed(), Failure::Scene(_)));
+    assert_eq!(last_good_end(&bench, 1), LastGoodEnd::Stopped);
+}
+
 #[test]
 fn a_file_that_breaks_during_a_render_does_not_stop_it_and_costs_nothing_that_is_kept() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), slow);
@@ -165,6 +185,13 @@ fn a_file_that_breaks_during_a_render_does_not_stop_it_and_costs_nothing_that_is
         }
     }
     assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
+    let finished = |unchanged| LastGoodEnd::Finished { unchanged };
+    assert_eq!(last_good_end(&bench, broken), finished(false));
+    // Another mistake finds it as it is.
+    bench.edit("width = = 40", "width = = = 40");
+    assert!(matches!(bench.failed(), Failure::Scene(_)));
+    assert_eq!(last_good_end(&bench, bench.generation), finished(true));
+    bench.edit("width = = = 40", "width = = 40");
     bench.edit("width = = 40", "width = 40");
     let report = bench.done().0;
     assert_statuses(&report, "rrrrrsrr");

@@ -4,14 +4,15 @@ use std::sync::Arc;
 
 use super::say::{notify, say};
 use crate::tui::event::Effect;
-use crate::tui::state::{Activity, State};
+use crate::tui::state::{Rendering, State};
 
 const NEWEST: &str = "this is the newest picture";
 
 /// The picture that stands goes to those of before.
 pub(super) fn record(state: &mut State) {
     if let Some(shown) = newest(state).filter(|shown| shown.generation == state.request.generation) {
-        let origin = state.request.origin(state.work.activity != Activity::Done && !shown.is_finished());
+        let is_finished = state.work.rendering == Rendering::Finished || shown.is_finished();
+        let origin = state.request.origin(!is_finished);
         state.picture.history.record(shown, state.now, origin);
     }
 }
@@ -19,7 +20,7 @@ pub(super) fn record(state: &mut State) {
 /// Records a picture of the newest request that was shown, or that waits behind an older one. The last one often comes after the
 /// end of its render. Pixels 1:1 of a finished picture do not take its place.
 pub(super) fn record_newest(state: &mut State) {
-    let is_over = !state.work.is_running();
+    let is_over = !state.work.is_under_way();
     if is_over && newest(state).is_some_and(|shown| shown.section.is_some()) {
         return;
     }
