@@ -64,6 +64,7 @@ pub(super) struct History {
 #[derive(Debug)]
 struct Past {
     shown: Shown,
+    /// Time at which its render last improved it.
     time: Instant,
     /// The last edit that it is after.
     edits: u64,
@@ -140,7 +141,7 @@ impl History {
                     self.read_edits = self.past[at].edits;
                     origin = self.past[at].origin.of_same_image(origin);
                 }
-                self.replace(at, shown, origin);
+                self.replace(at, (shown, time), origin);
                 self.unite(at);
             }
             None => {
@@ -156,10 +157,14 @@ impl History {
     }
 
     /// Puts a picture in the place of another one of its request or of its image.
-    fn replace(&mut self, at: usize, shown: Shown, origin: Origin) {
+    fn replace(&mut self, at: usize, (shown, time): (Shown, Instant), origin: Origin) {
         let Some(past) = self.past.get_mut(at) else { return };
-        if past.shown.picture != shown.picture {
+        let is_other_picture = past.shown.picture != shown.picture;
+        if is_other_picture {
             past.small = OnceCell::new();
+        }
+        if past.origin.is_unfinished && (is_other_picture || !origin.is_unfinished) {
+            past.time = time;
         }
         let is_other = past.origin != origin;
         (past.shown, past.origin) = (shown, origin);
@@ -357,7 +362,7 @@ impl History {
         self.open.take().map(|(_, newest)| newest)
     }
 
-    /// The run of the picture that is looked at, if it is an older one, and the time when it was made.
+    /// The run of the picture that is looked at, if it is an older one, and the time at which its render last improved it.
     pub(super) fn place(&self) -> Option<(Option<u64>, Instant)> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| (past.run, past.time))

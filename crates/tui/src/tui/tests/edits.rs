@@ -258,6 +258,34 @@ fn the_number_of_a_picture_is_that_of_its_run() {
 }
 
 #[test]
+fn the_age_of_a_picture_counts_from_the_time_at_which_it_was_last_improved() {
+    let mut desk = Desk::with(state(120, 40));
+    save(&mut desk, "shininess = 60");
+    read(&mut desk);
+    shown(&mut desk, "bright", RED, false);
+    desk.wait(8000);
+    end(&mut desk, false, 8.0, 8.0);
+    desk.wait(3000);
+    // Shown once more, such as in another size, it is as old as it was.
+    shown(&mut desk, "bright", GREEN, true);
+    save(&mut desk, "shininess = 6");
+    read(&mut desk);
+    shown(&mut desk, "dull", BLUE, false);
+    desk.wait(2000);
+    desk.press('n');
+    assert!(desk.text().contains("picture 1 of 2, 5 s ago"), "{}", desk.text());
+    // So is one whose render was stopped.
+    desk.press('N');
+    shown(&mut desk, "dull", GREEN, false);
+    desk.wait(4000);
+    desk.press('s');
+    desk.wait(1000);
+    desk.finish(RED);
+    desk.press('n');
+    assert!(desk.text().contains("unfinished picture, 5 s ago"), "{}", desk.text());
+}
+
+#[test]
 fn settings_of_the_scene_again_stand_together() {
     let mut desk = Desk::with(state(120, 40));
     desk.finish(RED);
