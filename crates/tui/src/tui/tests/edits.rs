@@ -101,6 +101,35 @@ fn an_edit_of_a_comment_adds_no_picture_and_no_run() {
 }
 
 #[test]
+fn a_save_that_only_writes_another_file_adds_no_picture() {
+    let mut desk = Desk::with(state(120, 40));
+    save(&mut desk, "camera.fov = 40");
+    read(&mut desk);
+    shown(&mut desk, "narrow", RED, true);
+    end(&mut desk, false, 1.0, 1.0);
+    save(&mut desk, "camera.fov = 44");
+    read(&mut desk);
+    shown(&mut desk, "wide", BLUE, true);
+    end(&mut desk, false, 1.0, 1.0);
+    save(&mut desk, "camera.fov = 44\nrender.output = \"other.png\"");
+    read(&mut desk);
+    shown(&mut desk, "wide", BLUE, true);
+    let generation = desk.state.request.generation;
+    let mut event = done(generation, Vec::new(), false);
+    if let protocol::Event::Done { report, .. } = &mut event {
+        report.stages[Stage::Render as usize].status = Status::Reused;
+    }
+    desk.worker(event);
+    let text = desk.text();
+    // It is written by another run, and made by the same edit.
+    assert!(text.contains("· run 3") && text.contains("▸3 camera.fov"), "{text}");
+    assert!(!text.contains("render.output"), "{text}");
+    assert_eq!(desk.state.picture.history.len(), 2);
+    desk.press('b');
+    assert!(desk.text().contains("before the last edit, camera.fov 40 → 44  "), "{}", desk.text());
+}
+
+#[test]
 fn a_render_that_goes_on_counts_all_seconds_of_its_samples_and_is_one_picture() {
     let mut desk = Desk::with(state(120, 40));
     save(&mut desk, "a = 1");
