@@ -338,6 +338,20 @@ fn write_is_refused_once_the_first_pass_was_stopped() {
 }
 
 #[test]
+fn a_refusal_to_write_does_not_deny_the_picture_that_is_on_disk() {
+    let mut bench = Bench::with(SCENE, slow);
+    bench.done();
+    bench.write("scene.toml", &wide());
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { .. }) {}
+    bench.worker.send(Command::Cancel);
+    bench.until_end(of);
+    bench.worker.send(Command::Write);
+    let why = "the newest picture is not written: the render was stopped before every pixel had a sample";
+    assert!(matches!(bench.next(), Event::WriteFailed { message, .. } if message == why));
+}
+
+#[test]
 fn a_write_that_waits_is_done_by_the_request_that_comes_in_between() {
     let mut bench = Bench::with(&wide(), slow);
     bench.send();
