@@ -16,7 +16,7 @@ pub use super::answers::{CameraEdit, Kept, MovedCamera, Picked, Section, Spot, T
 pub use super::report::{
     Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts,
 };
-use super::settings::{Effective, Overrides};
+use super::settings::{Effective, Overrides, OwnSettings};
 use super::watch::content::FileRead;
 use crate::film::Picture;
 pub use crate::scene::description::Viewpoint;
@@ -144,6 +144,8 @@ pub enum Event {
         camera: Viewpoint,
         /// The scene's own exposure, in stops.
         exposure: f32,
+        /// The scene's other settings that keys change.
+        own: OwnSettings,
     },
     /// The scene file could be read.
     Text {

@@ -42,7 +42,7 @@ use super::render::preview::Screen;
 use super::render::scheduler::Rendering;
 use super::render::share::Share;
 use super::report::finish::{Finished, report};
-use super::settings::{Checkpoints, Overrides, Resume, View};
+use super::settings::{Checkpoints, Overrides, OwnSettings, Resume, View};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
 use super::stages::containers::Containers;
@@ -368,11 +368,17 @@ impl Engine {
         let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(cautions);
         let own = Eye::new(&plan.scene, parsed.orbiter, &CameraChange::default());
+        let scene = &parsed.loaded.scene;
         table.sink.send(Event::Settings {
             generation: request.generation,
             settings: Box::new(plan.effective.clone()),
             camera: own.viewpoint(),
-            exposure: parsed.loaded.scene.render.exposure,
+            exposure: scene.render.exposure,
+            own: OwnSettings {
+                integrator: scene.render.integrator,
+                shadows: scene.render.shadows,
+                photons: scene.photons.enabled,
+            },
         });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
         let looked = self.look_for_conflicts(request, &plan, findings, table.sink);

@@ -11,6 +11,7 @@ use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::pipeline::engine::Means;
 use crate::pipeline::protocol::LastGoodEnd;
 use crate::pipeline::settings::View;
+use crate::scene::description::{Integrator, Shadows};
 use crate::world::World;
 
 /// A kernel as the real one, but slow: a tile takes until its token is cancelled.
@@ -208,7 +209,7 @@ fn picture_by(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
 #[test]
 fn while_the_scene_is_broken_keys_change_the_picture_of_the_last_good_one() {
     use crate::math::DVec3;
-    use crate::scene::description::{CameraChange, Pose, Shadows};
+    use crate::scene::description::{CameraChange, Pose};
     let moved = Pose { position: DVec3::new(0.5, 1.5, 4.25), look_at: DVec3::Y, up: DVec3::Y };
     let changes: [fn(&mut Bench, Pose); 4] = [
         |bench, pose| bench.overrides.camera = CameraChange { pose: Some(pose), ..CameraChange::default() },
@@ -613,12 +614,17 @@ fn a_render_that_goes_on_tells_the_seconds_of_all_its_samples() {
 fn a_request_tells_what_the_scene_itself_says() {
     let mut bench = Bench::new(&SCENE.replace("exposure = 0.0", "exposure = 0.5"));
     bench.overrides.exposure = Some(2.0);
+    bench.overrides.shadows = Some(Shadows::Off);
+    bench.overrides.integrator = Some(Integrator::Whitted);
+    bench.overrides.photons = Some(true);
     bench.overrides.camera.fov = Some(10.0);
     let of = bench.send();
     let events = bench.until_end(of);
     let said = |event: &Event| {
-        let Event::Settings { settings, camera, exposure, .. } = event else { return None };
-        Some((settings.exposure, *exposure, camera.fov))
+        let Event::Settings { settings, camera, exposure, own, .. } = event else { return None };
+        let shadows = (settings.shadows, own.shadows);
+        Some((settings.exposure, *exposure, camera.fov, shadows, own.integrator, own.photons))
     };
-    assert_eq!(events.iter().find_map(said), Some((2.0, 0.5, 40.0)));
+    let shadows = (Shadows::Off, Shadows::Soft);
+    assert_eq!(events.iter().find_map(said), Some((2.0, 0.5, 40.0, shadows, Integrator::Whitted, false)));
 }

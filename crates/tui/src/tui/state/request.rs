@@ -8,7 +8,7 @@ use crate::choice::Choice;
 use crate::math::DVec3;
 use crate::pipeline::FileRead;
 use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
-use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
+use crate::pipeline::settings::{CameraChange, Effective, Overrides, OwnSettings, View};
 use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::sanitize::visible;
 use crate::scene::{changes, is_mesh};
@@ -144,6 +144,8 @@ pub(in crate::tui) struct RequestState {
     pub camera: Option<Viewpoint>,
     /// The scene's own exposure, in stops.
     pub exposure: Option<f32>,
+    /// The scene's other settings that keys change.
+    pub own: Option<OwnSettings>,
 }
 
 impl RequestState {
@@ -166,6 +168,7 @@ impl RequestState {
             effective: None,
             camera: None,
             exposure: None,
+            own: None,
         }
     }
 
@@ -269,22 +272,34 @@ impl RequestState {
         self.toggles.view.unwrap_or_else(|| self.base_view())
     }
 
+    /// The shadows of the scene with the command line. `None` until a scene has been understood.
+    pub(in crate::tui) fn base_shadows(&self) -> Option<Shadows> {
+        self.command_line.shadows.or(self.own.map(|own| own.shadows))
+    }
+
     /// The shadows that hold now.
     pub(in crate::tui) fn shadows(&self) -> Shadows {
-        let of_scene = self.effective.as_ref().map_or(Shadows::Soft, |effective| effective.shadows);
-        self.overrides().shadows.unwrap_or(of_scene)
+        self.toggles.shadows.or(self.base_shadows()).unwrap_or(Shadows::Soft)
+    }
+
+    /// Whether the scene with the command line has photons. `None` until a scene has been understood.
+    pub(in crate::tui) fn base_photons(&self) -> Option<bool> {
+        self.command_line.photons.or(self.own.map(|own| own.photons))
     }
 
     /// Whether photons are on now.
     pub(in crate::tui) fn photons(&self) -> bool {
-        let of_scene = self.effective.as_ref().is_some_and(|effective| effective.photons);
-        self.overrides().photons.unwrap_or(of_scene)
+        self.toggles.photons.or(self.base_photons()).unwrap_or(false)
+    }
+
+    /// The integrator of the scene with the command line. `None` until a scene has been understood.
+    pub(in crate::tui) fn base_integrator(&self) -> Option<Integrator> {
+        self.command_line.integrator.or(self.own.map(|own| own.integrator))
     }
 
     /// The integrator that holds now.
     pub(in crate::tui) fn integrator(&self) -> Integrator {
-        let of_scene = self.effective.as_ref().map_or(Integrator::Whitted, |effective| effective.integrator);
-        self.overrides().integrator.unwrap_or(of_scene)
+        self.toggles.integrator.or(self.base_integrator()).unwrap_or(Integrator::Whitted)
     }
 
     /// Aspect ratio of the image; a usual one until it is known.

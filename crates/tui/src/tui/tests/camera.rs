@@ -211,7 +211,13 @@ fn save(desk: &mut Desk, camera: Viewpoint) {
     desk.event(Event::Changed(Changed { noticed: desk.now }));
     let generation = desk.state.request.generation;
     desk.worker(protocol::Event::Started { generation });
-    desk.worker(protocol::Event::Settings { generation, settings: settings().into(), camera, exposure: 0.0 });
+    desk.worker(protocol::Event::Settings {
+        generation,
+        settings: settings().into(),
+        camera,
+        exposure: 0.0,
+        own: own(),
+    });
     show(desk);
 }
 

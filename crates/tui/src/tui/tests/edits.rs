@@ -39,7 +39,7 @@ fn read(desk: &mut Desk) {
     let generation = desk.state.request.generation;
     desk.worker(protocol::Event::Started { generation });
     let (settings, camera) = (Box::new(settings()), camera());
-    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0 });
+    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0, own: own() });
 }
 
 /// The end of a request: its render stage took so many seconds, and its image all these.

@@ -26,6 +26,7 @@ fn rendered(desk: &mut Desk, error: f32) {
         settings: settings.clone(),
         camera: camera(),
         exposure: 0.0,
+        own: own(),
     });
     let picture = plain_picture(90, 68, RED);
     desk.event(Event::Picture {
@@ -149,7 +150,7 @@ fn begun(desk: &mut Desk, text: &str, color: Option<[u8; 3]>) {
     desk.worker(protocol::Event::Started { generation });
     desk.worker(protocol::Event::Text { generation, text: text.into() });
     let (settings, camera) = (Box::new(settings()), camera());
-    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0 });
+    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0, own: own() });
     color.into_iter().for_each(|color| show(desk, color));
 }
 

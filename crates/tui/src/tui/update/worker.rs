@@ -54,7 +54,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Started { .. } => started(state),
         Event::Stage { stage, .. } => record(state, stage),
         Event::Asset { progress, .. } => asset(state, progress),
-        Event::Settings { settings, camera, exposure, .. } => {
+        Event::Settings { settings, camera, exposure, own, .. } => {
+            state.request.own = Some(own);
             (state.request.camera, state.request.exposure) = (Some(camera), Some(exposure));
             let pinhole = state.request.overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
