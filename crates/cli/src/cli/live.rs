@@ -89,10 +89,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         let _ = tap.join();
     }
     if let Ok(ended) = &outcome {
-        let mut said = writes.said(ended.is_write_unanswered, has_ended);
-        if said.is_empty() && ended.status == ExitStatus::QUIT {
-            said.push(ended.summary.clone());
-        }
+        let mut said = last_words(&writes, ended, has_ended);
         // After SIGHUP nobody reads it.
         if ended.status != ExitStatus::HANGUP {
             said.extend(writes.checkpoint());
@@ -107,6 +104,17 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         let exit = if matches!(error, TuiError::NotATerminal { .. }) { Exit::WRONG } else { Exit::FAILED };
         (exit, error.to_string())
     })
+}
+
+/// Outcomes of writing that a person does not know of. After `q` the summary follows if there are none, and if an order to write
+/// was not carried out while files of before are there.
+fn last_words(writes: &Writes, ended: &Ended, has_ended: bool) -> Vec<String> {
+    let mut lines = writes.said(ended.is_write_unanswered, has_ended);
+    let has_files_of_before = ended.is_write_unanswered && ended.has_written && !writes.has_written();
+    if ended.status == ExitStatus::QUIT && (lines.is_empty() || has_files_of_before) {
+        lines.push(ended.summary.clone());
+    }
+    lines
 }
 
 /// Error about a scene that does not exist at the start; glimt waits for a scene that disappears later.
@@ -130,6 +138,8 @@ struct Writes(Arc<Mutex<Heard>>);
 struct Heard {
     /// A line for each picture since the last order to write, and whether it came after the front end was left.
     lines: Vec<(bool, String)>,
+    /// Whether a picture was written since the last order to write.
+    has_written: bool,
     has_left: bool,
     /// The checkpoint that was written after the front end was left, or the reason why there is none.
     checkpoint: Option<String>,
@@ -144,12 +154,18 @@ impl Writes {
 
     /// A person asks for the picture.
     fn order(&self) {
-        self.heard().lines.clear();
+        let mut heard = self.heard();
+        heard.lines.clear();
+        heard.has_written = false;
     }
 
     /// The front end is left.
     fn leave(&self) {
         self.heard().has_left = true;
+    }
+
+    fn has_written(&self) -> bool {
+        self.heard().has_written
     }
 
     fn is_last_stage(&self) -> bool {
@@ -160,7 +176,10 @@ impl Writes {
         let mut heard = self.heard();
         let has_left = heard.has_left;
         match event {
-            Event::Written { path, .. } => heard.lines.push((has_left, format!("wrote {}", path.display()))),
+            Event::Written { path, .. } => {
+                heard.lines.push((has_left, format!("wrote {}", path.display())));
+                heard.has_written = true;
+            }
             Event::WriteFailed { message, .. } => heard.lines.push((has_left, format!("error: {message}"))),
             Event::Refused { conflicts, .. } => {
                 let lines =
@@ -195,6 +214,7 @@ impl Writes {
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
             | Event::WriteDone { .. }
+            | Event::LastGoodEnded { .. }
             | Event::Checkpoint { .. }
             | Event::Text { .. }
             | Event::CameraKept { .. }
@@ -260,6 +280,29 @@ fn await_scene(problem: &mut Diagnostic) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_order_that_was_not_carried_out_is_told_beside_the_files_that_are_there() {
+        let summary = "wrote a.png: 640×480, 4 samples, 1.39 s; the render after it was stopped at 0 %";
+        let ended = |has_written| Ended {
+            status: ExitStatus::QUIT,
+            is_write_unanswered: true,
+            summary: summary.to_owned(),
+            has_written,
+            is_unwritten: false,
+        };
+        let writes = Writes::default();
+        writes.hear(&Event::Written { generation: 1, path: "a.png".into(), bytes: 1 });
+        writes.order();
+        writes.leave();
+        let message = "the newest picture is not written".to_owned();
+        writes.hear(&Event::WriteFailed { generation: 2, path: None, message });
+        let error = "error: the newest picture is not written";
+        assert_eq!(last_words(&writes, &ended(true), true), [error, summary]);
+        assert_eq!(last_words(&writes, &ended(false), true), [error]);
+        writes.hear(&Event::Written { generation: 2, path: "a.png".into(), bytes: 1 });
+        assert_eq!(last_words(&writes, &ended(true), true), [error, "wrote a.png"]);
+    }
 
     #[test]
     fn a_scene_that_is_gone_is_waited_for() {

@@ -245,6 +245,7 @@ fn follow(
             | Event::Refused { .. }
             | Event::WritePostponed { .. }
             | Event::WriteDone { .. }
+            | Event::LastGoodEnded { .. }
             | Event::Checkpoint { .. }
             | Event::Text { .. }
             | Event::CameraKept { .. }

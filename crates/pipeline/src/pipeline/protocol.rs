@@ -16,7 +16,7 @@ pub use super::answers::{CameraEdit, Kept, MovedCamera, Picked, Section, Spot, T
 pub use super::report::{
     Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts,
 };
-use super::settings::{Effective, Overrides};
+use super::settings::{Effective, Overrides, OwnSettings};
 use super::watch::content::FileRead;
 use crate::film::Picture;
 pub use crate::scene::description::Viewpoint;
@@ -144,6 +144,8 @@ pub enum Event {
         camera: Viewpoint,
         /// The scene's own exposure, in stops.
         exposure: f32,
+        /// The scene's other settings that keys change.
+        own: OwnSettings,
     },
     /// The scene file could be read.
     Text {
@@ -255,6 +257,14 @@ pub enum Event {
         /// Why.
         failure: Failure,
     },
+    /// The scene of the request could not be read, as [`Event::Failed`] has said, and the last good one took its place: its render
+    /// ended.
+    LastGoodEnded {
+        /// Number of the request.
+        generation: u64,
+        /// How it ended.
+        end: LastGoodEnd,
+    },
     /// The request was stopped by a newer one or by [`Command::Cancel`].
     Cancelled {
         /// Number of the request.
@@ -318,6 +328,18 @@ pub enum Failure {
     Scene(Vec<Diagnostic>),
     /// The work failed (exit code 1): a file that could not be written, a worker that died.
     Work(String),
+}
+
+/// End of a render of the last good scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LastGoodEnd {
+    /// The picture is finished.
+    Finished {
+        /// Whether it was finished before: nothing was rendered or written, and the same picture shown.
+        unchanged: bool,
+    },
+    /// The picture is not finished: the render was stopped, or no scene could be read so far.
+    Stopped,
 }
 
 /// An asset that is loading.

@@ -148,6 +148,17 @@ pub enum Resume {
     IfSame,
 }
 
+/// Settings of the scene itself, which keys change for a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OwnSettings {
+    /// Method.
+    pub integrator: Integrator,
+    /// Shadows.
+    pub shadows: Shadows,
+    /// Whether photons are on.
+    pub photons: bool,
+}
+
 /// The settings a request renders with, for status lines.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Effective {

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::fixtures::{asset, camera, diagnostic, done, settings, stage};
+use super::fixtures::{asset, camera, diagnostic, done, own, settings, stage};
 use super::{Changed, ColorChoice, News, Options, PreviewChoice, run};
 use crate::film::Picture;
 use crate::pipeline::protocol::{
@@ -96,7 +96,13 @@ fn pretend(
         return None;
     }
     say(Event::Stage { generation, stage: stage(Stage::Parse, Status::Done, 0.0003, "") });
-    say(Event::Settings { generation, settings: Box::new(settings()), camera: camera(), exposure: 0.0 });
+    say(Event::Settings {
+        generation,
+        settings: Box::new(settings()),
+        camera: camera(),
+        exposure: 0.0,
+        own: own(),
+    });
     say(Event::Stage { generation, stage: stage(Stage::Textures, Status::Running, 0.0, "") });
     let start = Instant::now();
     for step in 0..=20_u32 {

@@ -21,7 +21,7 @@ use crate::pipeline::protocol::{
     self, AssetProgress, Command, Counters, Failure, ImageReport, RenderProgress, Report, Request,
     SampleCounts, Stage, StageReport, Status, Viewpoint,
 };
-use crate::pipeline::settings::{Effective, Overrides, View};
+use crate::pipeline::settings::{Effective, Overrides, OwnSettings, View};
 use crate::scene::description::{Accel, Integrator, Pose, Shadows};
 use crate::scene::diagnostic::{Diagnostic, Place, Severity};
 
@@ -106,6 +106,7 @@ impl Desk {
             settings: Box::new(settings()),
             camera: camera(),
             exposure: 0.0,
+            own: own(),
         });
         self.event(Event::Picture {
             generation,
@@ -175,6 +176,11 @@ pub(super) fn settings() -> Effective {
         threads: 2,
         outputs: vec![PathBuf::from("cornell.png")],
     }
+}
+
+/// Settings of the scene itself.
+pub(super) fn own() -> OwnSettings {
+    OwnSettings { integrator: Integrator::Whitted, shadows: Shadows::Soft, photons: false }
 }
 
 /// At (0, 1, 4), which looks along −z at a point 4 away.

@@ -64,6 +64,7 @@ pub(super) struct History {
 #[derive(Debug)]
 struct Past {
     shown: Shown,
+    /// Time at which its render last improved it.
     time: Instant,
     /// The last edit that it is after.
     edits: u64,
@@ -134,13 +135,15 @@ impl History {
         let is_last = |last: &usize| self.past.get(*last).is_some_and(|past| past.is_same(&shown, &origin));
         match known.or_else(|| last.filter(is_last)) {
             Some(at) => {
-                let mut origin = origin;
+                let past = &self.past[at];
                 if known.is_none() {
                     // What was edited since has changed nothing visible.
-                    self.read_edits = self.past[at].edits;
-                    origin = self.past[at].origin.of_same_image(origin);
+                    self.read_edits = past.edits;
                 }
-                self.replace(at, shown, origin);
+                // A picture keeps the origin that it had first.
+                let is_same = known.is_none() || past.shown.is_of_same_image(&shown);
+                let origin = if is_same { past.origin.of_same_image(origin) } else { origin };
+                self.replace(at, (shown, time), origin);
                 self.unite(at);
             }
             None => {
@@ -156,10 +159,14 @@ impl History {
     }
 
     /// Puts a picture in the place of another one of its request or of its image.
-    fn replace(&mut self, at: usize, shown: Shown, origin: Origin) {
+    fn replace(&mut self, at: usize, (shown, time): (Shown, Instant), origin: Origin) {
         let Some(past) = self.past.get_mut(at) else { return };
-        if past.shown.picture != shown.picture {
+        let is_other_picture = past.shown.picture != shown.picture;
+        if is_other_picture {
             past.small = OnceCell::new();
+        }
+        if past.origin.is_unfinished && (is_other_picture || !origin.is_unfinished) {
+            past.time = time;
         }
         let is_other = past.origin != origin;
         (past.shown, past.origin) = (shown, origin);
@@ -307,6 +314,11 @@ impl History {
         self.past.len()
     }
 
+    /// The newest of the pictures that are kept.
+    pub(super) fn last_picture(&self) -> Option<&Arc<Picture>> {
+        self.past.back().map(|newest| &newest.shown.picture)
+    }
+
     /// Index of the picture that is looked at: the newest one, unless an older one is.
     pub(super) fn looked_at(&self) -> Option<usize> {
         self.open.as_ref().map(|(at, _)| *at).or_else(|| self.past.len().checked_sub(1))
@@ -352,7 +364,7 @@ impl History {
         self.open.take().map(|(_, newest)| newest)
     }
 
-    /// The run of the picture that is looked at, if it is an older one, and the time when it was made.
+    /// The run of the picture that is looked at, if it is an older one, and the time at which its render last improved it.
     pub(super) fn place(&self) -> Option<(Option<u64>, Instant)> {
         let (at, _) = self.open.as_ref()?;
         self.past.get(*at).map(|past| (past.run, past.time))
@@ -653,6 +665,42 @@ mod tests {
         assert_eq!(changes(&history)[4], "camera moved");
         record(&mut history, 8, "fov", true, text, Some(true));
         assert_eq!(changes(&history)[4], "+ camera");
+    }
+
+    #[test]
+    fn an_entry_keeps_the_words_of_the_edit_that_made_its_picture() {
+        let mut history = History::default();
+        let mut generation = 0;
+        let mut record = |history: &mut History, name: &str, toggles: Toggles, text: &str| {
+            generation += 1;
+            // Shown on its way, at the end, and once more.
+            for _ in 0..3 {
+                let (shown, origin) = of_image(generation, name, true);
+                history.record(shown, Instant::now(), Origin { toggles, text: Some(text.into()), ..origin });
+            }
+            edit(history);
+            changes(history)
+        };
+        let keys = Toggles::default();
+        record(&mut history, "narrow", keys, "camera.fov = 40");
+        record(&mut history, "wide", keys, "camera.fov = 44");
+        let words = ["first", "camera.fov 40 → 44"];
+        let output = "camera.fov = 44\nrender.output = \"other.png\"";
+        assert_eq!(record(&mut history, "wide", keys, output), words);
+        let named = format!("{output}\nname = \"globe\"");
+        assert_eq!(record(&mut history, "wide", keys, &named), words);
+        // A camera that keys have moved is not the one that is saved. One that the scene has by now is.
+        let mut history = History::default();
+        let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
+        let moved = Toggles { camera, ..Toggles::default() };
+        record(&mut history, "own", keys, "camera.fov = 44");
+        for (toggles, text, words) in [
+            (moved, "camera.fov = 44", "camera moved"),
+            (moved, "camera.fov = 50", "camera moved"),
+            (keys, "camera.fov = 30", "camera.fov 44 → 30"),
+        ] {
+            assert_eq!(record(&mut history, "moved", toggles, text), ["first", words]);
+        }
     }
 
     #[test]

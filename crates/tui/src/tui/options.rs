@@ -91,6 +91,8 @@ pub struct Ended {
     pub is_write_unanswered: bool,
     /// The files written, with their samples and seconds, in one line.
     pub summary: String,
+    /// Whether a file was written.
+    pub has_written: bool,
     /// Whether the last picture that was to be written is not on disk.
     pub is_unwritten: bool,
 }

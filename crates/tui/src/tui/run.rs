@@ -163,9 +163,14 @@ impl Ui {
             }
             None => ExitStatus::QUIT,
         };
-        let (summary, is_unwritten) =
-            (exit_summary::words(&self.state), self.state.saving.write_failed.is_some());
-        Ok(Ended { status, is_write_unanswered: self.state.saving.is_write_requested, summary, is_unwritten })
+        let saving = &self.state.saving;
+        Ok(Ended {
+            status,
+            is_write_unanswered: saving.is_write_requested,
+            summary: exit_summary::words(&self.state),
+            has_written: !saving.written.is_empty(),
+            is_unwritten: saving.write_failed.is_some(),
+        })
     }
 
     /// Gives the screen back and waits a little for the answers that the terminal owes: a shell would take them for

@@ -91,6 +91,7 @@ fn value(event: &Event) -> Option<Value> {
         | Event::Refused { .. }
         | Event::WritePostponed { .. }
         | Event::WriteDone { .. }
+        | Event::LastGoodEnded { .. }
         | Event::Text { .. }
         | Event::CameraKept { .. }
         | Event::CameraUndone { .. }

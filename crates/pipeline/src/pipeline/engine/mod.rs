@@ -42,7 +42,7 @@ use super::render::preview::Screen;
 use super::render::scheduler::Rendering;
 use super::render::share::Share;
 use super::report::finish::{Finished, report};
-use super::settings::{Checkpoints, Overrides, Resume};
+use super::settings::{Checkpoints, Overrides, OwnSettings, Resume, View};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
 use super::stages::containers::Containers;
@@ -201,11 +201,7 @@ impl Engine {
         let generation = request.generation;
         sink.send(Event::Started { generation });
         let mut findings = Findings::default();
-        let shown = |engine: &Self| {
-            let view = engine.plan.as_ref().map(|plan| plan.settings.view);
-            (engine.films.current().map(|canvas| canvas.key), view)
-        };
-        let before = shown(self);
+        let before = self.shown();
         let outcome = self.run(request, sink, meanwhile, &mut findings);
         if let Err(Stop::Failed(Failure::Scene(diagnostics))) = &outcome {
             findings.read_named(diagnostics, &request.scene, &self.contents, meanwhile.token);
@@ -226,9 +222,15 @@ impl Engine {
         self.end(outcome.is_ok() || is_read);
         let report = outcome?;
         let settled = |stage: Stage| report.stages[stage as usize].status != Status::Done;
-        let unchanged = shown(self) == before && settled(Stage::Render) && settled(Stage::Write);
+        let unchanged = self.shown() == before && settled(Stage::Render) && settled(Stage::Write);
         let Findings { conflicts, warnings, .. } = findings;
         Ok(Outcome { report, conflicts, warnings, unchanged })
+    }
+
+    /// The current picture and its view.
+    fn shown(&self) -> (Option<Key>, Option<View>) {
+        let view = self.plan.as_ref().map(|plan| plan.settings.view);
+        (self.films.current().map(|canvas| canvas.key), view)
     }
 
     /// Show the picture as it is at another size, outside of a request.
@@ -366,11 +368,17 @@ impl Engine {
         let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(cautions);
         let own = Eye::new(&plan.scene, parsed.orbiter, &CameraChange::default());
+        let scene = &parsed.loaded.scene;
         table.sink.send(Event::Settings {
             generation: request.generation,
             settings: Box::new(plan.effective.clone()),
             camera: own.viewpoint(),
-            exposure: parsed.loaded.scene.render.exposure,
+            exposure: scene.render.exposure,
+            own: OwnSettings {
+                integrator: scene.render.integrator,
+                shadows: scene.render.shadows,
+                photons: scene.photons.enabled,
+            },
         });
         let before = std::mem::replace(&mut self.inputs, Inputs::of_scene(&parsed));
         let looked = self.look_for_conflicts(request, &plan, findings, table.sink);

@@ -24,8 +24,10 @@ impl Engine {
             return sink.write_failed(None, "there is no picture yet".to_owned());
         };
         if !canvas.is_covered() {
-            let message = "nothing is written: the render was stopped before every pixel had a sample";
-            return sink.write_failed(None, message.to_owned());
+            // Pictures of before are there.
+            let what = if self.written.is_empty() { "nothing is" } else { "the newest picture is not" };
+            let message = format!("{what} written: the render was stopped before every pixel had a sample");
+            return sink.write_failed(None, message);
         }
         if self.is_broken
             && let Some(path) = self.written.not_ours(&plan.outputs, &self.contents)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Engine, Meanwhile};
 use crate::pipeline::plan::plan;
-use crate::pipeline::protocol::Request;
+use crate::pipeline::protocol::{Event, LastGoodEnd, Request, Status};
 use crate::pipeline::sink::Sink;
 use crate::pipeline::stages::containers::Containers;
 use crate::pipeline::stages::meshes::Meshes;
@@ -32,22 +32,28 @@ impl Engine {
     /// Shows and writes the last good scene with what the newest request changes of it, as that request is of a scene that
     /// cannot be read. Files that the scene might name by now are not written.
     pub(super) fn go_on(&mut self, newest: &Request, sink: &Sink, meanwhile: &Meanwhile<'_>) {
+        let before = self.shown();
         // A newer request asks again; the request that failed has reported its errors.
-        let _ = self.render_last_good(newest, sink, meanwhile);
+        let end = match self.render_last_good(newest, sink, meanwhile) {
+            Ok(Some(is_reused)) => LastGoodEnd::Finished { unchanged: is_reused && self.shown() == before },
+            Ok(None) | Err(_) => LastGoodEnd::Stopped,
+        };
+        sink.send(Event::LastGoodEnded { generation: newest.generation, end });
     }
 
+    /// Renders and writes the last good scene. Returns whether both were done before. `None` if there is no such scene.
     fn render_last_good(
         &mut self,
         newest: &Request,
         sink: &Sink,
         meanwhile: &Meanwhile<'_>,
-    ) -> Result<(), Stop> {
+    ) -> Result<Option<bool>, Stop> {
         let is_it = |good: &&Good| good.parsed.loaded.path == newest.scene;
-        let Some(good) = self.good.as_ref().filter(is_it).cloned() else { return Ok(()) };
+        let Some(good) = self.good.as_ref().filter(is_it).cloned() else { return Ok(None) };
         let request = Request { force: false, ..newest.clone() };
         // Put the scene and the request together.
         let (loaded, path) = (&good.parsed.loaded, &request.scene);
-        let Ok(plan) = plan(&loaded.scene, path, &request.overrides) else { return Ok(()) };
+        let Ok(plan) = plan(&loaded.scene, path, &request.overrides) else { return Ok(None) };
         // Load what another view needs, if the files still hold it.
         let pool = self.pool(plan.threads)?;
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
@@ -60,12 +66,14 @@ impl Engine {
         let ready = self.build(&request, &good, plan, &mut table, &reading)?;
         let photons = self.light(&request, &ready, &mut table, sink, meanwhile)?;
         // Render and write.
-        self.render(&request, &ready, photons, sink, meanwhile)?;
+        let rendered = self.render(&request, &ready, photons, sink, meanwhile)?;
+        let mut is_written_now = false;
         if self.written.not_ours(&ready.plan.outputs, &self.contents).is_none() {
             // The stage reports files that cannot be written.
-            let _ = self.write(&request, &ready.plan, &Findings::default(), sink, meanwhile.writing);
+            let written = self.write(&request, &ready.plan, &Findings::default(), sink, meanwhile.writing);
+            is_written_now = written.is_ok_and(|staged| staged.status == Status::Done);
         }
-        Ok(())
+        Ok(Some(rendered.status == Status::Reused && !is_written_now))
     }
 
     /// Loads what this picture looks up, where the scene was read for another one.

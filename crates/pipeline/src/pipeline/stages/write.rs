@@ -46,6 +46,11 @@ impl Written {
         paths.iter().map(PathBuf::as_path).find(|path| is_there(path) && !is_ours(path))
     }
 
+    /// Whether there is none.
+    pub(in crate::pipeline) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// Write everything next time.
     fn forget(&mut self) {
         self.0.clear();

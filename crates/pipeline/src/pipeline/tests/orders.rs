@@ -9,7 +9,9 @@ use crate::control::{CancelToken, Cancelled};
 use crate::film::{Pixels, Rect, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::pipeline::engine::Means;
+use crate::pipeline::protocol::LastGoodEnd;
 use crate::pipeline::settings::View;
+use crate::scene::description::{Integrator, Shadows};
 use crate::world::World;
 
 /// A kernel as the real one, but slow: a tile takes until its token is cancelled.
@@ -140,6 +142,25 @@ pub(super) fn slow(
     KERNEL(photons, world, settings, pixels, samples, token)
 }
 
+/// End of the render that goes on while the scene of this request is broken.
+fn last_good_end(bench: &Bench, of: u64) -> LastGoodEnd {
+    loop {
+        match bench.next() {
+            Event::LastGoodEnded { generation, end } if generation == of => return end,
+            Event::Preview { .. } | Event::Progress { .. } | Event::WriteDone { .. } => {}
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn without_a_good_scene_nothing_goes_on() {
+    let mut bench = Bench::new(&SCENE.replace("width = 40", "width = = 40"));
+    bench.writing = Writing::Try;
+    assert!(matches!(bench.failed(), Failure::Scene(_)));
+    assert_eq!(last_good_end(&bench, 1), LastGoodEnd::Stopped);
+}
+
 #[test]
 fn a_file_that_breaks_during_a_render_does_not_stop_it_and_costs_nothing_that_is_kept() {
     let mut bench = Bench::with(&SCENE.replace("samples = 4", "samples = 10000"), slow);
@@ -165,6 +186,13 @@ fn a_file_that_breaks_during_a_render_does_not_stop_it_and_costs_nothing_that_is
         }
     }
     assert!(is_seen && samples_on_disk(&bench).starts_with("10000"), "{}", samples_on_disk(&bench));
+    let finished = |unchanged| LastGoodEnd::Finished { unchanged };
+    assert_eq!(last_good_end(&bench, broken), finished(false));
+    // Another mistake finds it as it is.
+    bench.edit("width = = 40", "width = = = 40");
+    assert!(matches!(bench.failed(), Failure::Scene(_)));
+    assert_eq!(last_good_end(&bench, bench.generation), finished(true));
+    bench.edit("width = = = 40", "width = = 40");
     bench.edit("width = = 40", "width = 40");
     let report = bench.done().0;
     assert_statuses(&report, "rrrrrsrr");
@@ -181,7 +209,7 @@ fn picture_by(scene: &str, change: impl Fn(&mut Bench)) -> Vec<u8> {
 #[test]
 fn while_the_scene_is_broken_keys_change_the_picture_of_the_last_good_one() {
     use crate::math::DVec3;
-    use crate::scene::description::{CameraChange, Pose, Shadows};
+    use crate::scene::description::{CameraChange, Pose};
     let moved = Pose { position: DVec3::new(0.5, 1.5, 4.25), look_at: DVec3::Y, up: DVec3::Y };
     let changes: [fn(&mut Bench, Pose); 4] = [
         |bench, pose| bench.overrides.camera = CameraChange { pose: Some(pose), ..CameraChange::default() },
@@ -308,6 +336,20 @@ fn write_is_refused_once_the_first_pass_was_stopped() {
     bench.worker.send(Command::Write);
     assert!(is_refusal(bench.next()), "and one that comes later");
     assert_eq!(bench.picture(), b"the old one");
+}
+
+#[test]
+fn a_refusal_to_write_does_not_deny_the_picture_that_is_on_disk() {
+    let mut bench = Bench::with(SCENE, slow);
+    bench.done();
+    bench.write("scene.toml", &wide());
+    let of = bench.send();
+    while !matches!(bench.next(), Event::Progress { .. }) {}
+    bench.worker.send(Command::Cancel);
+    bench.until_end(of);
+    bench.worker.send(Command::Write);
+    let why = "the newest picture is not written: the render was stopped before every pixel had a sample";
+    assert!(matches!(bench.next(), Event::WriteFailed { message, .. } if message == why));
 }
 
 #[test]
@@ -572,12 +614,17 @@ fn a_render_that_goes_on_tells_the_seconds_of_all_its_samples() {
 fn a_request_tells_what_the_scene_itself_says() {
     let mut bench = Bench::new(&SCENE.replace("exposure = 0.0", "exposure = 0.5"));
     bench.overrides.exposure = Some(2.0);
+    bench.overrides.shadows = Some(Shadows::Off);
+    bench.overrides.integrator = Some(Integrator::Whitted);
+    bench.overrides.photons = Some(true);
     bench.overrides.camera.fov = Some(10.0);
     let of = bench.send();
     let events = bench.until_end(of);
     let said = |event: &Event| {
-        let Event::Settings { settings, camera, exposure, .. } = event else { return None };
-        Some((settings.exposure, *exposure, camera.fov))
+        let Event::Settings { settings, camera, exposure, own, .. } = event else { return None };
+        let shadows = (settings.shadows, own.shadows);
+        Some((settings.exposure, *exposure, camera.fov, shadows, own.integrator, own.photons))
     };
-    assert_eq!(events.iter().find_map(said), Some((2.0, 0.5, 40.0)));
+    let shadows = (Shadows::Off, Shadows::Soft);
+    assert_eq!(events.iter().find_map(said), Some((2.0, 0.5, 40.0, shadows, Integrator::Whitted, false)));
 }

@@ -97,6 +97,7 @@ fn nothing_that_is_watched_can_be_written() {
     fs::remove_file(bench.path("later.ppm")).expect("removed");
     bench.edit("skin.ppm", "later.ppm");
     bench.failed();
+    assert!(matches!(bench.next(), Event::LastGoodEnded { .. }));
     bench.worker.send(Command::Write);
     assert!(matches!(bench.next(), Event::Refused { .. }));
     assert!(!bench.path("later.ppm").exists());
@@ -144,6 +145,7 @@ fn while_the_scene_is_broken_only_what_this_run_wrote_is_replaced() {
     bench.done();
     bench.edit("\"skin.ppm\"", "\"out.ppm\"\nbogus = 1");
     assert!(matches!(bench.failed(), Failure::Scene(_)));
+    assert!(matches!(bench.next(), Event::LastGoodEnded { .. }));
     bench.worker.send(Command::Write);
     assert!(matches!(bench.next(), Event::Written { .. }), "nothing is lost");
     assert!(matches!(bench.next(), Event::WriteDone { .. }));

@@ -8,7 +8,7 @@ const MOST_BYTES: usize = 256 << 10;
 /// Most changes with a text of their own; of more, the text has the number.
 const TOLD: usize = 3;
 /// Characters of a value and of a name that are shown at most.
-const VALUE: usize = 24;
+const VALUE: usize = 48;
 const NAME: usize = 48;
 
 /// The keys whose values differ, with both values; `None` if no key differs or one of the texts is no TOML.
@@ -133,7 +133,12 @@ impl Found<'_> {
             return "{…}".to_owned();
         }
         let written = self.texts[text].get(value.span()).unwrap_or_default();
-        shortened(&written.split_whitespace().collect::<Vec<_>>().join(" "), VALUE)
+        let shown = shortened(&written.split_whitespace().collect::<Vec<_>>().join(" "), VALUE);
+        // A number that is cut looks like another number.
+        match (value.item(), shown.rfind(", ")) {
+            (Item::Array(_), Some(end)) if shown.ends_with('…') => format!("{}…", &shown[..end + 2]),
+            _ => shown,
+        }
     }
 }
 
@@ -196,6 +201,15 @@ mod tests {
         said("[0.8, 0.02, 0.02]", "\"red\"", "materials.wall.diffuse [0.8, 0.02, 0.02] → \"red\"");
         said("radius = 0.5", "radius = 0.7", "sphere.ball.radius 0.5 → 0.7");
         said("radius = 1", "radius = 3", "sphere.2.radius 1 → 3");
+    }
+
+    #[test]
+    fn values_are_whole_or_cut_between_their_elements() {
+        let three = "[-0.3773, 0.9512, 3.5904]";
+        said("[0, 1, 4]", three, &format!("camera.position [0, 1, 4] → {three}"));
+        let matrix = "[1.25, 0.125, 0.125, 0.125, 0.125, 1.25, 0.125, 0.125, 0.125]";
+        let cut = "camera.position [0, 1, 4] → [1.25, 0.125, 0.125, 0.125, 0.125, 1.25, …";
+        said("[0, 1, 4]", matrix, cut);
     }
 
     #[test]

@@ -17,7 +17,7 @@ pub(super) use self::picture::PictureState;
 pub(super) use self::request::{CameraStep, Origin, RequestState, Toggles, signed_stops};
 pub(super) use self::saving::{PendingChange, SavingState};
 pub(super) use self::selection::{PickPurpose, Press, SelectionState};
-pub(super) use self::work::{Activity, AssetBar, WorkState};
+pub(super) use self::work::{Activity, AssetBar, Rendering, WorkState};
 use super::color::{Ansi, ColorDepth};
 use super::event::Window;
 use super::known::Ask;

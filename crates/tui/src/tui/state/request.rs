@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use crate::choice::Choice;
+use crate::math::DVec3;
 use crate::pipeline::FileRead;
 use crate::pipeline::protocol::{PreviewSize, Section, Viewpoint};
-use crate::pipeline::settings::{CameraChange, Effective, Overrides, View};
-use crate::scene::description::{Integrator, Shadows};
+use crate::pipeline::settings::{CameraChange, Effective, Overrides, OwnSettings, View};
+use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::sanitize::visible;
 use crate::scene::{changes, is_mesh};
 
@@ -130,6 +131,8 @@ pub(in crate::tui) struct RequestState {
     pub camera_step: CameraStep,
     /// First request of a camera that keys have moved.
     pub moved_since: Option<u64>,
+    /// Parts of the camera that keys have changed, as the scene had them when a key first changed them.
+    pub moved_from: CameraChange,
 
     /// Text of the scene file, in the newest request that was understood.
     pub text: Option<Arc<str>>,
@@ -141,6 +144,8 @@ pub(in crate::tui) struct RequestState {
     pub camera: Option<Viewpoint>,
     /// The scene's own exposure, in stops.
     pub exposure: Option<f32>,
+    /// The scene's other settings that keys change.
+    pub own: Option<OwnSettings>,
 }
 
 impl RequestState {
@@ -157,11 +162,13 @@ impl RequestState {
             first_section: None,
             camera_step: CameraStep::default(),
             moved_since: None,
+            moved_from: CameraChange::default(),
             text: None,
             files: Arc::default(),
             effective: None,
             camera: None,
             exposure: None,
+            own: None,
         }
     }
 
@@ -199,6 +206,48 @@ impl RequestState {
         self.camera.map(|camera| camera.changed(&self.toggles.camera))
     }
 
+    /// Notes the scene's own camera, in the parts that keys have changed. Parts that were noted before stay as they are.
+    pub(in crate::tui) fn note_moved_parts(&mut self) {
+        let Some(own) = self.camera else { return };
+        let (moved, from) = (&self.toggles.camera, self.moved_from);
+        self.moved_from = CameraChange {
+            pose: moved.pose.and(from.pose.or(Some(own.pose))),
+            fov: moved.fov.and(from.fov.or(Some(own.fov))),
+            focus: moved.focus.and(from.focus.or(Some(own.focus))),
+        };
+    }
+
+    /// Takes the scene's own camera for the one that keys have moved.
+    pub(in crate::tui) fn move_from_own(&mut self) {
+        self.moved_from = CameraChange::default();
+        self.note_moved_parts();
+    }
+
+    /// Keys of the camera that were saved since keys moved them, with the values that the scene has now.
+    pub(in crate::tui) fn saved_since_moved(&self) -> Vec<String> {
+        let Some((own, moved)) = self.camera.zip(self.viewpoint()) else { return Vec::new() };
+        let from = &self.moved_from;
+        let of_pose = |key: &str, of: fn(&Pose) -> DVec3| {
+            let (before, now) = (of(&from.pose?), of(&own.pose));
+            let DVec3 { x, y, z } = now;
+            (before != now && now != of(&moved.pose)).then(|| format!("camera.{key} = [{x}, {y}, {z}]"))
+        };
+        let of_number = |key: &str, before: Option<f64>, now: f64, moved: f64| {
+            let is_saved = before.is_some_and(|before| before != now) && now != moved;
+            is_saved.then(|| format!("camera.{key} = {now}"))
+        };
+        // A plane in focus that goes through `look_at` moves with the camera.
+        let focus = from.focus.filter(|_| !own.is_focused_on_look_at());
+        let all = [
+            of_pose("position", |pose| pose.position),
+            of_pose("look_at", |pose| pose.look_at),
+            of_pose("up", |pose| pose.up),
+            of_number("fov", from.fov, own.fov, moved.fov),
+            of_number("focus", focus, own.focus, moved.focus),
+        ];
+        all.into_iter().flatten().collect()
+    }
+
     /// Changes by keys that the picture alone does not show, in words.
     pub(in crate::tui) fn changes(&self) -> Vec<String> {
         let CameraChange { pose, fov, focus } = self.toggles.camera;
@@ -223,22 +272,34 @@ impl RequestState {
         self.toggles.view.unwrap_or_else(|| self.base_view())
     }
 
+    /// The shadows of the scene with the command line. `None` until a scene has been understood.
+    pub(in crate::tui) fn base_shadows(&self) -> Option<Shadows> {
+        self.command_line.shadows.or(self.own.map(|own| own.shadows))
+    }
+
     /// The shadows that hold now.
     pub(in crate::tui) fn shadows(&self) -> Shadows {
-        let of_scene = self.effective.as_ref().map_or(Shadows::Soft, |effective| effective.shadows);
-        self.overrides().shadows.unwrap_or(of_scene)
+        self.toggles.shadows.or(self.base_shadows()).unwrap_or(Shadows::Soft)
+    }
+
+    /// Whether the scene with the command line has photons. `None` until a scene has been understood.
+    pub(in crate::tui) fn base_photons(&self) -> Option<bool> {
+        self.command_line.photons.or(self.own.map(|own| own.photons))
     }
 
     /// Whether photons are on now.
     pub(in crate::tui) fn photons(&self) -> bool {
-        let of_scene = self.effective.as_ref().is_some_and(|effective| effective.photons);
-        self.overrides().photons.unwrap_or(of_scene)
+        self.toggles.photons.or(self.base_photons()).unwrap_or(false)
+    }
+
+    /// The integrator of the scene with the command line. `None` until a scene has been understood.
+    pub(in crate::tui) fn base_integrator(&self) -> Option<Integrator> {
+        self.command_line.integrator.or(self.own.map(|own| own.integrator))
     }
 
     /// The integrator that holds now.
     pub(in crate::tui) fn integrator(&self) -> Integrator {
-        let of_scene = self.effective.as_ref().map_or(Integrator::Whitted, |effective| effective.integrator);
-        self.overrides().integrator.unwrap_or(of_scene)
+        self.toggles.integrator.or(self.base_integrator()).unwrap_or(Integrator::Whitted)
     }
 
     /// Aspect ratio of the image; a usual one until it is known.

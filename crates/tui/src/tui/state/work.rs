@@ -21,6 +21,14 @@ pub(in crate::tui) enum Activity {
     Cancelled,
 }
 
+/// Render of the newest request's picture. While the scene is broken, that is a picture of the last good one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::tui) enum Rendering {
+    UnderWay,
+    Finished,
+    Stopped,
+}
+
 /// The bar of a loading asset.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::tui) struct AssetBar {
@@ -41,6 +49,7 @@ impl AssetBar {
 /// Progress and result of the newest request.
 pub(in crate::tui) struct WorkState {
     pub activity: Activity,
+    pub rendering: Rendering,
     pub paused: bool,
     /// Time at which the request was paused.
     pub paused_at: Option<Instant>,
@@ -66,6 +75,7 @@ impl WorkState {
     pub(super) fn new(now: Instant) -> Self {
         Self {
             activity: Activity::Running { since: now },
+            rendering: Rendering::UnderWay,
             paused: false,
             paused_at: None,
             stages: Default::default(),
@@ -95,6 +105,11 @@ impl WorkState {
     pub(in crate::tui) fn find_curve(&mut self, origin: &Origin) {
         let found = self.curves.iter().find(|(other, _)| other == origin);
         self.curve = found.map(|(_, curve)| curve.clone()).unwrap_or_default();
+    }
+
+    /// Whether a picture is being rendered, be it of the last good scene.
+    pub(in crate::tui) fn is_under_way(&self) -> bool {
+        self.rendering == Rendering::UnderWay
     }
 
     pub(in crate::tui) fn is_running(&self) -> bool {

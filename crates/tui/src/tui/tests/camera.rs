@@ -1,10 +1,11 @@
 //! Tests of keys on the camera: which pictures they request, how often, and the messages.
 
 use super::{BLUE, RED};
-use crate::pipeline::protocol::{self, Writing};
+use crate::pipeline::protocol::{self, Command, Viewpoint, Writing};
 use crate::pipeline::settings::Overrides;
+use crate::scene::description::Pose;
 use crate::scene::diagnostic::Severity;
-use crate::tui::event::{Event, KeyPress};
+use crate::tui::event::{Effect, Event, KeyPress};
 use crate::tui::fixtures::*;
 use crate::tui::preview_kind::PreviewKind;
 use crate::tui::{Changed, ColorDepth};
@@ -203,4 +204,122 @@ fn the_scene_of_a_model_is_written_once_and_its_camera_is_kept() {
     desk.press('l');
     desk.finish([200, 30, 30]);
     assert!(crate::tui::exit_summary::words(&desk.state).contains("discarded"), "it was moved since");
+}
+
+/// A save after which the scene has this camera.
+fn save(desk: &mut Desk, camera: Viewpoint) {
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::Started { generation });
+    desk.worker(protocol::Event::Settings {
+        generation,
+        settings: settings().into(),
+        camera,
+        exposure: 0.0,
+        own: own(),
+    });
+    show(desk);
+}
+
+/// The camera that `c` orders to be written. `None` if it orders nothing.
+fn kept(desk: &mut Desk) -> Option<Viewpoint> {
+    let is_order = |effect: Effect| match effect {
+        Effect::Send(Command::KeepCamera(moved)) => Some(moved.camera),
+        _ => None,
+    };
+    desk.press('c').into_iter().find_map(is_order)
+}
+
+fn moved_to(position: [f64; 3]) -> Viewpoint {
+    let camera = camera();
+    Viewpoint { pose: Pose { position: position.into(), ..camera.pose }, ..camera }
+}
+
+#[test]
+fn what_was_saved_of_a_moved_camera_is_named_before_c_writes_over_it() {
+    let wide = |fov| Viewpoint { fov, ..camera() };
+    let look_at = Viewpoint { pose: Pose { look_at: [0.0, 0.5, 0.0].into(), ..camera().pose }, ..camera() };
+    let both = Viewpoint { fov: 25.0, ..moved_to([0.0, 2.0, 4.0]) };
+    for (keys, saved, words) in [
+        ("h", moved_to([0.0, 2.0, 4.0]), "camera.position = [0, 2, 4]"),
+        ("h", look_at, "camera.look_at = [0, 0.5, 0]"),
+        ("<", wide(25.0), "camera.fov = 25"),
+        ("h<", both, "camera.position = [0, 2, 4], camera.fov = 25"),
+        ("h<", wide(25.0), "camera.fov = 25"),
+    ] {
+        let mut desk = Desk::with(state(160, 40));
+        desk.finish(RED);
+        for key in keys.chars() {
+            desk.press(key);
+            show(&mut desk);
+        }
+        let moved = desk.state.request.toggles.camera;
+        save(&mut desk, saved);
+        assert_eq!(kept(&mut desk), None, "{keys}");
+        let said = format!(
+            "error: {words} was saved since the keys moved the camera: press c again to write over it"
+        );
+        assert!(desk.text().contains(&said), "{keys}: {}", desk.text());
+        assert_eq!(kept(&mut desk), Some(saved.changed(&moved)), "{keys}: the second time it is meant");
+    }
+}
+
+#[test]
+fn what_is_saved_after_that_is_named_again() {
+    let mut desk = Desk::with(state(160, 40));
+    desk.finish(RED);
+    desk.press('h');
+    show(&mut desk);
+    for height in [2.0, 3.0] {
+        save(&mut desk, moved_to([0.0, height, 4.0]));
+        assert_eq!(kept(&mut desk), None);
+        assert!(desk.text().contains(&format!("camera.position = [0, {height}, 4]")), "{}", desk.text());
+    }
+    // Moved on, it is still the camera that is meant.
+    desk.press('h');
+    show(&mut desk);
+    assert!(kept(&mut desk).is_some());
+}
+
+#[test]
+fn what_was_saved_beside_a_moved_camera_stays_when_c_writes() {
+    let saved = Viewpoint { fov: 25.0, ..camera() };
+    let mut desk = Desk::with(state(160, 40));
+    desk.finish(RED);
+    desk.press('h');
+    show(&mut desk);
+    save(&mut desk, saved);
+    let moved = desk.state.request.toggles.camera;
+    assert_eq!(kept(&mut desk), Some(saved.changed(&moved)));
+    // The plane in focus goes with what is looked at: it was not saved.
+    let mut desk = Desk::with(state(160, 40));
+    desk.finish(RED);
+    desk.state.request.toggles.camera.focus = Some(2.5);
+    desk.press('r');
+    save(&mut desk, moved_to([0.0, 1.0, 6.0]));
+    assert_eq!(kept(&mut desk).map(|camera| (camera.focus, camera.pose.position.z)), Some((2.5, 6.0)));
+}
+
+#[test]
+fn keys_that_move_the_camera_from_a_saved_one_write_over_nothing_that_is_newer() {
+    let mut desk = Desk::with(state(160, 40));
+    desk.finish(RED);
+    desk.press('h');
+    show(&mut desk);
+    save(&mut desk, moved_to([0.0, 2.0, 4.0]));
+    desk.press('0');
+    desk.press('h');
+    assert!(kept(&mut desk).is_some());
+}
+
+#[test]
+fn the_camera_of_a_model_is_saved_by_nobody() {
+    let mut desk = Desk::with(state(160, 40));
+    desk.state.request.scene = "assets/vase.obj".into();
+    desk.finish(RED);
+    desk.press('h');
+    show(&mut desk);
+    // The model has another size by now, and is framed anew.
+    save(&mut desk, moved_to([0.0, 2.0, 4.0]));
+    assert!(kept(&mut desk).is_some());
 }

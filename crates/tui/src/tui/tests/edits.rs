@@ -1,7 +1,7 @@
 //! Tests of edits, typos among them: which pictures are before them, how they are numbered, and what a render took.
 
 use super::{BLUE, RED, cells_of};
-use crate::pipeline::protocol::{self, Kept, PreviewSource, Stage, Status};
+use crate::pipeline::protocol::{self, Kept, LastGoodEnd, PreviewSource, Stage, Status};
 use crate::pipeline::settings::Effective;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::Fingerprint;
@@ -39,7 +39,7 @@ fn read(desk: &mut Desk) {
     let generation = desk.state.request.generation;
     desk.worker(protocol::Event::Started { generation });
     let (settings, camera) = (Box::new(settings()), camera());
-    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0 });
+    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0, own: own() });
 }
 
 /// The end of a request: its render stage took so many seconds, and its image all these.
@@ -101,6 +101,35 @@ fn an_edit_of_a_comment_adds_no_picture_and_no_run() {
 }
 
 #[test]
+fn a_save_that_only_writes_another_file_adds_no_picture() {
+    let mut desk = Desk::with(state(120, 40));
+    save(&mut desk, "camera.fov = 40");
+    read(&mut desk);
+    shown(&mut desk, "narrow", RED, true);
+    end(&mut desk, false, 1.0, 1.0);
+    save(&mut desk, "camera.fov = 44");
+    read(&mut desk);
+    shown(&mut desk, "wide", BLUE, true);
+    end(&mut desk, false, 1.0, 1.0);
+    save(&mut desk, "camera.fov = 44\nrender.output = \"other.png\"");
+    read(&mut desk);
+    shown(&mut desk, "wide", BLUE, true);
+    let generation = desk.state.request.generation;
+    let mut event = done(generation, Vec::new(), false);
+    if let protocol::Event::Done { report, .. } = &mut event {
+        report.stages[Stage::Render as usize].status = Status::Reused;
+    }
+    desk.worker(event);
+    let text = desk.text();
+    // It is written by another run, and made by the same edit.
+    assert!(text.contains("· run 3") && text.contains("▸3 camera.fov"), "{text}");
+    assert!(!text.contains("render.output"), "{text}");
+    assert_eq!(desk.state.picture.history.len(), 2);
+    desk.press('b');
+    assert!(desk.text().contains("before the last edit, camera.fov 40 → 44  "), "{}", desk.text());
+}
+
+#[test]
 fn a_render_that_goes_on_counts_all_seconds_of_its_samples_and_is_one_picture() {
     let mut desk = Desk::with(state(120, 40));
     save(&mut desk, "a = 1");
@@ -127,6 +156,116 @@ fn a_render_that_goes_on_counts_all_seconds_of_its_samples_and_is_one_picture() 
     assert_eq!(desk.state.picture.history.len(), 1, "{text}");
 }
 
+/// The request under way has a picture, which the terminal gets.
+fn shown(desk: &mut Desk, name: &str, color: [u8; 3], is_finished: bool) {
+    preview(desk, name, color, is_finished);
+    let generation = desk.state.request.generation;
+    desk.event(Event::Shown { generation });
+}
+
+/// The last good scene, which is rendered while the newest is broken, comes to an end.
+fn last_good(desk: &mut Desk, end: LastGoodEnd) {
+    let generation = desk.state.request.generation;
+    desk.worker(protocol::Event::LastGoodEnded { generation, end });
+}
+
+const FINISHED: LastGoodEnd = LastGoodEnd::Finished { unchanged: false };
+
+/// A finished picture, and an edit that a typo follows during its render.
+fn typo_during_a_render() -> Desk {
+    let mut desk = Desk::with(state(120, 40));
+    save(&mut desk, "shininess = 60");
+    desk.finish(RED);
+    save(&mut desk, "shininess = 6");
+    read(&mut desk);
+    shown(&mut desk, "dull", BLUE, false);
+    typo(&mut desk);
+    shown(&mut desk, "dull", GREEN, false);
+    desk
+}
+
+#[test]
+fn the_last_good_scene_is_the_picture_under_way_and_its_end_is_a_run() {
+    let mut desk = typo_during_a_render();
+    let newest = |desk: &mut Desk| {
+        let text = desk.text();
+        assert!(text.contains("▸2 shininess") && text.contains(" 1 first"), "{text}");
+        assert!(!text.contains("unfinished"), "{text}");
+    };
+    newest(&mut desk);
+    last_good(&mut desk, FINISHED);
+    assert_eq!(desk.state.work.renders, 2);
+    // The last picture of the render comes after its end.
+    shown(&mut desk, "dull", BLUE, true);
+    newest(&mut desk);
+    for key in ['n', 'N'] {
+        desk.press(key);
+    }
+    newest(&mut desk);
+    save(&mut desk, "shininess = 6");
+    read(&mut desk);
+    shown(&mut desk, "dull", BLUE, true);
+    end(&mut desk, true, 0.0, 1.0);
+    newest(&mut desk);
+    assert!(desk.text().contains("unchanged · run 2"), "{}", desk.text());
+    save(&mut desk, "shininess = 5");
+    read(&mut desk);
+    shown(&mut desk, "duller", RED, true);
+    end(&mut desk, false, 1.0, 1.0);
+    desk.press('n');
+    assert!(desk.text().contains("picture 2 of 3, 0 s ago"), "{}", desk.text());
+}
+
+#[test]
+fn a_last_good_scene_that_is_stopped_is_unfinished() {
+    let mut desk = typo_during_a_render();
+    last_good(&mut desk, LastGoodEnd::Stopped);
+    assert!(desk.text().contains("▸– unfinished;"), "{}", desk.text());
+    assert_eq!(desk.state.work.renders, 1);
+}
+
+#[test]
+fn what_a_key_changes_of_the_last_good_scene_is_a_picture_with_a_number() {
+    let mut desk = Desk::with(state(120, 40));
+    save(&mut desk, "shininess = 60");
+    read(&mut desk);
+    shown(&mut desk, "bright", RED, true);
+    end(&mut desk, false, 1.0, 1.0);
+    typo(&mut desk);
+    shown(&mut desk, "bright", RED, true);
+    last_good(&mut desk, LastGoodEnd::Finished { unchanged: true });
+    assert_eq!((desk.state.picture.history.len(), desk.state.work.renders), (1, 1));
+    for (run, name, words) in [(2, "hard", "shadows"), (3, "off", "shadows off")] {
+        desk.press('s');
+        desk.fail(vec![diagnostic(Severity::Error, "unknown key `radus`")]);
+        for is_finished in [false, true] {
+            shown(&mut desk, name, [7, run, u8::from(is_finished)], is_finished);
+            assert!(desk.text().contains(&format!("▸{run} {words}")), "{}", desk.text());
+            assert!(desk.text().contains(" 1 first"), "{}", desk.text());
+        }
+        last_good(&mut desk, FINISHED);
+        assert_eq!(desk.state.work.renders, u64::from(run));
+        assert!(desk.text().contains(&format!("▸{run} {words}")), "{}", desk.text());
+    }
+    desk.press('n');
+    assert!(desk.text().contains("picture 2 of 3, 0 s ago"), "{}", desk.text());
+}
+
+#[test]
+fn a_finished_picture_whose_run_is_not_known_is_not_called_unfinished() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    desk.press('s');
+    read(&mut desk);
+    // All samples are there, but the next key comes before the end of the request.
+    shown(&mut desk, "hard", GREEN, true);
+    desk.press('s');
+    desk.finish(BLUE);
+    desk.press('n');
+    let text = desk.text();
+    assert!(text.contains("older picture, 0 s ago") && !text.contains("unfinished"), "{text}");
+}
+
 #[test]
 fn the_number_of_a_picture_is_that_of_its_run() {
     let mut desk = Desk::with(state(120, 40));
@@ -145,6 +284,34 @@ fn the_number_of_a_picture_is_that_of_its_run() {
     assert!(desk.text().contains("unfinished; after shadows hard; n older, N newer"), "{}", desk.text());
     desk.press('n');
     assert!(desk.text().contains("picture 1 of 2, 0 s ago"), "{}", desk.text());
+}
+
+#[test]
+fn the_age_of_a_picture_counts_from_the_time_at_which_it_was_last_improved() {
+    let mut desk = Desk::with(state(120, 40));
+    save(&mut desk, "shininess = 60");
+    read(&mut desk);
+    shown(&mut desk, "bright", RED, false);
+    desk.wait(8000);
+    end(&mut desk, false, 8.0, 8.0);
+    desk.wait(3000);
+    // Shown once more, such as in another size, it is as old as it was.
+    shown(&mut desk, "bright", GREEN, true);
+    save(&mut desk, "shininess = 6");
+    read(&mut desk);
+    shown(&mut desk, "dull", BLUE, false);
+    desk.wait(2000);
+    desk.press('n');
+    assert!(desk.text().contains("picture 1 of 2, 5 s ago"), "{}", desk.text());
+    // So is one whose render was stopped.
+    desk.press('N');
+    shown(&mut desk, "dull", GREEN, false);
+    desk.wait(4000);
+    desk.press('s');
+    desk.wait(1000);
+    desk.finish(RED);
+    desk.press('n');
+    assert!(desk.text().contains("unfinished picture, 5 s ago"), "{}", desk.text());
 }
 
 #[test]

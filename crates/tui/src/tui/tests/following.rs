@@ -155,7 +155,13 @@ impl Watch {
         let generation = desk.state.request.generation;
         desk.worker(protocol::Event::Started { generation });
         let settings = Box::new(settings());
-        desk.worker(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0 });
+        desk.worker(protocol::Event::Settings {
+            generation,
+            settings,
+            camera: camera(),
+            exposure: 0.0,
+            own: own(),
+        });
         let size = desk.state.request.preview_size.expect("previews are asked for");
         let (outbox, slot) = (Rc::<RefCell<Vec<Vec<u8>>>>::default(), PreviewSlot::default());
         let images = match preview {

@@ -4,7 +4,7 @@ use super::{BLUE, RED, cells_of};
 use crate::choice::Choice;
 use crate::math::DVec3;
 use crate::pipeline::protocol::{self, CameraEdit, Command, Spot, Writing};
-use crate::pipeline::settings::{Effective, Overrides, View};
+use crate::pipeline::settings::{Effective, Overrides, OwnSettings, View};
 use crate::scene::description::{Integrator, Pose, Shadows};
 use crate::scene::diagnostic::Severity;
 use crate::tui::action::Action;
@@ -36,30 +36,39 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
     let overrides = |effects: &[Effect]| request(effects).map(|it| it.overrides.clone());
     match action {
         Action::CycleShadows => {
-            for wanted in [Shadows::Hard, Shadows::Off, Shadows::Soft] {
+            // Back at the scene's own value, nothing is overridden.
+            for (wanted, by_key) in [
+                (Shadows::Hard, Some(Shadows::Hard)),
+                (Shadows::Off, Some(Shadows::Off)),
+                (Shadows::Soft, None),
+            ] {
                 let effects = desk.key(key);
-                assert_eq!(overrides(&effects).expect("a request").shadows, Some(wanted));
+                assert_eq!(overrides(&effects).expect("a request").shadows, by_key);
+                assert_eq!(desk.state.request.shadows(), wanted);
             }
         }
         Action::ToggleDepthOfField => {
-            for wanted in [false, true] {
+            for by_key in [Some(false), None] {
                 let effects = desk.key(key);
-                assert_eq!(overrides(&effects).expect("a request").dof, Some(wanted));
+                assert_eq!(overrides(&effects).expect("a request").dof, by_key);
             }
         }
         Action::TogglePhotons => {
-            for wanted in [true, false] {
+            for (wanted, by_key) in [(true, Some(true)), (false, None)] {
                 let effects = desk.key(key);
-                assert_eq!(overrides(&effects).expect("a request").photons, Some(wanted));
+                assert_eq!(overrides(&effects).expect("a request").photons, by_key);
+                assert_eq!(desk.state.request.photons(), wanted);
             }
             desk.press('i');
             assert!(desk.key(key).is_empty(), "path has none");
             assert!(desk.text().contains("path gathers no photons; press i for whitted"), "{}", desk.text());
         }
         Action::CycleIntegrator => {
-            for wanted in [Integrator::Path, Integrator::Whitted] {
+            for (wanted, by_key) in [(Integrator::Path, Some(Integrator::Path)), (Integrator::Whitted, None)]
+            {
                 let effects = desk.key(key);
-                assert_eq!(overrides(&effects).expect("a request").integrator, Some(wanted));
+                assert_eq!(overrides(&effects).expect("a request").integrator, by_key);
+                assert_eq!(desk.state.request.integrator(), wanted);
             }
             desk.key(key);
             assert!(desk.text().contains("path"), "{}", desk.text());
@@ -330,6 +339,7 @@ fn depth_of_field_of_a_pinhole_is_explained() {
         settings: pinhole(),
         camera: camera(),
         exposure: 0.0,
+        own: own(),
     });
     assert!(desk.press('d').is_empty());
     assert!(desk.text().contains("the camera's `aperture` is 0"));
@@ -342,6 +352,7 @@ fn depth_of_field_of_a_pinhole_is_explained() {
         settings: pinhole(),
         camera: camera(),
         exposure: 0.0,
+        own: own(),
     });
     assert_eq!(request(&desk.press('d')).expect("a request").overrides.dof, Some(true));
     desk.worker(protocol::Event::Settings {
@@ -349,6 +360,7 @@ fn depth_of_field_of_a_pinhole_is_explained() {
         settings: pinhole(),
         camera: camera(),
         exposure: 0.0,
+        own: own(),
     });
     assert!(desk.text().contains("the camera's `aperture` is 0"));
 }
@@ -419,4 +431,52 @@ fn a_render_that_is_stopped_is_no_longer_held() {
     desk.press(' ');
     desk.worker(protocol::Event::Cancelled { generation: 1 });
     assert!(!desk.state.work.paused && !desk.text().contains("paused"), "{}", desk.text());
+}
+
+#[test]
+fn a_toggle_that_is_back_where_the_scene_has_it_is_no_change() {
+    for (keys, base) in [
+        ("sss", Overrides::default()),
+        ("sss", Overrides { shadows: Some(Shadows::Hard), ..Overrides::default() }),
+        ("ii", Overrides::default()),
+        ("pp", Overrides::default()),
+        ("dd", Overrides::default()),
+        ("vV", Overrides::default()),
+    ] {
+        let mut desk =
+            Desk::with(state_with(120, 40, PreviewKind::HalfBlock, ColorDepth::TrueColor, base.clone()));
+        desk.finish(RED);
+        let mut requests = Vec::new();
+        for key in keys.chars() {
+            assert_eq!(desk.state.request.overrides() == base, requests.is_empty(), "{keys}");
+            requests.extend(request(&desk.press(key)).cloned());
+        }
+        assert_eq!(requests.last().map(|request| &request.overrides), Some(&base), "{keys}");
+        // It goes on from there, whether its answer has come or not.
+        let first = request(&desk.press(keys.chars().next().expect("a key"))).cloned().expect("a request");
+        assert_eq!(first.overrides, requests[0].overrides, "{keys}");
+    }
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    "sssii".chars().for_each(|key| drop(desk.press(key)));
+    assert!(desk.press('0').is_empty());
+    assert!(desk.text().contains("the keys have changed nothing"), "{}", desk.text());
+}
+
+#[test]
+fn the_scene_has_other_settings_after_a_save() {
+    let mut desk = Desk::with(state(120, 40));
+    desk.finish(RED);
+    desk.press('s');
+    desk.finish(BLUE);
+    // The save is of `hard`, which the keys have as well.
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    let (generation, own) = (desk.state.request.generation, OwnSettings { shadows: Shadows::Hard, ..own() });
+    let settings = Box::new(Effective { shadows: Shadows::Hard, ..settings() });
+    desk.worker(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0, own });
+    let shadows: Vec<Option<Shadows>> = "sss"
+        .chars()
+        .map(|key| request(&desk.press(key)).and_then(|request| request.overrides.shadows))
+        .collect();
+    assert_eq!(shadows, [Some(Shadows::Off), Some(Shadows::Soft), None]);
 }

@@ -27,7 +27,13 @@ fn rendered(desk: &mut Desk, (width, height): (u32, u32)) {
     let generation = desk.state.request.generation;
     desk.worker(protocol::Event::Started { generation });
     let settings = Box::new(Effective { width, height, ..settings() });
-    desk.worker(protocol::Event::Settings { generation, settings, camera: camera(), exposure: 0.0 });
+    desk.worker(protocol::Event::Settings {
+        generation,
+        settings,
+        camera: camera(),
+        exposure: 0.0,
+        own: own(),
+    });
     show(desk, (width, height));
 }
 
@@ -118,6 +124,7 @@ fn a_picture_of_another_shape_is_asked_for_in_its_size_at_once() {
         settings: settings(640),
         camera: camera(),
         exposure: 0.0,
+        own: own(),
     });
     assert!(same.is_empty(), "{same:?}");
     let wide = desk.worker(protocol::Event::Settings {
@@ -125,6 +132,7 @@ fn a_picture_of_another_shape_is_asked_for_in_its_size_at_once() {
         settings: settings(1200),
         camera: camera(),
         exposure: 0.0,
+        own: own(),
     });
     assert!(
         matches!(wide[..], [Effect::Send(Command::Preview(Some(PreviewSize { width: 80, .. })))]),
@@ -254,7 +262,13 @@ fn hints_wrap_at_the_width_of_the_panel() {
         let mut desk = Desk::with(state(columns, rows));
         desk.finish(RED);
         let settings = Box::new(Effective { width, height: 480, ..settings() });
-        desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
+        desk.worker(protocol::Event::Settings {
+            generation: 1,
+            settings,
+            camera: camera(),
+            exposure: 0.0,
+            own: own(),
+        });
         let panel = Layout::of(&desk.state).panel;
         let hint = "save cornell.toml to render again";
         assert_eq!(

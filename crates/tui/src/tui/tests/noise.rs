@@ -32,7 +32,13 @@ fn the_total_of_samples_is_a_guess_while_noise_decides_it() {
     let mut desk = Desk::new();
     desk.worker(protocol::Event::Started { generation: 1 });
     let settings = Box::new(crate::pipeline::settings::Effective { error: 0.02, ..settings() });
-    desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
+    desk.worker(protocol::Event::Settings {
+        generation: 1,
+        settings,
+        camera: camera(),
+        exposure: 0.0,
+        own: own(),
+    });
     desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
     assert!(desk.text().contains("32 of about 64 samples"), "{}", desk.text());
 }

@@ -3,7 +3,7 @@
 use crossterm::event::KeyCode;
 
 use super::{BLUE, RED};
-use crate::pipeline::protocol::{Command, Event as WorkerEvent, Picked};
+use crate::pipeline::protocol::{Command, Event as WorkerEvent, Kept, Picked};
 use crate::tui::Changed;
 use crate::tui::event::{Effect, Event, KeyPress, Mouse, MouseKind};
 use crate::tui::fixtures::*;
@@ -69,6 +69,23 @@ fn the_image_that_w_writes_meanwhile_is_the_newest_and_is_called_so() {
     desk.worker(WorkerEvent::WriteDone { generation, paths: vec!["ow.png".into()] });
     let words = "wrote ow.png: the newest picture, not the one that is shown";
     assert!(desk.text().contains(words), "{}", desk.text());
+}
+
+#[test]
+fn the_camera_that_c_writes_meanwhile_is_that_of_the_newest_and_is_called_so() {
+    for is_own in [true, false] {
+        let mut desk = older();
+        desk.press('b');
+        desk.press('h');
+        desk.finish(RED);
+        desk.press('n');
+        assert!(!desk.press('c').is_empty());
+        let kept = Kept { path: "a.toml".into(), is_new: true, is_own, of_model: false, edit: None };
+        let generation = desk.state.request.generation;
+        desk.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
+        let words = "that of the newest picture, not of the one that was shown";
+        assert!(desk.text().contains(words), "{}", desk.text());
+    }
 }
 
 #[test]

@@ -209,7 +209,13 @@ fn nothing_of_the_panel_is_cut_off_below_the_list_of_views() {
     let mut desk = Desk::with(state(120, 40));
     desk.finish(RED);
     let settings = Box::new(Effective { width: 480, height: 480, ..settings() });
-    desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
+    desk.worker(protocol::Event::Settings {
+        generation: 1,
+        settings,
+        camera: camera(),
+        exposure: 0.0,
+        own: own(),
+    });
     desk.press('v');
     let generation = desk.state.request.generation;
     desk.worker(protocol::Event::Started { generation });
@@ -312,7 +318,13 @@ fn errors_lie_beside_the_picture_where_there_is_room() {
         let mut desk = Desk::with(state(columns, rows));
         desk.finish(RED);
         let settings = Box::new(Effective { width, height: 480, ..settings() });
-        desk.worker(protocol::Event::Settings { generation: 1, settings, camera: camera(), exposure: 0.0 });
+        desk.worker(protocol::Event::Settings {
+            generation: 1,
+            settings,
+            camera: camera(),
+            exposure: 0.0,
+            own: own(),
+        });
         let before = cells_of(&mut desk, RED);
         desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
         assert!(desk.text().contains("error: unknown key `heigth`"), "{}", desk.text());

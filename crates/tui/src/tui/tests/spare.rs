@@ -26,6 +26,7 @@ fn rendered(desk: &mut Desk, error: f32) {
         settings: settings.clone(),
         camera: camera(),
         exposure: 0.0,
+        own: own(),
     });
     let picture = plain_picture(90, 68, RED);
     desk.event(Event::Picture {
@@ -149,7 +150,7 @@ fn begun(desk: &mut Desk, text: &str, color: Option<[u8; 3]>) {
     desk.worker(protocol::Event::Started { generation });
     desk.worker(protocol::Event::Text { generation, text: text.into() });
     let (settings, camera) = (Box::new(settings()), camera());
-    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0 });
+    desk.worker(protocol::Event::Settings { generation, settings, camera, exposure: 0.0, own: own() });
     color.into_iter().for_each(|color| show(desk, color));
 }
 
@@ -190,6 +191,57 @@ fn the_picture_does_not_wait_for_its_entry_in_the_strip() {
     desk.event(Event::Shown { generation });
     assert_eq!(desk.state.picture.history.len(), before + 1);
     assert!(desk.state.dirty, "the strip has a new entry");
+}
+
+/// Colour of the newest entry's small picture.
+fn small_color(desk: &Desk) -> [u8; 3] {
+    let history = &desk.state.picture.history;
+    history.small(history.len() - 1).expect("a small picture").pixels[0]
+}
+
+#[test]
+fn the_entry_gets_the_picture_that_comes_after_the_end() {
+    let mut desk = Desk::with(state(120, 40));
+    edited(&mut desk, &[("camera.fov = 40", RED)]);
+    begun(&mut desk, "camera.fov = 30", Some([0, 0, 0]));
+    let generation = desk.state.request.generation;
+    // The last picture is taken from its slot when the line has room for it.
+    desk.worker(done(generation, Vec::new(), false));
+    desk.screen();
+    show(&mut desk, BLUE);
+    assert_eq!(small_color(&desk), BLUE);
+    assert!(desk.state.dirty, "the strip is drawn again");
+    assert!(panel(&mut desk).contains("▸2 camera.fov 40 → 30"), "{}", desk.text());
+    assert_eq!(desk.state.picture.history.len(), 2);
+    // Nothing is drawn for a picture that is shown already.
+    desk.event(Event::Shown { generation });
+    assert!(!desk.state.dirty);
+}
+
+#[test]
+fn the_entry_gets_the_picture_that_comes_after_the_end_while_an_older_one_is_looked_at() {
+    let mut desk = Desk::with(state(120, 40));
+    edited(&mut desk, &[("camera.fov = 40", RED)]);
+    begun(&mut desk, "camera.fov = 30", Some([0, 0, 0]));
+    let generation = desk.state.request.generation;
+    desk.press('n');
+    desk.worker(done(generation, Vec::new(), false));
+    desk.screen();
+    show(&mut desk, BLUE);
+    assert_eq!(small_color(&desk), BLUE);
+    assert!(desk.state.dirty, "the strip is drawn again");
+}
+
+#[test]
+fn pixels_one_to_one_are_no_small_picture() {
+    let mut desk = Desk::with(state(120, 40));
+    edited(&mut desk, &[("camera.fov = 40", RED), ("camera.fov = 30", BLUE)]);
+    let (generation, picture) = (desk.state.request.generation, plain_picture(50, 38, RED));
+    let section = Some(protocol::Section { left: 0.4, top: 0.4, width: 0.2, height: 0.2 });
+    let (range, lacks_photons, source) = (None, false, None);
+    desk.event(Event::Picture { generation, picture, range, section, lacks_photons, source });
+    desk.event(Event::Shown { generation });
+    assert_eq!(small_color(&desk), BLUE);
 }
 
 #[test]

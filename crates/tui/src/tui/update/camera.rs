@@ -120,6 +120,15 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
     if !state.request.toggles.camera.is_any() && !is_set && !is_mesh(&state.request.scene) {
         return notify(state, "the camera is where the scene has it: there is nothing to write");
     }
+    let saved = state.request.saved_since_moved();
+    // A model has no file in which a camera is saved.
+    if !saved.is_empty() && !is_mesh(&state.request.scene) {
+        // The person knows of it from here on.
+        state.request.move_from_own();
+        let saved = saved.join(", ");
+        let why = "was saved since the keys moved the camera: press c again to write over it";
+        return notify(state, &format!("error: {saved} {why}"));
+    }
     vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
 }
 
@@ -137,11 +146,13 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         (state.saving.has_scene_of_model, state.saving.camera_of_model) = (true, state.request.viewpoint());
     }
     let name = visible(&path.to_string_lossy()).into_owned();
+    let is_older = state.picture.history.is_open();
+    let which = if is_older { ": that of the newest picture, not of the one that was shown" } else { "" };
     let words = match (is_new, is_own) {
-        _ if of_model => format!("wrote {name}, a scene of this model with this camera"),
-        (true, true) => format!("the camera is in {name} now; u undoes c"),
-        (true, false) => format!("the camera is in {name}; in this call --set comes first"),
-        (false, _) => format!("{name} has this camera already"),
+        _ if of_model => format!("wrote {name}, a scene of this model with this camera{which}"),
+        (true, true) => format!("the camera is in {name} now{which}; u undoes c"),
+        (true, false) => format!("the camera is in {name}{which}; in this call --set comes first"),
+        (false, _) => format!("{name} has this camera already{which}"),
     };
     state.saving.camera_edits.extend(edit);
     let mut effects = Vec::new();

@@ -1,31 +1,35 @@
 //! Pictures of before: the last ones, older and newer, and the one from before the last edit.
 
+use std::sync::Arc;
+
 use super::say::{notify, say};
 use crate::tui::event::Effect;
-use crate::tui::state::{Activity, State};
+use crate::tui::state::{Rendering, State};
 
 const NEWEST: &str = "this is the newest picture";
 
 /// The picture that stands goes to those of before.
 pub(super) fn record(state: &mut State) {
-    let newest = if state.picture.history.is_open() {
-        state.picture.history.newest()
-    } else {
-        state.picture.shown.clone()
-    };
-    if let Some(shown) = newest.filter(|shown| shown.generation == state.request.generation) {
-        let origin = state.request.origin(state.work.activity != Activity::Done && !shown.is_finished());
+    if let Some(shown) = newest(state).filter(|shown| shown.generation == state.request.generation) {
+        let is_finished = state.work.rendering == Rendering::Finished || shown.is_finished();
+        let origin = state.request.origin(!is_finished);
         state.picture.history.record(shown, state.now, origin);
     }
 }
 
-/// The picture of a render that is under way is the newest one.
-pub(super) fn record_under_way(state: &mut State) {
-    if state.work.is_running() {
-        let before = state.picture.history.len();
-        record(state);
-        state.dirty |= state.picture.history.len() != before;
+/// Records a picture of the newest request that was shown, or that waits behind an older one. The last one often comes after the
+/// end of its render. Pixels 1:1 of a finished picture do not take its place.
+pub(super) fn record_newest(state: &mut State) {
+    let is_over = !state.work.is_under_way();
+    if is_over && newest(state).is_some_and(|shown| shown.section.is_some()) {
+        return;
     }
+    let (count, last) = (state.picture.history.len(), state.picture.history.last_picture().cloned());
+    record(state);
+    let history = &state.picture.history;
+    let is_new = history.len() != count;
+    let is_other = history.last_picture().zip(last).is_some_and(|(now, before)| !Arc::ptr_eq(now, &before));
+    state.dirty |= is_new || is_over && is_other;
 }
 
 /// Goes so many pictures back; negative: forward.

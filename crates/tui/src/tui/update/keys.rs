@@ -94,10 +94,16 @@ fn change(state: &mut State, how: impl FnOnce(&mut State)) -> Vec<Effect> {
     Vec::new()
 }
 
+/// Whether a setting differs from the one without keys.
+fn is_change<T: PartialEq>(next: &T, base: Option<T>) -> bool {
+    base.is_none_or(|base| *next != base)
+}
+
 fn cycle_integrator(state: &mut State) -> Vec<Effect> {
     let (all, own) = (Integrator::ALL, state.request.integrator());
     let next = all.iter().skip_while(|one| **one != own).nth(1).or(all.first());
-    state.request.toggles.integrator = next.copied();
+    state.request.toggles.integrator =
+        next.copied().filter(|next| is_change(next, state.request.base_integrator()));
     render(state, false)
 }
 
@@ -120,7 +126,7 @@ fn cycle_shadows(state: &mut State) -> Vec<Effect> {
         Shadows::Hard => Shadows::Off,
         Shadows::Off => Shadows::Soft,
     };
-    state.request.toggles.shadows = Some(next);
+    state.request.toggles.shadows = Some(next).filter(|next| is_change(next, state.request.base_shadows()));
     render(state, false)
 }
 
@@ -134,7 +140,9 @@ fn toggle_depth_of_field(state: &mut State) -> Vec<Effect> {
         }
         Some(_) => {}
     }
-    state.request.toggles.dof = Some(switched_off);
+    // Where nothing switches it off, the lens decides.
+    let base = state.request.command_line.dof.or(Some(true));
+    state.request.toggles.dof = Some(switched_off).filter(|next| is_change(next, base));
     render(state, false)
 }
 
@@ -142,7 +150,8 @@ fn toggle_photons(state: &mut State) -> Vec<Effect> {
     if let Some(refused) = refused(state, |method| method.gathers, "gathers no photons") {
         return notify(state, &refused);
     }
-    state.request.toggles.photons = Some(!state.request.photons());
+    let next = !state.request.photons();
+    state.request.toggles.photons = Some(next).filter(|next| is_change(next, state.request.base_photons()));
     render(state, false)
 }
 

@@ -95,7 +95,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Signal(signal) => vec![signalled(signal)],
         Event::Shown { generation } => {
             // The picture does not wait for its entry in the strip.
-            history::record_under_way(state);
+            history::record_newest(state);
             shown(state, generation)
         }
         Event::Tick => tick(state),
@@ -121,7 +121,7 @@ fn show(state: &mut State, shown: Shown) -> Vec<Effect> {
         && state.display.kind != PreviewKind::None
     {
         if state.picture.history.holds_back(&shown) {
-            history::record_under_way(state);
+            history::record_newest(state);
             return Vec::new();
         }
         state.urgent |= state.picture.shown.as_ref().is_none_or(|last| last.generation != shown.generation);

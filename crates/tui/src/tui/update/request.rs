@@ -3,7 +3,7 @@
 use super::history;
 use crate::pipeline::protocol::{Command, Request, Writing};
 use crate::tui::event::Effect;
-use crate::tui::state::{Activity, CameraStep, State, Toggles};
+use crate::tui::state::{Activity, CameraStep, Rendering, State, Toggles};
 use crate::tui::view::layout::Layout;
 
 /// A new request with the settings that hold now. The table of stages stays until the worker takes it up.
@@ -26,6 +26,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
     let is_moved = state.request.toggles.camera.is_any();
     state.request.moved_since =
         is_moved.then_some(state.request.moved_since.unwrap_or(state.request.generation));
+    state.request.note_moved_parts();
     state.request.preview_size = Layout::preview_size(state);
     state.request.resize_due = None;
     state.request.camera_step = CameraStep::default();
@@ -49,6 +50,7 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
         effects.push(Effect::Send(Command::Pause(false)));
     }
     state.work.activity = Activity::Running { since: state.now };
+    state.work.rendering = Rendering::UnderWay;
     effects.push(Effect::Send(Command::Render(Box::new(request))));
     effects
 }

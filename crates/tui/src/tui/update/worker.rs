@@ -7,7 +7,7 @@ use super::request::resized_preview;
 use super::say::say;
 use super::{camera, history, pointer};
 use crate::pipeline::protocol::{
-    AssetProgress, CheckpointNews, Event, Failure, Report, Stage, StageReport, Status,
+    AssetProgress, CheckpointNews, Event, Failure, LastGoodEnd, Report, Stage, StageReport, Status,
 };
 use crate::scene::MOST_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -16,7 +16,7 @@ use crate::tui::chrome;
 use crate::tui::event::{Effect, Unwritten, Written};
 use crate::tui::exit_summary;
 use crate::tui::noise_curve::NoiseCurve;
-use crate::tui::state::{Activity, AssetBar, Pane, Problems, State};
+use crate::tui::state::{Activity, AssetBar, Pane, Problems, Rendering, State};
 
 /// Why a picture that is not on disk is not there.
 const UNWRITTEN: &str = "not written: e says why";
@@ -54,7 +54,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Started { .. } => started(state),
         Event::Stage { stage, .. } => record(state, stage),
         Event::Asset { progress, .. } => asset(state, progress),
-        Event::Settings { settings, camera, exposure, .. } => {
+        Event::Settings { settings, camera, exposure, own, .. } => {
+            state.request.own = Some(own);
             (state.request.camera, state.request.exposure) = (Some(camera), Some(exposure));
             let pinhole = state.request.overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
@@ -128,8 +129,9 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             failed(state, failure);
             return notice(state, time);
         }
+        Event::LastGoodEnded { end, .. } => last_good_ended(state, end),
         Event::Cancelled { .. } => {
-            state.work.activity = Activity::Cancelled;
+            (state.work.activity, state.work.rendering) = (Activity::Cancelled, Rendering::Stopped);
             state.set_paused(false);
             state.work.assets.clear();
         }
@@ -162,6 +164,7 @@ fn generation(event: &Event) -> u64 {
         | Event::Checkpoint { generation, .. }
         | Event::WritePostponed { generation }
         | Event::WriteDone { generation, .. }
+        | Event::LastGoodEnded { generation, .. }
         | Event::Text { generation, .. }
         | Event::Files { generation, .. }
         | Event::CameraKept { generation, .. }
@@ -278,7 +281,7 @@ fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, u
         record(state, stage.clone());
     }
     state.request.effective = Some(report.settings.clone());
-    state.work.activity = Activity::Done;
+    (state.work.activity, state.work.rendering) = (Activity::Done, Rendering::Finished);
     state.set_paused(false);
     state.work.assets.clear();
     // The picture of this request is on disk: none is missing any more.
@@ -363,8 +366,10 @@ fn failed(state: &mut State, failure: Failure) {
     state.set_paused(false);
     state.work.assets.clear();
     state.saving.change = None;
-    if matches!(failure, Failure::Scene(_)) {
-        state.picture.history.broken();
+    match failure {
+        // The last good scene is rendered.
+        Failure::Scene(_) => state.picture.history.broken(),
+        Failure::Work(_) => state.work.rendering = Rendering::Stopped,
     }
     match failure {
         Failure::Scene(diagnostics) if !state.saving.is_settled => {
@@ -373,6 +378,18 @@ fn failed(state: &mut State, failure: Failure) {
         }
         Failure::Scene(diagnostics) => broken(state, Problems { diagnostics, work: None }),
         Failure::Work(message) => broken(state, Problems { diagnostics: Vec::new(), work: Some(message) }),
+    }
+}
+
+/// The render of the last good scene, whose picture is the newest while the file is broken, has ended.
+fn last_good_ended(state: &mut State, end: LastGoodEnd) {
+    match end {
+        LastGoodEnd::Finished { unchanged } => {
+            state.work.rendering = Rendering::Finished;
+            history::record(state);
+            count(state, unchanged);
+        }
+        LastGoodEnd::Stopped => state.work.rendering = Rendering::Stopped,
     }
 }
 

@@ -144,17 +144,21 @@ fn close_up(state: &State) -> String {
 /// Progress or result, in full and in short.
 fn figures(state: &State) -> Vec<String> {
     if let Some((run, time)) = state.picture.history.place() {
+        let is_unfinished = state.picture.history.origin_of_open().is_some_and(|origin| origin.is_unfinished);
         let (place, words) = match run {
             Some(run) => {
                 let place = format!("{run} of {}", last_run(state));
                 (place.clone(), format!("picture {place}"))
             }
-            None => ("unfinished".to_owned(), "unfinished picture".to_owned()),
+            None => {
+                let place = if is_unfinished { "unfinished" } else { "older" };
+                (place.to_owned(), format!("{place} picture"))
+            }
         };
         let age = ago(state.now.saturating_duration_since(time));
         let mut figures = vec![format!("{words}, {age}"), place.clone()];
         // The newest one is at work meanwhile.
-        if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_running()) {
+        if let Some(progress) = state.work.progress.as_ref().filter(|_| state.work.is_under_way()) {
             let done = format!("newest {} %", percent(progress.fraction));
             let eta = eta(state, progress);
             figures = [
@@ -195,7 +199,7 @@ fn figures(state: &State) -> Vec<String> {
 fn last_run(state: &State) -> u64 {
     let history = &state.picture.history;
     let is_under_way =
-        state.work.is_running() && history.is_newest(state.request.generation) && history.awaits_run();
+        state.work.is_under_way() && history.is_newest(state.request.generation) && history.awaits_run();
     state.work.renders + u64::from(is_under_way)
 }
 

@@ -82,7 +82,7 @@ fn number(state: &State, index: usize) -> String {
 
 /// Whether the render of a picture goes on.
 fn is_under_way(state: &State, index: usize) -> bool {
-    state.work.is_running() && state.picture.history.is_of(index, state.request.generation)
+    state.work.is_under_way() && state.picture.history.is_of(index, state.request.generation)
 }
 
 /// Columns of a picture of this height, so that words have room beside it.

@@ -21,17 +21,20 @@ enum Form {
     New,
     /// The last two names of the key, with its new value.
     Short,
-    /// The same of the first change alone.
-    First,
-    /// The same with the key in one line.
+    /// The same of so many changes.
+    First(usize),
+    /// The first change, with the key in one line.
     Cut,
 }
 
 /// Lines of a width: in the first number of rows if that is enough, else in the second. The last line has what is too much.
 pub(super) fn fitting(words: &Words, width: usize, rows: [usize; 2]) -> Vec<String> {
     let [few, most] = rows;
-    let in_few = [Form::Full, Form::New, Form::Short].map(|form| (form, few));
-    let in_most = [Form::Full, Form::New, Form::Short, Form::First, Form::Cut].map(|form| (form, most));
+    let all = [Form::Full, Form::New, Form::Short];
+    let count = words.changes.iter().map(|change| apart(change).len()).sum();
+    let fewer = (1..count).rev().map(Form::First).chain([Form::Cut]);
+    let in_few = all.map(|form| (form, few));
+    let in_most = all.into_iter().chain(fewer).map(|form| (form, most));
     let lines = |form| filled(&words.head, &pieces(words, form, width), width);
     let is_lone =
         |lines: &[String]| lines.first().is_some_and(|line| line.trim_end() == words.head.trim_end());
@@ -53,7 +56,8 @@ fn pieces(words: &Words, form: Form, width: usize) -> Vec<String> {
     let changes: Vec<&str> = words.changes.iter().flat_map(|change| apart(change)).collect();
     let told = match form {
         Form::Full | Form::New | Form::Short => changes.len(),
-        Form::First | Form::Cut => 1,
+        Form::First(told) => told,
+        Form::Cut => 1,
     };
     let mut pieces = Vec::new();
     for (number, change) in (1..).zip(changes.iter().take(told)) {
@@ -78,7 +82,7 @@ fn of_change(change: &str, form: Form, beside_head: usize) -> Vec<String> {
     match form {
         Form::Full => vec![key.to_owned(), old.to_owned(), new],
         Form::New => vec![key.to_owned(), new],
-        Form::Short | Form::First => vec![last_names(key).to_owned(), new],
+        Form::Short | Form::First(_) => vec![last_names(key).to_owned(), new],
         Form::Cut => vec![shortened(last_names(key), u16::try_from(beside_head).unwrap_or(u16::MAX)), new],
     }
 }
@@ -180,5 +184,25 @@ mod tests {
         assert_eq!(lines("▸4", &changes, 14), ["▸4 camera.fov", "→ 30 …"]);
         let moved = "camera.position [0, 0, 4] → [0, 0, 3.8], camera.focus 4.0 → 3.8";
         assert_eq!(lines("▸3", &[moved], 14), ["▸3 camera.", "position", "→ [0, 0, 3.8]", "…"]);
+    }
+
+    #[test]
+    fn as_many_changes_are_told_as_there_is_room_for() {
+        let changes = "camera.fov 40 → 25.0, render.samples 64 → 16";
+        assert_eq!(lines(" –", &["unfinished", changes], 14), [" – unfinished;", "camera.fov", "→ 25.0 …"]);
+        let six = "+ render.shadows = \"off\", camera.position [0, 1, 4] → [-0.3773, 0.9512, 3.5904], \
+            camera.fov 40 → 25 and 3 more";
+        let [few, most] = [24, 26].map(|width| lines("10", &[six], width));
+        assert_eq!(
+            few,
+            ["10 + render.shadows =", "\"off\"; camera.position →", "[-0.3773, 0.9512,", "3.5904] …"]
+        );
+        let all = [
+            "10 + render.shadows =",
+            "\"off\"; camera.position →",
+            "[-0.3773, 0.9512, 3.5904];",
+            "camera.fov → 25 and 3 more",
+        ];
+        assert_eq!(most, all);
     }
 }
