@@ -65,6 +65,7 @@ pub(crate) fn render(
             | Event::Checkpoint { .. }
             | Event::WritePostponed { .. }
             | Event::WriteDone { .. }
+            | Event::LastGoodEnded { .. }
             | Event::Text { .. }
             | Event::Warnings { .. }
             | Event::Refused { .. }
