@@ -624,7 +624,7 @@ fn rough_glass_is_warned_of_where_light_goes_straight_through_it() {
         let ball = format!(
             "render = {{ integrator = \"path\" }}\ncamera = {{ position = [0, 1, 4], look_at = [0, 0, 0] }}\n\
              [materials.g]\ntype = \"glass\"\nior = {ior}\nroughness = 0.5\n[[sphere]]\nmaterial = \"g\"\n\
-             radius = 1\n[[light]]\nposition = [0, 3, 0]\n"
+             center = [0, 0, 0]\nradius = 1\n[[light]]\nposition = [0, 3, 0]\n"
         );
         desk.write("ball.toml", ball);
         let stderr = String::from_utf8(desk.run("check ball.toml").stderr).expect("UTF-8");
