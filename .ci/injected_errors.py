@@ -247,7 +247,7 @@ FAULTS = [
     ("a share by the wrong slope", "materials/rough/frosted/row.rs", "light.cosine * ⟦(eye.cosine + eye.slope)⟧",
      "(eye.cosine + light.slope)", ROUGH_GLASS + "one_vertex_for_both_sides_goes_on_as_two_do"),
     ("edges of a box taken for its faces", "geometry/cuboid.rs", "⟦are_far.into_iter().filter(|&is_far| is_far).count() == 2⟧",
-     "true", "world::isolated_tests::what_is_isolated_is_what_a_search_finds_nothing_at"),
+     "true", "world::isolated::tests::what_is_isolated_is_what_a_search_finds_nothing_at"),
     ("both sides of glass go on", "materials/rough/frosted/row.rs", "if ⟦is_mirrored == THROUGH⟧ { useless }", "false",
      ROUGH_GLASS + "a_path_goes_on_at_exactly_one_side"),
     ("Fresnel's reflectance of glass dropped", "materials/rough/frosted/row.rs",
