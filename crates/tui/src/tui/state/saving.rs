@@ -30,6 +30,8 @@ pub(in crate::tui) struct SavingState {
     pub first_change: Option<Duration>,
     /// Time at which glimt wrote the camera into the scene file.
     pub camera_kept: Option<Instant>,
+    /// Whether an older picture was shown when a key last asked for that.
+    pub is_camera_of_newest: bool,
     /// Cameras that glimt wrote into the scene file and can take back, the last one at the end.
     pub camera_edits: Vec<CameraEdit>,
     /// Whether there is a scene beside the model that is shown: `c` does not write over it.
@@ -59,6 +61,7 @@ impl SavingState {
             editor_closed: None,
             first_change: None,
             camera_kept: None,
+            is_camera_of_newest: false,
             camera_edits: Vec::new(),
             has_scene_of_model: false,
             camera_of_model: None,

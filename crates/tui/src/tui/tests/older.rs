@@ -73,13 +73,17 @@ fn the_image_that_w_writes_meanwhile_is_the_newest_and_is_called_so() {
 
 #[test]
 fn the_camera_that_c_writes_meanwhile_is_that_of_the_newest_and_is_called_so() {
-    for is_own in [true, false] {
+    // The save is often noticed before the answer comes, and leads to the newest picture.
+    for (is_own, is_noticed) in [(true, false), (false, false), (true, true)] {
         let mut desk = older();
         desk.press('b');
         desk.press('h');
         desk.finish(RED);
         desk.press('n');
         assert!(!desk.press('c').is_empty());
+        if is_noticed {
+            desk.event(Event::Changed(crate::tui::Changed { noticed: desk.now }));
+        }
         let kept = Kept { path: "a.toml".into(), is_new: true, is_own, of_model: false, edit: None };
         let generation = desk.state.request.generation;
         desk.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });

@@ -129,6 +129,7 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
         let why = "was saved since the keys moved the camera: press c again to write over it";
         return notify(state, &format!("error: {saved} {why}"));
     }
+    state.saving.is_camera_of_newest = state.picture.history.is_open();
     vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
 }
 
@@ -146,8 +147,11 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         (state.saving.has_scene_of_model, state.saving.camera_of_model) = (true, state.request.viewpoint());
     }
     let name = visible(&path.to_string_lossy()).into_owned();
-    let is_older = state.picture.history.is_open();
-    let which = if is_older { ": that of the newest picture, not of the one that was shown" } else { "" };
+    let which = if state.saving.is_camera_of_newest {
+        ": that of the newest picture, not of the one that was shown"
+    } else {
+        ""
+    };
     let words = match (is_new, is_own) {
         _ if of_model => format!("wrote {name}, a scene of this model with this camera{which}"),
         (true, true) => format!("the camera is in {name} now{which}; u undoes c"),
