@@ -41,12 +41,13 @@ pub fn linear_to_srgb8(linear: f32) -> u8 {
 }
 
 /// An sRGB byte triple as a linear colour.
+#[inline]
 pub fn srgb8_to_linear(bytes: [u8; 3]) -> Vec3 {
-    Vec3::from_array(bytes.map(|byte| LINEAR_OF_BYTE[usize::from(byte)]))
+    Vec3::from_array(bytes.map(|byte| LINEAR_OF_SRGB8[usize::from(byte)]))
 }
 
 /// [`srgb_to_linear`] of each byte.
-static LINEAR_OF_BYTE: LazyLock<[f32; 256]> =
+pub static LINEAR_OF_SRGB8: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
 
 #[cfg(test)]

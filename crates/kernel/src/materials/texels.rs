@@ -1,14 +1,8 @@
 //! Texels of an image, stored as compactly as in its file.
 
-use std::sync::LazyLock;
-
-use crate::math::color::srgb_to_linear;
+use crate::math::color::{LINEAR_OF_SRGB8, srgb8_to_linear};
 use crate::math::lanes::{LANES, Lanes3, set_lane};
 use crate::math::{DVec3, Vec3};
-
-/// Table that decodes every sRGB byte.
-static SRGB: LazyLock<[f32; 256]> =
-    LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
 
 /// An image in memory, rows from top to bottom, RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +39,7 @@ impl Texels {
     #[inline]
     pub fn at(&self, place: usize) -> Vec3 {
         match &self.data {
-            TexelData::Srgb8(bytes) => of_srgb(bytes[place]),
+            TexelData::Srgb8(bytes) => srgb8_to_linear(bytes[place]),
             TexelData::Linear8(bytes) => of_linear(bytes[place]),
             TexelData::Float(floats) => floats[place],
         }
@@ -57,7 +51,7 @@ impl Texels {
     pub fn fill_row(&self, places: &[usize; LANES], values: &mut Lanes3) {
         match &self.data {
             TexelData::Srgb8(bytes) => {
-                let table = &*SRGB;
+                let table = &*LINEAR_OF_SRGB8;
                 for i in 0..LANES {
                     let [r, g, b] = bytes[places[i]];
                     let decoded = |byte: u8| table[usize::from(byte)];
@@ -80,7 +74,7 @@ impl Texels {
     /// Linear values of all texels.
     pub fn into_linear(self) -> Vec<Vec3> {
         match self.data {
-            TexelData::Srgb8(bytes) => bytes.into_iter().map(of_srgb).collect(),
+            TexelData::Srgb8(bytes) => bytes.into_iter().map(srgb8_to_linear).collect(),
             TexelData::Linear8(bytes) => bytes.into_iter().map(of_linear).collect(),
             TexelData::Float(floats) => floats,
         }
@@ -138,10 +132,6 @@ impl Texels {
             TexelData::Float(floats) => size_of_val(floats.as_slice()),
         }
     }
-}
-
-fn of_srgb(bytes: [u8; 3]) -> Vec3 {
-    Vec3::from_array(bytes.map(|byte| SRGB[usize::from(byte)]))
 }
 
 #[inline(always)]

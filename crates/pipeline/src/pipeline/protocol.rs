@@ -262,7 +262,7 @@ pub enum Event {
     LastGoodEnded {
         /// Number of the request.
         generation: u64,
-        /// How it ended.
+        /// End of the render.
         end: LastGoodEnd,
     },
     /// The request was stopped by a newer one or by [`Command::Cancel`].

@@ -64,7 +64,7 @@ pub struct PrincipledRow<const THROUGH: bool> {
     transmits: bool,
 }
 
-/// What depends on the direction to the viewer.
+/// Values that depend on the direction to the viewer.
 struct Seen {
     /// [`PrincipledRow::left`].
     left: Vec3,
