@@ -6,6 +6,7 @@
 #![allow(unsafe_code, clippy::panic)]
 
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
+use std::mem::ManuallyDrop;
 use std::path::Path;
 use std::ptr::{null, null_mut};
 use std::sync::atomic::{AtomicIsize, Ordering};
@@ -90,7 +91,8 @@ struct Queries {
 
 /// A loaded library.
 pub struct Embree {
-    library: Library,
+    /// Never unloaded: its threads outlive its devices.
+    library: ManuallyDrop<Library>,
     queries: Queries,
 }
 
@@ -124,7 +126,7 @@ impl Embree {
                 intersect16: *library.get(b"rtcIntersect16")?,
             }
         };
-        Ok(Self { library, queries })
+        Ok(Self { library: ManuallyDrop::new(library), queries })
     }
 
     /// A function of the interface.

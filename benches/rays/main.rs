@@ -8,6 +8,7 @@
 //! - `--instructions NAME` traverses by these instructions alone.
 //! - `--high` cuts large triangles first, `Quality::High`, also in Embree.
 //! - `--build` builds and traces nothing.
+//! - `--closest FILE`, `--any FILE` time rays of a file too: nearest hits of the rays, or whether they hit anything.
 //! - `--rays FILE --hits FILE` (or `--occluded FILE`), any number of times, counts differences from given answers.
 //!
 //! Runs of glimt and of Embree alternate chunk by chunk, and each chunk counts by its fastest run. Other load on the
@@ -43,6 +44,8 @@ struct Asked {
     isa: Option<String>,
     build_only: bool,
     high: bool,
+    /// Files of rays to be timed, and whether any hit ends them.
+    timed: Vec<(PathBuf, bool)>,
     /// Files of rays, each with its answers.
     given: Vec<(PathBuf, PathBuf)>,
     files: Vec<String>,
@@ -87,6 +90,9 @@ fn asked() -> Asked {
             }
             "--high" => asked.high = true,
             "--build" => asked.build_only = true,
+            "--closest" | "--any" => {
+                asked.timed.extend(arguments.next().map(|file| (PathBuf::from(file), argument == "--any")));
+            }
             "--rays" => rays = arguments.next().map(PathBuf::from),
             "--hits" | "--occluded" => {
                 asked.given.extend(rays.take().zip(arguments.next().map(PathBuf::from)));
@@ -162,12 +168,55 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
         any("shadow", &tree, scene.as_ref(), &rays.shadow);
         packets(&tree, scene.as_ref(), &rays);
         all_threads(&tree, &rays, threads);
+        for (file, any_hit) in &asked.timed {
+            match meshes::ray_file(file) {
+                Ok(rays) => timed(&tree, scene.as_ref(), &rays, *any_hit),
+                Err(error) => println!("  {}: {error}", file.display()),
+            }
+        }
         for (rays, answers) in &asked.given {
             if let Err(error) = compare::compare(&tree, mesh, rays, answers) {
                 println!("  {}: {error}", rays.display());
             }
         }
     }
+}
+
+/// Seconds of rays from a file, by one thread: one by one, and sixteen at a time in the file's order. Of Embree's ways, the fastest.
+fn timed(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray], any_hit: bool) {
+    let seconds = |rate: f64| rays.len() as f64 / 1e6 / rate;
+    let mut single = |rays: &[Ray]| match any_hit {
+        true => rays.iter().filter(|ray| tree.any(ray, None)).count(),
+        false => rays.iter().filter(|ray| tree.closest(ray).is_some()).count(),
+    };
+    let mut packets = |rays: &[Ray]| {
+        let mut hits = [None; PACKET];
+        let mut found = |some: &[Ray]| {
+            if any_hit {
+                return tree.any_packet(some, &ends(some), &[]).count_ones() as usize;
+            }
+            tree.closest_packet(some, &ends(some), &mut hits[..some.len()]);
+            hits[..some.len()].iter().flatten().count()
+        };
+        rays.chunks(PACKET).map(&mut found).sum()
+    };
+    let own = rates(rays, [&mut single, &mut packets]);
+    let peer = scene.map(|scene| {
+        let mut single = |rays: &[Ray]| match any_hit {
+            true => rays.iter().filter(|ray| scene.any(ray)).count(),
+            false => rays.iter().filter(|ray| scene.closest(ray).is_some()).count(),
+        };
+        let mut plain = |rays: &[Ray]| scene.closest16(rays, false);
+        let mut coherent = |rays: &[Ray]| scene.closest16(rays, true);
+        // Packets ask for nearest hits alone.
+        let ways: &mut [Way<'_>] = &mut [&mut single, &mut plain, &mut coherent];
+        let count = if any_hit { 1 } else { ways.len() };
+        ways[..count].iter_mut().map(|way| rates(rays, [*way])[0]).fold(0.0, f64::max)
+    });
+    let kind = if any_hit { "any hit" } else { "nearest" };
+    println!("  {kind}: {} rays of a file", rays.len());
+    line("one by one", "s", seconds(own[0]), peer.map(seconds));
+    line("packets", "s", seconds(own[1]), peer.map(seconds));
 }
 
 /// The rates on all threads: packets of primary and shadow rays, single diffuse ones.
