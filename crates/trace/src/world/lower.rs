@@ -223,9 +223,13 @@ fn file_color(images: &Images, path: &Option<PathBuf>, constant: Vec3) -> Color 
 
 fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
     let strength = own.specular * (2.0 / (own.shininess + 2.0));
+    let specular = match own.has_highlight() {
+        true => file_color(images, &own.specular_texture, strength),
+        false => Color::Constant(Vec3::ZERO),
+    };
     Rough::Phong(Phong {
         diffuse: file_color(images, &own.diffuse_texture, own.diffuse),
-        specular: file_color(images, &own.specular_texture, strength),
+        specular,
         shininess: own.shininess,
         ambient: None,
     })
