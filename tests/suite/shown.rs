@@ -530,3 +530,62 @@ fn messages_about_a_model_name_no_line_of_a_scene_that_nobody_wrote() {
     let said = desk.expect(&format!("a.obj {SMALL} -o nope.png"), 2);
     assert!(said.contains("cannot write nope.png") && !said.contains("a.obj:"), "{said}");
 }
+
+/// The picture is that of the ground alone, which says nothing of what is wrong.
+#[test]
+fn a_model_of_which_nothing_is_seen_says_so() {
+    let desk = Desk::new();
+    let said = |file: &str| {
+        let said = desk.expect(&format!("{file} {SMALL} -o a.exr"), 0);
+        (said.matches("nothing of it is seen: its faces have an opacity of 0").count(), said)
+    };
+    let mut unseen = Vec::new();
+    for (material, is_seen) in [
+        (json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0]}}), false),
+        (json!({"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.3]}}), false),
+        (json!({"alphaMode": "MASK", "alphaCutoff": 2}), false),
+        (json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.1]}}), true),
+        (json!({"alphaMode": "OPAQUE", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0]}}), true),
+        (json!({"alphaMode": "MASK", "alphaCutoff": 1}), true),
+    ] {
+        let mut glb = Glb::default();
+        let mut cube = cube(&mut glb);
+        cube["material"] = json!(0);
+        let is_beyond = material["alphaCutoff"] == 2;
+        desk.write(
+            "a.glb",
+            glb.finish(json!({
+                "nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}], "materials": [material]
+            })),
+        );
+        let (count, said) = said("a.glb");
+        assert_eq!(count, usize::from(!is_seen), "{material}: {said}");
+        assert_eq!(
+            said.contains("materials[0]: an alpha cutoff above 1 cuts all of it away"),
+            is_beyond,
+            "{said}"
+        );
+        if !is_seen {
+            unseen.push(desk.bytes("a.exr"));
+        }
+        if !is_beyond {
+            desk.expect("import a.glb --strict", 0);
+            fs::remove_file(desk.path("a.toml")).expect("removed");
+            fs::remove_dir_all(desk.path("a_files")).expect("removed");
+        }
+    }
+    assert!(unseen.iter().all(|picture| *picture == unseen[0]), "the ground alone");
+    // One face that is seen is enough.
+    let faces = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl p\nf 1 2 3\nusemtl q\nf 1 3 2\n";
+    desk.write("a.obj", faces);
+    for (mtl, count) in [
+        ("newmtl p\nd 0\nnewmtl q\nd 0\n", 1),
+        ("newmtl p\nd 0\nnewmtl q\nd 0.5\n", 0),
+        ("newmtl p\nd 0\n", 0),
+        ("newmtl p\nd 0\nnewmtl q\nd 0\nillum 7\n", 0),
+    ] {
+        desk.write("a.mtl", mtl);
+        let (found, said) = said("a.obj");
+        assert_eq!(found, count, "{mtl}: {said}");
+    }
+}
