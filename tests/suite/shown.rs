@@ -524,7 +524,9 @@ fn messages_about_a_model_name_no_line_of_a_scene_that_nobody_wrote() {
         assert!(said.contains("cannot read a.mtl"), "{call}: {said}");
     }
     desk.write("a.mtl", "newmtl q\nmap_Kd nope.png\n");
-    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 2);
+    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 0);
+    assert!(said.contains("nope.png") && said.contains("--> a.obj\n"), "{said}");
+    let said = desk.expect("check a.obj", 2);
     assert!(said.contains("nope.png") && said.contains("--> a.obj\n"), "{said}");
     desk.write("nope.png", checker());
     let said = desk.expect(&format!("a.obj {SMALL} -o nope.png"), 2);
@@ -588,4 +590,72 @@ fn a_model_of_which_nothing_is_seen_says_so() {
         let (found, said) = said("a.obj");
         assert_eq!(found, count, "{mtl}: {said}");
     }
+}
+
+/// A model whose picture was not copied along is shown without it.
+#[test]
+fn a_model_is_shown_without_pictures_that_cannot_be_read() {
+    let desk = Desk::new();
+    let faces = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl q\nf 1/1 2/2 3/3\n";
+    desk.write("a.obj", faces);
+    let maps = "map_Kd kd.png\nmap_Ks ks.png\nmap_Ke ke.png\nmap_d d.png\nnorm n.png\n";
+    let names = ["kd.png", "ks.png", "ke.png", "d.png", "n.png"];
+    let physical = "map_Pr pr.png\nmap_Pm pm.png\nmap_Kd kd.png\n";
+    for (plain, maps, names) in [
+        ("Kd 0.8 0.2 0.1\nKs 0.1 0.1 0.1\nNs 20\nKe 0.1 0 0\nd 0.7\n", maps, &names[..]),
+        ("Kd 0.8 0.2 0.1\nPr 0.2\nPm 0.5\n", physical, &["kd.png", "pr.png", "pm.png"]),
+    ] {
+        // A map that shines is not replaced by light all over.
+        desk.write("a.mtl", format!("newmtl q\n{}", plain.replace("Ke 0.1 0 0\n", "")));
+        let expected = picture(&desk, "a.obj");
+        desk.write("a.mtl", format!("newmtl q\n{plain}{maps}"));
+        for content in [None, Some("no picture")] {
+            for name in names {
+                match content {
+                    None => drop(fs::remove_file(desk.path(name))),
+                    Some(content) => desk.write(name, content),
+                }
+            }
+            let said = desk.expect(&format!("a.obj {SMALL} -o a.exr"), 0);
+            for name in names {
+                assert!(said.contains(name), "{name}: {said}");
+            }
+            assert!(said.contains("the material \"q\" of a.obj is shown without it"), "{said}");
+            assert!(picture(&desk, "a.obj") == expected, "{maps}{content:?}");
+        }
+        // It stays an input, and who asks for the model as a whole is refused.
+        let said = desk.expect(&format!("a.obj {SMALL} -o kd.png"), 2);
+        assert!(said.contains("cannot write kd.png"), "{said}");
+        assert_eq!(desk.bytes("kd.png"), b"no picture");
+        assert!(desk.expect("check a.obj", 2).contains("kd.png"));
+    }
+    // Of glTF too: images that are files, and images inside.
+    let plain = |glb: Vec<u8>| {
+        desk.write("a.glb", glb);
+        picture(&desk, "a.glb")
+    };
+    let mut glb = Glb::default();
+    let mut bare = cube(&mut glb);
+    bare["material"] = json!(0);
+    let bare = plain(glb.finish(json!({
+        "nodes": [{"mesh": 0, "name": "../cube"}], "meshes": [{"primitives": [bare]}], "materials": [{"pbrMetallicRoughness": {}}]
+    })));
+    assert!(plain(with_image("lost.png")) == bare);
+    let said = desk.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
+    assert!(
+        said.contains("lost.png") && said.contains("\"material\" of a.glb is shown without it"),
+        "{said}"
+    );
+    assert!(desk.expect("import a.glb", 2).contains("images[0]"));
+    assert!(desk.expect("check a.glb", 2).contains("lost.png"));
+    desk.write("lost.png", checker());
+    assert!(picture(&desk, "a.glb") != bare);
+    desk.write("lost.png", "no picture");
+    assert!(picture(&desk, "a.glb") == bare);
+    assert!(desk.expect(&format!("a.glb {SMALL} -o lost.png"), 2).contains("cannot write lost.png"));
+    let mut damaged = checker();
+    damaged.truncate(60);
+    desk.write("a.glb", cubes(&damaged));
+    let said = desk.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
+    assert!(said.contains("\"paint \"1\"\" of a.glb is shown without it"), "{said}");
 }
