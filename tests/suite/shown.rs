@@ -659,3 +659,16 @@ fn a_model_is_shown_without_pictures_that_cannot_be_read() {
     let said = desk.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
     assert!(said.contains("\"paint \"1\"\" of a.glb is shown without it"), "{said}");
 }
+
+#[test]
+fn a_picture_of_a_model_says_how_it_was_seen() {
+    let desk = Desk::new();
+    desk.write("a.obj", box_of([1, 2, 3]));
+    desk.expect(&format!("a.obj {SMALL} --from left --up z -o a.png"), 0);
+    let info = |name: &str| String::from_utf8(desk.run(&format!("info {name}")).stdout).expect("UTF-8");
+    let said = info("a.png");
+    assert!(said.contains("  from        left\n") && said.contains("  up          z\n"), "{said}");
+    desk.expect(&format!("a.obj {SMALL} -o b.png"), 0);
+    let said = info("b.png");
+    assert!(!said.contains("  from ") && !said.contains("  up "), "{said}");
+}

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::settings::{Checkpoints, Effective, Layer, Overrides, View};
+use super::settings::{Checkpoints, Effective, Layer, Overrides, Side, UpAxis, View};
 use super::turntable::{self, Turn};
 use crate::choice::Choice;
 use crate::film::stretch::{Kind, Stretch};
@@ -39,6 +39,9 @@ pub(super) struct Plan {
     pub(super) turn: Option<Turn>,
     /// Layers beside the picture in EXR files.
     pub(super) layers: Vec<Layer>,
+    /// The side from which a model is seen, and its axis that points upwards, where the call names them.
+    pub(super) from: Option<Side>,
+    pub(super) up: Option<UpAxis>,
     /// Files of the other pictures of the turntable, still to come.
     pub(super) to_come: Vec<PathBuf>,
     pub(super) named_by: NamedBy,
@@ -113,6 +116,8 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         to_come,
         turn: overrides.turn,
         layers: overrides.layers.clone(),
+        from: overrides.from,
+        up: overrides.up,
         named_by,
         report: report(overrides),
         replaces_foreign: overrides.replaces_foreign,
