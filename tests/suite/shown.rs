@@ -672,3 +672,13 @@ fn a_picture_of_a_model_says_how_it_was_seen() {
     let said = info("b.png");
     assert!(!said.contains("  from ") && !said.contains("  up "), "{said}");
 }
+
+#[test]
+fn a_model_that_would_be_replaced_is_called_a_model() {
+    let desk = Desk::new();
+    desk.write("a.obj", box_of([1, 2, 3]));
+    std::os::unix::fs::symlink("a.obj", desk.path("a.png")).expect("a link");
+    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 2);
+    assert!(said.contains("cannot write a.png: it is a.obj, the model"), "{said}");
+    assert!(said.lines().all(|line| line.trim() != "|"), "{said}");
+}
