@@ -38,6 +38,10 @@ fn every_format_says_how_it_was_made() {
     }
     let json: Value = serde_json::from_str(&info(&desk, "a.apng --json", 0)).expect("JSON");
     assert_eq!(json["frames"], 3);
+    for name in ["a.gif", "a.apng"] {
+        let json: Value = serde_json::from_str(&info(&desk, &format!("{name} --json"), 0)).expect("JSON");
+        assert_eq!((&json["frames"], &json["settings"]["samples"]), (&3.into(), &"2".into()), "{name}");
+    }
 }
 
 #[test]

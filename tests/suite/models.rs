@@ -108,6 +108,47 @@ fn the_physical_extension_of_mtl_is_the_principled_material() {
     }
 }
 
+/// MeshLab and others count `Tr` the other way round: 1 is opaque there, as is 0 for the rest.
+#[test]
+fn statements_of_mtl_that_would_spoil_the_picture_are_not_taken_by_the_letter() {
+    let desk = Desk::new();
+    desk.write("shine.ppm", "P3 1 1 255 255 255 255\n");
+    desk.write(
+        "a.obj",
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\nusemtl n\nf 1/1 3/1 2/1\n",
+    );
+    let said = |mtl: &str| {
+        desk.write("a.mtl", format!("newmtl m\n{mtl}newmtl n\n{mtl}newmtl unused\n{mtl}"));
+        let said = desk.expect("a.obj --once --force --width 24 --height 18 --samples 4 -o a.exr", 0);
+        (desk.bytes("a.exr"), said)
+    };
+    let (plain, quiet) = said("Kd 0.8 0.8 0.8\n");
+    assert!(!quiet.contains("warning"), "{quiet}");
+    let opaque = "a.mtl: \"m\" and 1 more: `Tr 1` without `d` counts as opaque; write `d 0` for what is not to be seen";
+    let dull = "a.mtl: \"m\" and 1 more: `Ks` without `Ns` above 0 makes no highlight";
+    for (mtl, words) in [
+        ("Tr 1.000000\n", Some(opaque)),
+        ("Tr 1\nd 1\n", None),
+        ("Tr 0\n", None),
+        ("Ks 0.8 0.8 0.8\nNs 0\nillum 2\n", Some(dull)),
+        ("Ks 0.8 0.8 0.8\n", Some(dull)),
+        ("Ks 0.8 0.8 0.8\nTr 1\n", Some(dull)),
+        ("Ks 0.8 0.8 0.8\nTr 1\n", Some(opaque)),
+        ("map_Ks shine.ppm\n", Some(dull)),
+        ("Ks 0 0 0\nNs 0\n", None),
+        // Model 1 has no highlight.
+        ("Ks 0.8 0.8 0.8\nNs 0\nillum 1\n", None),
+    ] {
+        let (picture, said) = said(&format!("Kd 0.8 0.8 0.8\n{mtl}"));
+        assert!(picture == plain, "{mtl}");
+        match words {
+            Some(words) => assert_eq!(said.matches(words).count(), 1, "{mtl}: {said}"),
+            None => assert!(!said.contains("warning"), "{mtl}: {said}"),
+        }
+    }
+    assert!(said("Kd 0.8 0.8 0.8\nKs 0.5 0.5 0.5\nNs 20\n").0 != plain, "a highlight is seen");
+}
+
 #[test]
 fn a_direction_that_a_mesh_has_not_is_a_warning() {
     let desk = Desk::new();

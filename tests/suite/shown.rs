@@ -524,9 +524,161 @@ fn messages_about_a_model_name_no_line_of_a_scene_that_nobody_wrote() {
         assert!(said.contains("cannot read a.mtl"), "{call}: {said}");
     }
     desk.write("a.mtl", "newmtl q\nmap_Kd nope.png\n");
-    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 2);
+    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 0);
+    assert!(said.contains("nope.png") && said.contains("--> a.obj\n"), "{said}");
+    let said = desk.expect("check a.obj", 2);
     assert!(said.contains("nope.png") && said.contains("--> a.obj\n"), "{said}");
     desk.write("nope.png", checker());
     let said = desk.expect(&format!("a.obj {SMALL} -o nope.png"), 2);
     assert!(said.contains("cannot write nope.png") && !said.contains("a.obj:"), "{said}");
+}
+
+/// The picture is that of the ground alone, which says nothing of what is wrong.
+#[test]
+fn a_model_of_which_nothing_is_seen_says_so() {
+    let desk = Desk::new();
+    let said = |file: &str| {
+        let said = desk.expect(&format!("{file} {SMALL} -o a.exr"), 0);
+        (said.matches("nothing of it is seen: its faces have an opacity of 0").count(), said)
+    };
+    let mut unseen = Vec::new();
+    for (material, is_seen) in [
+        (json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0]}}), false),
+        (json!({"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.3]}}), false),
+        (json!({"alphaMode": "MASK", "alphaCutoff": 2}), false),
+        (json!({"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.1]}}), true),
+        (json!({"alphaMode": "OPAQUE", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0]}}), true),
+        (json!({"alphaMode": "MASK", "alphaCutoff": 1}), true),
+    ] {
+        let mut glb = Glb::default();
+        let mut cube = cube(&mut glb);
+        cube["material"] = json!(0);
+        let is_beyond = material["alphaCutoff"] == 2;
+        desk.write(
+            "a.glb",
+            glb.finish(json!({
+                "nodes": [{"mesh": 0}], "meshes": [{"primitives": [cube]}], "materials": [material]
+            })),
+        );
+        let (count, said) = said("a.glb");
+        assert_eq!(count, usize::from(!is_seen), "{material}: {said}");
+        assert_eq!(
+            said.contains("materials[0]: an alpha cutoff above 1 cuts all of it away"),
+            is_beyond,
+            "{said}"
+        );
+        if !is_seen {
+            unseen.push(desk.bytes("a.exr"));
+        }
+        if !is_beyond {
+            desk.expect("import a.glb --strict", 0);
+            fs::remove_file(desk.path("a.toml")).expect("removed");
+            fs::remove_dir_all(desk.path("a_files")).expect("removed");
+        }
+    }
+    assert!(unseen.iter().all(|picture| *picture == unseen[0]), "the ground alone");
+    // One face that is seen is enough.
+    let faces = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl p\nf 1 2 3\nusemtl q\nf 1 3 2\n";
+    desk.write("a.obj", faces);
+    for (mtl, count) in [
+        ("newmtl p\nd 0\nnewmtl q\nd 0\n", 1),
+        ("newmtl p\nd 0\nnewmtl q\nd 0.5\n", 0),
+        ("newmtl p\nd 0\n", 0),
+        ("newmtl p\nd 0\nnewmtl q\nd 0\nillum 7\n", 0),
+    ] {
+        desk.write("a.mtl", mtl);
+        let (found, said) = said("a.obj");
+        assert_eq!(found, count, "{mtl}: {said}");
+    }
+}
+
+/// A model whose picture was not copied along is shown without it.
+#[test]
+fn a_model_is_shown_without_pictures_that_cannot_be_read() {
+    let desk = Desk::new();
+    let faces = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl q\nf 1/1 2/2 3/3\n";
+    desk.write("a.obj", faces);
+    let maps = "map_Kd kd.png\nmap_Ks ks.png\nmap_Ke ke.png\nmap_d d.png\nnorm n.png\n";
+    let names = ["kd.png", "ks.png", "ke.png", "d.png", "n.png"];
+    let physical = "map_Pr pr.png\nmap_Pm pm.png\nmap_Kd kd.png\n";
+    for (plain, maps, names) in [
+        ("Kd 0.8 0.2 0.1\nKs 0.1 0.1 0.1\nNs 20\nKe 0.1 0 0\nd 0.7\n", maps, &names[..]),
+        ("Kd 0.8 0.2 0.1\nPr 0.2\nPm 0.5\n", physical, &["kd.png", "pr.png", "pm.png"]),
+    ] {
+        // A map that shines is not replaced by light all over.
+        desk.write("a.mtl", format!("newmtl q\n{}", plain.replace("Ke 0.1 0 0\n", "")));
+        let expected = picture(&desk, "a.obj");
+        desk.write("a.mtl", format!("newmtl q\n{plain}{maps}"));
+        for content in [None, Some("no picture")] {
+            for name in names {
+                match content {
+                    None => drop(fs::remove_file(desk.path(name))),
+                    Some(content) => desk.write(name, content),
+                }
+            }
+            let said = desk.expect(&format!("a.obj {SMALL} -o a.exr"), 0);
+            for name in names {
+                assert!(said.contains(name), "{name}: {said}");
+            }
+            assert!(said.contains("the material \"q\" of a.obj is shown without it"), "{said}");
+            assert!(picture(&desk, "a.obj") == expected, "{maps}{content:?}");
+        }
+        // It stays an input, and who asks for the model as a whole is refused.
+        let said = desk.expect(&format!("a.obj {SMALL} -o kd.png"), 2);
+        assert!(said.contains("cannot write kd.png"), "{said}");
+        assert_eq!(desk.bytes("kd.png"), b"no picture");
+        assert!(desk.expect("check a.obj", 2).contains("kd.png"));
+    }
+    // Of glTF too: images that are files, and images inside.
+    let plain = |glb: Vec<u8>| {
+        desk.write("a.glb", glb);
+        picture(&desk, "a.glb")
+    };
+    let mut glb = Glb::default();
+    let mut bare = cube(&mut glb);
+    bare["material"] = json!(0);
+    let bare = plain(glb.finish(json!({
+        "nodes": [{"mesh": 0, "name": "../cube"}], "meshes": [{"primitives": [bare]}], "materials": [{"pbrMetallicRoughness": {}}]
+    })));
+    assert!(plain(with_image("lost.png")) == bare);
+    let said = desk.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
+    assert!(
+        said.contains("lost.png") && said.contains("\"material\" of a.glb is shown without it"),
+        "{said}"
+    );
+    assert!(desk.expect("import a.glb", 2).contains("images[0]"));
+    assert!(desk.expect("check a.glb", 2).contains("lost.png"));
+    desk.write("lost.png", checker());
+    assert!(picture(&desk, "a.glb") != bare);
+    desk.write("lost.png", "no picture");
+    assert!(picture(&desk, "a.glb") == bare);
+    assert!(desk.expect(&format!("a.glb {SMALL} -o lost.png"), 2).contains("cannot write lost.png"));
+    let mut damaged = checker();
+    damaged.truncate(60);
+    desk.write("a.glb", cubes(&damaged));
+    let said = desk.expect(&format!("a.glb {SMALL} -o a.exr"), 0);
+    assert!(said.contains("\"paint \"1\"\" of a.glb is shown without it"), "{said}");
+}
+
+#[test]
+fn a_picture_of_a_model_says_how_it_was_seen() {
+    let desk = Desk::new();
+    desk.write("a.obj", box_of([1, 2, 3]));
+    desk.expect(&format!("a.obj {SMALL} --from left --up z -o a.png"), 0);
+    let info = |name: &str| String::from_utf8(desk.run(&format!("info {name}")).stdout).expect("UTF-8");
+    let said = info("a.png");
+    assert!(said.contains("  from        left\n") && said.contains("  up          z\n"), "{said}");
+    desk.expect(&format!("a.obj {SMALL} -o b.png"), 0);
+    let said = info("b.png");
+    assert!(!said.contains("  from ") && !said.contains("  up "), "{said}");
+}
+
+#[test]
+fn a_model_that_would_be_replaced_is_called_a_model() {
+    let desk = Desk::new();
+    desk.write("a.obj", box_of([1, 2, 3]));
+    std::os::unix::fs::symlink("a.obj", desk.path("a.png")).expect("a link");
+    let said = desk.expect(&format!("a.obj {SMALL} -o a.png"), 2);
+    assert!(said.contains("cannot write a.png: it is a.obj, the model"), "{said}");
+    assert!(said.lines().all(|line| line.trim() != "|"), "{said}");
 }

@@ -226,3 +226,27 @@ fn pictures_of_a_longer_turntable_before_are_named_and_stay() {
     assert!(said.contains("w_03.png and 1 more: of a longer turntable before"), "{said}");
     assert_eq!(desk.bytes("w_03.png"), third);
 }
+
+/// `output` in `[render]` names no pictures of a turntable, and a model has none.
+#[test]
+fn the_way_out_of_a_foreign_picture_is_one_that_the_call_takes() {
+    let desk = Desk::new();
+    desk.write("plank.obj", "v -1 0 -8\nv 1 0 -8\nv 1 2 8\nf 1 2 3\n");
+    let foreign = std::fs::read("assets/textures/checker.png").expect("an image");
+    for name in ["plank.png", "plank_0001.png", "ball_0002.png", "ball.png"] {
+        desk.write(name, &foreign);
+    }
+    let said = |line: &str| desk.expect(line, 2);
+    for (file, name) in [("plank.obj", "plank_####.png"), ("ball.toml", "ball_####.png")] {
+        let said = said(&format!("{file} {SMALL} --turntable 3"));
+        assert!(said.contains(&format!("-o '{name}' or --force replaces it")), "{said}");
+        assert!(said.contains("name others with -o 'NAME_####.png'") && !said.contains("[render]"), "{said}");
+    }
+    let single = said(&format!("plank.obj {SMALL}"));
+    assert!(
+        single.contains("name a file with -o FILE; -o plank.png") && !single.contains("[render]"),
+        "{single}"
+    );
+    assert!(said(&format!("ball.toml {SMALL}")).contains("in [render]"));
+    desk.expect(&format!("plank.obj {SMALL} --turntable 3 -o plank_####.png"), 0);
+}

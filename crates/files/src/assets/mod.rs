@@ -132,6 +132,13 @@ pub struct FileMaterial {
     pub physical: Option<PhysicalMaterial>,
 }
 
+impl FileMaterial {
+    /// Whether it has a highlight. Without an exponent above 0 it would be spread over the hemisphere at full strength.
+    pub fn has_highlight(&self) -> bool {
+        self.shininess > 0.0
+    }
+}
+
 /// The extension of MTL for physically based rendering. Numbers are in [0, 1].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhysicalMaterial {

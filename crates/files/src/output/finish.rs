@@ -26,6 +26,15 @@ impl Finish {
         film.image(self.quantity)
     }
 
+    /// The names and values for a file, with its samples behind the scene.
+    pub fn metadata_with(&self, SampleStats { min, mean, max }: SampleStats) -> Vec<(String, String)> {
+        let mut metadata = self.metadata.clone();
+        let samples =
+            if min == max { min.to_string() } else { format!("{min} to {max}, {mean:.2} on average") };
+        metadata.insert(metadata.len().min(1), ("glimt:samples".to_owned(), samples));
+        metadata
+    }
+
     /// The bytes of a file. `image` is the picture of the film; the layers beside it are for EXR files.
     ///
     /// # Errors
@@ -38,12 +47,8 @@ impl Finish {
         token: &CancelToken,
     ) -> Result<Vec<u8>, OutputError> {
         let tone = self.tone.of_picture(image);
-        // Add what the film tells: the samples behind the scene, the range at the end.
-        let mut metadata = self.metadata.clone();
-        let SampleStats { min, mean, max } = film.samples();
-        let samples =
-            if min == max { min.to_string() } else { format!("{min} to {max}, {mean:.2} on average") };
-        metadata.insert(metadata.len().min(1), ("glimt:samples".to_owned(), samples));
+        // Add what the film tells: the samples, the range at the end.
+        let mut metadata = self.metadata_with(film.samples());
         let range = tone.stretch.range();
         let range = range.map(|range| format!("{} to {}", range.least, range.greatest));
         metadata.extend(range.map(|range| ("glimt:range".to_owned(), range)));

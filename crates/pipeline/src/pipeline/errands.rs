@@ -203,6 +203,24 @@ fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<Kept, Str
         ));
     }
     let text = loaded.text_with_camera(camera)?;
-    write::new_file(&path, text.as_bytes()).map_err(|error| format!("{shown}: {}", in_words(&error)))?;
+    write::new_file(&path, text.as_bytes())
+        .map_err(|error| format!("{shown} is not written: {}", in_words(&error)))?;
     Ok(Kept { path, is_new: true, is_own: false, of_model: true, edit: None })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::DVec3;
+    use crate::pipeline::tests::loaded_of;
+    use crate::scene::description::Pose;
+
+    #[test]
+    fn the_scene_of_a_model_that_cannot_be_written_is_said_to_be_unwritten() {
+        let loaded = Loaded { path: "gone/a.obj".into(), ..loaded_of("[environment]\ncolor = 1\n") };
+        let pose = Pose { position: DVec3::Z, look_at: DVec3::ZERO, up: DVec3::Y };
+        let camera = Viewpoint { pose, fov: 40.0, aperture: 0.0, focus: 1.0 };
+        let said = write_scene_of_model(&loaded, &camera).expect_err("no folder");
+        assert_eq!(said, "gone/a.toml is not written: no such file or directory");
+    }
 }

@@ -10,8 +10,8 @@ use super::stages::parse::Parsed;
 use super::watch::content::FileRead;
 use crate::assets::gltf::is_gltf;
 use crate::output::FileIdentity;
-use crate::scene::Loaded;
 use crate::scene::description::Camera;
+use crate::scene::{Loaded, is_model};
 
 /// A file that must not be written.
 #[derive(Clone, Debug)]
@@ -33,7 +33,8 @@ impl Inputs {
         let loaded = &parsed.loaded;
         let scene = &loaded.scene;
         let path = loaded.path.clone();
-        let mut inputs = Self(vec![Input { path, role: "the scene file".to_owned(), place: None }]);
+        let role = if is_model(&path) { "the model" } else { "the scene file" };
+        let mut inputs = Self(vec![Input { path, role: role.to_owned(), place: None }]);
         let mut add = |path: &Path, span: &Range<usize>, role: String| {
             let place = Some((Arc::clone(loaded), span.clone()));
             inputs.0.push(Input { path: path.to_owned(), role, place });

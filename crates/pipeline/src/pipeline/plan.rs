@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::settings::{Checkpoints, Effective, Layer, Overrides, View};
+use super::settings::{Checkpoints, Effective, Layer, Overrides, Side, UpAxis, View};
 use super::turntable::{self, Turn};
 use crate::choice::Choice;
 use crate::film::stretch::{Kind, Stretch};
@@ -39,9 +39,14 @@ pub(super) struct Plan {
     pub(super) turn: Option<Turn>,
     /// Layers beside the picture in EXR files.
     pub(super) layers: Vec<Layer>,
+    /// The side from which a model is seen, and its axis that points upwards, where the call names them.
+    pub(super) from: Option<Side>,
+    pub(super) up: Option<UpAxis>,
     /// Files of the other pictures of the turntable, still to come.
     pub(super) to_come: Vec<PathBuf>,
     pub(super) named_by: NamedBy,
+    /// The name of a turntable's pictures that nobody named, with `#` for their numbers. `None` otherwise.
+    pub(super) usual_names: Option<PathBuf>,
     pub(super) report: Option<PathBuf>,
     pub(super) replaces_foreign: bool,
     /// The part of the picture that is rendered, from 1, and the number of parts.
@@ -85,6 +90,8 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
     };
     let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
     let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
+    let is_usual = named_by == NamedBy::Nobody && overrides.turn.is_some();
+    let usual_names = outputs.first().filter(|_| is_usual).cloned();
     let Outputs { outputs, moving, to_come } = Outputs::of(outputs, overrides.turn);
     let bit_depth = overrides.bit_depth.unwrap_or(8);
     match overrides.shard {
@@ -113,7 +120,10 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         to_come,
         turn: overrides.turn,
         layers: overrides.layers.clone(),
+        from: overrides.from,
+        up: overrides.up,
         named_by,
+        usual_names,
         report: report(overrides),
         replaces_foreign: overrides.replaces_foreign,
         shard: overrides.shard,

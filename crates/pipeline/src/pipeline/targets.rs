@@ -13,6 +13,7 @@ use crate::output::part::{self, PartFile};
 use crate::output::write::Guard;
 use crate::output::{FileIdentity, Losses, OutputError, replaced_json, replaced_picture};
 use crate::scene::diagnostic::{Diagnostic, Severity};
+use crate::scene::is_mesh;
 
 /// A file to be written.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -44,7 +45,7 @@ fn linked(plan: &Plan) -> Vec<Diagnostic> {
             Entry::Vacant(new) => drop(new.insert(path)),
             Entry::Occupied(twin) if *twin.get() != path => {
                 let target = Target { path, kind: Kind::Picture(plan.named_by) };
-                found.push(is_twin(target, twin.get()));
+                found.push(is_twin(plan, target, twin.get()));
             }
             Entry::Occupied(_) => {}
         }
@@ -107,43 +108,47 @@ fn conflict(
 ) -> Option<Diagnostic> {
     if let Some(identity) = FileIdentity::of(at) {
         if let Some(input) = inputs.get(&identity) {
-            return Some(is_input(target, input));
+            return Some(is_input(plan, target, input));
         }
         // Numbers keep those apart that are still to come.
         let mut earlier = targets_now(plan).take_while(|other| *other != target);
         if let Some(twin) = earlier.find(|other| FileIdentity::of(other.path).as_ref() == Some(&identity)) {
-            return Some(is_twin(target, twin.path));
+            return Some(is_twin(plan, target, twin.path));
         }
     }
     if plan.replaces_foreign { None } else { is_foreign(plan, target, at) }
 }
 
-fn is_input(target: Target<'_>, input: &Input) -> Diagnostic {
+fn is_input(plan: &Plan, target: Target<'_>, input: &Input) -> Diagnostic {
     let is_same_name = target.path == input.path;
     let other = if is_same_name { String::new() } else { format!("{}, ", input.path.display()) };
     let message = format!("cannot write {}: it is {other}{}", target.path.display(), input.role);
-    let help = Some(way_out(target.kind).to_owned());
+    let help = Some(way_out(plan, target.kind).to_owned());
     match &input.place {
         Some((loaded, span)) => loaded.diagnostic_at(span.clone(), Severity::Error, message, help),
         None => of_call(message, help),
     }
 }
 
-fn is_twin(target: Target<'_>, twin: &Path) -> Diagnostic {
+fn is_twin(plan: &Plan, target: Target<'_>, twin: &Path) -> Diagnostic {
     let (name, twin) = (target.path.display(), twin.display());
     let message = match target.kind {
         Kind::Picture(_) => format!("the outputs {twin} and {name} are one file"),
         Kind::Report => format!("the picture {twin} and the report {name} are one file"),
     };
-    of_call(message, Some(format!("each needs a file of its own: {}", way_out(target.kind))))
+    of_call(message, Some(format!("each needs a file of its own: {}", way_out(plan, target.kind))))
 }
 
 /// A file that exists already and that glimt did not write.
 fn is_foreign(plan: &Plan, target: Target<'_>, at: &Path) -> Option<Diagnostic> {
-    let (name, way_out) = (target.path.display(), way_out(target.kind));
+    let (name, way_out) = (target.path.display(), way_out(plan, target.kind));
     let (replaced, help) = match target.kind {
         Kind::Picture(NamedBy::Nobody) => {
-            (replaced_picture(at), format!("{way_out}; -o {name} or --force replaces it"))
+            let own = match &plan.usual_names {
+                Some(names) => format!("'{}'", names.display()),
+                None => name.to_string(),
+            };
+            (replaced_picture(at), format!("{way_out}; -o {own} or --force replaces it"))
         }
         Kind::Report => {
             let replaced = replaced_json(at, "a report", Marks::have_all_stages);
@@ -170,11 +175,13 @@ fn is_other_part(plan: &Plan, target: Target<'_>, at: &Path) -> Option<Diagnosti
         None => "a part or a checkpoint of another version of glimt".to_owned(),
     };
     let message = format!("cannot write {}: it is {what}", target.path.display());
-    Some(of_call(message, Some(format!("{}; --force replaces it", way_out(target.kind)))))
+    Some(of_call(message, Some(format!("{}; --force replaces it", way_out(plan, target.kind)))))
 }
 
-fn way_out(kind: Kind) -> &'static str {
+fn way_out(plan: &Plan, kind: Kind) -> &'static str {
     match kind {
+        Kind::Picture(NamedBy::Nobody) if plan.turn.is_some() => "name others with -o 'NAME_####.png'",
+        Kind::Picture(NamedBy::Nobody) if is_mesh(Path::new(&plan.name)) => "name a file with -o FILE",
         Kind::Picture(NamedBy::Call) => "name another file with -o FILE",
         Kind::Picture(NamedBy::Scene) => "name another file with -o FILE, or as `output` in [render]",
         Kind::Picture(NamedBy::Nobody) => "name a file with -o FILE, or with `output = \"FILE\"` in [render]",

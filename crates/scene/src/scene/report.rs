@@ -118,19 +118,27 @@ fn one(
     if let Some(help) = &diagnostic.help {
         group = group.element(Level::HELP.message(wrapped(help, width.saturating_sub(14))));
     }
-    without_second_origin(&renderer.render(&[group]))
+    let rendered = without_second_origin(&renderer.render(&[group]));
+    if has_origin { rendered } else { without_lines(&rendered, "|") }
+}
+
+/// The text of a rendered line, without colours and the blanks around it.
+fn bare(line: &str) -> String {
+    let parts = line.split("\u{1b}[").enumerate().map(|(number, part)| match part.split_once('m') {
+        Some((_, text)) if number > 0 => text,
+        _ => part,
+    });
+    parts.collect::<String>().trim().to_owned()
+}
+
+/// The rendered text without lines of nothing but this.
+fn without_lines(rendered: &str, text: &str) -> String {
+    rendered.split_inclusive('\n').filter(|line| bare(line) != text).collect()
 }
 
 /// The renderer announces a snippet whose origin was already given by a line `:::` of its own.
 fn without_second_origin(rendered: &str) -> String {
-    let is_second = |line: &&str| {
-        let bare = line.split("\u{1b}[").enumerate().map(|(number, part)| match part.split_once('m') {
-            Some((_, text)) if number > 0 => text,
-            _ => part,
-        });
-        bare.collect::<String>().trim() == ":::"
-    };
-    let Some(second) = rendered.lines().find(is_second) else { return rendered.to_owned() };
+    let Some(second) = rendered.lines().find(|line| bare(line) == ":::") else { return rendered.to_owned() };
     rendered.replacen(&format!("{second}\n"), "", 1)
 }
 

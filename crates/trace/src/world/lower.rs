@@ -164,9 +164,14 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     if !file_emits(own) {
         return Emission::NONE;
     }
-    let texture = own.emission_texture.as_ref();
-    let texture = texture.map(|path| file_texture(images, &file_source(path, TextureUse::Color)));
-    Emission { texture, ..Emission::constant(own.emission) }
+    match &own.emission_texture {
+        None => Emission::constant(own.emission),
+        // A material whose map cannot be read does not shine all over.
+        Some(path) => match file_texture(images, &file_source(path, TextureUse::Color)) {
+            None => Emission::NONE,
+            texture => Emission { texture, ..Emission::constant(own.emission) },
+        },
+    }
 }
 
 /// Opacity of a mesh file's material. `None` if the material is there everywhere; glass is.
@@ -174,8 +179,9 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
     if file_is_glass(own) {
         return None;
     }
-    let value = match &own.opacity_texture {
-        Some(path) => Number::Texture(file_texture(images, &file_source(path, FILE_OPACITY))),
+    let texture = own.opacity_texture.as_ref();
+    let value = match texture.and_then(|path| file_texture(images, &file_source(path, FILE_OPACITY))) {
+        Some(texture) => Number::Texture(texture),
         None if own.opacity < 1.0 => Number::Constant(own.opacity),
         None => return None,
     };
@@ -200,9 +206,9 @@ pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
 
 /// A rough material of a mesh file, with its emission and its normal map.
 fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
-    let normals = own.normal_texture.as_ref().map(|path| NormalMap {
-        texture: file_texture(images, &file_source(path, TextureUse::Normal)),
-        strength: own.normal_strength,
+    let normals = own.normal_texture.as_ref().and_then(|path| {
+        let texture = file_texture(images, &file_source(path, TextureUse::Normal))?;
+        Some(NormalMap { texture, strength: own.normal_strength })
     });
     // Grey ones are heights, of a length that the file does not tell.
     let normals = normals.filter(|map| !map.texture.texels.is_grey());
@@ -215,17 +221,19 @@ fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
 }
 
 fn file_color(images: &Images, path: &Option<PathBuf>, constant: Vec3) -> Color {
-    match path {
-        Some(path) => Color::Texture(file_texture(images, &file_source(path, TextureUse::Color))),
-        None => Color::Constant(constant),
-    }
+    let texture = path.as_ref().and_then(|path| file_texture(images, &file_source(path, TextureUse::Color)));
+    texture.map_or(Color::Constant(constant), Color::Texture)
 }
 
 fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
     let strength = own.specular * (2.0 / (own.shininess + 2.0));
+    let specular = match own.has_highlight() {
+        true => file_color(images, &own.specular_texture, strength),
+        false => Color::Constant(Vec3::ZERO),
+    };
     Rough::Phong(Phong {
         diffuse: file_color(images, &own.diffuse_texture, own.diffuse),
-        specular: file_color(images, &own.specular_texture, strength),
+        specular,
         shininess: own.shininess,
         ambient: None,
     })
@@ -233,9 +241,9 @@ fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
 
 /// A principled material of a mesh file. An index of refraction of 1 or less says nothing.
 fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> Rough {
-    let number = |path: &Option<PathBuf>, constant: f32| match path {
-        Some(path) => Number::Texture(file_texture(images, &file_source(path, FILE_NUMBER))),
-        None => Number::Constant(constant),
+    let number = |path: &Option<PathBuf>, constant: f32| {
+        let texture = path.as_ref().and_then(|path| file_texture(images, &file_source(path, FILE_NUMBER)));
+        texture.map_or(Number::Constant(constant), Number::Texture)
     };
     Rough::Principled(Box::new(Principled::new(PrincipledInputs {
         color: file_color(images, &own.diffuse_texture, own.diffuse.min(Vec3::ONE)),
@@ -297,10 +305,11 @@ fn declared_texture(scene: &Scene, images: &Images, index: usize, used: TextureU
     Arc::new(Texture { texels, mipmaps, filter, wrap, repeat, moved, factor })
 }
 
-fn file_texture(images: &Images, source: &TextureSource) -> Arc<Texture> {
+/// A texture of a mesh file. `None` if it was not loaded: it is never looked up, or could not be read.
+fn file_texture(images: &Images, source: &TextureSource) -> Option<Arc<Texture>> {
     let (filter, wrap, repeat) = (TextureFilter::Bilinear, Wrap::Repeat, Vec2::ONE);
-    let Image { texels, .. } = image(images, source);
-    Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat, moved: None, factor: None })
+    let texels = images.get(source)?.texels.clone();
+    Some(Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat, moved: None, factor: None }))
 }
 
 /// The loaded image. A material that no object has may name textures that were not loaded: they are never looked up.

@@ -33,7 +33,7 @@ pub use camera::Camera;
 pub use contact::{Meeting, Near, NearMemory, Sides};
 pub use emitters::{lights, photon_source, sky};
 pub use geometry::{Geometry, Hit};
-pub use lower::file_emits;
+pub use lower::{file_emits, file_is_glass};
 pub use merged::MergedMeshes;
 pub use mesh_instance::MeshInstance;
 pub use mesh_tree::MeshTree;

@@ -238,7 +238,10 @@ fn file_textures(material: &FileMaterial, lookups: Lookups) -> impl Iterator<Ite
     let own = match &material.physical {
         None => vec![
             (&material.diffuse_texture, TextureRole::Diffuse),
-            (&material.specular_texture, TextureRole::Specular),
+            (
+                if material.has_highlight() { &material.specular_texture } else { &None },
+                TextureRole::Specular,
+            ),
         ],
         Some(physical) => vec![
             (&material.diffuse_texture, TextureRole::Facets),

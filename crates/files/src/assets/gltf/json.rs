@@ -37,6 +37,9 @@ pub(super) struct Root {
 #[serde(default)]
 pub(super) struct Asset {
     pub(super) version: String,
+    /// The least version of which all must be read. Empty for any.
+    #[serde(rename = "minVersion")]
+    pub(super) min_version: String,
 }
 
 #[derive(Debug, Default, Deserialize)]

@@ -173,6 +173,10 @@ impl Reader<'_> {
         let value = Slot { factor: DVec3::splat(unit(alpha)), texture };
         match json.alpha_mode.as_str() {
             "OPAQUE" => Ok(Alpha::Opaque),
+            "MASK" if json.alpha_cutoff > 1.0 => {
+                self.note("an alpha cutoff above 1 cuts all of it away");
+                Ok(Alpha::Blend(Slot::number(0.0)))
+            }
             "MASK" => Ok(Alpha::Mask { value, cutoff: unit(json.alpha_cutoff) }),
             "BLEND" => Ok(Alpha::Blend(value)),
             other => Err(Wrong::new(format!("there is no alpha mode {:?}", super::shown(other)))),

@@ -397,6 +397,10 @@ fn chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), Wrong> {
 }
 
 fn check_version(root: &Root) -> Result<(), Wrong> {
+    let least = &root.asset.min_version;
+    if !matches!(least.as_str(), "" | "2.0") {
+        return Err(Wrong::new(format!("it needs a reader of glTF {}, and 2.0 is read", shown(least))));
+    }
     match root.asset.version.as_str() {
         version if version.starts_with("2.") => Ok(()),
         "" => Err(Wrong::new("it is no glTF: asset.version is missing")),

@@ -339,7 +339,10 @@ impl Walk<'_> {
                 let back = lens.ymag.abs() / libm::tan((NARROW * 0.5).to_radians());
                 (NARROW, None, position - direction * back)
             }
-            (None, None) => return,
+            (None, None) => {
+                let what = "its camera is left out: it is neither perspective nor orthographic";
+                return self.notes.add(place, what);
+            }
         };
         let is_usable = position.abs().max_element() < MOST && fov > 0.0 && fov < 180.0;
         if is_usable {

@@ -579,3 +579,40 @@ fn the_files_that_it_names_are_known_by_its_json_alone() {
     assert_eq!(files("a.glb", &whole[..whole.len() - 3]), named);
     assert!(super::files_named(&desk.0.path().join("none.glb")).is_err());
 }
+
+#[test]
+fn a_file_that_needs_a_newer_version_is_refused_by_its_number() {
+    let mut json = square();
+    for (asset, is_read) in [
+        (json!({"version": "2.0", "minVersion": "2.0"}), true),
+        (json!({"version": "2.3"}), true),
+        (json!({"version": "2.1", "minVersion": "2.1"}), false),
+        (json!({"version": "2.10", "minVersion": "3.0"}), false),
+    ] {
+        json["asset"] = asset.clone();
+        match open_json(&json) {
+            Ok(_) => assert!(is_read, "{asset}"),
+            Err(error) => {
+                let least = asset["minVersion"].as_str().expect("text");
+                let words = format!("it needs a reader of glTF {least}, and 2.0 is read");
+                assert!(!is_read && error.to_string().contains(&words), "{asset}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_camera_of_no_known_kind_is_named() {
+    let mut json = square();
+    json["nodes"][0]["camera"] = json!(0);
+    for camera in [json!({"type": "panorama"}), json!({"type": "perspective"}), json!({})] {
+        json["cameras"] = json!([camera]);
+        let scene = scene(&open_json(&json).expect("read")).expect("a scene");
+        let words = "its camera is left out: it is neither perspective nor orthographic";
+        assert!(
+            scene.cameras.is_empty() && scene.notes.iter().any(|note| note.contains(words)),
+            "{:?}",
+            scene.notes
+        );
+    }
+}

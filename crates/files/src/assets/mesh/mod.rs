@@ -80,9 +80,13 @@ impl Source<'_> {
 
     /// An error at a byte of a text file.
     fn wrong_at(&self, at: usize, reason: impl Into<String>) -> AssetError {
+        AssetError::malformed(self.path, Some(self.line(at)), reason)
+    }
+
+    /// The line of a byte, from 1.
+    fn line(&self, at: usize) -> usize {
         let before = &self.bytes[..at.min(self.bytes.len())];
-        let line = 1 + memchr::memchr_iter(b'\n', before).count();
-        AssetError::malformed(self.path, Some(line), reason)
+        1 + memchr::memchr_iter(b'\n', before).count()
     }
 }
 

@@ -173,11 +173,47 @@ pub(super) fn material(found: &tobj::Material, folder: &Path) -> FileMaterial {
     }
 }
 
-/// The opacity: `d`, or else 1 − `Tr`.
+/// The opacity: `d`, or else 1 − `Tr`, unless that alone would hide the material.
 fn opacity(found: &tobj::Material) -> f32 {
-    let transparency = || found.unknown_param.get("Tr")?.split_whitespace().next()?.parse().ok();
-    let opacity = found.dissolve.or_else(|| transparency().map(|part: f64| 1.0 - part));
-    opacity.unwrap_or(1.0).clamp(0.0, 1.0) as f32
+    let opacity = found.dissolve.or_else(|| transparency(found).map(|part| 1.0 - part));
+    if is_hidden_by_tr(found) { 1.0 } else { opacity.unwrap_or(1.0).clamp(0.0, 1.0) as f32 }
+}
+
+fn transparency(found: &tobj::Material) -> Option<f64> {
+    found.unknown_param.get("Tr")?.split_whitespace().next()?.parse().ok()
+}
+
+/// Whether `Tr` says without `d` that there is nothing to see: MeshLab and others write so what is opaque.
+fn is_hidden_by_tr(found: &tobj::Material) -> bool {
+    found.dissolve.is_none() && transparency(found).is_some_and(|part| part >= 1.0)
+}
+
+/// Warnings of materials of a file that are not shown by the letter.
+pub(super) fn warnings<'a>(path: &Path, materials: impl Iterator<Item = &'a tobj::Material>) -> Vec<String> {
+    let (mut hidden, mut dull) = (Vec::new(), Vec::new());
+    for found in materials {
+        let own = material(found, Path::new(""));
+        // Glass has no opacity, and the other models no highlight.
+        let (is_glass, is_shiny) = match own.illumination_model {
+            Some(4 | 6 | 7 | 9) => (true, false),
+            Some(0 | 1 | 3 | 5 | 8) => (false, false),
+            Some(_) | None => (false, own.physical.is_none()),
+        };
+        if is_hidden_by_tr(found) && own.opacity_texture.is_none() && !is_glass {
+            hidden.push(own.name.clone());
+        }
+        let has_strength = own.specular != Vec3::ZERO || own.specular_texture.is_some();
+        if is_shiny && has_strength && !own.has_highlight() {
+            dull.push(own.name);
+        }
+    }
+    let said = |names: &[String], what: &str| {
+        let more = if names.len() > 1 { format!(" and {} more", names.len() - 1) } else { String::new() };
+        names.first().map(|first| format!("{}: {first:?}{more}: {what}", path.display()))
+    };
+    let hidden = said(&hidden, "`Tr 1` without `d` counts as opaque; write `d 0` for what is not to be seen");
+    let dull = said(&dull, "`Ks` without `Ns` above 0 makes no highlight");
+    hidden.into_iter().chain(dull).collect()
 }
 
 /// Statements of the extension for physically based rendering that make a material physical; `Ps` and `aniso` have no other effect.

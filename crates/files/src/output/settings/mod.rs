@@ -108,6 +108,13 @@ pub fn made(path: &Path) -> Result<Made, MadeError> {
     {
         return Ok(made);
     }
+    // The frames of a GIF go on to its end.
+    if start.len() as u64 == START_BYTES && start.starts_with(b"GIF") {
+        let rest = BufReader::new(&opened);
+        if let Some(made) = gif::of_gif(start.chain(rest)) {
+            return Ok(made);
+        }
+    }
     of_bytes(&start).map_err(|why| MadeError::NoPicture { path: path.to_owned(), why })
 }
 

@@ -38,7 +38,8 @@ fn every_format_gives_back_what_was_written_into_it() {
 #[test]
 fn moving_pictures_too() {
     let frame = Picture { width: 5, height: 4, pixels: vec![[9, 8, 7]; 20] };
-    for (format, name, frames) in [(MovingFormat::Gif, "GIF", None), (MovingFormat::Apng, "APNG", Some(3))] {
+    for (format, name, frames) in [(MovingFormat::Gif, "GIF", Some(3)), (MovingFormat::Apng, "APNG", Some(3))]
+    {
         let bytes = moving::encode(&vec![frame.clone(); 3], &settings(), format, &CancelToken::new());
         let mut made = of_bytes(&bytes.expect("encoded")).expect("read");
         assert_eq!((made.format.as_str(), made.size, made.frames), (name, Some((5, 4)), frames));
@@ -85,4 +86,24 @@ fn broken_headers_do_no_harm() {
             let _ = of_bytes(&bytes);
         }
     }
+}
+
+/// Frames may be far behind the header, each with a palette of its own; a file that is cut short has no known number of them.
+#[test]
+fn frames_of_a_gif_are_counted_to_its_end() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.gif");
+    let noise =
+        (0..400 * 400_u32).map(|i| i.wrapping_mul(2_654_435_761).to_le_bytes()).map(|[a, b, c, _]| [a, b, c]);
+    let frame = Picture { width: 400, height: 400, pixels: noise.collect() };
+    let bytes = moving::encode(&vec![frame; 30], &settings(), MovingFormat::Gif, &CancelToken::new())
+        .expect("encoded");
+    assert!(bytes.len() as u64 > START_BYTES, "{}", bytes.len());
+    std::fs::write(&path, &bytes).expect("written");
+    assert_eq!(made(&path).expect("read").frames, Some(30));
+    std::fs::write(&path, &bytes[..bytes.len() - 9]).expect("written");
+    let cut = made(&path).expect("read");
+    assert_eq!((cut.frames, cut.size), (None, Some((400, 400))));
+    let local = b"GIF89a\x01\0\x01\0\0\0\0,\0\0\0\0\x01\0\x01\0\x80\0\0\0\xff\xff\xff\x02\x02L\x01\0;";
+    assert_eq!(of_bytes(local).expect("read").frames, Some(1));
 }

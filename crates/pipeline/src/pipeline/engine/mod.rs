@@ -631,6 +631,7 @@ impl Engine {
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;
             let mut wanted = needed(loaded, &found, Lookups::ALL, &self.textures);
             add_declared(loaded, &mut wanted.textures);
+            wanted.are_required = true;
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             glass(loaded, &found, &mut self.bodies, &mut findings, token)?;
             let overrides = Overrides::default();

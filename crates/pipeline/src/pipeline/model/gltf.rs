@@ -2,18 +2,19 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::frame::{framed, tidied};
 use super::materials::{Materials, TextureFile};
 use super::toml::{Toml, color, list, number, vector};
 use super::{
-    Eye, FOV, Lighting, ModelText, ROUGH, SIZE, Show, Unique, camera, file_name, ground, light, render,
+    Eye, FOV, Lighting, ModelText, ROUGH, SIZE, Show, UNSEEN, Unique, camera, file_name, ground, light,
+    render,
 };
 use crate::assets::AssetError;
 use crate::assets::gltf::{
-    Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial, ModelScene,
-    Slot,
+    Alpha, Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
+    ModelScene, Slot,
 };
 use crate::control::{CancelToken, unwatched};
 use crate::math::color::luminance;
@@ -73,14 +74,20 @@ pub(super) fn text(
         names: HashMap::new(),
         images: BTreeSet::new(),
         image_names: scene.images.clone(),
+        companions: container.companions().to_vec(),
     };
     writer.write(&scene, bounds, show);
-    let Writer { toml, assets, images, .. } = writer;
-    for image in images {
-        container.check_image_header(image, token)?;
+    let Writer { toml, assets, images, companions, .. } = writer;
+    let is_unseen = scene.instances.iter().all(|one| is_clear(&scene.materials[one.material]));
+    let ModelScene { mut notes, .. } = scene;
+    match naming {
+        // A model is shown without images that cannot be read.
+        Naming::Inside => notes.extend(is_unseen.then(|| UNSEEN.to_owned())),
+        Naming::Folder(_) => {
+            images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
+        }
     }
-    let ModelScene { notes, .. } = scene;
-    Ok(ModelText { text: toml.finish(), companions: container.companions().to_vec(), notes, assets })
+    Ok(ModelText { text: toml.finish(), companions, notes, assets })
 }
 
 struct Writer<'a> {
@@ -95,6 +102,8 @@ struct Writer<'a> {
     /// Images that materials show.
     images: BTreeSet<usize>,
     image_names: Vec<String>,
+    /// Other files that the text was made of.
+    companions: Vec<PathBuf>,
 }
 
 impl Writer<'_> {
@@ -260,13 +269,18 @@ impl super::materials::Files for Writer<'_> {
         self.images.insert(image);
         let bytes = self.container.image(image);
         match (self.naming, bytes) {
-            (Naming::Inside, Ok(ImageBytes::File(file))) if has_ending(&file) => {
+            (Naming::Inside, Ok(ImageBytes::File(file))) if has_ending(&file) && file.is_file() => {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
                 let name = file.strip_prefix(folder).unwrap_or(&file);
                 TextureFile { file: name.to_string_lossy().into_owned(), image: None }
             }
-            // A file without an ending is known by its content, as an image inside is.
-            (Naming::Inside, _) => TextureFile { file: file_name(self.path), image: Some(image) },
+            // A file without an ending is known by its content, as an image inside is. One that is missing is waited for.
+            (Naming::Inside, bytes) => {
+                if let Ok(ImageBytes::File(file)) = bytes {
+                    self.companions.push(file);
+                }
+                TextureFile { file: file_name(self.path), image: Some(image) }
+            }
             (Naming::Folder(_), bytes) => {
                 let ending = match &bytes {
                     Ok(ImageBytes::Inside(bytes)) => ending(bytes).to_owned(),
@@ -289,6 +303,16 @@ impl super::materials::Files for Writer<'_> {
 fn has_ending(file: &Path) -> bool {
     let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     MAPS.contains(&ending.as_str())
+}
+
+/// Whether a material lets all light pass everywhere.
+fn is_clear(material: &ModelMaterial) -> bool {
+    let is_clear = match &material.alpha {
+        Alpha::Opaque => false,
+        Alpha::Mask { value, cutoff } => value.factor.x < *cutoff,
+        Alpha::Blend(value) => value.factor.x == 0.0,
+    };
+    is_clear && material.glass.is_none()
 }
 
 /// Whether a material may throw light on others as a mirror does. A texture may have any number up to its factor.

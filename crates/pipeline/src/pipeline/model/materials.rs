@@ -134,8 +134,8 @@ impl<F: Files> Materials<'_, F> {
             Alpha::Opaque => {}
             Alpha::Mask { value, cutoff } => {
                 self.opacity(keys, value, &material.color);
-                // A cutoff of 0 shows everything.
-                if *cutoff > 0.0 {
+                // A cutoff of 0 shows everything, as does any without an alpha below 1.
+                if *cutoff > 0.0 && (value.texture.is_some() || value.factor != DVec3::ONE) {
                     keys.push(("opacity_cutoff", number(*cutoff)));
                 }
             }

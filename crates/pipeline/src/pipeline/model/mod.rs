@@ -110,6 +110,9 @@ pub(in crate::pipeline) fn text(
     plain::text(path, show, containers, token)
 }
 
+/// The note about a model that leaves no trace in its picture.
+const UNSEEN: &str = "nothing of it is seen: its faces have an opacity of 0";
+
 /// A mistake in the scene of a model, which is in no file.
 pub(in crate::pipeline) fn in_its_scene(one: Diagnostic) -> Diagnostic {
     Diagnostic { message: format!("in the scene of this model, {}", one.message), ..one }

@@ -7,15 +7,17 @@ use std::path::Path;
 use super::frame::framed;
 use super::toml::Toml;
 use super::{
-    FOV, Lighting, ModelText, NARROW, ROUGH, SIZE, Show, Unique, camera, file_name, ground, light, render,
+    FOV, Lighting, ModelText, NARROW, ROUGH, SIZE, Show, UNSEEN, Unique, camera, file_name, ground, light,
+    render,
 };
-use crate::assets::{AssetError, FileMaterial};
+use crate::assets::{AssetError, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, unwatched};
 use crate::math::DVec3;
 use crate::math::limits::LARGEST;
 use crate::pipeline::settings::{Side, UpAxis};
 use crate::pipeline::stages::containers::Containers;
 use crate::scene::quoted;
+use crate::world::file_is_glass;
 
 /// The axis that points upwards where the call does not say it: z in STL files, as programs for construction and printing have
 /// it, and in PLY files by Blender; else y.
@@ -69,6 +71,14 @@ fn is_polished(material: &FileMaterial) -> bool {
             is_mirror_or_glass || reflects && material.shininess > NARROW
         }
     }
+}
+
+/// Whether every face has a material that lets all light pass.
+fn is_unseen(loaded: &LoadedMesh) -> bool {
+    let is_clear =
+        |own: &FileMaterial| own.opacity == 0.0 && own.opacity_texture.is_none() && !file_is_glass(own);
+    let is_unseen = |index: &u32| loaded.materials.get(*index as usize).is_some_and(is_clear);
+    !loaded.mesh.materials.is_empty() && loaded.mesh.materials.iter().all(is_unseen)
 }
 
 /// The scene of a mesh file.
@@ -138,7 +148,8 @@ pub(super) fn text(
     }
     ground(&mut toml, &mut names, bounds, &eye);
     // The scene gives the mesh another material where the file's own are missing, and would say nothing of that.
-    let notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
+    let mut notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
+    notes.extend(is_unseen(&loaded).then(|| UNSEEN.to_owned()));
     let (companions, assets) = (loaded.companions.clone(), Vec::new());
     containers.keep(path, loaded);
     Ok(ModelText { text: toml.finish(), companions, notes, assets })

@@ -18,10 +18,12 @@ use crate::assets::image::{
 };
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
-use crate::materials::texels::Texels;
-use crate::scene::Loaded;
-use crate::scene::description::{Channel, Encoding, PixelNumber, Scene};
+use crate::materials::texels::{TexelData, Texels};
+use crate::math::Vec3;
+use crate::scene::description::{Channel, Encoding, PixelNumber, Scene, TextureRole};
+use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::{Fingerprint, Key};
+use crate::scene::{Loaded, is_model};
 use crate::world::{
     Image, Images, Lookups, NeededTexture, TextureSource, environment_source, textures_needed,
 };
@@ -95,6 +97,8 @@ pub(in crate::pipeline) struct Needed {
     pub(in crate::pipeline) textures: Vec<NeededTexture>,
     /// Number of other textures, which the scene shows and this view does not look up.
     pub(in crate::pipeline) left_out: usize,
+    /// Whether the call is to see each of them: a model is else shown without those that cannot be read.
+    pub(in crate::pipeline) are_required: bool,
 }
 
 /// The textures that visible materials of this scene look up in a picture. Those of other pictures stay where all of them
@@ -110,9 +114,9 @@ pub(in crate::pipeline) fn needed(
     let of_picture = textures_needed(&loaded.scene, &meshes, lookups);
     let left_out = all.len() - of_picture.len();
     if left_out == 0 || cache.has_all(&all) {
-        return Needed { textures: all, left_out: 0 };
+        return Needed { textures: all, ..Needed::default() };
     }
-    Needed { textures: of_picture, left_out }
+    Needed { textures: of_picture, left_out, ..Needed::default() }
 }
 
 /// One image with all who ask for it.
@@ -142,7 +146,7 @@ pub(in crate::pipeline) fn textures(
     reading: &Reading<'_>,
 ) -> Result<Staged<Textures>, Stop> {
     let mut textures = Textures::default();
-    let Needed { textures: needed, left_out } = needed;
+    let Needed { textures: needed, left_out, are_required } = needed;
     if needed.is_empty() {
         let why = match left_out {
             0 => "nothing that is seen names a texture",
@@ -189,6 +193,12 @@ pub(in crate::pipeline) fn textures(
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
+            Err(error) if !are_required && is_model(&loaded.path) => {
+                counts.failed += 1;
+                for one in &image.asked_by {
+                    show_without(loaded, one, &error, &mut textures.images, findings);
+                }
+            }
             Err(error) => {
                 counts.failed += 1;
                 for one in &image.asked_by {
@@ -210,6 +220,46 @@ pub(in crate::pipeline) fn textures(
         findings.warn(loaded, environment_span(&loaded.scene).unwrap_or(0..0), message);
     }
     Ok(loaded_and_kept(textures, Counts { left_out: *left_out, ..counts }))
+}
+
+/// Warns of an image that a model is shown without, and puts even texels in its place: factors are then what is seen, but for
+/// emission, which is left out. Materials of mesh files have values of their own in place of textures that are not there.
+fn show_without(
+    loaded: &Loaded,
+    one: &NeededTexture,
+    error: &AssetError,
+    images: &mut Images,
+    findings: &mut Findings,
+) {
+    let file = loaded.path.display();
+    let mut warn = |material: &str| {
+        let help = format!("the material \"{material}\" of {file} is shown without it");
+        let warning =
+            loaded.diagnostic_at(place(loaded, one), Severity::Warning, error.to_string(), Some(help));
+        if !findings.warnings.contains(&warning) {
+            findings.warnings.push(warning);
+        }
+    };
+    one.material.iter().for_each(|material| warn(material));
+    let Some(declared) = one.declared else { return };
+    let mut is_light = true;
+    for material in &loaded.scene.materials {
+        let mut roles =
+            material.textures().into_iter().filter(|(texture, _)| *texture == declared).peekable();
+        if roles.peek().is_some() {
+            warn(&material.name);
+        }
+        is_light &= roles.all(|(_, role)| role == TextureRole::Emission);
+    }
+    let texel = match one.source.encoding {
+        ImageEncoding::Linear => Vec3::new(0.5, 0.5, 1.0),
+        ImageEncoding::Color if is_light => Vec3::ZERO,
+        ImageEncoding::Color | ImageEncoding::Srgb | ImageEncoding::Raw | ImageEncoding::Number { .. } => {
+            Vec3::ONE
+        }
+    };
+    let texels = Texels { width: 1, height: 1, data: TexelData::Float(vec![texel]), unusable: 0 };
+    images.insert(one.source.clone(), Image { texels: Arc::new(texels), mipmaps: None });
 }
 
 /// Says how much of an image cannot be shown.

@@ -197,9 +197,9 @@ pub(in crate::pipeline) fn write_by_hand(canvas: &FilmState, to: Destination<'_>
     }
 }
 
-/// Frames of a turntable so far.
+/// Frames of a turntable so far, each with its samples.
 #[derive(Debug, Default)]
-pub(in crate::pipeline) struct Frames(Vec<Picture>);
+pub(in crate::pipeline) struct Frames(Vec<(Picture, SampleStats)>);
 
 /// Adds the picture to the frames of its turntable; with the last one, writes the moving pictures. Returns whether they are on disk.
 ///
@@ -215,15 +215,20 @@ pub(in crate::pipeline) fn write_moving(
     let finish = finish(plan);
     let image = finish.image(&canvas.film);
     frames.0.truncate(turn.number as usize);
-    frames.0.push(develop(&image, &finish.tone.of_picture(&image)));
+    frames.0.push((develop(&image, &finish.tone.of_picture(&image)), canvas.film.samples()));
     if !turn.is_last() {
         return Ok(Staged::skipped(false, format!("it is kept as frame {} of {}", turn.number + 1, turn.of)));
     }
-    let frames = std::mem::take(frames).0;
+    let (frames, samples): (Vec<_>, Vec<_>) = std::mem::take(frames).0.into_iter().unzip();
+    let metadata = finish.metadata_with(SampleStats {
+        min: samples.iter().map(|one| one.min).min().unwrap_or(0),
+        mean: samples.iter().map(|one| one.mean).sum::<f64>() / samples.len() as f64,
+        max: samples.iter().map(|one| one.max).max().unwrap_or(0),
+    });
     for path in &plan.moving {
         let Some(format) = MovingFormat::of(path) else { continue };
         let write = || {
-            let bytes = moving::encode(&frames, &finish.metadata, format, token)?;
+            let bytes = moving::encode(&frames, &metadata, format, token)?;
             let write = |guard: &Guard<'_>| output::write::atomic_until(path, &bytes, guard, token);
             guarded(plan, inputs, path, sink, write)?;
             Ok(bytes.len() as u64)
@@ -297,6 +302,12 @@ fn metadata(plan: &Plan) -> Vec<(String, String)> {
     ];
     let mut pairs = pairs.map(|(key, value)| (key.to_owned(), value)).to_vec();
     let mut add = |name: &str, value: String| pairs.push((format!("glimt:{name}"), value));
+    if let Some(from) = plan.from {
+        add("from", from.name().to_owned());
+    }
+    if let Some(up) = plan.up {
+        add("up", up.name().to_owned());
+    }
     if settings.clamp > 0.0 {
         add("clamp", settings.clamp.to_string());
     }

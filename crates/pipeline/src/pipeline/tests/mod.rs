@@ -77,6 +77,8 @@ pub(super) const KERNEL: Kernel = crate::integrators::render_tile_by;
 
 pub(in crate::pipeline) struct Bench {
     pub(super) folder: tempfile::TempDir,
+    /// Name of the scene, or of the model.
+    pub(super) scene: &'static str,
     pub(super) worker: Handle,
     pub(super) generation: u64,
     pub(super) overrides: Overrides,
@@ -104,6 +106,7 @@ impl Bench {
         let worker = start_with(means).expect("a thread");
         let bench = Self {
             folder,
+            scene: "scene.toml",
             worker,
             generation: 0,
             overrides,
@@ -137,7 +140,7 @@ impl Bench {
         self.generation += 1;
         self.worker.send(Command::Render(Box::new(Request {
             generation: self.generation,
-            scene: self.path("scene.toml"),
+            scene: self.path(self.scene),
             overrides: self.overrides.clone(),
             preview: self.preview,
             write: self.writing,

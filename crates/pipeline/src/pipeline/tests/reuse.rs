@@ -466,3 +466,30 @@ fn numbers_about_the_samples_take_none_of_their_own() {
     assert_statuses(&bench.done().0, "rrrrrsrd");
     assert_eq!(bench.picture(), beauty);
 }
+
+/// A picture that was not copied along is waited for, and is shown when it comes.
+#[test]
+fn a_picture_of_a_model_that_comes_later_is_seen() {
+    let mut bench = Bench::new(SCENE);
+    bench.scene = "one.obj";
+    bench.write("one.mtl", "newmtl m\nKd 0.2 0.4 0.2\nmap_Kd later.ppm\n");
+    bench.write("one.obj", "mtllib one.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n");
+    let of = bench.send();
+    let events = bench.until_end(of);
+    let is_watched = |event: &Event| match event {
+        Event::Files { files, .. } => files.iter().any(|file| file.path == bench.path("later.ppm")),
+        _ => false,
+    };
+    assert!(events.iter().any(is_watched));
+    let is_said = |warnings: &[Diagnostic]| warnings.iter().any(|one| one.message.contains("later.ppm"));
+    let Some(Event::Done { warnings, .. }) = events.last() else { panic!("{:?}", events.last()) };
+    assert!(is_said(warnings), "{warnings:?}");
+    let without = bench.picture();
+    bench.write("later.ppm", "P6\n1 1\n255\nabc");
+    assert!(!is_said(&bench.done_with_warnings().1));
+    let with = bench.picture();
+    assert!(with != without);
+    fs::remove_file(bench.path("later.ppm")).expect("removed");
+    assert!(is_said(&bench.done_with_warnings().1));
+    assert!(bench.picture() == without);
+}

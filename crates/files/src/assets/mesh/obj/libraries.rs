@@ -76,6 +76,8 @@ impl Libraries<'_> {
                 let mut found = self.found.borrow_mut();
                 found.materials.extend(known);
                 found.warnings.extend(warnings);
+                let used: BTreeSet<usize> = self.places(&materials).into_values().collect();
+                found.warnings.extend(mtl::warnings(path, used.into_iter().map(|index| &materials[index])));
                 found.pictures.extend(materials.iter().flat_map(|material| mtl::pictures(material, folder)));
                 Ok(materials)
             }

@@ -9,6 +9,9 @@ pub(super) trait Numbers {
     fn integer(&mut self, scalar: Scalar) -> Result<i64, String>;
     fn skip(&mut self, scalar: Scalar, count: usize) -> Result<(), String>;
 
+    /// Ends an item of an element.
+    fn end_item(&mut self) {}
+
     /// Byte of the file.
     fn at(&self) -> usize;
 
@@ -17,7 +20,15 @@ pub(super) trait Numbers {
 }
 
 /// Words between blanks.
-pub(super) struct Ascii<'a>(pub(super) Cursor<'a>);
+pub(super) struct Ascii<'a>(pub(super) Cursor<'a>, pub(super) Lines);
+
+/// Meaning of the ends of lines.
+pub(super) enum Lines {
+    /// They are blanks.
+    Blank,
+    /// They end items. Values before them that no property takes are left out: the number of such lines, and a byte of the first.
+    EndItems(u64, Option<usize>),
+}
 
 impl Ascii<'_> {
     fn seek_word(&mut self) -> Result<(), String> {
@@ -42,6 +53,17 @@ impl Numbers for Ascii<'_> {
             self.0.word();
         }
         Ok(())
+    }
+
+    fn end_item(&mut self) {
+        match &mut self.1 {
+            Lines::EndItems(count, first) if self.0.skip_in_line() => {
+                *count += 1;
+                first.get_or_insert(self.0.at());
+                self.0.end_line();
+            }
+            Lines::EndItems(..) | Lines::Blank => {}
+        }
     }
 
     fn at(&self) -> usize {

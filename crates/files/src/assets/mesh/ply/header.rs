@@ -102,9 +102,16 @@ impl Element {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
+    /// Warnings of lines that were skipped.
+    pub(super) warnings: Vec<String>,
     /// First byte behind the header.
     pub(super) body: usize,
 }
+
+/// Words that begin the statements of a header.
+const STATEMENTS: [&str; 6] = ["format", "element", "property", "comment", "obj_info", "end_header"];
+/// Most lines of a header whose skipping is said.
+const MOST_WARNINGS: usize = 10;
 
 /// Reads the header.
 pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
@@ -124,6 +131,7 @@ pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
     }
     let mut encoding = None;
     let mut elements = Vec::new();
+    let mut warnings = Vec::new();
     for (start, end, line) in lines {
         if end == HEADER_LIMIT && !line.ends_with(b"\n") {
             break; // cut within the line
@@ -132,7 +140,13 @@ pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
         let words: Vec<&str> = line.split_whitespace().collect();
         if words == ["end_header"] {
             let encoding = encoding.ok_or_else(|| source.wrong_at(start, "the header has no format line"))?;
-            return Ok(Header { encoding, elements, body: end });
+            return Ok(Header { encoding, elements, warnings, body: end });
+        }
+        if words.first().is_some_and(|first| !STATEMENTS.contains(first)) {
+            let (line, word) = (source.line(start), shown(words[0].as_bytes()));
+            let warning = format!("line {line}: {word} is no statement of a PLY header: the line is skipped");
+            warnings.extend((warnings.len() < MOST_WARNINGS).then_some(warning));
+            continue;
         }
         statement(&words, &mut encoding, &mut elements).map_err(|reason| source.wrong_at(start, reason))?;
     }

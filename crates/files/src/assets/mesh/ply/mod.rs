@@ -9,7 +9,7 @@ use super::assemble::{Parsed, assemble, color_bytes};
 use super::text::Cursor;
 use super::{AssetError, LoadedMesh, Source};
 use crate::math::{DVec2, DVec3};
-use body::{Ascii, Binary, Numbers};
+use body::{Ascii, Binary, Lines, Numbers};
 use header::{Element, Encoding, Header, Kind, Scalar};
 
 /// Elements between two polls of the token.
@@ -19,12 +19,38 @@ pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     source.tick(0)?;
     let header = header::parse(source)?;
     let (bytes, at) = (source.bytes, header.body);
-    let parsed = match header.encoding {
-        Encoding::Ascii => read(source, &header, Ascii(Cursor::new(bytes, at))),
-        Encoding::LittleEndian => read(source, &header, Binary::<false> { bytes, at }),
-        Encoding::BigEndian => read(source, &header, Binary::<true> { bytes, at }),
-    }?;
-    assemble(source, parsed)
+    match header.encoding {
+        Encoding::Ascii => read_text(source, &header),
+        Encoding::LittleEndian => read(source, &header, &mut Binary::<false> { bytes, at }),
+        Encoding::BigEndian => read(source, &header, &mut Binary::<true> { bytes, at }),
+    }
+}
+
+/// Reads a text word by word, whatever its lines. If that fails or does not reach its end, lines may have values that the header does
+/// not name: then an item a line.
+fn read_text(source: &Source<'_>, header: &Header) -> Result<LoadedMesh, AssetError> {
+    let cursor = Cursor::new(source.bytes, header.body);
+    let mut words = Ascii(cursor, Lines::Blank);
+    let by_words = read(source, header, &mut words);
+    source.watch.token.check()?;
+    if by_words.is_ok() && !words.0.skip_blank() {
+        return by_words;
+    }
+    let mut lines = Ascii(cursor, Lines::EndItems(0, None));
+    let by_lines = read(source, header, &mut lines);
+    match (by_lines, lines.1) {
+        (Ok(mut loaded), Lines::EndItems(count, Some(first))) => {
+            let line = source.line(first);
+            let lines = match count {
+                1 => format!("line {line} has"),
+                _ => format!("line {line} and {} more have", count - 1),
+            };
+            let warning = format!("{lines} more values than the header names: those are left out");
+            loaded.warnings.push(warning);
+            Ok(loaded)
+        }
+        (Ok(_) | Err(_), Lines::EndItems(..) | Lines::Blank) => by_words,
+    }
 }
 
 /// Place of a fault in the file.
@@ -44,7 +70,7 @@ impl Place<'_> {
     }
 }
 
-fn read(source: &Source<'_>, header: &Header, mut numbers: impl Numbers) -> Result<Parsed, AssetError> {
+fn read(source: &Source<'_>, header: &Header, numbers: &mut impl Numbers) -> Result<LoadedMesh, AssetError> {
     let place = Place { source, encoding: header.encoding };
     let count_of =
         |name: &str| header.elements.iter().filter(|e| e.name == name).map(|e| e.count).sum::<u64>();
@@ -54,20 +80,20 @@ fn read(source: &Source<'_>, header: &Header, mut numbers: impl Numbers) -> Resu
     }
     // Strips repeat what faces say, if there are faces.
     let has_faces = count_of("face") > 0;
-    let mut parsed = Parsed::default();
+    let mut parsed = Parsed { warnings: header.warnings.clone(), ..Parsed::default() };
     for element in &header.elements {
         plausible(source, element, header.encoding, numbers.at())?;
         match element.name.as_str() {
-            "vertex" => read_vertices(&place, element, &mut numbers, &mut parsed)?,
-            "face" => read_faces(&place, element, &mut numbers, vertices, &mut parsed)?,
-            "tristrips" if !has_faces => read_strips(&place, element, &mut numbers, vertices, &mut parsed)?,
+            "vertex" => read_vertices(&place, element, numbers, &mut parsed)?,
+            "face" => read_faces(&place, element, numbers, vertices, &mut parsed)?,
+            "tristrips" if !has_faces => read_strips(&place, element, numbers, vertices, &mut parsed)?,
             _ if element.properties.is_empty() => {}
-            _ => each(&place, element, &mut numbers, |numbers| {
+            _ => each(&place, element, numbers, |numbers| {
                 element.properties.iter().try_for_each(|property| skip(numbers, property.kind))
             })?,
         }
     }
-    Ok(parsed)
+    assemble(source, parsed)
 }
 
 /// Refuses a header that claims more than the file can hold, before anything is allocated.
@@ -99,6 +125,7 @@ fn each<N: Numbers>(
             place.source.tick(numbers.at())?;
         }
         one(numbers).map_err(|reason| place.wrong(numbers.at(), element, index, &reason))?;
+        numbers.end_item();
     }
     Ok(())
 }

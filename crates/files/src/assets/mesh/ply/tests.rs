@@ -218,3 +218,41 @@ fn strips_are_triangles_that_turn_in_turns() {
     let both = format!("{strips}element face 1\nproperty list uchar int vertex_indices\n");
     assert_eq!(read_bytes(&file("4 0 1 3 2\n3 0 1 2\n", &both)).expect("whole").mesh.triangles, [[0, 1, 2]]);
 }
+
+#[test]
+fn a_line_of_a_header_that_says_nothing_is_skipped_with_a_warning() {
+    let text = String::from_utf8(ascii(&format!("{SQUARE}4 0 1 2 3\n"))).expect("text");
+    let plain = read_bytes(text.as_bytes()).expect("whole");
+    let odd = text.replace("comment made here", "Created by hand, with love");
+    let read = read_bytes(odd.as_bytes()).expect("whole");
+    assert_eq!(read.mesh, plain.mesh);
+    assert_eq!(read.warnings, ["line 3: \"Created\" is no statement of a PLY header: the line is skipped"]);
+    // A statement that is not whole could mean anything.
+    assert!(says(text.replace("comment made here", "element box").as_bytes()).contains("is no statement"));
+    assert!(says(text.replace("comment made here", "format").as_bytes()).contains("is no statement"));
+    assert!(says(&[b"ply\n".as_slice(), &[7; 3000]].concat()).contains("end_header"));
+}
+
+/// Some programs write lists that their header does not name. Others read such files line by line.
+#[test]
+fn values_that_the_header_does_not_name_are_left_out_line_by_line() {
+    let plain = read_bytes(&ascii(&format!("{SQUARE}3 0 1 2\n").replace('\u{0}', ""))).expect("whole");
+    for body in [
+        "0 0 0 9 9\n1 0 0\n1 1 0 9\n\n0 1 0\n3 0 1 2\n",
+        "0 0 0\n1 0 0\n1 1 0\n0 1 0 0.5\n3 0 1 2 6 0.5 0.5\n",
+    ] {
+        let read = read_bytes(&ascii(body)).expect("whole");
+        assert_eq!(read.mesh, plain.mesh, "{body}");
+        assert_eq!(read.warnings.len(), 1);
+        let line = if body.contains("9 9") { 11 } else { 14 };
+        let said =
+            format!("line {line} and 1 more have more values than the header names: those are left out");
+        assert_eq!(read.warnings[0], said);
+    }
+    // Where there are too few, the error is that of the file as it stands.
+    let said = says(&ascii("0 0 0 9\n1 0 0\n1 1 0\n0 1 0\n3 0 1\n"));
+    assert!(said.starts_with("a.ply:"), "{said}");
+    // Several items in a line are fine.
+    let joined = read_bytes(&ascii("0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2\n")).expect("whole");
+    assert_eq!((joined.mesh, joined.warnings.len()), (plain.mesh, 0));
+}
