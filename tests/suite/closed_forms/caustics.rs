@@ -135,7 +135,7 @@ fn a_ball_of_glass_and_a_mirror_in_a_box_throw_the_light_that_paths_find() {
 fn every_part_of_the_light_by_photons_is_that_by_paths_and_they_add_up() {
     let glossy = room(phong(0.4, 0.4, 20.0, 0.0), |radiance| phong(0.4, 0.0, 1.0, radiance));
     let whole = glossy.pictured(v(0.0, 1.4, 0.9), v(0.15, 0.1, 0.4), 40.0, SIDE as u32, SIDE as u32).depth(5);
-    let effort = Effort { path_samples: 128, passes: 16, photons: 15_000, radius: 0.03 };
+    let effort = Effort { path_samples: 128, passes: 20, photons: 15_000, radius: 0.03 };
     let views = [View::Emission, View::Diffuse, View::Specular, View::Caustic, View::Indirect, View::Beauty];
     assert_same_light("a glowing room", &whole, &views, &effort);
     let part = |view| whole.clone().photons(5000, 0.05).viewed(view).picture(4, 3);

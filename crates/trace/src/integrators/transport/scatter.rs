@@ -28,6 +28,8 @@ pub struct Continuation {
 impl Continuation {
     /// Scatterings before Russian roulette begins.
     const SURE: u32 = 3;
+    /// Reciprocal of the throughput below which Russian roulette may end a path.
+    const GAIN: f32 = 2.5;
 
     /// The continuation in these lobes from vertices after so many scatterings.
     pub fn new(tile: &TileContext<'_>, depth: u32, lobes: LobeSet) -> Self {
@@ -38,11 +40,11 @@ impl Continuation {
         Self { leads_on, is_risked: depth >= Self::SURE, lobes }
     }
 
-    /// Survival probability of a path: the root of its throughput, as its part of the variance goes with the square of its
-    /// throughput (Bolin and Meyer, *An Error Metric for Monte Carlo Ray Tracing*, 1997).
+    /// Survival probability of a path: in proportion to its throughput, so that all that were at risk go on with one throughput
+    /// (Arvo and Kirk, *Particle Transport and Image Synthesis*, 1990). The gain is measured: see `benches/README.md`.
     #[inline(always)]
     fn chance(self, roulette_throughput: f32) -> f32 {
-        if self.is_risked & (roulette_throughput < 1.0) { roulette_throughput.sqrt() } else { 1.0 }
+        if self.is_risked { (roulette_throughput * Self::GAIN).min(1.0) } else { 1.0 }
     }
 
     /// Russian roulette for a path after a mirror or glass. `None` if it ends; survivors are reweighted.
