@@ -226,8 +226,10 @@ fn delete_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
 
 fn repeat_line(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
     let line = random.pick(&lines(bytes)).clone();
-    let text = [b"\n", &bytes[line.clone()]].concat().repeat(1 << random.below(12));
-    bytes.splice(line.end..line.end, text);
+    let text = [b"\n", &bytes[line.clone()]].concat();
+    // No more of a long line than is kept: the worker's memory is watched.
+    let times = (1 << random.below(12)).min(MOST_BYTES / text.len() + 1);
+    bytes.splice(line.end..line.end, text.repeat(times));
 }
 
 fn swap_lines(bytes: &mut Vec<u8>, _: &[u8], random: &mut Random) {
