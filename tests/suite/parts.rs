@@ -236,6 +236,21 @@ fn a_joined_picture_takes_the_place_of_nothing_that_it_is_made_of() {
             assert_eq!(desk.bytes(name), TILES.as_bytes());
         }
     }
+    // One that has changed since, or is not there.
+    for content in [Some("P3 1 1 255 9 9 9\n"), None] {
+        match content {
+            Some(text) => desk.write("tiles.ppm", text),
+            None => fs::remove_file(desk.path("tiles.ppm")).expect("removed"),
+        };
+        for name in ["tiles.ppm", "elsewhere/../tiles.ppm"] {
+            let said = desk.expect(&format!("merge {name} 1.part 2.part --progress none"), 2);
+            let reason =
+                format!("cannot write {name}: the parts were rendered from a file of that name (tiles.ppm)");
+            assert!(said.contains(&reason), "{said}");
+            let left = fs::read_to_string(desk.path("tiles.ppm")).ok();
+            assert_eq!(left.as_deref(), content);
+        }
+    }
     desk.expect("merge joined.ppm 1.part 2.part --progress none", 0);
 }
 

@@ -102,10 +102,12 @@ impl Merge<'_> {
 
     /// Why the picture must not be written to a file: the parts were made of it. `None` if they were not.
     fn refused_input(&self, parts: &[PartFile], path: &Path) -> Option<String> {
-        let name = part::input_in_place_of(parts, path)?;
+        let by_content = || part::input_in_place_of(parts, path).map(|name| (name, "it"));
+        let by_name = || part::input_of_that_name(parts, path).map(|name| (name, "a file of that name"));
+        let (name, what) = by_content().or_else(by_name)?;
         let out = self.args.out.display();
         Some(format!(
-            "cannot write {out}: the parts were rendered from it ({name}); choose another name for the picture"
+            "cannot write {out}: the parts were rendered from {what} ({name}); choose another name for the picture"
         ))
     }
 

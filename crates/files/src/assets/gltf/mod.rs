@@ -397,9 +397,19 @@ fn chunks(bytes: &[u8]) -> Result<(Range, Option<Range>), Wrong> {
 }
 
 fn check_version(root: &Root) -> Result<(), Wrong> {
-    let least = &root.asset.min_version;
-    if !matches!(least.as_str(), "" | "2.0") {
-        return Err(Wrong::new(format!("it needs a reader of glTF {}, and 2.0 is read", shown(least))));
+    let least = root.asset.min_version.as_str();
+    let number = |text: &str| text.parse::<u32>().ok();
+    let parts = match least.split_once('.') {
+        Some((major, minor)) => number(major).zip(number(minor)),
+        None => number(least).map(|major| (major, 0)),
+    };
+    match parts {
+        _ if least.is_empty() => {}
+        Some(version) if version <= (2, 0) => {}
+        Some(_) => {
+            return Err(Wrong::new(format!("it needs a reader of glTF {least}, and 2.0 is read")));
+        }
+        None => return Err(Wrong::new(format!("asset.minVersion is no version: {:?}", shown(least)))),
     }
     match root.asset.version.as_str() {
         version if version.starts_with("2.") => Ok(()),

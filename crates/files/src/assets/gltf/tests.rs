@@ -586,6 +586,8 @@ fn a_file_that_needs_a_newer_version_is_refused_by_its_number() {
     for (asset, is_read) in [
         (json!({"version": "2.0", "minVersion": "2.0"}), true),
         (json!({"version": "2.3"}), true),
+        (json!({"version": "2.0", "minVersion": "2"}), true),
+        (json!({"version": "2.0", "minVersion": "1.0"}), true),
         (json!({"version": "2.1", "minVersion": "2.1"}), false),
         (json!({"version": "2.10", "minVersion": "3.0"}), false),
     ] {

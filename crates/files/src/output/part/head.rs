@@ -1,5 +1,7 @@
 //! The head of a part: what the picture is, which part of it this is, and how it becomes a file.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 
 use super::super::{BitDepth, Finish};
@@ -55,6 +57,13 @@ impl Head {
     pub(super) fn input_of_hash(&self, hash: &str) -> Option<&str> {
         let is_it = |one: &&Trait| one.name.starts_with(FILE) && one.value == hash;
         self.identity.iter().find(is_it).map(|one| name_of(&one.name))
+    }
+
+    /// The name, as seen from the scene's folder, of a file that the picture was made of or would have been, with which this path
+    /// ends. `None` if there is none.
+    pub(super) fn input_of_name(&self, path: &Path) -> Option<&str> {
+        let files = self.identity.iter().filter(|one| one.name.starts_with(FILE));
+        files.map(|one| name_of(&one.name)).find(|name| !name.is_empty() && path.ends_with(name))
     }
 }
 

@@ -22,7 +22,7 @@ mod save;
 pub use error::{PartError, WhichPart, missing_parts};
 pub use head::{Head, Kind, PictureHead, ShareHead, ToneHead, Trait, differences};
 pub use merge::{Merged, check, merge};
-pub use read::{PartFile, input_in_place_of, is_part};
+pub use read::{PartFile, input_in_place_of, input_of_that_name, is_part};
 pub use save::save;
 
 /// The first bytes of a file. Like those of PNG, they are changed by whatever takes the file for a text.

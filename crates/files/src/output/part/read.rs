@@ -44,6 +44,14 @@ pub fn input_in_place_of<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a s
     parts.iter().find_map(|part| part.head.input_of_hash(&hash))
 }
 
+/// The name of a file that one of these pictures was made of, if a path ends with it: a file that was missing then, or has changed
+/// since, has another content.
+pub fn input_of_that_name<'a>(parts: &'a [PartFile], path: &Path) -> Option<&'a str> {
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let real = path.canonicalize().unwrap_or_else(|_| whole.clone());
+    parts.iter().find_map(|part| [&whole, &real].into_iter().find_map(|path| part.head.input_of_name(path)))
+}
+
 impl PartFile {
     /// Opens a file and reads all of it.
     ///

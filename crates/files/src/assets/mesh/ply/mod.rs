@@ -49,7 +49,9 @@ fn read_text(source: &Source<'_>, header: &Header) -> Result<LoadedMesh, AssetEr
             loaded.warnings.push(warning);
             Ok(loaded)
         }
-        (Ok(_) | Err(_), Lines::EndItems(..) | Lines::Blank) => by_words,
+        // A file with such lines that is wrong in another way too: its words would be taken for others.
+        (Err(error), Lines::EndItems(_, Some(_))) => Err(error),
+        (Ok(_) | Err(_), Lines::EndItems(_, None) | Lines::Blank) => by_words,
     }
 }
 

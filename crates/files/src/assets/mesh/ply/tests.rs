@@ -249,6 +249,11 @@ fn values_that_the_header_does_not_name_are_left_out_line_by_line() {
             format!("line {line} and 1 more have more values than the header names: those are left out");
         assert_eq!(read.warnings[0], said);
     }
+    // A file that is cut short as well is not taken word by word.
+    let rows = "0 0 0 1 2 3\n1 0 0 1 2 3\n1 1 0 1 2 3\n0 1 0 1 2 3\n";
+    let cut = "a.ply: the header claims 1 times the element `face`, and only 0 bytes follow";
+    assert_eq!(says(&ascii(rows)), cut);
+    assert_eq!(says(&ascii("0 0 0 9\n1 0 0\n1 1 0\n0 1 0\n")), "a.ply:15: face 1: the file ends here");
     // Where there are too few, the error is that of the file as it stands.
     let said = says(&ascii("0 0 0 9\n1 0 0\n1 1 0\n0 1 0\n3 0 1\n"));
     assert!(said.starts_with("a.ply:"), "{said}");
