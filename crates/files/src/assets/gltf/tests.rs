@@ -601,6 +601,9 @@ fn a_file_that_needs_a_newer_version_is_refused_by_its_number() {
             }
         }
     }
+    json["asset"] = json!({"version": "2.0", "minVersion": "x"});
+    let error = open_json(&json).expect_err("no version").to_string();
+    assert!(error.contains("asset.minVersion is no version: \"x\""), "{error}");
 }
 
 #[test]

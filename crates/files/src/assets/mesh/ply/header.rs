@@ -102,16 +102,14 @@ impl Element {
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) elements: Vec<Element>,
-    /// Warnings of lines that were skipped.
-    pub(super) warnings: Vec<String>,
+    /// The warning of lines that were skipped.
+    pub(super) warning: Option<String>,
     /// First byte behind the header.
     pub(super) body: usize,
 }
 
 /// Words that begin the statements of a header.
 const STATEMENTS: [&str; 6] = ["format", "element", "property", "comment", "obj_info", "end_header"];
-/// Most lines of a header whose skipping is said.
-const MOST_WARNINGS: usize = 10;
 
 /// Reads the header.
 pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
@@ -131,7 +129,8 @@ pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
     }
     let mut encoding = None;
     let mut elements = Vec::new();
-    let mut warnings = Vec::new();
+    // Lines that the reader skips: their number, and the first with its word.
+    let mut skipped = (0_u32, String::new());
     for (start, end, line) in lines {
         if end == HEADER_LIMIT && !line.ends_with(b"\n") {
             break; // cut within the line
@@ -139,13 +138,27 @@ pub(super) fn parse(source: &Source<'_>) -> Result<Header, AssetError> {
         let line = String::from_utf8_lossy(line);
         let words: Vec<&str> = line.split_whitespace().collect();
         if words == ["end_header"] {
-            let encoding = encoding.ok_or_else(|| source.wrong_at(start, "the header has no format line"))?;
-            return Ok(Header { encoding, elements, warnings, body: end });
+            let (count, first) = skipped;
+            let warning = match count {
+                0 => None,
+                1 => Some(format!("{first} is no statement of a PLY header: the line is skipped")),
+                _ => Some(format!(
+                    "{first} is no statement of a PLY header: the line and {} more are skipped",
+                    count - 1
+                )),
+            };
+            let encoding = encoding.ok_or_else(|| {
+                let hint = warning.iter().map(|warning| format!("; {warning}")).collect::<String>();
+                source.wrong_at(start, format!("the header has no format line{hint}"))
+            })?;
+            return Ok(Header { encoding, elements, warning, body: end });
         }
-        if words.first().is_some_and(|first| !STATEMENTS.contains(first)) {
-            let (line, word) = (source.line(start), shown(words[0].as_bytes()));
-            let warning = format!("line {line}: {word} is no statement of a PLY header: the line is skipped");
-            warnings.extend((warnings.len() < MOST_WARNINGS).then_some(warning));
+        // Behind the first element, an unknown word may be a misspelt one of what the file holds.
+        if elements.is_empty() && words.first().is_some_and(|first| !STATEMENTS.contains(first)) {
+            if skipped.0 == 0 {
+                skipped.1 = format!("line {}: {}", source.line(start), shown(words[0].as_bytes()));
+            }
+            skipped.0 += 1;
             continue;
         }
         statement(&words, &mut encoding, &mut elements).map_err(|reason| source.wrong_at(start, reason))?;

@@ -82,7 +82,7 @@ fn read(source: &Source<'_>, header: &Header, numbers: &mut impl Numbers) -> Res
     }
     // Strips repeat what faces say, if there are faces.
     let has_faces = count_of("face") > 0;
-    let mut parsed = Parsed { warnings: header.warnings.clone(), ..Parsed::default() };
+    let mut parsed = Parsed { warnings: header.warning.iter().cloned().collect(), ..Parsed::default() };
     for element in &header.elements {
         plausible(source, element, header.encoding, numbers.at())?;
         match element.name.as_str() {

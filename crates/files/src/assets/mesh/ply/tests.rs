@@ -227,6 +227,16 @@ fn a_line_of_a_header_that_says_nothing_is_skipped_with_a_warning() {
     let read = read_bytes(odd.as_bytes()).expect("whole");
     assert_eq!(read.mesh, plain.mesh);
     assert_eq!(read.warnings, ["line 3: \"Created\" is no statement of a PLY header: the line is skipped"]);
+    let odd = text.replace("comment made here", "Created by hand\nwith love\nlong ago");
+    let more = ["line 3: \"Created\" is no statement of a PLY header: the line and 2 more are skipped"];
+    assert_eq!(read_bytes(odd.as_bytes()).expect("whole").warnings, more);
+    // Misspelt statements.
+    assert!(
+        says(text.replace("element face", "elment face").as_bytes()).contains("\"elment\" is no statement")
+    );
+    assert!(says(text.replace("property float z", "porperty float z").as_bytes()).contains("\"porperty\""));
+    let said = says(text.replace("format", "frmat").as_bytes());
+    assert!(said.contains("no format line; line 2: \"frmat\" is no statement"), "{said}");
     // A statement that is not whole could mean anything.
     assert!(says(text.replace("comment made here", "element box").as_bytes()).contains("is no statement"));
     assert!(says(text.replace("comment made here", "format").as_bytes()).contains("is no statement"));
