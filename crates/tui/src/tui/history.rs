@@ -376,7 +376,9 @@ impl Past {
     fn is_same(&self, shown: &Shown, origin: &Origin) -> bool {
         let is_of_image =
             self.shown.is_of_same_image(shown) && (self.origin.is_unfinished || !origin.is_unfinished);
-        is_of_image || self.shown.picture == shown.picture
+        // What is rendered may begin as it is and become another one.
+        let may_change = origin.is_unfinished && !self.origin.is_unfinished;
+        is_of_image || self.shown.picture == shown.picture && !may_change
     }
 
     /// Words about it, with a mark if its render was stopped.
@@ -461,6 +463,25 @@ mod tests {
             history.record(shown(generation, 10), Instant::now(), Origin::default());
         }
         assert_eq!((history.past.len(), history.past[0].shown.generation), (1, 2));
+    }
+
+    /// More samples of the same picture begin with that picture.
+    #[test]
+    fn an_unfinished_picture_is_not_the_finished_one_that_it_begins_with() {
+        let unfinished = Origin { is_unfinished: true, ..Origin::default() };
+        let mut history = History::default();
+        history.record(shown(1, 10), Instant::now(), Origin::default());
+        history.record(shown(2, 10), Instant::now(), unfinished.clone());
+        let generations = |history: &History| -> Vec<u64> {
+            history.past.iter().map(|past| past.shown.generation).collect()
+        };
+        assert_eq!(generations(&history), [1, 2]);
+        let better = Shown { picture: plain_picture(10, 10, [1, 2, 4]), ..shown(2, 10) };
+        history.record(better, Instant::now(), unfinished);
+        assert_eq!(generations(&history), [1, 2]);
+        // In the end it may be the same after all.
+        history.record(shown(2, 10), Instant::now(), Origin::default());
+        assert_eq!(generations(&history), [2]);
     }
 
     #[test]
