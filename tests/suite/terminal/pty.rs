@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use super::relay::{Answers, Relay, Seen};
+use crate::desk::PROGRAM;
 use nix::sys::signal::{Signal, kill};
 use nix::sys::termios::LocalFlags;
 use nix::unistd::Pid;
@@ -17,8 +18,6 @@ use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, SlavePty, native_p
 
 /// Longest time to wait for anything, on however busy a machine.
 const LIMIT: Duration = Duration::from_secs(60);
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_glimt");
 
 /// Variables by which terminals are known.
 const OF_TERMINALS: [&str; 11] = [

@@ -73,12 +73,14 @@ fn a_typo_during_a_render_leaves_one_picture_of_it() {
     terminal.wait_for_render(1);
     let long = SCENE.replace("samples = 4", "samples = 10000000");
     folder.write("scene.toml", &long);
-    terminal.wait_for("ETA");
+    // The strip has the picture once its first cells are on the screen.
+    let is_there = |screen: &vt100::Screen| words(screen).contains("▸2 render.");
+    terminal.wait("a picture under way", is_there);
     for _ in 0..2 {
         typo(&folder, &terminal, &long, "the last good scene goes on");
         terminal.wait_for("ETA");
     }
-    terminal.wait_for(" samples · ");
+    terminal.wait("a picture under way", is_there);
     terminal.press("n");
     terminal.wait_for("picture 1 of 2");
     terminal.wait("two pictures", |screen| {

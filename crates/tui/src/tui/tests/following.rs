@@ -327,29 +327,42 @@ fn apart(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
 /// Codes that the screen may be off the final one at 10, 25 and 50 % of a render.
 const MOST: [(f64, f64); 3] = [(0.1, 1.5), (0.25, 0.8), (0.5, 0.5)];
 
-#[test]
-fn a_quick_terminal_follows_the_render() {
-    let kinds = [
-        (PreviewKind::HalfBlock, ColorDepth::TrueColor),
-        (PreviewKind::Sextant, ColorDepth::TrueColor),
-        (PreviewKind::HalfBlock, ColorDepth::Indexed256),
-        (PreviewKind::Pixels(Protocol::Kitty), ColorDepth::TrueColor),
-    ];
-    for (preview, depth) in kinds {
-        let mut watch = Watch::new(QUICK, preview, depth);
-        let screens = MOST.map(|(fraction, _)| {
-            watch.until(fraction);
-            watch.terminal.seen()
-        });
-        watch.until(1.0);
-        let pictures = watch.shown;
-        watch.finish();
-        for ((fraction, most), screen) in MOST.into_iter().zip(&screens) {
-            let apart = apart(screen, &watch.terminal.seen());
-            assert!(apart <= most, "{preview:?}, {depth:?}, at {fraction}: {apart} codes");
-        }
-        assert!((45..=105).contains(&pictures), "{preview:?}, {depth:?}: {pictures} in 10 s");
+/// Checks that the screen is near the final one at each fraction of [`MOST`], and that there are enough pictures.
+#[track_caller]
+fn assert_followed(preview: PreviewKind, depth: ColorDepth) {
+    let mut watch = Watch::new(QUICK, preview, depth);
+    let screens = MOST.map(|(fraction, _)| {
+        watch.until(fraction);
+        watch.terminal.seen()
+    });
+    watch.until(1.0);
+    let pictures = watch.shown;
+    watch.finish();
+    for ((fraction, most), screen) in MOST.into_iter().zip(&screens) {
+        let apart = apart(screen, &watch.terminal.seen());
+        assert!(apart <= most, "{preview:?}, {depth:?}, at {fraction}: {apart} codes");
     }
+    assert!((45..=105).contains(&pictures), "{preview:?}, {depth:?}: {pictures} in 10 s");
+}
+
+#[test]
+fn a_quick_terminal_follows_the_render_in_half_blocks() {
+    assert_followed(PreviewKind::HalfBlock, ColorDepth::TrueColor);
+}
+
+#[test]
+fn a_quick_terminal_follows_the_render_in_sextants() {
+    assert_followed(PreviewKind::Sextant, ColorDepth::TrueColor);
+}
+
+#[test]
+fn a_quick_terminal_follows_the_render_in_256_colours() {
+    assert_followed(PreviewKind::HalfBlock, ColorDepth::Indexed256);
+}
+
+#[test]
+fn a_quick_terminal_follows_the_render_in_pixels() {
+    assert_followed(PreviewKind::Pixels(Protocol::Kitty), ColorDepth::TrueColor);
 }
 
 #[test]
