@@ -4,7 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::{Command as Process, Output, Stdio};
 
-use assert_cmd::cargo::CommandCargoExt;
+/// The program that the tests were built with.
+pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_glimt");
 
 /// A sphere under a point light.
 pub(crate) const SCENE: &str = r#"[render]
@@ -53,13 +54,13 @@ impl Desk {
     /// the file could still be open for writing in a program that another test just starts, and would not run.
     pub(crate) fn program(&self) -> PathBuf {
         let copy = self.path("program");
-        let made = Process::new("cp").arg(self.glimt("").get_program()).arg(&copy).status();
+        let made = Process::new("cp").arg(PROGRAM).arg(&copy).status();
         assert!(made.expect("cp runs").success(), "a copy");
         copy
     }
 
     pub(crate) fn glimt(&self, line: &str) -> Process {
-        let mut process = Process::cargo_bin("glimt").expect("the program");
+        let mut process = Process::new(PROGRAM);
         process.current_dir(self.0.path()).args(line.split_whitespace()).stdin(Stdio::null());
         process.env_remove("NO_COLOR").env("TERM", "xterm");
         process

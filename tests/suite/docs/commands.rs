@@ -5,9 +5,8 @@ use std::os::unix::fs::symlink;
 use std::path::Path;
 use std::process::Command;
 
-use assert_cmd::cargo::CommandCargoExt;
-
 use super::{Block, Page, pages, root};
+use crate::desk::PROGRAM;
 
 /// Programs that pages name and this test does not start.
 const OTHERS: [&str; 3] = ["cargo", "ssh", "tmux"];
@@ -58,9 +57,8 @@ fn furnish(folder: &Path, page: &Page) {
     for name in ["scenes", "assets"] {
         symlink(root().join(name), folder.join(name)).expect("linked");
     }
-    let program = Command::cargo_bin("glimt").expect("the program");
     std::fs::create_dir(folder.join("bin")).expect("a folder");
-    symlink(program.get_program(), folder.join("bin/glimt")).expect("linked");
+    symlink(PROGRAM, folder.join("bin/glimt")).expect("linked");
     for Block { text, .. } in page.blocks("toml") {
         let name = text.lines().next().and_then(|line| line.strip_prefix("# "));
         if let Some(name) = name.filter(|name| name.ends_with(".toml")) {
