@@ -1,5 +1,6 @@
 //! Over a thin line, glimt answers a key at once, whatever is on the way, and the shell returns at once.
 
+use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use super::pty::{Folder, GREEN, RED, SCENE, Terminal};
@@ -125,8 +126,12 @@ fn the_line_is_measured_and_shown() {
         let folder = Folder::new();
         let mut terminal = folder.thin_line(Answers::Terminal);
         terminal.wait_for_render(1);
-        terminal.wait("kB and ms", |screen| measured(screen).is_some());
-        let (size, time) = terminal.look(measured).expect("just seen");
+        let seen = Cell::new(None);
+        terminal.wait("kB and ms", |screen| {
+            seen.set(measured(screen));
+            seen.get().is_some()
+        });
+        let (size, time) = seen.get().expect("it was waited for");
         assert!((1..200).contains(&size) && time >= 150, "{size} kB, {time} ms");
         terminal.press("?");
         terminal.wait_for("the terminal's time to answer");
