@@ -5,9 +5,8 @@ use std::f64::consts::{PI, TAU};
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
 use glimt::math::{DVec2, DVec3, Vec2, Vec3};
-use glimt::scene::description::{
-    Bump, Falloff, Integrator, Material, NormalMap, Shadows, TextureFilter, Wrap,
-};
+use glimt::scene::description::light::Falloff;
+use glimt::scene::description::{Bump, Integrator, Material, NormalMap, Shadows, TextureFilter, Wrap};
 
 use super::scenes::{
     AS_IT_IS, Build, frosted, glass, lat_long_sphere, matte, metal, mirror, phong, plastic, principled,

@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
 use glimt::math::DVec3;
-use glimt::scene::description::{Falloff, Shadows};
+use glimt::scene::description::Shadows;
+use glimt::scene::description::light::Falloff;
 
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, receiver};
 use super::{assert_close, assert_mean, lambert, v};

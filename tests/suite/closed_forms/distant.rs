@@ -3,9 +3,8 @@
 use std::f64::consts::PI;
 
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{
-    ColorSource, DirectionalLight, Falloff, Light, MaterialKind, PointLight, Shadows, SpotLight,
-};
+use glimt::scene::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
+use glimt::scene::description::{ColorSource, Light, MaterialKind, Shadows};
 
 use super::direct::at_origin;
 use super::scenes::{Build, matte, plain, receiver, scene};

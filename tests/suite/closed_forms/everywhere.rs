@@ -5,9 +5,9 @@ use std::f64::consts::PI;
 
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec3};
+use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
-    EmissionSides, EmissionSource, Falloff, Integrator, Material, MaterialKind, NumberSource, OpacitySource,
-    Shape,
+    EmissionSides, EmissionSource, Integrator, Material, MaterialKind, NumberSource, OpacitySource, Shape,
 };
 
 use super::scenes::{AS_IT_IS, Build, metal, plastic, principled, receiver, scene};

@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec2, Vec3};
-use glimt::scene::description::{Bump, Falloff, NormalMap, Shadows, TextureFilter, Wrap};
+use glimt::scene::description::light::Falloff;
+use glimt::scene::description::{Bump, NormalMap, Shadows, TextureFilter, Wrap};
 
 use super::scenes::{AS_IT_IS, Build, emitter, lat_long_sphere, matte, scene};
 use super::{Random, v};

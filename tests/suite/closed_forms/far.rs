@@ -6,9 +6,8 @@ use glimt::assets::mesh::load;
 use glimt::control::{CancelToken, unwatched};
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec2, Vec3};
-use glimt::scene::description::{
-    Accel, ColorSource, Falloff, MaterialKind, Shadows, Shape, TextureFilter, Wrap,
-};
+use glimt::scene::description::light::Falloff;
+use glimt::scene::description::{Accel, ColorSource, MaterialKind, Shadows, Shape, TextureFilter, Wrap};
 
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};
 use super::v;

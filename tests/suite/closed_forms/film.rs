@@ -4,7 +4,8 @@ use glimt::choice::Choice;
 use glimt::control::CancelToken;
 use glimt::film::Film;
 use glimt::integrators::render_tile;
-use glimt::scene::description::{Falloff, PixelFilter, Render};
+use glimt::scene::description::light::Falloff;
+use glimt::scene::description::{PixelFilter, Render};
 use glimt::world::World;
 
 use super::scenes::{Build, emitter, matte, scene};

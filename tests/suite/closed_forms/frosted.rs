@@ -2,8 +2,9 @@
 
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
+use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
-    EmissionSource, Falloff, Integrator, Material, MaterialKind, NumberSource, Shadows, Shape,
+    EmissionSource, Integrator, Material, MaterialKind, NumberSource, Shadows, Shape,
 };
 
 use super::global::by_paths;

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{ColorSource, Falloff, Integrator, Material, MaterialKind, Shadows, Shape};
+use glimt::scene::description::light::Falloff;
+use glimt::scene::description::{ColorSource, Integrator, Material, MaterialKind, Shadows, Shape};
 
 use super::distant::sun;
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tinted};

@@ -2,7 +2,8 @@
 
 use glimt::integrators::render_tile;
 use glimt::math::DVec3;
-use glimt::scene::description::{Falloff, Shadows, Shape};
+use glimt::scene::description::light::Falloff;
+use glimt::scene::description::{Shadows, Shape};
 
 use super::glass::boxes;
 use super::scenes::{AS_IT_IS, Build, emitter, matte, metal, receiver, scene};

@@ -5,7 +5,8 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
 use glimt::lights::Receivers;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{DirectionalLight, Falloff, Light, PointLight, Shadows, Shape, SpotLight};
+use glimt::scene::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
+use glimt::scene::description::{Light, Shadows, Shape};
 
 use super::global::by_paths;
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene, tile};

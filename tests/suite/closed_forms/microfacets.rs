@@ -3,7 +3,8 @@
 use glimt::choice::Choice;
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{EmissionSource, Falloff, Integrator, Material, Shadows};
+use glimt::scene::description::light::Falloff;
+use glimt::scene::description::{EmissionSource, Integrator, Material, Shadows};
 
 use super::global::{by_paths, lamps_over_a_floor};
 use super::photons::{assert_same_light, both};

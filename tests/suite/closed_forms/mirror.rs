@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use glimt::math::DVec3;
-use glimt::scene::description::Falloff;
+use glimt::scene::description::light::Falloff;
 
 use super::scenes::{Build, emitter, matte, mirror, scene};
 use super::{assert_close, v};

@@ -8,7 +8,8 @@ use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::{PhotonMap, PhotonMaps, PhotonSettings, Photons, View, render_tile_by};
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{Falloff, Shape};
+use glimt::scene::description::Shape;
+use glimt::scene::description::light::Falloff;
 
 use super::distant::sun;
 use super::glass::boxes;

@@ -9,7 +9,8 @@ use glimt::integrators::render_tile;
 use glimt::lights::Source;
 use glimt::materials::fresnel::dielectric;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{Falloff, Integrator, Shape};
+use glimt::scene::description::light::Falloff;
+use glimt::scene::description::{Integrator, Shape};
 use glimt::world::{Geometry, Hit};
 
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};

@@ -6,9 +6,8 @@ use glimt::control::CancelToken;
 use glimt::film::Rect;
 use glimt::integrators::render_tile;
 use glimt::math::{DVec3, Vec2, Vec3};
-use glimt::scene::description::{
-    ColorSource, Falloff, Material, MaterialKind, Shadows, Shape, TextureFilter, Wrap,
-};
+use glimt::scene::description::light::Falloff;
+use glimt::scene::description::{ColorSource, Material, MaterialKind, Shadows, Shape, TextureFilter, Wrap};
 
 use super::scenes::{Build, emitter, glass, mirror, plain, scene};
 use super::v;

@@ -11,11 +11,11 @@ use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::{self, PhotonMaps, PhotonSettings, RenderSettings, View, render_tile_by};
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
+use glimt::scene::description::light::{Falloff, PointLight};
 use glimt::scene::description::{
-    Accel, Camera, ColorSource, EmissionSource, Encoding, Environment, Falloff, FresnelSource, Integrator,
-    Light, Located, Material, MaterialKind, Mesh, MeshFile, NumberSource, Object, OpacitySource, Photons,
-    PixelFilter, Placement, PointLight, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap,
-    UvSet, Wrap,
+    Accel, Camera, ColorSource, EmissionSource, Encoding, Environment, FresnelSource, Integrator, Light,
+    Located, Material, MaterialKind, Mesh, MeshFile, NumberSource, Object, OpacitySource, Photons,
+    PixelFilter, Placement, Render, Scene, Shadows, Shape, Texture, TextureFilter, Tonemap, UvSet, Wrap,
 };
 use glimt::world::{Geometry, Image, Lookups, MeshTree, Parts, World, lights, origin, sky, textures_needed};
 

@@ -6,8 +6,9 @@ use glimt::choice::Choice;
 use glimt::integrators::View;
 use glimt::materials::TexturePoint;
 use glimt::math::{DVec3, Vec2, Vec3};
+use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
-    ColorSource, Falloff, Material, MaterialKind, Mesh, Shadows, Shape, TextureFilter, Wrap,
+    ColorSource, Material, MaterialKind, Mesh, Shadows, Shape, TextureFilter, Wrap,
 };
 
 use super::scenes::{Build, emitter, glass, lat_long_sphere, matte, mirror, phong, scene};

@@ -4,7 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{DirectionalLight, Integrator, Light, Shadows};
+use glimt::scene::description::light::DirectionalLight;
+use glimt::scene::description::{Integrator, Light, Shadows};
 
 use super::direct::at_origin;
 use super::scenes::{Build, glass, matte, mirror, phong, receiver, scene};

@@ -5,9 +5,10 @@ use std::f64::consts::PI;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec2, Vec3};
+use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{
-    Accel, ColorSource, EmissionSides, Falloff, Integrator, Material, MaterialKind, NumberSource,
-    OpacitySource, Shadows, Shape, TextureFilter, Wrap,
+    Accel, ColorSource, EmissionSides, Integrator, Material, MaterialKind, NumberSource, OpacitySource,
+    Shadows, Shape, TextureFilter, Wrap,
 };
 
 use super::scenes::{AS_IT_IS, Build, emitter, matte, mirror, phong, plain, receiver, scene};

@@ -3,7 +3,8 @@
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec3};
-use glimt::scene::description::{Accel, Falloff, Integrator, Shadows};
+use glimt::scene::description::light::Falloff;
+use glimt::scene::description::{Accel, Integrator, Shadows};
 
 use super::scenes::{AS_IT_IS, Build, matte, scene};
 use super::v;

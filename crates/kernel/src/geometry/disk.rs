@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use super::axial::{AxialFrame, exact_t, hit};
+use super::local_form::{Extent, Ground, LocalForm};
 use super::rows::{Ends, HitRows, RayRows, accept};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -117,6 +118,14 @@ impl Disk {
     pub fn distance(&self, point: DVec3) -> f64 {
         let local = self.frame.local(point);
         DVec2::new((local.truncate().length() - self.radius).max(0.0), local.z).length()
+    }
+
+    /// The form near a point.
+    pub fn local_form(&self, point: DVec3) -> LocalForm {
+        let (normal, from) = (self.normal(), point - self.middle());
+        let extent = Extent::Flat(self.radius - from.length());
+        let ground = Ground { normal, height: from.dot(normal).abs(), extent };
+        LocalForm::Surface { distance: self.distance(point), ground: Some(ground) }
     }
 
     /// Whether a point is inside: never, as a disk encloses nothing.

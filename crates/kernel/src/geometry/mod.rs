@@ -10,6 +10,7 @@ pub mod cuboid;
 pub mod cylinder;
 pub mod disk;
 pub mod facets;
+pub mod local_form;
 pub mod mesh;
 pub mod parallelogram;
 pub mod plane;
@@ -24,6 +25,7 @@ pub mod watertight;
 pub mod watertight_rows;
 
 pub use aabb::Aabb;
+pub use local_form::LocalForm;
 pub use ray::{Ray, RayF64};
 pub use surface::{AreaPoint, Asked, ShapeHit, SurfacePoint};
 
@@ -33,6 +35,7 @@ use cone::Cone;
 use cuboid::Cuboid;
 use cylinder::Cylinder;
 use disk::Disk;
+use local_form::{Piece, parallelogram};
 use parallelogram::Parallelogram;
 use plane::Plane;
 use rows::{Ends, HitRows, RayRows};
@@ -269,6 +272,56 @@ impl Shape {
         }
     }
 
+    /// The form of the shape near a point.
+    #[inline]
+    pub fn local_form(&self, point: DVec3) -> LocalForm {
+        match self {
+            Self::Quad(_) | Self::Triangle(_) => LocalForm::Pieces(1),
+            Self::Box(_) => LocalForm::Pieces(6),
+            Self::Sphere(sphere) => sphere.local_form(point),
+            Self::Plane(plane) => plane.local_form(point),
+            Self::Disk(disk) => disk.local_form(point),
+            Self::Cylinder(cylinder) => LocalForm::curved(cylinder.distance(point)),
+            Self::Cone(cone) => LocalForm::curved(cone.distance(point)),
+            Self::Torus(torus) => LocalForm::curved(torus.distance(point)),
+        }
+    }
+
+    /// One of its flat pieces. `None` if it does not have as many, or is not made of such.
+    #[inline]
+    pub fn piece(&self, number: u32) -> Option<Piece> {
+        match self {
+            Self::Quad(quad) => (number < 1).then(|| parallelogram((quad.corner, quad.u, quad.v))),
+            Self::Triangle(triangle) => {
+                (number < 1).then(|| [triangle.a, triangle.b, triangle.c].into_iter().collect())
+            }
+            Self::Box(cuboid) => (number < 6).then(|| parallelogram(cuboid.face(number))),
+            Self::Sphere(_)
+            | Self::Plane(_)
+            | Self::Disk(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Torus(_) => None,
+        }
+    }
+
+    /// Whether a ray that enters or leaves its inside at a point of the surface goes farther than `distance` before it can
+    /// meet another side; `false` if that is not known.
+    #[inline]
+    pub fn is_far_side_beyond(&self, point: DVec3, distance: f64) -> bool {
+        match self {
+            Self::Sphere(sphere) => sphere.radius > distance,
+            Self::Box(cuboid) => cuboid.is_on_one_face(point, distance),
+            Self::Quad(_)
+            | Self::Plane(_)
+            | Self::Triangle(_)
+            | Self::Disk(_)
+            | Self::Cylinder(_)
+            | Self::Cone(_)
+            | Self::Torus(_) => false,
+        }
+    }
+
     /// Projected area: the area whose front faces a unit direction, times the cosines; for a torus, the mean over all
     /// directions.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
@@ -373,14 +426,9 @@ mod tests {
 
     #[test]
     fn the_distance_of_a_point_is_that_of_the_nearest_place() {
-        let distance = |shape: &Shape, point: DVec3| match shape {
-            Shape::Sphere(sphere) => Some(sphere.distance(point)),
-            Shape::Plane(plane) => Some(plane.distance(point)),
-            Shape::Disk(disk) => Some(disk.distance(point)),
-            Shape::Cylinder(cylinder) => Some(cylinder.distance(point)),
-            Shape::Cone(cone) => Some(cone.distance(point)),
-            Shape::Torus(torus) => Some(torus.distance(point)),
-            Shape::Quad(_) | Shape::Box(_) | Shape::Triangle(_) => None,
+        let distance = |shape: &Shape, point: DVec3| match shape.local_form(point) {
+            LocalForm::Surface { distance, .. } => Some(distance),
+            LocalForm::Pieces(_) => None,
         };
         for shape in shapes() {
             let parts = (0_u32..).zip(shape.areas()).filter(|(_, area)| *area > 0.0);

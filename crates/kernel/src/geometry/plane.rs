@@ -1,5 +1,6 @@
 //! Infinite planes, in double precision.
 
+use super::local_form::{Extent, Ground, LocalForm};
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface::flat_axes;
 use super::surface_rows::{Exact, ExactPoint, Mapped};
@@ -99,6 +100,13 @@ impl Plane {
     /// Distance of a point from it.
     pub fn distance(&self, point: DVec3) -> f64 {
         (point - self.point).dot(self.normal).abs()
+    }
+
+    /// The form near a point.
+    pub fn local_form(&self, point: DVec3) -> LocalForm {
+        let distance = self.distance(point);
+        let ground = Ground { normal: self.normal, height: distance, extent: Extent::Flat(f64::INFINITY) };
+        LocalForm::Surface { distance, ground: Some(ground) }
     }
 
     /// Whether a point is inside, where nothing is.

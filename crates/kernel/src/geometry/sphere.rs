@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::local_form::{Extent, Ground, LocalForm};
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -116,6 +117,13 @@ impl Sphere {
     /// Distance of a point from the surface.
     pub fn distance(&self, point: DVec3) -> f64 {
         ((point - self.center).length() - self.radius).abs()
+    }
+
+    /// The form near a point.
+    pub fn local_form(&self, point: DVec3) -> LocalForm {
+        let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
+        let ground = Ground { normal: out, height: distance, extent: Extent::Round(self.radius) };
+        LocalForm::Surface { distance, ground: Some(ground) }
     }
 
     /// Whether a point is inside.

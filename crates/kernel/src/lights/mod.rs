@@ -46,9 +46,7 @@ pub use area::{
     AreaLight, Chart, EmissionTexture, Emitter, MeshEmitter, Part, Patch, Side, area_light, back_light,
     sheer_light,
 };
-pub use delta::{Falloff, PointLight, SpotLight};
 pub use emission::{Ball, Emitted, Numbers, Outline, PhotonSource, Start};
-pub use infinite::{DirectionalLight, Environment, SkyMap};
 pub use light::{Family, Light};
 pub use row::{LightRow, SourceRow};
 pub use sample::{End, LightHit, LightSample, Middle, Source};

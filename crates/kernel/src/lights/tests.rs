@@ -12,6 +12,7 @@ use crate::geometry::sphere::Sphere;
 use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
 use crate::geometry::{Ray, Shape, ShapeHit};
+use crate::lights::delta::{Falloff, PointLight};
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::{Decision, PixelSampler};

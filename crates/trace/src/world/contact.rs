@@ -100,22 +100,12 @@ impl World {
         self.contact_of(at, (memory, error), visit)
     }
 
-    /// Whether a hit is that of a ball or a box of glass whose other sides are far from the surfaces near the point.
+    /// Whether a hit is that of a shape of glass whose other sides are far from the surfaces near the point.
     fn is_far_side_away(&self, at: &Meeting, margin: Vec3) -> bool {
         let far = 8.0 * f64::from(margin.max_element());
         let is_away = match &self.geometry.objects()[at.hit.object as usize] {
-            Object::Shape(Shape::Sphere(sphere)) => sphere.radius > far,
-            Object::Shape(Shape::Box(cuboid)) => cuboid.is_on_one_face(at.surface.point.as_dvec3(), far),
-            Object::Shape(
-                Shape::Quad(_)
-                | Shape::Plane(_)
-                | Shape::Triangle(_)
-                | Shape::Disk(_)
-                | Shape::Cylinder(_)
-                | Shape::Cone(_)
-                | Shape::Torus(_),
-            )
-            | Object::Mesh(_) => false,
+            Object::Shape(shape) => shape.is_far_side_beyond(at.surface.point.as_dvec3(), far),
+            Object::Mesh(_) => false,
         };
         is_away && self.is_glass(self.material_index(&at.hit) as u32)
     }

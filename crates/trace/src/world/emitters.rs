@@ -7,9 +7,11 @@ use super::{Geometry, Images, MeshInstance, Object};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Shape;
 use crate::lights::MeshEmitter;
+use crate::lights::delta::{PointLight, SpotLight};
+use crate::lights::infinite::{DirectionalLight, Environment, SkyMap};
 use crate::lights::{
-    AreaLight, Ball, Chart, DirectionalLight, EmissionTexture, Environment, Light, LightBounds, Lights,
-    Patch, PhotonSource, PointLight, Side, SkyMap, SpotLight, area_light, back_light, sheer_light,
+    AreaLight, Ball, Chart, EmissionTexture, Light, LightBounds, Lights, Patch, PhotonSource, Side,
+    area_light, back_light, sheer_light,
 };
 use crate::lights::{Emitter, Part};
 use crate::materials::texels::Texels;
@@ -80,8 +82,8 @@ fn around(environment: &description::Environment, sky: Option<Arc<SkyMap>>) -> O
 
 /// A light that is not a shape, in coordinates that start at `origin`.
 fn described(light: &description::Light, origin: DVec3) -> Light {
-    let point = |light: &description::PointLight| {
-        let description::PointLight { position, intensity, falloff } = *light;
+    let point = |light: &description::light::PointLight| {
+        let description::light::PointLight { position, intensity, falloff } = *light;
         PointLight { position: position - origin, intensity, falloff }
     };
     match light {

@@ -127,7 +127,7 @@ fn from_edge(half: f64, width: f64, part: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lights::Falloff;
+    use crate::lights::delta::Falloff;
     use crate::math::DVec3;
 
     /// Relative intensity of a cone with a half angle in degrees, in a direction at an angle in degrees from its axis.

@@ -12,10 +12,9 @@ use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
 use crate::lights::area::Side;
 use crate::lights::delta::DeltaLight;
-use crate::lights::{
-    AreaLight, Chart, DirectionalLight, EmissionTexture, Emitter, Environment, MeshEmitter, Part, Patch,
-    SkyMap, SpotLight, area_light,
-};
+use crate::lights::delta::SpotLight;
+use crate::lights::infinite::{DirectionalLight, Environment, SkyMap};
+use crate::lights::{AreaLight, Chart, EmissionTexture, Emitter, MeshEmitter, Part, Patch, area_light};
 use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Texture, TextureFilter, Wrap};
 use crate::math::random;

@@ -10,10 +10,9 @@ use crate::geometry::disk::Disk;
 use crate::geometry::parallelogram::Parallelogram;
 use crate::geometry::sphere::Sphere;
 use crate::geometry::triangle::Triangle;
-use crate::lights::{
-    AreaLight, DirectionalLight, Emitter, Environment, Falloff, Light, Lights, MeshEmitter, Part, PointLight,
-    Side, SpotLight, area_light,
-};
+use crate::lights::delta::{Falloff, PointLight, SpotLight};
+use crate::lights::infinite::{DirectionalLight, Environment};
+use crate::lights::{AreaLight, Emitter, Light, Lights, MeshEmitter, Part, Side, area_light};
 use crate::math::{DVec3, Vec3, random};
 
 /// A light of a random kind, size and position.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::super::fingerprint::{Fingerprint, Fingerprinted, Referents};
 use super::Located;
-pub use crate::lights::Falloff;
+pub use crate::lights::delta::Falloff;
 use crate::math::{DVec3, Vec3};
 
 /// A light that is no shape.

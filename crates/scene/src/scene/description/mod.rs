@@ -4,7 +4,7 @@
 //! Lengths are in the scene's unit, angles in degrees, colours linear Rec. 709. All numbers are finite.
 
 mod camera;
-mod light;
+pub mod light;
 mod material;
 mod method;
 mod render;
@@ -14,7 +14,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 pub use camera::{Camera, CameraChange, Pose, Viewpoint, is_same_distance};
-pub use light::{DirectionalLight, Environment, Falloff, Light, PointLight, SpotLight};
+pub use light::{Environment, Light};
 pub use material::{
     Bump, Channel, ColorSource, EmissionSides, EmissionSource, Encoding, FresnelSource, Material,
     MaterialKind, NormalMap, NumberSource, OpacitySource, PixelNumber, Texture, TextureFilter, TextureRole,

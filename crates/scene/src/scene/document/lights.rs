@@ -1,6 +1,7 @@
 //! `[[light]]`.
 
-use super::super::description::{DirectionalLight, Falloff, Light, PointLight, SpotLight};
+use super::super::description::Light;
+use super::super::description::light::{DirectionalLight, Falloff, PointLight, SpotLight};
 use super::context::Issue;
 use super::limits::Limits;
 use super::shapes::direction;

@@ -4,7 +4,7 @@ use super::key::Default::Is;
 use super::key::Kind::{Color, Number, Numbers, Words};
 use super::key::{Form, TableInfo, TypeInfo, key, words};
 use super::limits::Limits::{Any, AtLeast, Between, Inside};
-use crate::scene::description::Falloff;
+use crate::scene::description::light::Falloff;
 
 pub(super) const LIGHT: TableInfo = TableInfo {
     name: "light",

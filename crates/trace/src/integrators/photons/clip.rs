@@ -5,7 +5,8 @@ use arrayvec::ArrayVec;
 
 use super::kernel::weight_over;
 use super::map::{GatherPoint, LEAST_COSINE, REACH};
-use crate::geometry::{Aabb, Shape, ShapeHit};
+use crate::geometry::local_form::{Extent, Ground, Piece};
+use crate::geometry::{Aabb, LocalForm, Shape, ShapeHit};
 use crate::materials::{Material, Rough};
 use crate::math::frame::Frame;
 use crate::math::{DVec2, DVec3};
@@ -93,9 +94,6 @@ impl Wall {
     }
 }
 
-/// A flat piece by its corners in order.
-type Piece = ArrayVec<DVec3, 4>;
-
 /// Surfaces around the middle of a kernel.
 struct Around {
     point: DVec3,
@@ -154,45 +152,26 @@ impl Around {
 
     /// Adds a shape; returns whether the part still has a closed form.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
-        let point = self.point;
-        let is_far = |distance: f64| distance > FAR * self.radius;
-        let parallelogram = |c: DVec3, u: DVec3, v: DVec3| Piece::from([c, c + u, c + u + v, c + v]);
-        match shape {
-            Shape::Quad(quad) => self.add_piece(&parallelogram(quad.corner, quad.u, quad.v), receives),
-            Shape::Triangle(triangle) => {
-                self.add_piece(&[triangle.a, triangle.b, triangle.c].into_iter().collect(), receives)
+        match shape.local_form(self.point) {
+            LocalForm::Pieces(count) => (0..count)
+                .filter_map(|number| shape.piece(number))
+                .all(|piece| self.add_piece(&piece, &receives)),
+            LocalForm::Surface { distance, ground } => {
+                distance > FAR * self.radius
+                    || ground.is_some_and(|ground| self.add_ground(&ground, receives))
             }
-            Shape::Box(cuboid) => (0..6).all(|face| {
-                let (corner, u, v) = cuboid.face(face);
-                self.add_piece(&parallelogram(corner, u, v), &receives)
-            }),
-            Shape::Plane(plane) => {
-                let distance = plane.distance(point);
-                is_far(distance) || self.add_surface(plane.normal(), distance, receives)
-            }
-            Shape::Disk(disk) => {
-                let from = point - disk.middle();
-                let is_around = disk.radius() - from.length() > FAR * self.radius;
-                is_far(disk.distance(point))
-                    || is_around && self.add_surface(disk.normal(), from.dot(disk.normal()).abs(), receives)
-            }
-            Shape::Sphere(sphere) => {
-                let distance = sphere.distance(point);
-                let out = (point - sphere.center).normalize_or_zero();
-                is_far(distance)
-                    || sphere.radius > WIDE * self.radius && self.add_surface(out, distance, receives)
-            }
-            Shape::Cylinder(cylinder) => is_far(cylinder.distance(point)),
-            Shape::Cone(cone) => is_far(cone.distance(point)),
-            Shape::Torus(torus) => is_far(torus.distance(point)),
         }
     }
 
-    /// Adds a surface that extends over the whole kernel if it has its normal in the middle, at this distance.
-    fn add_surface(&mut self, normal: DVec3, distance: f64, receives: impl Fn() -> bool) -> bool {
-        let is_own = normal.dot(self.normal).abs() > SAME_PLANE && distance < FLAT * self.radius;
-        self.whole += u32::from(is_own && receives());
-        is_own
+    /// Adds a surface that extends over the whole kernel and has its normal in the middle; returns whether it does.
+    fn add_ground(&mut self, ground: &Ground, receives: impl Fn() -> bool) -> bool {
+        let is_wide = match ground.extent {
+            Extent::Flat(reach) => reach > FAR * self.radius,
+            Extent::Round(radius) => radius > WIDE * self.radius,
+        };
+        let is_same = ground.normal.dot(self.normal).abs() > SAME_PLANE && ground.height < FLAT * self.radius;
+        self.whole += u32::from(is_wide && is_same && receives());
+        is_wide && is_same
     }
 
     /// Adds the triangles of a mesh.

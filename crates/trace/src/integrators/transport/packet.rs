@@ -86,7 +86,7 @@ pub struct PacketHits {
     found: u32,
     /// Look-ups of textures of plain surfaces.
     pub lookups: u64,
-    /// [`Environment::arriving_row`](crate::lights::Environment::arriving_row), if any ray hits nothing.
+    /// [`Environment::arriving_row`](crate::lights::infinite::Environment::arriving_row), if any ray hits nothing.
     sky: (Lanes3, Lanes),
 }
 
