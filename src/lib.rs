@@ -12,7 +12,7 @@
 //! | [`math`] | numbers, vectors, transforms, colour |
 //! | [`control`] | the cancel token and the progress sink |
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
-//! | [`accel`] | a bounding volume hierarchy over any shapes, where a closure tests each; over triangles, one by vector instructions, and a k-d tree |
+//! | [`accel`] | bounding volume hierarchies over any shapes, which a closure tests, and over triangles, by vector instructions; a k-d tree over triangles |
 //! | [`sampling`] | sample streams, warps, distributions |
 //! | [`materials`] | rough BSDFs in rows (phong, metal, plastic, principled), smooth coats, mirror, glass, panes; opacity; texture lookup, normal maps, heights, Fresnel |
 //! | [`lights`] | lights without extent (`delta`), from beyond the scene (`infinite`), and shapes that emit (`area`); a tree over many lights; photon emission |
@@ -49,13 +49,14 @@
 //!
 //! ## The life of a save
 //!
-//! From the event of the watcher to the picture on the screen, and to the written file. `OUT/` stands for `crates/files/src/output/`:
+//! From the event of the watcher to the picture on the screen, and to the written file. Paths begin with the room: `tui/run.rs` is
+//! `crates/tui/src/tui/run.rs`; the table above names the crate of each room.
 //!
 //! 1. `pipeline/watch/mod.rs`: the system hints at a change; the watcher compares contents and reports
 //!    only real differences. `cli/live.rs` forwards them.
 //! 2. `tui/run.rs` receives it as an event (`tui/event.rs`); `tui/update/mod.rs` notes the change.
-//! 3. `tui/update/request.rs` makes a request; `tui/run.rs` sends it. The first cell that changes is the header's: it says
-//!    that a render runs.
+//! 3. `tui/update/request.rs` makes a request; `tui/run.rs` sends it. The first cell that changes is the header's
+//!    (`tui/view/header.rs`): it says that a render runs.
 //! 4. `pipeline/worker.rs`: the mailbox of one request; a newer request cancels the render under way.
 //! 5. `pipeline/engine/mod.rs`: `pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes, textures, accel, lights and photons, each reused
 //!    if its key in `pipeline/keys.rs` is that of before. A broken scene ends here: the picture before it stays.
@@ -63,9 +64,9 @@
 //!    one, `pipeline/render/first_picture.rs`; with photons, `engine/mod.rs` shows one before it traces them.
 //! 7. `integrators/mod.rs` renders a tile: see below. `pipeline/render/film_state.rs` adds its samples to the film.
 //! 8. `pipeline/render/preview.rs` puts a preview into the slot; `cli/live.rs` tells the front end.
-//! 9. `tui/presenter.rs` takes it when its time comes, `tui/view/preview.rs` makes cells of it, `tui/paint/mod.rs` the cheapest
-//!    bytes, and `tui/writer.rs` writes them.
-//! 10. `pipeline/stages/write.rs` encodes the finished picture; `OUT/write.rs` renames the temporary file into its place.
+//! 9. `tui/presenter.rs` takes it when its time comes, `tui/view/preview.rs` makes cells of it, `tui/display.rs` decides how many of them
+//!    go now, `tui/paint/mod.rs` makes the cheapest bytes, and `tui/writer.rs` writes them.
+//! 10. `pipeline/stages/write.rs` encodes the finished picture; `output/write.rs` renames the temporary file into its place.
 //!
 //! ## The life of a ray
 //!
@@ -75,11 +76,12 @@
 //! 2. `transport/camera.rs` makes rows of sixteen rays; `eye.rs` follows them round by round.
 //! 3. `transport/packet.rs` intersects a row: `world/geometry.rs`, then the trees of `accel/wide_bvh/`, or `geometry/facets.rs` for few
 //!    triangles.
-//! 4. `packet.rs` puts surfaces of simple materials into rows of sixteen vertices, `transport/batch.rs`; all BSDFs of a row are of
+//! 4. `transport/packet.rs` puts surfaces of simple materials into rows of sixteen vertices, `transport/batch.rs`; all BSDFs of a row are of
 //!    one kind, `materials/rough/mod.rs`.
-//! 5. Others go one by one: `transport/walk.rs` passes parts of one glass (`crossing.rs`), `vertex.rs` prepares the surface.
+//! 5. Others go one by one: `transport/walk.rs` passes parts of one glass (`transport/crossing.rs`), `transport/vertex.rs` prepares the surface.
 //! 6. At mirrors and glass, `transport/interface.rs` makes the rays of the next round.
-//! 7. `direct/queue.rs` lights rows: `all_lights.rs` or `picked.rs` sample lights, `mis.rs` weighs, `shadow_rays.rs` traces.
+//! 7. `direct/queue.rs` lights rows: `direct/all_lights.rs` or `direct/picked.rs` sample lights, `direct/mis.rs` weighs, `direct/shadow_rays.rs`
+//!    traces.
 //! 8. `direct/lobe_rays.rs` finds lights in narrow lobes; `photons/gather.rs` adds photons, which `photons/emit.rs` has traced.
 //! 9. `transport/scatter.rs` scatters paths that go on, for the next round.
 //! 10. `transport/accumulator.rs` sums what the view shows, by sample; `film/sums.rs` adds samples to pixels.

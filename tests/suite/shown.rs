@@ -277,7 +277,7 @@ fn an_interrupted_import_leaves_nothing() {
     // Many parts of some size, so that writing takes a while.
     let mut glb = Glb::default();
     let positions: Vec<[f32; 3]> =
-        (0..60_000).map(|i| [(i % 250) as f32, (i / 250) as f32, (i % 7) as f32]).collect();
+        (0..30_000).map(|i| [(i % 250) as f32, (i / 250) as f32, (i % 7) as f32]).collect();
     // Each has numbers of its own: parts of the same ones would be written once.
     let parts = (0..30).map(|_| json!({"attributes": {"POSITION": glb.vectors(&positions)}}));
     let primitives: Vec<_> = parts.collect();

@@ -21,8 +21,7 @@
 //! 2. The `mod.rs` of its folder: one line for the module, one for the name.
 //! 3. `light.rs`: a variant, and the arms that the compiler lists: its family, how it is sampled, and the pdf of its samples. An
 //!    infinite light also has to be known to `set.rs`, which adds up what rays see that leave the scene.
-//! 4. Outside of this room: its table in `scene::description::light` and `scene::document::lights`, and its coordinates in
-//!    `world::emitters`.
+//! 4. Outside of this room: see CONTRIBUTING.
 //!
 //! Three numbers have to agree; the tests of this folder compare them with integrals and with rays for every kind:
 //!

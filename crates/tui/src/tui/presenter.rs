@@ -1,4 +1,4 @@
-//! Pictures on their way to the screen: which are worth being drawn, when, and how near to them the cells have to come.
+//! Decisions which previews are drawn, when, and how exactly.
 //!
 //! The time comes with each call, so that a test can choose it.
 
@@ -46,7 +46,7 @@ struct Aimed {
     samples: f64,
     /// When it was aimed at.
     at: Option<Instant>,
-    /// Whether there is a newer one of the same request in the slot, which was not worth its bytes yet.
+    /// Whether the slot holds a newer preview of the same request, put off as it was not worth its bytes.
     is_old: bool,
     /// Whether it is the first one of its request.
     is_first: bool,
@@ -109,7 +109,7 @@ impl Presenter {
         }
     }
 
-    /// Cells that a picture takes, or that would take as many bytes.
+    /// Number of cells of a preview; of pixels, the number of cells that cost as many bytes.
     fn cells(&self, state: &State, picture: &Picture) -> u32 {
         if self.display.draws_pixels() {
             return picture.width * picture.height / 4;
@@ -149,7 +149,7 @@ impl Presenter {
             self.display.dress(chrome);
         }
         let is_new = self.note_picture(state, now);
-        // It is all there, and no better one has come since.
+        // The first preview stops being the first once all of it is on the screen, or once a newer one is noted.
         self.drawn.is_first &= is_new || !self.display.is_complete();
         let area = Layout::of(state).preview;
         self.display.place(view::preview::placement(state, area), is_still(state));
@@ -164,8 +164,8 @@ impl Presenter {
         Besides { later: drawn.later, links: files.map(link).collect() }
     }
 
-    /// Whether the line stands idle while a key is held that moves the camera: the last picture is there as far as a moving one
-    /// has to be, and the next one is not yet.
+    /// Whether the line is idle between two previews while a key moves the camera: the last one is on the screen, as exactly as a
+    /// moving one has to be, and the next one has not come.
     fn has_room_to_refine(&self, state: &State) -> bool {
         let is_step = state.request.camera_step.generation == Some(self.drawn.generation);
         is_step && self.drawn.is_first && !self.drawn.is_refined && self.display.is_complete()
@@ -198,7 +198,7 @@ impl Presenter {
         }
     }
 
-    /// Sends what the line has room for, and no more than there is once `is_late` says so; what came of it, for the state.
+    /// Sends what the line has room for, and stops early once `is_late`. Returns the events that follow for the state.
     pub(super) fn pump(&mut self, state: &State, now: Instant, is_late: impl Fn() -> bool) -> Vec<Event> {
         let has_sent = self.display.pump(now, is_late);
         let mut events: Vec<Event> = self.display.take_report().map(Event::Frame).into_iter().collect();

@@ -1,11 +1,11 @@
 //! Placement of samples under a budget of time: where they lower the error of the picture most.
 //!
-//! Parts of the picture, both halves of each cell, get twice the samples that they have, those first whose error falls most by each
-//! sample of these. Between powers of two the points of a pixel leave gaps: there a third more samples may be worth nothing.
+//! The parts of a picture are the two halves of each cell. A round doubles the samples of parts, beginning with those whose error
+//! falls most for each sample. Between powers of two the points of a pixel leave gaps: there a third more samples may be worth nothing.
 //!
 //! Rare bright samples must not bring more samples to the place where they were met: the picture would be too dark. As in
-//! [`super::noise_goals`], one half goes by the noise of the other half. It counts only samples that the other half has in any
-//! case, so that it does not learn how many the first half wanted either.
+//! [`super::noise_goals`], one half goes by the noise of the other half, estimated from the samples alone that every half has: how
+//! many more the other half has depends on the first half's noise.
 
 use crate::film::Film;
 
@@ -57,9 +57,9 @@ struct Half {
     samples: u32,
     /// Samples that it is to have next.
     goal: u32,
-    /// Squared error of its pixels that one sample would leave.
+    /// Sum of the squared errors of its pixels, each with one sample.
     error: f64,
-    /// The power of the samples with which that falls.
+    /// Exponent p: the error falls with the number of samples to the power −p.
     power: f64,
     /// Cost of a sample, in rays.
     cost: f64,
@@ -190,10 +190,18 @@ mod tests {
     }
 
     /// The mean of many cells of rare bright samples, 1 in the long run, after some rounds; or where each half goes by its own noise.
-    /// Of few cells, what one gets is lost to the others.
+    /// With few cells, samples that one gets would be missing in the others.
     fn rendered(next: &mut impl FnMut() -> f32, by_own: bool) -> f64 {
+        const CHANCE: f64 = 0.002;
         let film = Film::new(64 * SIDE, 1, None).expect("a film");
-        let mut sample = || if next() < 0.002 { 500.0 } else { 0.0 };
+        // The number of dark samples before a bright one has the distribution of Bernoulli trials, without a draw for each of them.
+        let mut gap = || (f64::from(1.0 - next()).ln() / (1.0 - CHANCE).ln()) as usize;
+        let mut left = gap();
+        let mut sample = || {
+            let is_bright = left == 0;
+            left = if is_bright { gap() } else { left - 1 };
+            if is_bright { 500.0 } else { 0.0 }
+        };
         let mut done = vec![[u32::MAX; 2]; film.cell_count()];
         let places: Vec<_> = cells(&film).into_iter().flat_map(|cell| [(cell, 0), (cell, 1)]).collect();
         for &(cell, half) in &places {

@@ -39,7 +39,7 @@ impl CompetingTechnique {
         }
     }
 
-    /// Number of rays by the BSDF for each of so many samples of a light.
+    /// Number of BSDF rays for each sample of a light that takes `count` samples.
     #[inline(always)]
     pub fn rays_per_sample(self, count: u32) -> f32 {
         match self {
@@ -50,7 +50,7 @@ impl CompetingTechnique {
     }
 
     /// Multiplies `values`, the contributions of light samples at the vertices of a row, by their power-heuristic weights. The
-    /// inverse pdfs of the samples are given; `competing` rays by the BSDF come on each sample.
+    /// inverse pdfs of the samples are given; `competing` is the number of BSDF rays for each sample.
     #[inline(always)]
     pub fn weighted(
         self,
@@ -136,7 +136,7 @@ impl TileContext<'_> {
         if density.is_nan() || density <= 0.0 {
             return lights.beyond_with(sky, path.ray.direction, |_, _| 1.0);
         }
-        // No light sample finds the environment, so its light-sampling pdf is 0.
+        // If light samples leave out the environment, its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.leaves_sky { 0.0 } else { of_sky }));
         let share = |of_light: f32| weight(of_light * samples / density);
         self.shared_beyond((None, sky), &path.ray, path.state.normal, share)
@@ -147,10 +147,10 @@ impl TileContext<'_> {
         self.radiance_of(None, ray, normal, density)
     }
 
-    /// [`TileContext::radiance_beyond`] of the light of a number; of all lights without one.
+    /// [`TileContext::radiance_beyond`] of the light `number` alone; of all lights if it is `None`.
     pub fn radiance_of(&self, number: Option<u32>, ray: &Ray, normal: Vec3, density: f32) -> Vec3 {
         let sky = self.world.lights.environment().map(|environment| environment.arriving(ray.direction));
-        // Light samples leave out the light of the sky if rays in lobes find it.
+        // If rays in lobes find the sky, light samples leave it out, and its light-sampling pdf is 0.
         let sky = sky.map(|(radiance, of_sky)| (radiance, if self.lobes_find_sky { 0.0 } else { of_sky }));
         self.shared_beyond((number, sky), ray, normal, |of_light| weight(of_light / density))
     }
@@ -254,8 +254,8 @@ impl TileContext<'_> {
         sum
     }
 
-    /// [`TileContext::lamp_weight`] for a lamp that touches the glass which the path hits with it: the result of the light samples'
-    /// shadow rays decides whether they find it there.
+    /// [`TileContext::lamp_weight`] of a lamp that touches the glass which the path hits: 1 if shadow rays of light samples cannot
+    /// reach the lamp there.
     pub fn touching_lamp_weight(&self, path: &PathRay, hit: &Hit) -> f32 {
         let Ray { origin, direction, .. } = path.ray;
         let shadow = Ray::segment(origin, origin + direction * hit.shape.t);

@@ -64,11 +64,12 @@ fn the_glossy_lobe_is_drawn_by_its_density_however_narrow() {
                     let offset = (direction - lobes.mirrored_eye).as_dvec3();
                     let cosine = 1.0 - 0.5 * offset.length_squared();
                     // Uniform in cos^(α + 1) and in the angle about the axis.
-                    let ring = (libm::pow(cosine.max(0.0), n) * 16.0) as usize;
+                    let power = libm::pow(cosine.max(0.0), n - 1.0);
+                    let ring = (power * cosine * 16.0) as usize;
                     let phi = frame.t.dot(direction).atan2(frame.s.dot(direction)) / (2.0 * PI) + 0.5;
                     counts[ring.min(15) * 16 + ((phi * 16.0) as usize).min(15)] += 1;
                     let density = lobes.density(direction, gloss(lobes.mirrored_eye, direction, shininess));
-                    let exact = n / std::f64::consts::TAU * libm::pow(cosine, n - 1.0);
+                    let exact = n / std::f64::consts::TAU * power;
                     let is_near = (f64::from(density) - exact).abs() <= 2e-3 * exact + 1e-6 * n;
                     assert!(is_near, "α {shininess} at {degrees}°: {density} is not {exact}");
                 }
