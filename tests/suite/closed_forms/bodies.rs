@@ -266,6 +266,52 @@ fn quads_of_glass_are_a_box() {
     assert_same("quads", &whole, &parts, 64, 3.5, 0.0);
 }
 
+#[test]
+fn a_camera_in_a_body_of_parts_is_in_its_glass() {
+    // A lamp in the glass, which the camera sees through 0.8 of it: no surface of glass is on the way.
+    let (low, high) = (v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0));
+    let material = tinted(1.33, v(0.5, 0.5, 0.5));
+    let lit = |build: Build| {
+        build.sphere(v(0.3, 0.9, 1.0), 0.1, emitter(2.0)).seen(v(0.3, 0.0, 1.0), v(0.3, 0.9, 1.0))
+    };
+    let of = |shapes: &[Shape], flips: &dyn Fn(usize) -> bool| {
+        let shapes = shapes.iter().enumerate();
+        shapes.fold(scene(), |build, (number, shape)| {
+            build.shape(shape.clone(), if flips(number) { matte(0.5) } else { material.clone() })
+        })
+    };
+    let all = |_: usize| false;
+    let whole = scene().cuboid((low + high) * 0.5, high - low, DVec3::ZERO, material.clone());
+    let cube = prism(
+        &[low, v(1.0, -1.0, 0.0), v(1.0, 1.0, 0.0), v(-1.0, 1.0, 0.0)],
+        &[[0, 1, 2], [0, 2, 3]],
+        2.0,
+        3,
+    );
+    let mesh = |mesh: &TriangleMesh| scene().mesh(mesh.clone(), AS_IT_IS, material.clone());
+    // Of the quads, the last one is above: the surface of a pool.
+    let bodies = [
+        ("a box", whole),
+        ("quads", of(&quads(low, high, 0), &all)),
+        ("quads that look inwards", of(&quads(low, high, 0b10_0110), &all)),
+        ("a pool", of(&quads(low, high, 0), &|number| number != 5)),
+        ("a mesh", mesh(&cube)),
+        ("a mesh that looks inwards", mesh(&turned(&cube))),
+    ];
+    for (what, build) in bodies {
+        for integrator in [Integrator::Whitted, Integrator::Path] {
+            let value = lit(build.clone()).with(|scene| scene.render.integrator = integrator).value();
+            let expected = 2.0 * 0.5_f64.powf(0.8);
+            assert!((value - expected).abs() < 1e-3, "{what} by {integrator:?}: {value} is not {expected}");
+        }
+    }
+    // Outside of it, above the pool, nothing is on the way.
+    let above = of(&quads(low, high, 0), &|number| number != 5)
+        .sphere(v(0.3, 0.9, 3.0), 0.1, emitter(2.0))
+        .seen(v(0.3, 0.0, 3.0), v(0.3, 0.9, 3.0));
+    assert!((above.value() - 2.0).abs() < 1e-6, "{}", above.value());
+}
+
 /// Checks that two scenes have the same picture by its mean and that of its quarters, within so many standard errors
 /// and a fraction of the value.
 #[track_caller]

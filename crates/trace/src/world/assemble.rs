@@ -37,6 +37,7 @@ impl World {
             bodies,
             dark_bodies: Box::default(),
             glass_at_eye: Vec::new(),
+            bodies_at_eye: Vec::new(),
             is_mipmapped,
             has_second_uvs: has_second_uvs(scene, parts),
             colored: colored(scene),
@@ -45,6 +46,7 @@ impl World {
         Self {
             dark_bodies: world.find_dark_bodies(),
             glass_at_eye: world.find_glass_at_eye(),
+            bodies_at_eye: world.find_bodies_at_eye(),
             passable: Passable::of(&world).map(Box::new),
             ..world
         }

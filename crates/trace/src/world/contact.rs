@@ -219,15 +219,6 @@ impl World {
         }
     }
 
-    /// The closed shapes of glass around a point at the camera, by their objects and materials.
-    pub fn glass_around(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
-        let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
-            Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
-            Object::Mesh(_) => false,
-        };
-        self.glass_at_eye.iter().copied().filter(is_inside)
-    }
-
     /// The closed shapes of glass, by their objects and materials.
     pub fn closed_glasses(&self) -> impl Iterator<Item = (u32, u32)> {
         (0..self.geometry.objects().len() as u32).filter_map(|id| {
@@ -242,24 +233,6 @@ impl World {
             Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
             Object::Mesh(_) => false,
         }
-    }
-
-    /// Whether no part of the lens is in a closed shape of glass.
-    pub fn is_eye_in_air(&self) -> bool {
-        self.glass_at_eye.is_empty()
-    }
-
-    /// The closed shapes of glass that the lens may be in, by their objects and materials.
-    pub(super) fn find_glass_at_eye(&self) -> Vec<(u32, u32)> {
-        let (eye, lens) = (self.camera.position.as_vec3(), Vec3::splat(self.camera.aperture as f32));
-        let lens = Aabb { min: eye, max: eye }.grown(lens + eye.abs() * f32::EPSILON);
-        let objects = (0_u32..).zip(self.geometry.objects());
-        let near = objects.filter_map(|(id, object)| {
-            let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
-            let is_near = object.bounds().is_none_or(|bounds| bounds.meets(&lens));
-            (is_near && self.is_closed(id) && self.is_glass(material)).then_some((id, material))
-        });
-        near.collect()
     }
 }
 

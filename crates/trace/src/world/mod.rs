@@ -3,6 +3,7 @@
 mod along;
 mod around;
 mod assemble;
+mod at_eye;
 mod bodies;
 pub mod camera;
 pub mod contact;
@@ -112,6 +113,8 @@ pub struct World {
     dark_bodies: Box<[bool]>,
     /// The closed shapes of glass that the lens may be in, with their materials.
     glass_at_eye: Vec<(u32, u32)>,
+    /// The other bodies of glass that the camera is in, with their materials.
+    bodies_at_eye: Vec<(u32, u32)>,
     /// Whether any material has a texture with mip levels.
     is_mipmapped: bool,
     /// Whether any texture is looked up by a mesh's second set of coordinates.

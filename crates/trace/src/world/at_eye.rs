@@ -1,0 +1,132 @@
+//! Glass around the camera.
+//!
+//! A closed shape knows which points it contains. A body of meshes or of several objects does not: rays from the camera to points of
+//! its surface tell on which side of it they begin.
+
+use std::collections::BTreeMap;
+
+use super::{Hit, Object, ObjectMaterial, OpenGlass, World};
+use crate::geometry::ray::offset_origin;
+use crate::geometry::{Aabb, Asked, Ray, ShapeHit};
+use crate::math::{DVec3, Vec2, Vec3};
+
+/// Rays that look for the surface of a body.
+const RAYS: usize = 32;
+
+/// Surfaces of other glass that such a ray passes.
+const PASSED: usize = 16;
+
+impl World {
+    /// The closed shapes of glass around a point at the camera, and the bodies that the camera is in, with their materials.
+    pub fn glass_around(&self, point: Vec3) -> impl Iterator<Item = (u32, u32)> {
+        let is_inside = move |&(object, _): &(u32, u32)| match &self.geometry.objects()[object as usize] {
+            Object::Shape(shape) => shape.encloses(point.as_dvec3()) == Some(true),
+            Object::Mesh(_) => false,
+        };
+        self.glass_at_eye.iter().copied().filter(is_inside).chain(self.bodies_at_eye.iter().copied())
+    }
+
+    /// Whether no part of the lens is in a closed shape of glass, and the camera in no other body.
+    pub fn is_eye_in_air(&self) -> bool {
+        self.glass_at_eye.is_empty() && self.bodies_at_eye.is_empty()
+    }
+
+    /// The closed shapes of glass that the lens may be in, by their objects and materials.
+    pub(super) fn find_glass_at_eye(&self) -> Vec<(u32, u32)> {
+        let (eye, lens) = (self.camera.position.as_vec3(), Vec3::splat(self.camera.aperture as f32));
+        let lens = Aabb { min: eye, max: eye }.grown(lens + eye.abs() * f32::EPSILON);
+        let objects = (0_u32..).zip(self.geometry.objects());
+        let near = objects.filter_map(|(id, object)| {
+            let material = self.material_index(&Hit { shape: ShapeHit::at(0.0), object: id }) as u32;
+            let is_near = object.bounds().is_none_or(|bounds| bounds.meets(&lens));
+            (is_near && self.is_closed(id) && self.is_glass(material)).then_some((id, material))
+        });
+        near.collect()
+    }
+
+    /// The other bodies of glass without a hole that the camera is in, by their places in the order of the file and the materials that
+    /// rays from the camera meet.
+    pub(super) fn find_bodies_at_eye(&self) -> Vec<(u32, u32)> {
+        // Collect the objects of each body.
+        let mut bodies: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+        for object in 0..self.geometry.objects().len() as u32 {
+            let body = self.body(object);
+            let may_be_glass = match self.object_materials[object as usize] {
+                ObjectMaterial::One(material) => self.is_glass(material),
+                ObjectMaterial::OfFile { .. } => self.has_glass,
+            };
+            if may_be_glass && !self.is_closed(object) && !self.is_open(body) {
+                bodies.entry(body).or_default().push(object);
+            }
+        }
+        // Ask those whose box has the camera in it, and those that something opaque closes.
+        let eye = self.camera.position.as_vec3();
+        let may_hold_eye = |objects: &[u32]| {
+            let bounds =
+                objects.iter().filter_map(|&object| self.geometry.objects()[object as usize].bounds());
+            let is_covered = |open: &OpenGlass| objects.contains(&open.object);
+            bounds.fold(Aabb::EMPTY, Aabb::union).meets(&Aabb { min: eye, max: eye })
+                || self.bodies.open().iter().any(is_covered)
+        };
+        let asked = bodies.into_iter().filter(|(_, objects)| may_hold_eye(objects));
+        asked.filter_map(|(body, objects)| Some((body, self.material_around_eye(body, &objects)?))).collect()
+    }
+
+    /// The material of a body by its surface as most rays from the camera see it. `None` if they see its outside, or not at all.
+    fn material_around_eye(&self, body: u32, objects: &[u32]) -> Option<u32> {
+        let (mut votes, mut material) = (0, None);
+        for ray in 0..RAYS.max(objects.len()) {
+            let target = self.geometry.objects()[objects[ray % objects.len()] as usize].some_point(ray);
+            let Some((is_back, seen)) = target.and_then(|target| self.side_from_eye(body, target)) else {
+                continue;
+            };
+            votes += if is_back { 1 } else { -1 };
+            material = if is_back { material.or(Some(seen)) } else { material };
+        }
+        material.filter(|_| votes > 0)
+    }
+
+    /// Whether a ray from the camera to a point sees a body of glass from its back, and the material there. `None` if something opaque
+    /// is before it.
+    fn side_from_eye(&self, body: u32, target: DVec3) -> Option<(bool, u32)> {
+        let eye = self.camera.position;
+        let mut ray = Ray::new(eye.as_vec3(), (target - eye).as_vec3());
+        for _ in 0..PASSED {
+            let hit = self.geometry.closest(&ray)?;
+            let material = self.material_index(&hit) as u32;
+            if !self.is_glass(material) {
+                return None;
+            }
+            let bare = Asked { uv: false, shadow_point: false };
+            let surface = self.geometry.asked_surface(&ray, &hit, bare);
+            if self.body(hit.object) == body {
+                let is_back = surface.normal.dot(ray.direction) > 0.0;
+                return Some((is_back != self.bodies.is_turned(hit.object), material));
+            }
+            let origin = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
+            ray = Ray::new(origin, ray.direction);
+        }
+        None
+    }
+}
+
+impl Object {
+    /// A point of the surface, for each number another one. `None` if the object has no area.
+    fn some_point(&self, number: usize) -> Option<DVec3> {
+        match self {
+            Self::Shape(shape) => {
+                let areas = shape.areas();
+                let parts: Vec<usize> = (0..areas.len()).filter(|&part| areas[part] > 0.0).collect();
+                let part = *parts.get(number % parts.len().max(1))?;
+                let u = Vec2::new(0.618_034, 0.754_877_7) * (number as f32 + 0.5);
+                Some(shape.place(part as u32, u.fract()).point)
+            }
+            Self::Mesh(mesh) => {
+                let count = mesh.triangle_count();
+                let triangle = (number * 7919).checked_rem(count)?;
+                let [a, b, c] = mesh.world_corners(triangle as u32);
+                Some(a * 0.39 + b * 0.33 + c * 0.28)
+            }
+        }
+    }
+}
