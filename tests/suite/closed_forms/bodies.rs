@@ -8,6 +8,7 @@ use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::{Integrator, Material, Shape};
 use glimt::world::Bodies;
 
+use super::photons::{assert_same_light, both};
 use super::scenes::{AS_IT_IS, Build, emitter, glass, lat_long_sphere, matte, scene, tinted};
 use super::{Random, v};
 
@@ -274,13 +275,13 @@ fn a_camera_in_a_body_of_parts_is_in_its_glass() {
     let lit = |build: Build| {
         build.sphere(v(0.3, 0.9, 1.0), 0.1, emitter(2.0)).seen(v(0.3, 0.0, 1.0), v(0.3, 0.9, 1.0))
     };
-    let of = |shapes: &[Shape], flips: &dyn Fn(usize) -> bool| {
+    let of = |shapes: &[Shape], is_opaque: &dyn Fn(usize) -> bool| {
         let shapes = shapes.iter().enumerate();
         shapes.fold(scene(), |build, (number, shape)| {
-            build.shape(shape.clone(), if flips(number) { matte(0.5) } else { material.clone() })
+            build.shape(shape.clone(), if is_opaque(number) { matte(0.5) } else { material.clone() })
         })
     };
-    let all = |_: usize| false;
+    let none = |_: usize| false;
     let whole = scene().cuboid((low + high) * 0.5, high - low, DVec3::ZERO, material.clone());
     let cube = prism(
         &[low, v(1.0, -1.0, 0.0), v(1.0, 1.0, 0.0), v(-1.0, 1.0, 0.0)],
@@ -292,8 +293,8 @@ fn a_camera_in_a_body_of_parts_is_in_its_glass() {
     // Of the quads, the last one is above: the surface of a pool.
     let bodies = [
         ("a box", whole),
-        ("quads", of(&quads(low, high, 0), &all)),
-        ("quads that look inwards", of(&quads(low, high, 0b10_0110), &all)),
+        ("quads", of(&quads(low, high, 0), &none)),
+        ("quads that look inwards", of(&quads(low, high, 0b10_0110), &none)),
         ("a pool", of(&quads(low, high, 0), &|number| number != 5)),
         ("a mesh", mesh(&cube)),
         ("a mesh that looks inwards", mesh(&turned(&cube))),
@@ -310,6 +311,43 @@ fn a_camera_in_a_body_of_parts_is_in_its_glass() {
         .sphere(v(0.3, 0.9, 3.0), 0.1, emitter(2.0))
         .seen(v(0.3, 0.0, 3.0), v(0.3, 0.9, 3.0));
     assert!((above.value() - 2.0).abs() < 1e-6, "{}", above.value());
+}
+
+#[test]
+fn photons_of_a_lamp_in_glass_in_parts_start_in_it() {
+    let cube = |low: f64, high: f64, z: f64| {
+        let at = |x: f64, y: f64| v(x, y, z);
+        prism(
+            &[at(low, low), at(high, low), at(high, high), at(low, high)],
+            &[[0, 1, 2], [0, 2, 3]],
+            high - low,
+            2,
+        )
+    };
+    // A lamp in a hollow of a cube of glass, both meshes.
+    // The room is seen from above, and open there.
+    let walls = quads(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 2.0), 0).into_iter().take(5);
+    let hollow = walls
+        .fold(scene(), |build, wall| build.shape(wall, matte(0.6)))
+        .mesh(cube(-0.5, 0.5, 0.5), AS_IT_IS, glass(1.45))
+        .mesh(cube(-0.35, 0.35, 0.65), AS_IT_IS, glass(1.0))
+        .sphere(v(0.0, 0.0, 1.0), 0.2, emitter(5.0))
+        .pictured(v(0.0, 0.0, 6.0), v(0.0, 0.0, 0.0), 24.0, 12, 12)
+        .depth(5);
+    // A lamp under the surface of a pool with opaque walls.
+    let water = tinted(1.33, v(0.5, 0.5, 0.5));
+    let pool = quads(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 1.0), 0).into_iter().enumerate();
+    let pool = pool
+        .fold(scene(), |build, (number, shape)| {
+            build.shape(shape, if number == 5 { water.clone() } else { matte(0.6) })
+        })
+        .sphere(v(0.3, 0.2, 0.6), 0.1, emitter(20.0))
+        .pictured(v(0.0, 0.0, 6.0), v(0.0, 0.0, 0.0), 16.0, 12, 12)
+        .depth(4);
+    for (what, build, depth) in [("a hollow", hollow, 5), ("a pool", pool, 4)] {
+        let means = both(&build, depth, [512, 24], (20_000, 0.05));
+        assert_same_light(what, means, 1.2e-2, 4e-3);
+    }
 }
 
 /// Checks that two scenes have the same picture by its mean and that of its quarters, within so many standard errors

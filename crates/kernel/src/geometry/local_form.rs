@@ -4,13 +4,13 @@ use arrayvec::ArrayVec;
 
 use crate::math::DVec3;
 
-/// A flat piece by its corners in order; its front is where they run counter-clockwise.
+/// A flat piece by its corners, counter-clockwise as seen from its front.
 pub type Piece = ArrayVec<DVec3, 4>;
 
 /// The form of a shape near a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LocalForm {
-    /// As many flat pieces make up the shape: see [`Shape::piece`](super::Shape::piece).
+    /// Number of the flat pieces that make up the shape: see [`Shape::piece`](super::Shape::piece).
     Pieces(u32),
     /// A surface at a distance from the point.
     Surface {
@@ -28,11 +28,11 @@ pub struct Ground {
     pub normal: DVec3,
     /// Height of the point above the surface, to either side.
     pub height: f64,
-    /// How far the surface extends around the foot.
+    /// Extent of the surface around the foot.
     pub extent: Extent,
 }
 
-/// How far a surface extends around a point.
+/// Extent of a surface around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Extent {
     /// It is flat up to this distance.

@@ -287,7 +287,7 @@ impl Shape {
         }
     }
 
-    /// One of its flat pieces. `None` if it does not have as many, or is not made of such.
+    /// The flat piece of a number. `None` if the shape does not have as many, or is not made of flat pieces.
     #[inline]
     pub fn piece(&self, number: u32) -> Option<Piece> {
         match self {

@@ -7,28 +7,40 @@ use crate::math::Vec3;
 /// Room for rounding around lamps, relative to their distance from the origin.
 const ROUNDING: f32 = 1e-5;
 
+/// The boxes of a lamp, which is in both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LampBox {
+    /// Box of the ball around the lamp.
+    of_ball: Aabb,
+    /// Box of the object that emits.
+    of_object: Option<Aabb>,
+}
+
+impl LampBox {
+    /// Whether the lamp may meet a box.
+    pub fn meets(&self, bounds: &Aabb) -> bool {
+        self.of_ball.meets(bounds) && self.of_object.is_none_or(|own| own.meets(bounds))
+    }
+
+    /// The middle and the corners of the smaller box.
+    pub fn points(&self) -> impl Iterator<Item = Vec3> {
+        let own = self.of_object.unwrap_or(self.of_ball);
+        let corner = move |i: usize| {
+            let pick = |axis: usize| if i & (1 << axis) == 0 { own.min[axis] } else { own.max[axis] };
+            Vec3::new(pick(0), pick(1), pick(2))
+        };
+        std::iter::once(own.center()).chain((0..8).map(corner))
+    }
+}
+
 impl World {
     /// Whether each object is the place of a closed body of glass that no lamp is in or touches. Empty if no glass is rough.
     pub(super) fn find_dark_bodies(&self) -> Box<[bool]> {
         if !self.has_rough_glass() {
             return Box::default();
         }
-        let objects = self.geometry.objects();
+        let (objects, lamps) = (self.geometry.objects(), self.lamp_boxes());
         let everywhere = Aabb::around([Vec3::NEG_INFINITY, Vec3::INFINITY]);
-        // A lamp is within the sphere around it, and within the box around its object.
-        let lamps: Vec<[Aabb; 2]> = self
-            .lights
-            .iter()
-            .filter_map(|(_, light)| {
-                let bounds = light.bounds().filter(|_| !light.is_beyond())?;
-                let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
-                let room = ROUNDING * (radius + center.abs().max_element());
-                let around = Vec3::splat(radius + room);
-                let object = light.as_area().and_then(|area| objects[area.object as usize].bounds());
-                let of_object = object.map_or(everywhere, |own| own.grown(Vec3::splat(room)));
-                Some([Aabb::around([center - around, center + around]), of_object])
-            })
-            .collect();
         // Join the boxes of each body's objects.
         let mut boxes: Vec<Option<Aabb>> = vec![None; objects.len()];
         for (id, object) in (0_u32..).zip(objects) {
@@ -39,13 +51,27 @@ impl World {
             }
         }
         // Leave out those that a lamp may be in, and those that rays may leave.
-        let holds_lamp =
-            |bounds: &Aabb| lamps.iter().any(|boxes| boxes.iter().all(|lamp| lamp.meets(bounds)));
+        let holds_lamp = |bounds: &Aabb| lamps.iter().any(|lamp| lamp.meets(bounds));
         let is_dark = |(body, bounds): (u32, &Option<Aabb>)| {
             let closed = bounds.as_ref().filter(|bounds| bounds.extent().is_finite() && !self.is_open(body));
             closed.is_some_and(|bounds| !holds_lamp(bounds))
         };
         (0..).zip(&boxes).map(is_dark).collect()
+    }
+
+    /// Boxes around the lamps of finite extent, with room for rounding.
+    pub fn lamp_boxes(&self) -> Vec<LampBox> {
+        let boxes = self.lights.iter().filter_map(|(_, light)| {
+            let bounds = light.bounds().filter(|_| !light.is_beyond())?;
+            let (center, radius) = (bounds.center.as_vec3(), bounds.radius as f32);
+            let room = ROUNDING * (radius + center.abs().max_element());
+            let around = Vec3::splat(radius + room);
+            let of_ball = Aabb::around([center - around, center + around]);
+            let object =
+                light.as_area().and_then(|area| self.geometry.objects()[area.object as usize].bounds());
+            Some(LampBox { of_ball, of_object: object.map(|own| own.grown(Vec3::splat(room))) })
+        });
+        boxes.collect()
     }
 
     /// Whether no light sample from within a body of glass finds anything.

@@ -31,7 +31,7 @@ use crate::materials::{Bsdf, Coated, Pane, Rough, RoughBsdf};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
-use crate::world::{Hit, Loops, World};
+use crate::world::{BodyInParts, Hit, Loops, World};
 
 /// Squared difference of directions that are equal within rounding.
 const SAME: f32 = 1e-8;
@@ -44,6 +44,8 @@ pub struct PhotonTracing<'a> {
     pub emission: &'a PhotonSource,
     /// The closed shapes of glass that lights may be in, with their materials.
     pub glasses: &'a [Inside],
+    /// Other bodies of glass that lights may be in.
+    pub bodies: &'a [BodyInParts],
     /// Inverse of the number of photons.
     pub share: f32,
     /// Most scatterings of a photon.
@@ -125,7 +127,11 @@ impl PhotonTracing<'_> {
     fn medium_at(&self, point: Vec3) -> Medium {
         let world = self.tile.world;
         let around = |glass: &&Inside| world.encloses(glass.body, point);
-        self.glasses.iter().filter(around).copied().fold(Medium::default(), Medium::entered)
+        let in_parts = self.bodies.iter().filter_map(|body| {
+            let material = world.material_around(body, point)?;
+            Some(Inside { body: body.body, material })
+        });
+        self.glasses.iter().filter(around).copied().chain(in_parts).fold(Medium::default(), Medium::entered)
     }
 }
 

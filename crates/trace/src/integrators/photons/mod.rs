@@ -52,11 +52,10 @@ use crate::integrators::method::Behaviour;
 use crate::integrators::settings::{PhotonSettings, RenderSettings};
 use crate::integrators::transport::medium::Inside;
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
-use crate::lights::tree::bounds::Space;
-use crate::lights::{Ball, LightBounds, PhotonSource};
+use crate::lights::{Ball, PhotonSource};
 use crate::materials::{Glass, Material};
 use crate::scene::description::{Render, Shadows};
-use crate::world::{Hit, World, photon_source};
+use crate::world::{BodyInParts, Hit, LampBox, World, photon_source};
 use emit::{EmittedPhotons, PhotonTracing};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
@@ -83,6 +82,8 @@ pub struct Photons {
     emission: Option<PhotonSource>,
     /// The closed shapes of glass that lights may be in.
     glasses: Vec<u32>,
+    /// The other bodies of glass that lights may be in.
+    bodies: Vec<BodyInParts>,
     /// Radii of the first pass: of the kernel for caustic photons, and of that for bounced ones.
     radii: [f32; 2],
 }
@@ -146,9 +147,10 @@ impl Photons {
         let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.exists());
         let aimed = AIMED[usize::from(specular.is_unbounded)];
         let emission = emission.map(|emission| emission.aimed_at(&specular.balls, aimed));
-        let glasses = glasses_at_lights(world);
+        let (glasses, bodies) = glasses_at_lights(world);
         let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
-        let mut own = Self { settings: photons, most_depth, emission, glasses, radii: [photons.radius; 2] };
+        let radii = [photons.radius; 2];
+        let mut own = Self { settings: photons, most_depth, emission, glasses, bodies, radii };
         // Trace pass 0, and choose the radii by its photons.
         let sent = own.trace_photons((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
@@ -252,7 +254,8 @@ impl Photons {
             };
             let (share, most_depth) = (1.0 / count as f32, self.most_depth);
             let shots =
-                PhotonTracing { tile: &tile, emission, glasses, share, most_depth }.trace_photons()?;
+                PhotonTracing { tile: &tile, emission, glasses, bodies: &self.bodies, share, most_depth }
+                    .trace_photons()?;
             let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
             progress(done, count.into());
             Ok(shots)
@@ -330,24 +333,23 @@ fn radius_to_hold(photons: &[Photon], wanted: f32, size: f32, token: &CancelToke
     Ok(largest.min(radius * (wanted / (NEAR * step as f32)).sqrt()))
 }
 
-/// The closed shapes of glass that lights may be in.
-fn glasses_at_lights(world: &World) -> Vec<u32> {
-    let places: Vec<Aabb> =
-        world.lights.iter().filter_map(|(_, light)| light.bounds()).filter_map(place).collect();
+/// The closed shapes of glass that lights may be in, and the other bodies.
+fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<BodyInParts>) {
+    let lamps = world.lamp_boxes();
     let may_hold_light = |object: &u32| {
         let bounds = world.geometry.objects()[*object as usize].bounds();
-        bounds.is_none_or(|bounds| places.iter().any(|place| place.meets(&bounds)))
+        bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.meets(&bounds)))
     };
-    world.closed_glasses().map(|(object, _)| object).filter(may_hold_light).collect()
-}
-
-/// A box around a light. `None` if the light is beyond the scene.
-fn place(of: LightBounds) -> Option<Aabb> {
-    let LightBounds { space, center, radius, .. } = of;
-    match space {
-        Space::Weakening | Space::Steady => Some(Aabb::around_f64([center - radius, center + radius])),
-        Space::Beyond => None,
-    }
+    let closed = world.closed_glasses().map(|(object, _)| object).filter(may_hold_light).collect();
+    // What opaque surfaces close may reach out of its box: ask for the middle and the corners of each lamp.
+    let is_around = |body: &BodyInParts, lamp: &LampBox| {
+        lamp.points().any(|point| world.material_around(body, point).is_some())
+    };
+    let mut bodies = world.bodies_in_parts();
+    bodies.retain(|body| {
+        lamps.iter().any(|lamp| lamp.meets(&body.bounds) || body.is_covered && is_around(body, lamp))
+    });
+    (closed, bodies)
 }
 
 /// Objects of glass with their boxes, and their indices of refraction.

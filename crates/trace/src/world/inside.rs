@@ -1,20 +1,35 @@
-//! Glass around the camera.
+//! Glass around a point: of the camera, or of a lamp.
 //!
-//! A closed shape knows which points it contains. A body of meshes or of several objects does not: rays from the camera to points of
+//! A closed shape knows which points it contains. A body of meshes or of several objects does not: rays from the point to points of
 //! its surface tell on which side of it they begin.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::{Hit, Object, ObjectMaterial, OpenGlass, World};
+use super::{Hit, Object, ObjectMaterial, World};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Aabb, Asked, Ray, ShapeHit};
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Rays that look for the surface of a body.
+/// Rays that look for the surface of a body, if it has no more objects.
 const RAYS: usize = 32;
+
+/// Majority of rays that decides.
+const MAJORITY: i32 = 3;
 
 /// Surfaces of other glass that such a ray passes.
 const PASSED: usize = 16;
+
+/// A body of glass without a hole, made of meshes or of several objects.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyInParts {
+    /// Its place in the order of the file.
+    pub body: u32,
+    objects: Vec<u32>,
+    /// The box around its objects.
+    pub bounds: Aabb,
+    /// Whether opaque surfaces close it, so that its inside may reach out of the box.
+    pub is_covered: bool,
+}
 
 impl World {
     /// The closed shapes of glass around a point at the camera, and the bodies that the camera is in, with their materials.
@@ -44,53 +59,65 @@ impl World {
         near.collect()
     }
 
-    /// The other bodies of glass without a hole that the camera is in, by their places in the order of the file and the materials that
-    /// rays from the camera meet.
+    /// The other bodies of glass that the camera is in, by their places in the order of the file and their materials.
     pub(super) fn find_bodies_at_eye(&self) -> Vec<(u32, u32)> {
-        // Collect the objects of each body.
+        let eye = self.camera.position.as_vec3();
+        let at = Aabb { min: eye, max: eye };
+        let near =
+            self.bodies_in_parts().into_iter().filter(|body| body.is_covered || body.bounds.meets(&at));
+        near.filter_map(|body| Some((body.body, self.material_around(&body, eye)?))).collect()
+    }
+
+    /// The bodies of glass that no single shape closes.
+    pub fn bodies_in_parts(&self) -> Vec<BodyInParts> {
+        if !self.has_glass {
+            return Vec::new();
+        }
+        let covered = self.bodies.open().iter().filter(|open| open.is_covered);
+        let covered: BTreeSet<u32> = covered.map(|open| self.body(open.object)).collect();
         let mut bodies: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
         for object in 0..self.geometry.objects().len() as u32 {
-            let body = self.body(object);
             let may_be_glass = match self.object_materials[object as usize] {
                 ObjectMaterial::One(material) => self.is_glass(material),
-                ObjectMaterial::OfFile { .. } => self.has_glass,
+                ObjectMaterial::OfFile { .. } => true,
             };
+            let body = self.body(object);
             if may_be_glass && !self.is_closed(object) && !self.is_open(body) {
                 bodies.entry(body).or_default().push(object);
             }
         }
-        // Ask those whose box has the camera in it, and those that something opaque closes.
-        let eye = self.camera.position.as_vec3();
-        let may_hold_eye = |objects: &[u32]| {
+        let in_parts = |(body, objects): (u32, Vec<u32>)| {
             let bounds =
                 objects.iter().filter_map(|&object| self.geometry.objects()[object as usize].bounds());
-            let is_covered = |open: &OpenGlass| objects.contains(&open.object);
-            bounds.fold(Aabb::EMPTY, Aabb::union).meets(&Aabb { min: eye, max: eye })
-                || self.bodies.open().iter().any(is_covered)
+            let bounds = bounds.fold(Aabb::EMPTY, Aabb::union);
+            BodyInParts { body, objects, bounds, is_covered: covered.contains(&body) }
         };
-        let asked = bodies.into_iter().filter(|(_, objects)| may_hold_eye(objects));
-        asked.filter_map(|(body, objects)| Some((body, self.material_around_eye(body, &objects)?))).collect()
+        bodies.into_iter().map(in_parts).collect()
     }
 
-    /// The material of a body by its surface as most rays from the camera see it. `None` if they see its outside, or not at all.
-    fn material_around_eye(&self, body: u32, objects: &[u32]) -> Option<u32> {
-        let (mut votes, mut material) = (0, None);
+    /// The material of a body around a point, by the side of its surface that most rays from there see. `None` if the point is not in
+    /// it, or nothing of it is seen.
+    pub fn material_around(&self, body: &BodyInParts, point: Vec3) -> Option<u32> {
+        let (objects, mut votes, mut material) = (&body.objects, 0_i32, None);
         for ray in 0..RAYS.max(objects.len()) {
             let target = self.geometry.objects()[objects[ray % objects.len()] as usize].some_point(ray);
-            let Some((is_back, seen)) = target.and_then(|target| self.side_from_eye(body, target)) else {
+            let Some((is_back, seen)) = target.and_then(|target| self.seen_side(body.body, point, target))
+            else {
                 continue;
             };
             votes += if is_back { 1 } else { -1 };
             material = if is_back { material.or(Some(seen)) } else { material };
+            if votes.abs() == MAJORITY {
+                break;
+            }
         }
         material.filter(|_| votes > 0)
     }
 
-    /// Whether a ray from the camera to a point sees a body of glass from its back, and the material there. `None` if something opaque
-    /// is before it.
-    fn side_from_eye(&self, body: u32, target: DVec3) -> Option<(bool, u32)> {
-        let eye = self.camera.position;
-        let mut ray = Ray::new(eye.as_vec3(), (target - eye).as_vec3());
+    /// Whether a ray from a point to another sees a body of glass from its back, and the material there. `None` if something opaque is
+    /// before it.
+    fn seen_side(&self, body: u32, point: Vec3, target: DVec3) -> Option<(bool, u32)> {
+        let mut ray = Ray::new(point, (target - point.as_dvec3()).as_vec3());
         for _ in 0..PASSED {
             let hit = self.geometry.closest(&ray)?;
             let material = self.material_index(&hit) as u32;
