@@ -345,7 +345,7 @@ fn photons_of_a_lamp_in_glass_in_parts_start_in_it() {
         .pictured(v(0.0, 0.0, 6.0), v(0.0, 0.0, 0.0), 16.0, 12, 12)
         .depth(4);
     for (what, build, depth) in [("a hollow", hollow, 5), ("a pool", pool, 4)] {
-        let means = both(&build, depth, [512, 24], (20_000, 0.05));
+        let means = both(&build, depth, [384, 12], (4_000, 0.05));
         assert_same_light(what, means, 1.2e-2, 4e-3);
     }
 }
