@@ -267,7 +267,7 @@ FAULTS = [
      FROSTED + "light_through_a_sheet_on_glass_goes_on_in_the_glass"),
     ("a camera that knows no bodies of parts", "world/inside.rs", "material.filter(|_| ⟦votes > 0⟧)", "false",
      "closed_forms::bodies::a_camera_in_a_body_of_parts_is_in_its_glass"),
-    ("photons that know no bodies of parts", "integrators/photons/emit.rs", "let material = ⟦world.material_around(body, point)⟧?;", "None",
+    ("photons that know no bodies of parts", "integrators/photons/emit.rs", "let material = ⟦world.material_around(body, point, emitter())⟧?;", "None",
      "closed_forms::bodies::photons_of_a_lamp_in_glass_in_parts_start_in_it"),
     ("of touching glasses the earlier one is rough", "integrators/transport/crossing.rs",
      "let later = ⟦near.glass().max(far.glass())⟧?;", "near.glass().or(far.glass())",

@@ -334,13 +334,14 @@ fn photons_of_a_lamp_in_glass_in_parts_start_in_it() {
         .sphere(v(0.0, 0.0, 1.0), 0.2, emitter(5.0))
         .pictured(v(0.0, 0.0, 6.0), v(0.0, 0.0, 0.0), 24.0, 12, 12)
         .depth(5);
-    // A lamp under the surface of a pool with opaque walls.
+    // A lamp in a bubble under the surface of a pool with opaque walls.
     let water = tinted(1.33, v(0.5, 0.5, 0.5));
     let pool = quads(v(-1.0, -1.0, 0.0), v(1.0, 1.0, 1.0), 0).into_iter().enumerate();
     let pool = pool
         .fold(scene(), |build, (number, shape)| {
             build.shape(shape, if number == 5 { water.clone() } else { matte(0.6) })
         })
+        .cuboid(v(0.3, 0.2, 0.6), v(0.4, 0.4, 0.4), DVec3::ZERO, glass(1.0))
         .sphere(v(0.3, 0.2, 0.6), 0.1, emitter(20.0))
         .pictured(v(0.0, 0.0, 6.0), v(0.0, 0.0, 0.0), 16.0, 12, 12)
         .depth(4);

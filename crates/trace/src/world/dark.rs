@@ -14,6 +14,8 @@ pub struct LampBox {
     of_ball: Aabb,
     /// Box of the object that emits.
     of_object: Option<Aabb>,
+    /// The object that emits.
+    pub object: Option<u32>,
 }
 
 impl LampBox {
@@ -67,9 +69,9 @@ impl World {
             let room = ROUNDING * (radius + center.abs().max_element());
             let around = Vec3::splat(radius + room);
             let of_ball = Aabb::around([center - around, center + around]);
-            let object =
-                light.as_area().and_then(|area| self.geometry.objects()[area.object as usize].bounds());
-            Some(LampBox { of_ball, of_object: object.map(|own| own.grown(Vec3::splat(room))) })
+            let object = light.as_area().map(|area| area.object);
+            let bounds = object.and_then(|object| self.geometry.objects()[object as usize].bounds());
+            Some(LampBox { of_ball, of_object: bounds.map(|own| own.grown(Vec3::splat(room))), object })
         });
         boxes.collect()
     }

@@ -16,7 +16,7 @@ const RAYS: usize = 32;
 /// Majority of rays that decides.
 const MAJORITY: i32 = 3;
 
-/// Surfaces of other glass that such a ray passes.
+/// Other surfaces that such a ray passes.
 const PASSED: usize = 16;
 
 /// A body of glass without a hole, made of meshes or of several objects.
@@ -65,7 +65,7 @@ impl World {
         let at = Aabb { min: eye, max: eye };
         let near =
             self.bodies_in_parts().into_iter().filter(|body| body.is_covered || body.bounds.meets(&at));
-        near.filter_map(|body| Some((body.body, self.material_around(&body, eye)?))).collect()
+        near.filter_map(|body| Some((body.body, self.material_around(&body, eye, None)?))).collect()
     }
 
     /// The bodies of glass that no single shape closes.
@@ -96,12 +96,12 @@ impl World {
     }
 
     /// The material of a body around a point, by the side of its surface that most rays from there see. `None` if the point is not in
-    /// it, or nothing of it is seen.
-    pub fn material_around(&self, body: &BodyInParts, point: Vec3) -> Option<u32> {
+    /// it, or nothing of it is seen. The point may be on an object, `of`, which then hides nothing.
+    pub fn material_around(&self, body: &BodyInParts, point: Vec3, of: Option<u32>) -> Option<u32> {
         let (objects, mut votes, mut material) = (&body.objects, 0_i32, None);
         for ray in 0..RAYS.max(objects.len()) {
             let target = self.geometry.objects()[objects[ray % objects.len()] as usize].some_point(ray);
-            let Some((is_back, seen)) = target.and_then(|target| self.seen_side(body.body, point, target))
+            let Some((is_back, seen)) = target.and_then(|target| self.seen_side(body, (point, of), target))
             else {
                 continue;
             };
@@ -114,19 +114,24 @@ impl World {
         material.filter(|_| votes > 0)
     }
 
-    /// Whether a ray from a point to another sees a body of glass from its back, and the material there. `None` if something opaque is
-    /// before it.
-    fn seen_side(&self, body: u32, point: Vec3, target: DVec3) -> Option<(bool, u32)> {
+    /// Whether a ray from a point of an object to another point sees a body of glass from its back, and the material there. `None` if
+    /// the ray misses it, or leaves it by something opaque that closes it.
+    fn seen_side(
+        &self,
+        body: &BodyInParts,
+        (point, of): (Vec3, Option<u32>),
+        target: DVec3,
+    ) -> Option<(bool, u32)> {
         let mut ray = Ray::new(point, (target - point.as_dvec3()).as_vec3());
         for _ in 0..PASSED {
             let hit = self.geometry.closest(&ray)?;
             let material = self.material_index(&hit) as u32;
-            if !self.is_glass(material) {
+            if body.is_covered && !self.is_glass(material) && Some(hit.object) != of {
                 return None;
             }
             let bare = Asked { uv: false, shadow_point: false };
             let surface = self.geometry.asked_surface(&ray, &hit, bare);
-            if self.body(hit.object) == body {
+            if self.is_glass(material) && self.body(hit.object) == body.body {
                 let is_back = surface.normal.dot(ray.direction) > 0.0;
                 return Some((is_back != self.bodies.is_turned(hit.object), material));
             }

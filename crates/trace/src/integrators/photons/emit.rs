@@ -123,12 +123,13 @@ impl PhotonTracing<'_> {
         None
     }
 
-    /// The glass around a point.
-    fn medium_at(&self, point: Vec3) -> Medium {
+    /// The glass around the start of a photon.
+    fn medium_at(&self, point: Vec3, emitted: &Emitted) -> Medium {
         let world = self.tile.world;
+        let emitter = || Some(world.lights.get(emitted.light).as_area()?.object);
         let around = |glass: &&Inside| world.encloses(glass.body, point);
-        let in_parts = self.bodies.iter().filter_map(|body| {
-            let material = world.material_around(body, point)?;
+        let in_parts = self.bodies.iter().filter(|_| !is_beyond(emitted)).filter_map(|body| {
+            let material = world.material_around(body, point, emitter())?;
             Some(Inside { body: body.body, material })
         });
         self.glasses.iter().filter(around).copied().chain(in_parts).fold(Medium::default(), Medium::entered)
@@ -224,7 +225,7 @@ impl PhotonWavefront<'_> {
                     throughput: emitted.flux * tracing.share,
                     slot: offset as u32,
                     path: CAMERA_PATH + 1,
-                    medium: tracing.medium_at(ray.origin),
+                    medium: tracing.medium_at(ray.origin, &emitted),
                     state: PathState::CAMERA,
                     cone: Cone::default(),
                 };

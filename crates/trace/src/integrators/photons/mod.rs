@@ -343,7 +343,7 @@ fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<BodyInParts>) {
     let closed = world.closed_glasses().map(|(object, _)| object).filter(may_hold_light).collect();
     // What opaque surfaces close may reach out of its box: ask for the middle and the corners of each lamp.
     let is_around = |body: &BodyInParts, lamp: &LampBox| {
-        lamp.points().any(|point| world.material_around(body, point).is_some())
+        lamp.points().any(|point| world.material_around(body, point, lamp.object).is_some())
     };
     let mut bodies = world.bodies_in_parts();
     bodies.retain(|body| {
