@@ -1,5 +1,7 @@
 //! The ray kernel: no leak between triangles, no speck on flat faces, the same bits by all instruction sets.
 
+use std::collections::HashMap;
+
 use glimt::accel::wide_bvh::Instructions;
 use glimt::accel::{KdTree, PACKET, WideBvh, ends};
 use glimt::control::CancelToken;
@@ -271,16 +273,24 @@ fn hits_right_at_the_start_of_a_ray_are_found() {
         })
         .collect();
     // Points farther off than this have no crossing with `least` ≥ −0.02 on a ray of length 0.03.
-    let around: Vec<(Vec3, f32)> = slivers
-        .iter()
-        .map(|corners| {
-            let middle = corners.iter().sum::<Vec3>() / 3.0;
-            (
-                middle,
-                corners.iter().map(|corner| (*corner - middle).length()).fold(0.0, f32::max) * 1.2 + 0.03,
-            )
-        })
-        .collect();
+    let around = |corners: &[Vec3; 3]| {
+        let middle = corners.iter().sum::<Vec3>() / 3.0;
+        (middle, corners.iter().map(|corner| (*corner - middle).length()).fold(0.0, f32::max) * 1.2 + 0.03)
+    };
+    // Each cell of a grid knows the slivers that may be so near to a point in it.
+    let cell = |at: Vec3| at.to_array().map(|x| x.floor() as i32);
+    let mut grid: HashMap<[i32; 3], Vec<usize>> = HashMap::new();
+    for (id, corners) in slivers.iter().enumerate() {
+        let (middle, reach) = around(corners);
+        let (low, high) = (cell(middle - reach), cell(middle + reach));
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    grid.entry([x, y, z]).or_default().push(id);
+                }
+            }
+        }
+    }
     let count = slivers.len() as u32;
     let corners = |id: u32| slivers[id as usize];
     let boxes = WideBvh::build(count, corners, &CancelToken::new()).expect("nobody cancels");
@@ -296,11 +306,11 @@ fn hits_right_at_the_start_of_a_ray_are_found() {
         let origin = a + (b - a) * u + (c - a) * v - direction * (distance * side);
         let ray = Ray { t_max: 2.0 * distance, ..Ray::new(origin, direction) };
         let (end, mut is_hit, mut is_free) = (f64::from(ray.t_max), false, true);
-        let near = slivers
-            .iter()
-            .zip(&around)
-            .filter(|(_, (middle, reach))| (origin - *middle).length_squared() < reach * reach);
-        for (t, least) in near.filter_map(|(corners, _)| crossing(&ray, corners)) {
+        let near = grid.get(&cell(origin)).into_iter().flatten().map(|id| &slivers[*id]).filter(|corners| {
+            let (middle, reach) = around(corners);
+            (origin - middle).length_squared() < reach * reach
+        });
+        for (t, least) in near.filter_map(|corners| crossing(&ray, corners)) {
             is_hit |= t > 1e-9 && t < 0.99 * end && least > 0.02;
             is_free &= t < -1e-9 || t > 1.01 * end || least < -0.02;
         }

@@ -45,27 +45,41 @@ impl Texels {
         }
     }
 
+    /// Linear values at some indices of the data.
+    #[inline(always)]
+    pub fn at_each<const N: usize>(&self, places: &[usize; N]) -> [Vec3; N] {
+        let mut values = [Vec3::ZERO; N];
+        self.decode(places, |i, value| values[i] = value);
+        values
+    }
+
     /// Linear values at indices of the data, side by side. Written in place: rows are larger than compilers like to
     /// return.
     #[inline(always)]
     pub fn fill_row(&self, places: &[usize; LANES], values: &mut Lanes3) {
+        self.decode(places, |i, value| set_lane(values, i, value));
+    }
+
+    /// Gives the linear value at each index of the data.
+    #[inline(always)]
+    fn decode<const N: usize>(&self, places: &[usize; N], mut put: impl FnMut(usize, Vec3)) {
         match &self.data {
             TexelData::Srgb8(bytes) => {
                 let table = &*LINEAR_OF_SRGB8;
-                for i in 0..LANES {
+                for i in 0..N {
                     let [r, g, b] = bytes[places[i]];
                     let decoded = |byte: u8| table[usize::from(byte)];
-                    set_lane(values, i, Vec3::new(decoded(r), decoded(g), decoded(b)));
+                    put(i, Vec3::new(decoded(r), decoded(g), decoded(b)));
                 }
             }
             TexelData::Linear8(bytes) => {
-                for i in 0..LANES {
-                    set_lane(values, i, of_linear(bytes[places[i]]));
+                for i in 0..N {
+                    put(i, of_linear(bytes[places[i]]));
                 }
             }
             TexelData::Float(floats) => {
-                for i in 0..LANES {
-                    set_lane(values, i, floats[places[i]]);
+                for i in 0..N {
+                    put(i, floats[places[i]]);
                 }
             }
         }

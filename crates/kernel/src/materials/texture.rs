@@ -161,7 +161,7 @@ impl Texture {
     /// The value at coordinates of the tiles, at this level if the filter has levels.
     #[inline]
     fn in_tiles(&self, tiles: DVec2, level: impl FnOnce() -> f32) -> Vec3 {
-        let folded = [tiles.x, tiles.y].map(|x| self.wrap.fold(finite(x)) as f32);
+        let folded = [self.wrap.fold(finite(tiles.x)) as f32, self.wrap.fold(finite(tiles.y)) as f32];
         match self.filter {
             TextureFilter::Nearest => self.nearest(folded),
             TextureFilter::Bilinear => self.bilinear(&self.texels, folded),
@@ -321,8 +321,10 @@ impl Texture {
     }
 
     fn nearest(&self, [u, v]: [f32; 2]) -> Vec3 {
-        let size = size(&self.texels);
-        self.texel(&self.texels, (u * size.x).floor(), (v * size.y).floor())
+        let (texels, size) = (&*self.texels, size(&self.texels));
+        let column = self.wrap.index(whole_part(u * size.x), texels.width as i32);
+        let row = self.wrap.index(whole_part(v * size.y), texels.height as i32);
+        texels.at(place(column, row, [texels.width as i32, texels.height as i32]))
     }
 
     /// Interpolates between the two levels at `level`.
@@ -340,30 +342,44 @@ impl Texture {
     }
 
     fn bilinear(&self, texels: &Texels, [u, v]: [f32; 2]) -> Vec3 {
-        let size = size(texels);
+        let (size, extent) = (size(texels), [texels.width as i32, texels.height as i32]);
         let (x, y) = (u * size.x - 0.5, v * size.y - 0.5);
-        let (left, bottom) = (x.floor(), y.floor());
-        let (fx, fy) = (x - left, y - bottom);
-        let texel = |x: f32, y: f32| self.texel(texels, x, y);
-        let lower = texel(left, bottom).lerp(texel(left + 1.0, bottom), fx);
-        let upper = texel(left, bottom + 1.0).lerp(texel(left + 1.0, bottom + 1.0), fx);
+        let (first, bottom) = (whole_part(x), whole_part(y));
+        let (fx, fy) = (x - first as f32, y - bottom as f32);
+        let [left, right] = self.wrap.neighbours(first, extent[0]);
+        let [bottom, top] = self.wrap.neighbours(bottom, extent[1]);
+        let corners = [(left, bottom), (right, bottom), (left, top), (right, top)];
+        let mut places = [0; 4];
+        for (place_of, (column, row)) in places.iter_mut().zip(corners) {
+            *place_of = place(column, row, extent);
+        }
+        let corners = texels.at_each(&places);
+        let lower = corners[0].lerp(corners[1], fx);
+        let upper = corners[2].lerp(corners[3], fx);
         lower.lerp(upper, fy)
-    }
-
-    /// A texel by column from the left and row from the bottom, which may lie one outside.
-    fn texel(&self, texels: &Texels, x: f32, y: f32) -> Vec3 {
-        let column = self.wrap.index(x as i32, texels.width as i32);
-        let row_from_bottom = self.wrap.index(y as i32, texels.height as i32);
-        texels.get(column as u32, texels.height - 1 - row_from_bottom as u32)
     }
 }
 
-/// Indices of texels, from their columns, and their rows from the bottom.
+/// The greatest integer that is not above a number. The call of a library would cost as much as a texel where no instruction
+/// rounds.
 #[inline(always)]
-fn places(columns: &[i32; LANES], rows: &[i32; LANES], [width, height]: [i32; 2]) -> [usize; LANES] {
+fn whole_part(x: f32) -> i32 {
+    let towards_zero = x as i32;
+    towards_zero - i32::from(towards_zero as f32 > x)
+}
+
+/// The index of a texel, from its column, and its row from the bottom.
+#[inline(always)]
+fn place(column: i32, row: i32, [width, height]: [i32; 2]) -> usize {
+    (height - 1 - row) as usize * width as usize + column as usize
+}
+
+/// [`place`] of each texel of a row.
+#[inline(always)]
+fn places(columns: &[i32; LANES], rows: &[i32; LANES], extent: [i32; 2]) -> [usize; LANES] {
     let mut places = [0; LANES];
     for i in 0..LANES {
-        places[i] = (height - 1 - rows[i]) as usize * width as usize + columns[i] as usize;
+        places[i] = place(columns[i], rows[i], extent);
     }
     places
 }
@@ -423,6 +439,12 @@ impl Wrap {
                 if period > 1.0 { 2.0 - period } else { period }
             }
         }
+    }
+
+    /// An index and the next one, wrapped.
+    #[inline(always)]
+    fn neighbours(self, first: i32, size: i32) -> [i32; 2] {
+        [self.index(first, size), self.index(first + 1, size)]
     }
 
     /// Wraps an index that is at most one outside 0 … size − 1.

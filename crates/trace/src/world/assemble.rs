@@ -17,7 +17,6 @@ impl World {
         let (materials, object_materials) = lower_materials(scene, parts);
         let camera = parts.camera.as_ref().unwrap_or(&scene.camera);
         let camera = Camera::new(camera, parts.orbiter.as_ref()).seen_from(geometry.origin());
-        let is_mipmapped = materials.iter().any(Material::is_mipmapped);
         let is_rough = |material: &Material| material.bsdf.glass().is_some_and(|glass| !glass.is_smooth());
         let has_rough_glass = materials.iter().any(is_rough);
         let has_glass = materials.iter().any(|material| material.bsdf.glass().is_some());
@@ -28,6 +27,7 @@ impl World {
             plain: materials.iter().map(PlainMaterial::of).collect(),
             has_directions: materials.iter().any(|material| material.bsdf.has_direction()),
             textured: materials.iter().map(Material::is_textured).collect(),
+            mipmapped: materials.iter().map(Material::is_mipmapped).collect(),
             materials,
             object_materials,
             lights,
@@ -38,7 +38,6 @@ impl World {
             dark_bodies: Box::default(),
             glass_at_eye: Vec::new(),
             bodies_at_eye: Vec::new(),
-            is_mipmapped,
             has_second_uvs: has_second_uvs(scene, parts),
             colored: colored(scene),
             passable: None,

@@ -117,8 +117,8 @@ pub struct World {
     glass_at_eye: Vec<(u32, u32)>,
     /// The other bodies of glass that the camera is in, with their materials.
     bodies_at_eye: Vec<(u32, u32)>,
-    /// Whether any material has a texture with mip levels.
-    is_mipmapped: bool,
+    /// [`Material::is_mipmapped`] of each material.
+    mipmapped: Box<[bool]>,
     /// Whether any texture is looked up by a mesh's second set of coordinates.
     has_second_uvs: bool,
     /// Whether the vertex colours of each object count. `None` if those of none do.
@@ -194,6 +194,12 @@ impl World {
         self.textured[material]
     }
 
+    /// [`Material::is_mipmapped`] of a material.
+    #[inline(always)]
+    pub fn is_mipmapped(&self, material: usize) -> bool {
+        self.mipmapped[material]
+    }
+
     /// Whether vertex colours count at an object.
     #[inline]
     pub fn is_colored(&self, object: u32) -> bool {
@@ -253,8 +259,8 @@ impl World {
     }
 
     /// Whether any material has a texture with mip levels, for which rays must know the width of their beams.
-    pub fn is_mipmapped(&self) -> bool {
-        self.is_mipmapped
+    pub fn has_mipmaps(&self) -> bool {
+        self.mipmapped.contains(&true)
     }
 
     /// Number of triangles over all mesh instances and single triangles.

@@ -96,58 +96,52 @@ fn another_kind_of_what_is_no_file_is_a_change() {
     scratch.expect_one();
 }
 
-#[test]
-fn truncate_and_write() {
-    let scratch = Scratch::new(false);
-    scratch.three_saves(|content| fs::write(scratch.path("a.toml"), content).expect("written"));
-}
+/// A way to save `a.toml` in a folder with a content.
+type Save = fn(folder: &Path, content: &str);
 
-#[test]
-fn a_slow_truncate_and_write_counts_once() {
-    let scratch = Scratch::new(false);
-    scratch.three_saves(|content| {
-        fs::write(scratch.path("a.toml"), "").expect("written");
+/// Ways in which editors save.
+const WAYS: [(&str, Save); 6] = [
+    ("truncate and write", |folder, content| {
+        fs::write(folder.join("a.toml"), content).expect("written");
+    }),
+    ("a slow truncate and write", |folder, content| {
+        fs::write(folder.join("a.toml"), "").expect("written");
         std::thread::sleep(Duration::from_millis(100));
-        fs::write(scratch.path("a.toml"), content).expect("written");
-    });
-}
+        fs::write(folder.join("a.toml"), content).expect("written");
+    }),
+    ("rename over it", |folder, content| {
+        fs::write(folder.join("a.toml.tmp"), content).expect("written");
+        fs::rename(folder.join("a.toml.tmp"), folder.join("a.toml")).expect("renamed");
+    }),
+    ("backup by rename, new file and delete, as vim does", |folder, content| {
+        fs::write(folder.join("4913"), "").expect("written");
+        fs::remove_file(folder.join("4913")).expect("removed");
+        fs::rename(folder.join("a.toml"), folder.join("a.toml~")).expect("renamed");
+        fs::write(folder.join("a.toml"), content).expect("written");
+        fs::remove_file(folder.join("a.toml~")).expect("removed");
+    }),
+    ("move away and write, as emacs does", |folder, content| {
+        fs::rename(folder.join("a.toml"), folder.join("a.toml~")).expect("renamed");
+        fs::write(folder.join("a.toml"), content).expect("written");
+    }),
+    ("unlink and write", |folder, content| {
+        fs::remove_file(folder.join("a.toml")).expect("removed");
+        fs::write(folder.join("a.toml"), content).expect("written");
+    }),
+];
 
 #[test]
-fn rename_over() {
-    let scratch = Scratch::new(false);
-    scratch.three_saves(|content| {
-        fs::write(scratch.path("a.toml.tmp"), content).expect("written");
-        fs::rename(scratch.path("a.toml.tmp"), scratch.path("a.toml")).expect("renamed");
-    });
-}
-
-#[test]
-fn backup_by_rename_new_file_and_delete_as_vim_does() {
-    let scratch = Scratch::new(false);
-    scratch.three_saves(|content| {
-        fs::write(scratch.path("4913"), "").expect("written");
-        fs::remove_file(scratch.path("4913")).expect("removed");
-        fs::rename(scratch.path("a.toml"), scratch.path("a.toml~")).expect("renamed");
-        fs::write(scratch.path("a.toml"), content).expect("written");
-        fs::remove_file(scratch.path("a.toml~")).expect("removed");
-    });
-}
-
-#[test]
-fn move_away_and_write_as_emacs_does() {
-    let scratch = Scratch::new(false);
-    scratch.three_saves(|content| {
-        fs::rename(scratch.path("a.toml"), scratch.path("a.toml~")).expect("renamed");
-        fs::write(scratch.path("a.toml"), content).expect("written");
-    });
-}
-
-#[test]
-fn unlink_and_write() {
-    let scratch = Scratch::new(false);
-    scratch.three_saves(|content| {
-        fs::remove_file(scratch.path("a.toml")).expect("removed");
-        fs::write(scratch.path("a.toml"), content).expect("written");
+fn each_way_to_save_is_one_change() {
+    // Most of the time is waiting, so that all ways go at once; a thread that fails tells its name.
+    std::thread::scope(|scope| {
+        for (name, save) in WAYS {
+            let three_saves = move || {
+                let scratch = Scratch::new(false);
+                scratch.three_saves(|content| save(scratch.folder.path(), content));
+            };
+            let thread = std::thread::Builder::new().name(name.to_owned());
+            thread.spawn_scoped(scope, three_saves).expect("a thread");
+        }
     });
 }
 

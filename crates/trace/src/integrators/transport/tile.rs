@@ -44,7 +44,7 @@ impl<'a> TileContext<'a> {
         behaviour: Behaviour,
     ) -> Self {
         let pixel_spread =
-            if world.is_mipmapped() { world.camera.pixel_spread(settings.render.height) } else { 0.0 };
+            if world.has_mipmaps() { world.camera.pixel_spread(settings.render.height) } else { 0.0 };
         let render = &settings.render;
         let is_even = match world.lights.environment() {
             Some(Environment::Constant(_)) => true,

@@ -46,9 +46,7 @@ pub struct Vertex<'a> {
 impl<'a> Vertex<'a> {
     /// The vertex at a hit.
     pub fn new(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
-        let material = &tile.world.materials[tile.world.material_index(hit)];
-        let surface = tile.world.geometry.surface(&path.ray, hit);
-        Self::at_surface(tile, path, (material, surface), hit, hit.shape.t)
+        Self::on(tile, path, hit, tile.world.geometry.surface(&path.ray, hit))
     }
 
     /// The vertex at a hit, with only those parts of the surface that its material needs.
@@ -58,8 +56,7 @@ impl<'a> Vertex<'a> {
 
     /// The vertex at a hit whose surface is known.
     pub fn on(tile: &TileContext<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
-        let material = &tile.world.materials[tile.world.material_index(hit)];
-        Self::at_surface(tile, path, (material, surface), hit, hit.shape.t)
+        Self::at_surface(tile, path, (tile.world.material_index(hit), surface), hit, hit.shape.t)
     }
 
     /// The vertex of a surface that touches the surface of a hit at this distance, as the way between the sides of both
@@ -75,31 +72,31 @@ impl<'a> Vertex<'a> {
 
     fn shaded(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
         let index = tile.world.material_index(hit);
-        let material = &tile.world.materials[index];
-        let is_lit = material.bsdf.is_lit();
+        let is_lit = tile.world.materials[index].bsdf.is_lit();
         let asked = Asked { uv: tile.world.is_textured(index), shadow_point: is_lit };
         let surface = tile.world.geometry.asked_surface(by, hit, asked);
-        Self::at_surface(tile, path, (material, surface), hit, distance)
+        Self::at_surface(tile, path, (index, surface), hit, distance)
     }
 
     fn at_surface(
         tile: &TileContext<'a>,
         path: &PathRay,
-        (material, surface): (&'a Material, SurfacePoint),
+        (index, surface): (usize, SurfacePoint),
         hit: &Hit,
         distance: f32,
     ) -> Self {
+        let material = &tile.world.materials[index];
         // Decide which side the path is on.
         let to_eye = -path.ray.direction;
         let side = if surface.normal.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
         let cone = path.cone.after(distance);
         // Compute what beams need, if there are any.
-        let has_extent = tile.pixel_spread > 0.0;
-        let footprint = |tangents| match has_extent {
+        let has_beam = tile.pixel_spread > 0.0;
+        let footprint = |tangents| match has_beam && tile.world.is_mipmapped(index) {
             true => Footprint::of_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents),
             false => Footprint::POINT,
         };
-        let curvature = match has_extent && material.bsdf.has_delta() {
+        let curvature = match has_beam && material.bsdf.has_delta() {
             true => side * tile.world.geometry.curvature(hit, &surface),
             false => 0.0,
         };
