@@ -56,7 +56,7 @@ impl<'a> Vertex<'a> {
 
     /// The vertex at a hit whose surface is known.
     pub fn on(tile: &TileContext<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
-        Self::at_surface(tile, path, (tile.world.material_index(hit), surface), hit, hit.shape.t)
+        Self::at_surface(tile, path, tile.world.material_index(hit), surface, hit, hit.shape.t)
     }
 
     /// The vertex of a surface that touches the surface of a hit at this distance, as the way between the sides of both
@@ -75,13 +75,16 @@ impl<'a> Vertex<'a> {
         let is_lit = tile.world.materials[index].bsdf.is_lit();
         let asked = Asked { uv: tile.world.is_textured(index), shadow_point: is_lit };
         let surface = tile.world.geometry.asked_surface(by, hit, asked);
-        Self::at_surface(tile, path, (index, surface), hit, distance)
+        Self::at_surface(tile, path, index, surface, hit, distance)
     }
 
+    // Surfaces are large: each call would copy them.
+    #[inline(always)]
     fn at_surface(
         tile: &TileContext<'a>,
         path: &PathRay,
-        (index, surface): (usize, SurfacePoint),
+        index: usize,
+        surface: SurfacePoint,
         hit: &Hit,
         distance: f32,
     ) -> Self {
