@@ -2,19 +2,26 @@
 
 use glimt::integrators::View;
 use glimt::math::{DVec3, Vec2, Vec3};
-use glimt::scene::description::{ColorSource, Integrator, Material, MaterialKind, TextureFilter, Wrap};
+use glimt::scene::description::{
+    ColorSource, EmissionSource, Integrator, Material, MaterialKind, TextureFilter, Wrap,
+};
 
-use super::scenes::{Build, lat_long_sphere, matte, mirror, phong, scene};
+use super::scenes::{Build, emitter, lat_long_sphere, matte, mirror, phong, plain, scene};
 use super::{mean_and_error, v};
 
-/// A checker board of squares of 16 texels, black and white, tiled, under ambient light alone.
-fn board(filter: TextureFilter, repeat: f32) -> (Build, Material) {
+/// A checker board of squares of 16 texels, black and white, tiled.
+fn checkers(build: &mut Build, filter: TextureFilter, repeat: f32) -> usize {
     let rows: Vec<Vec<Vec3>> = (0..32)
         .map(|y| (0..32).map(|x| Vec3::splat(if (x / 16 + y / 16) % 2 == 0 { 0.0 } else { 1.0 })).collect())
         .collect();
     let rows: Vec<&[Vec3]> = rows.iter().map(Vec::as_slice).collect();
+    build.texture(&rows, filter, Wrap::Repeat, Vec2::splat(repeat))
+}
+
+/// The board under ambient light alone.
+fn board(filter: TextureFilter, repeat: f32) -> (Build, Material) {
     let mut build = scene().with(|scene| scene.render.ambient = Vec3::ONE);
-    let texture = build.texture(&rows, filter, Wrap::Repeat, Vec2::splat(repeat));
+    let texture = checkers(&mut build, filter, repeat);
     let mut kind = phong(0.0, 0.0, 1.0, 0.0);
     if let MaterialKind::Phong { diffuse, .. } = &mut kind.kind {
         *diffuse = ColorSource::Texture(texture);
@@ -41,6 +48,36 @@ fn a_far_board_is_grey_by_one_sample() {
     assert!(off(&mipmapped) < 0.01, "{}", off(&mipmapped));
     let (mean, error) = mean_and_error(&seen(TextureFilter::Bilinear));
     assert!(error * 16.0 > 0.4, "bilinear look-ups alias: {mean} ± {error}");
+}
+
+#[test]
+fn far_boards_are_grey_whatever_they_colour() {
+    let materials: [(&str, fn(usize) -> Material); 4] = [
+        ("diffuse", |board| {
+            let diffuse = ColorSource::Texture(board);
+            let specular = ColorSource::Constant(Vec3::ZERO);
+            plain(MaterialKind::Phong { diffuse, specular, shininess: 1.0, ambient: None })
+        }),
+        ("emission", |board| {
+            let own = emitter(1.0);
+            Material { emission: EmissionSource { texture: Some(board), ..own.emission }, ..own }
+        }),
+        ("mirror", |board| plain(MaterialKind::Mirror { reflectance: ColorSource::Texture(board) })),
+        // Without refraction, a pane reflects nothing.
+        ("pane", |board| plain(MaterialKind::Pane { ior: 1.0, tint: ColorSource::Texture(board) })),
+    ];
+    for (what, material) in materials {
+        let mut build = scene().background(1.0).with(|scene| scene.render.ambient = Vec3::ONE);
+        let board = checkers(&mut build, TextureFilter::Mipmap, 200.0);
+        // Beside it is a material without a texture.
+        let build = build
+            .quad(v(-100.0, 0.0, 0.0), v(200.0, 0.0, 0.0), v(0.0, 0.0, -200.0), material(board))
+            .sphere(v(0.0, 90.0, 0.0), 1.0, matte(0.5))
+            .pictured(v(0.0, 40.0, 20.0), v(0.0, 0.0, -40.0), 40.0, 16, 16);
+        for grey in greys(&build) {
+            assert!((grey - 0.5).abs() < 0.01, "{what}: {grey}");
+        }
+    }
 }
 
 #[test]
