@@ -50,9 +50,12 @@ fn a_far_board_is_grey_by_one_sample() {
     assert!(error * 16.0 > 0.4, "bilinear look-ups alias: {mean} ± {error}");
 }
 
+/// A name, and a material with this texture.
+type Textured = (&'static str, fn(texture: usize) -> Material);
+
 #[test]
 fn far_boards_are_grey_whatever_they_colour() {
-    let materials: [(&str, fn(usize) -> Material); 4] = [
+    let materials: [Textured; 4] = [
         ("diffuse", |board| {
             let diffuse = ColorSource::Texture(board);
             let specular = ColorSource::Constant(Vec3::ZERO);

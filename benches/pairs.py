@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+"""Processor time of two glimt binaries on the same scenes, in turns, each with the settings of the scene.
+
+    python3 benches/pairs.py BEFORE AFTER SCENE... [--pairs N] [-- OPTION...]
+
+Prints for each scene the median seconds of both, user and system, of whole processes; the median of the ratios of the pairs, the
+ratio of the least seconds, and whether the pictures have the same pixels; at the end the geometric mean of the medians. Scenes that
+take long get fewer pairs, three at least. Options after `--` go to both binaries.
+"""
+
+import argparse
+import math
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+
+# Seconds of one binary on one scene after which it gets no more pairs.
+BUDGET_SECONDS = 12
+
+
+def seconds(binary, scene, picture, options):
+    """Processor seconds of one render."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [binary, scene, "--once", "--progress", "none", "--bit-depth", "16", "-o", picture, *options]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{binary} {scene}: {done.stderr}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def content(picture):
+    """Bytes of a PPM but for its comments, which name the program."""
+    with open(picture, "rb") as file:
+        return [line for line in file if not line.startswith(b"#")]
+
+
+def main():
+    arguments, options = sys.argv[1:], []
+    if "--" in arguments:
+        cut = arguments.index("--")
+        arguments, options = arguments[:cut], arguments[cut + 1 :]
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("before")
+    parser.add_argument("after")
+    parser.add_argument("scenes", nargs="+", metavar="SCENE")
+    parser.add_argument("--pairs", type=int, default=9, metavar="N", help="most pairs of a scene")
+    asked = parser.parse_args(arguments)
+    binaries, ratios = (asked.before, asked.after), []
+    with tempfile.TemporaryDirectory() as folder:
+        pictures = [os.path.join(folder, name) for name in ("before.ppm", "after.ppm")]
+        for scene in asked.scenes:
+            first = seconds(binaries[0], scene, pictures[0], options)
+            count = max(3, min(asked.pairs, int(BUDGET_SECONDS / max(first, 1e-3))))
+            times = ([], [])
+            for number in range(count):
+                for which in (0, 1) if number % 2 == 0 else (1, 0):
+                    times[which].append(seconds(binaries[which], scene, pictures[which], options))
+            ratio = statistics.median(after / before for before, after in zip(*times))
+            ratios.append(ratio)
+            same = "same" if content(pictures[0]) == content(pictures[1]) else "other"
+            medians = [statistics.median(of) for of in times]
+            print(
+                f"{os.path.basename(scene):22} {medians[0]:8.3f} {medians[1]:8.3f}  ratio {ratio:.3f}"
+                f"  of the least {min(times[1]) / min(times[0]):.3f}  {count} pairs, {same} pixels",
+                flush=True,
+            )
+    print(f"geometric mean {math.exp(statistics.fmean(map(math.log, ratios))):.4f}")
+
+
+main()
