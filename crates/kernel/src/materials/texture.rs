@@ -264,7 +264,7 @@ impl Texture {
     fn repeated_row(&self, uv: &[[f64; LANES]; 2], repeat: DVec2) -> Lanes3 {
         let (texels, size) = (&*self.texels, size(&self.texels));
         let folded = [self.wrap.fold_row(&uv[0], repeat.x), self.wrap.fold_row(&uv[1], repeat.y)];
-        let extent = [texels.width as i32, texels.height as i32];
+        let extent = extent(texels);
         let (mut first, mut part) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);
         let shift = match self.filter {
             TextureFilter::Nearest => 0.0,
@@ -321,10 +321,10 @@ impl Texture {
     }
 
     fn nearest(&self, [u, v]: [f32; 2]) -> Vec3 {
-        let (texels, size) = (&*self.texels, size(&self.texels));
-        let column = self.wrap.index(whole_part(u * size.x), texels.width as i32);
-        let row = self.wrap.index(whole_part(v * size.y), texels.height as i32);
-        texels.at(place(column, row, [texels.width as i32, texels.height as i32]))
+        let (size, extent) = (size(&self.texels), extent(&self.texels));
+        let column = self.wrap.index(floor(u * size.x), extent[0]);
+        let row = self.wrap.index(floor(v * size.y), extent[1]);
+        self.texels.at(place(column, row, extent))
     }
 
     /// Interpolates between the two levels at `level`.
@@ -342,28 +342,23 @@ impl Texture {
     }
 
     fn bilinear(&self, texels: &Texels, [u, v]: [f32; 2]) -> Vec3 {
-        let (size, extent) = (size(texels), [texels.width as i32, texels.height as i32]);
+        let (size, extent) = (size(texels), extent(texels));
         let (x, y) = (u * size.x - 0.5, v * size.y - 0.5);
-        let (first, bottom) = (whole_part(x), whole_part(y));
-        let (fx, fy) = (x - first as f32, y - bottom as f32);
-        let [left, right] = self.wrap.neighbours(first, extent[0]);
-        let [bottom, top] = self.wrap.neighbours(bottom, extent[1]);
-        let corners = [(left, bottom), (right, bottom), (left, top), (right, top)];
-        let mut places = [0; 4];
-        for (place_of, (column, row)) in places.iter_mut().zip(corners) {
-            *place_of = place(column, row, extent);
-        }
+        let first = [floor(x), floor(y)];
+        let (fx, fy) = (x - first[0] as f32, y - first[1] as f32);
+        let [left, right] = self.wrap.neighbours(first[0], extent[0]);
+        let [bottom, top] = self.wrap.neighbours(first[1], extent[1]);
+        let place = |column, row| place(column, row, extent);
+        let places = [place(left, bottom), place(right, bottom), place(left, top), place(right, top)];
         let corners = texels.at_each(&places);
-        let lower = corners[0].lerp(corners[1], fx);
-        let upper = corners[2].lerp(corners[3], fx);
+        let (lower, upper) = (corners[0].lerp(corners[1], fx), corners[2].lerp(corners[3], fx));
         lower.lerp(upper, fy)
     }
 }
 
-/// The greatest integer that is not above a number. The call of a library would cost as much as a texel where no instruction
-/// rounds.
+/// Floor of a number, without the call of a library that [`f32::floor`] is on processors that may lack an instruction for it.
 #[inline(always)]
-fn whole_part(x: f32) -> i32 {
+fn floor(x: f32) -> i32 {
     let towards_zero = x as i32;
     towards_zero - i32::from(towards_zero as f32 > x)
 }
@@ -382,6 +377,12 @@ fn places(columns: &[i32; LANES], rows: &[i32; LANES], extent: [i32; 2]) -> [usi
         places[i] = place(columns[i], rows[i], extent);
     }
     places
+}
+
+/// Columns and rows.
+#[inline(always)]
+fn extent(texels: &Texels) -> [i32; 2] {
+    [texels.width as i32, texels.height as i32]
 }
 
 /// Columns and rows as a vector.
