@@ -18,12 +18,13 @@ pub struct Inside {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Medium {
     inside: [Inside; 4],
-    count: u8,
+    /// Of 32 bits, so that copies are of whole words: of a word with one byte just written, the copy waits for the cache.
+    count: u32,
 }
 
 impl Medium {
     fn known(&self) -> &[Inside] {
-        &self.inside[..usize::from(self.count)]
+        &self.inside[..self.count as usize]
     }
 
     /// Whether no glass is known.
@@ -38,7 +39,7 @@ impl Medium {
 
     /// The medium after entering a glass.
     pub fn entered(mut self, glass: Inside) -> Self {
-        if usize::from(self.count) == self.inside.len() {
+        if self.count as usize == self.inside.len() {
             if glass < self.inside[0] {
                 return self;
             }
@@ -46,9 +47,9 @@ impl Medium {
             self.count -= 1;
         }
         let place = self.known().partition_point(|own| *own <= glass);
-        self.inside[usize::from(self.count)] = glass;
+        self.inside[self.count as usize] = glass;
         self.count += 1;
-        self.inside[place..usize::from(self.count)].rotate_right(1);
+        self.inside[place..self.count as usize].rotate_right(1);
         self
     }
 
@@ -61,9 +62,9 @@ impl Medium {
     }
 
     fn without(mut self, place: usize) -> Self {
-        self.inside[place..usize::from(self.count)].rotate_left(1);
+        self.inside[place..self.count as usize].rotate_left(1);
         self.count -= 1;
-        self.inside[usize::from(self.count)] = Inside::default();
+        self.inside[self.count as usize] = Inside::default();
         self
     }
 
