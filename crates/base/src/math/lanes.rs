@@ -46,6 +46,10 @@ pub trait Folds: Copy {
     /// One bit for each lane in which the condition holds.
     fn bits(self, holds: &Truths) -> u32;
 
+    /// `a · b + c`, rounded once where the processor has an instruction for it, and else twice: for bounds and guesses, whose last
+    /// bits decide nothing.
+    fn about(self, a: f32, b: f32, c: f32) -> f32;
+
     /// Does work by the same instructions in a function of its own, which all callers share: for work of which a call costs little
     /// and each copy much of the program's size.
     fn call<L: Loops>(self, work: L) -> L::Done;
@@ -74,6 +78,11 @@ impl Folds for PlainFolds {
             row[i] |= row[i + 2];
         }
         row[0] | row[1]
+    }
+
+    #[inline(always)]
+    fn about(self, a: f32, b: f32, c: f32) -> f32 {
+        a * b + c
     }
 
     #[inline(never)]

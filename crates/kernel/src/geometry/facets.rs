@@ -53,20 +53,23 @@ struct Facet {
     normal: Vec3,
     /// Product of the normal and a point of the plane.
     offset: f32,
-    /// Vectors whose products with a point, plus `start`, are its coordinates: 0 at the first corner of the first triangle, and 1
-    /// at one of the others.
+    /// Vectors whose products with a point, plus `start`, are its coordinates: 0 in the middle between the least and the greatest.
+    /// Along the edges at the first corner of the first triangle, they grow by 1.
     across: [Vec3; 2],
     start: [f32; 2],
-    /// Least and greatest coordinates, and the greatest sum of both.
-    low: [f32; 2],
-    high: [f32; 2],
-    most: f32,
+    /// Greatest coordinates.
+    half: [f32; 2],
+    /// Sum of the coordinates on the edge across from the first corner, and the most by which it may be exceeded.
+    diagonal: f32,
+    beyond: f32,
+    /// Distance of the sum from `diagonal`, in margins, beyond which it is certain which triangle it is; below 0 if there is one.
+    split: f32,
     /// Number of the triangle where the sum of the coordinates is below 1, and of that beyond; the same if there is one.
     numbers: [u32; 2],
-    /// D/(2A), and that times D.
-    slender: [f32; 2],
-    /// Length of the longer vector of `across`.
-    steep: f32,
+    /// D/(2A), which is not less than the length of either vector of `across`.
+    slender: f32,
+    /// [`ALONG`] times D/(2A), and times D.
+    along: [f32; 2],
 }
 
 /// Triangles of a small scene.
@@ -95,9 +98,9 @@ struct Candidates {
 struct Errors {
     /// [`PLANE`], for each ray.
     plane: Row,
-    /// [`ALONG`], for each ray, but for the factors of the facet.
-    along: [Row; 2],
-    /// [`ACROSS`], for each ray with its length, but for D/(2A).
+    /// R.
+    far: Row,
+    /// [`PLANE`] and [`ACROSS`], for each ray, but for its length and D/(2A).
     across: Row,
     /// Bound on the length of the direction.
     length: Row,
@@ -152,7 +155,7 @@ impl Facets {
         found: &mut HitRows,
         folds: impl Folds,
     ) -> u32 {
-        let candidates = self.candidates(rays, ends, &[NONE; PACKET]);
+        let candidates = self.candidates(rays, ends, &[NONE; PACKET], folds);
         let Tested { hit, undecided, hits } = self.test(rays, &candidates, (met, ends), folds);
         take(&hit, &hits.t, &mut found.t);
         take(&hit, &hits.u, &mut found.u);
@@ -171,7 +174,7 @@ impl Facets {
         except: &[u32; PACKET],
         folds: impl Folds,
     ) -> [u32; 2] {
-        let candidates = self.candidates(rays, ends, except);
+        let candidates = self.candidates(rays, ends, except, folds);
         let mut is_met = candidates.doubtful;
         for i in 0..PACKET {
             is_met[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
@@ -185,8 +188,14 @@ impl Facets {
 
     /// The nearest candidates; never the triangle on which a ray starts, nor that of `except`.
     #[inline(always)]
-    fn candidates(&self, rays: &RayRows, ends: &Ends, except: &[u32; PACKET]) -> Candidates {
-        let Errors { plane, along, across, length, end } = self.errors(rays);
+    fn candidates(
+        &self,
+        rays: &RayRows,
+        ends: &Ends,
+        except: &[u32; PACKET],
+        folds: impl Folds,
+    ) -> Candidates {
+        let Errors { plane, far, across, length, end } = self.errors(rays);
         let mut found = Candidates {
             near: [f32::INFINITY; PACKET],
             number: [0; PACKET],
@@ -196,49 +205,51 @@ impl Facets {
         let [ox, oy, oz] = &rays.origin;
         let [dx, dy, dz] = &rays.direction;
         for facet in &self.facets {
-            let Facet { normal, offset, across: [first, second], start, low, high, most, .. } = *facet;
-            let (steep, [slender, wide]) = (facet.steep, facet.slender);
+            let Facet { normal, offset, across: [first, second], start, half, diagonal, beyond, .. } = *facet;
+            let (slender, along, split) = (facet.slender, facet.along, facet.split);
             // By bits, as compilers would choose between two places in memory, one lane after the other.
             let [one, other] = facet.numbers;
-            let (between, is_single) = (one ^ other, one == other);
+            let between = one ^ other;
             for i in 0..PACKET {
                 // Cut the plane.
-                let above = offset - (normal.x * ox[i] + normal.y * oy[i] + normal.z * oz[i]);
-                let falls = normal.x * dx[i] + normal.y * dy[i] + normal.z * dz[i];
+                let above = folds.about(-normal.x, ox[i], offset);
+                let above = folds.about(-normal.y, oy[i], above);
+                let above = folds.about(-normal.z, oz[i], above);
+                let falls = folds.about(normal.x, dx[i], folds.about(normal.y, dy[i], normal.z * dz[i]));
                 let inverse = 1.0 / falls;
                 let t = above * inverse;
-                let (x, y, z) = (ox[i] + dx[i] * t, oy[i] + dy[i] * t, oz[i] + dz[i] * t);
-                let u = first.x * x + first.y * y + first.z * z + start[0];
-                let v = second.x * x + second.y * y + second.z * z + start[1];
+                let x = folds.about(dx[i], t, ox[i]);
+                let y = folds.about(dy[i], t, oy[i]);
+                let z = folds.about(dz[i], t, oz[i]);
+                let u = folds.about(first.x, x, folds.about(first.y, y, folds.about(first.z, z, start[0])));
+                let v =
+                    folds.about(second.x, x, folds.about(second.y, y, folds.about(second.z, z, start[1])));
                 // Bound the errors.
-                let size = if inverse < 0.0 { -inverse } else { inverse };
-                let distance = plane[i] + (along[0][i] * slender + along[1][i] * wide);
+                let size = inverse.abs();
+                let distance = folds.about(far[i], folds.about(far[i], along[0], along[1]), plane[i]);
                 let error = distance * size;
-                let margin = steep * (plane[i] * (size * length[i] + 1.0)) + across[i] * slender * size;
+                let margin = slender * folds.about(size * length[i], across[i], plane[i]);
                 // A facet that the ray may hit is a candidate, also if a bound is NaN.
                 let least = t - error;
-                let is_outside = (u < low[0] - margin)
-                    | (u > high[0] + margin)
-                    | (v < low[1] - margin)
-                    | (v > high[1] + margin)
-                    | (u + v > most + 2.0 * margin)
+                let over = u + v - diagonal;
+                let is_outside = (u.abs() > half[0] + margin)
+                    | (v.abs() > half[1] + margin)
+                    | (over > folds.about(2.0, margin, beyond))
                     | (t + error < 0.0)
                     | (least > ends[i]);
-                let is_far = above.abs() > distance + falls.abs() * end[i];
-                let is_sharp = (margin < BLUNT) & (least > f32::MIN) & (least < f32::MAX);
+                let is_far = above.abs() > folds.about(falls.abs(), end[i], distance);
+                let is_sharp = margin < BLUNT;
                 // Decide which of the two triangles it is.
-                let over = u + v - 1.0;
                 let number = other ^ (between & if over < 0.0 { TRUE } else { 0 });
-                let is_apart = (over > 2.0 * margin) | (over < -2.0 * margin);
-                let is_sure = is_sharp & (is_apart | is_single);
+                let is_sure = is_sharp & (over.abs() > split * margin);
                 let is_left_out = is_sure & ((rays.start[i] == number) | (except[i] == number));
                 let is_candidate = !(is_far | is_outside & is_sharp | is_left_out);
                 // Keep the nearest.
                 let (near, next, nearest) = (found.near[i], found.next[i], found.number[i]);
-                let is_nearer = is_candidate & (least < near);
+                let least = if is_candidate { least } else { f32::INFINITY };
+                let is_nearer = least < near;
                 let farther = if is_nearer { near } else { least };
-                let is_next = is_candidate & (farther < next);
-                found.next[i] = if is_next { farther } else { next };
+                found.next[i] = if farther < next { farther } else { next };
                 found.near[i] = if is_nearer { least } else { near };
                 found.number[i] = if is_nearer { number } else { nearest };
                 found.doubtful[i] |= if is_candidate & !is_sure { TRUE } else { 0 };
@@ -283,7 +294,7 @@ impl Facets {
     #[inline(always)]
     fn errors(&self, rays: &RayRows) -> Errors {
         let none = [0.0; PACKET];
-        let mut errors = Errors { plane: none, along: [none; 2], across: none, length: none, end: none };
+        let mut errors = Errors { plane: none, far: none, across: none, length: none, end: none };
         for i in 0..PACKET {
             let (mut most, mut far, mut length) = (0.0, 0.0, 0.0);
             for axis in 0..3 {
@@ -292,10 +303,12 @@ impl Facets {
                 far = greater(far, greater((high - at).abs(), (at - low).abs()));
                 length += rays.direction[axis][i].abs();
             }
+            // An origin that is no number has no bound, which `most` would hide.
+            let sum = rays.origin[0][i] + rays.origin[1][i] + rays.origin[2][i];
+            let most = if sum.is_nan() { f32::NAN } else { most };
             errors.plane[i] = PLANE * most;
-            errors.along[0][i] = ALONG[0] * far * far;
-            errors.along[1][i] = ALONG[1] * far;
-            errors.across[i] = ACROSS * far * length;
+            errors.far[i] = far;
+            errors.across[i] = PLANE * most + ACROSS * far;
             errors.length[i] = length;
             // The way is 2√3 R, and `length` at most √3 times that of the direction.
             errors.end[i] = 6.0 * far / length;
@@ -319,33 +332,36 @@ struct Tested {
 }
 
 impl Facet {
-    fn new([a, b, c]: &[Vec3; 3], apex: Option<Vec3>, numbers: [u32; 2], slender: [f64; 2]) -> Self {
+    fn new([a, b, c]: &[Vec3; 3], apex: Option<Vec3>, numbers: [u32; 2], [slender, wide]: [f64; 2]) -> Self {
         let [a, b, c] = [a, b, c].map(|corner| corner.as_dvec3());
         let (u, v) = (b - a, c - a);
         let normal = u.cross(v);
         let squared = normal.length_squared();
         let across = [v.cross(normal) / squared, normal.cross(u) / squared];
-        let (mut low, mut high, mut most) = ([0.0; 2], [1.0_f64; 2], 1.0_f64);
+        // Take the middle of the coordinates as their 0.
+        let (mut low, mut high, mut beyond) = ([0.0; 2], [1.0_f64; 2], 0.0);
         if let Some(apex) = apex {
-            let beyond = across.map(|across| across.dot(apex.as_dvec3() - a));
+            let along = across.map(|across| across.dot(apex.as_dvec3() - a));
             for axis in 0..2 {
-                low[axis] = beyond[axis].min(0.0);
-                high[axis] = beyond[axis].max(1.0);
+                low[axis] = along[axis].min(0.0);
+                high[axis] = along[axis].max(1.0);
             }
-            most = beyond[0] + beyond[1];
+            beyond = along[0] + along[1] - 1.0;
         }
+        let middle = [0, 1].map(|axis| (low[axis] + high[axis]) / 2.0);
         let unit = normal.normalize();
         Self {
             normal: unit.as_vec3(),
             offset: unit.dot(a) as f32,
             across: across.map(|across| across.as_vec3()),
-            start: across.map(|across| -across.dot(a) as f32),
-            low: low.map(|low| low as f32),
-            high: high.map(|high| high as f32),
-            most: most as f32,
+            start: [0, 1].map(|axis| (-across[axis].dot(a) - middle[axis]) as f32),
+            half: [0, 1].map(|axis| ((high[axis] - low[axis]) / 2.0) as f32),
+            diagonal: (1.0 - middle[0] - middle[1]) as f32,
+            beyond: beyond as f32,
+            split: if apex.is_some() { 2.0 } else { -1.0 },
             numbers,
-            slender: slender.map(|slender| slender as f32),
-            steep: across[0].length().max(across[1].length()) as f32,
+            slender: slender as f32,
+            along: [ALONG[0] * slender as f32, ALONG[1] * wide as f32],
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Plain loops, compiled once more for the vector instructions that the processor has. Nothing is fused or reordered: the bits
-//! are the same.
+//! Plain loops, compiled once more for the vector instructions that the processor has. Nothing is reordered, and
+//! fused only where the last bits decide nothing: the results have the same bits.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
@@ -30,7 +30,7 @@ impl Instructions {
 
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 fn avx2<L: Loops>(work: L) -> L::Done {
     work.run(Avx2Folds(()))
 }
@@ -42,7 +42,7 @@ fn avx512<L: Loops>(work: L) -> L::Done {
     work.run(Avx512Folds(()))
 }
 
-/// Proof that the processor has AVX2.
+/// Proof that the processor has AVX2 and FMA.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 struct Avx2Folds(());
@@ -51,8 +51,13 @@ struct Avx2Folds(());
 impl Folds for Avx2Folds {
     #[inline(always)]
     fn bits(self, holds: &Truths) -> u32 {
-        // SAFETY: a value is made where the processor has AVX2 alone.
+        // SAFETY: a value is made where the processor has AVX2 and FMA alone.
         unsafe { avx2_bits(holds) }
+    }
+
+    #[inline(always)]
+    fn about(self, a: f32, b: f32, c: f32) -> f32 {
+        a.mul_add(b, c)
     }
 
     #[inline(always)]
@@ -73,6 +78,11 @@ impl Folds for Avx512Folds {
     fn bits(self, holds: &Truths) -> u32 {
         // SAFETY: a value is made where the processor has AVX-512F, VL, DQ and BW alone.
         unsafe { avx512_bits(holds) }
+    }
+
+    #[inline(always)]
+    fn about(self, a: f32, b: f32, c: f32) -> f32 {
+        a.mul_add(b, c)
     }
 
     #[inline(always)]
