@@ -36,7 +36,26 @@ impl ShapeEmitter for QuadEmitter {
     /// Samples a rectangle by solid angle, another parallelogram by area.
     #[inline(always)]
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
-        let to_corner = self.corner_from(point);
+        self.sample_from(point, self.corner_from(point), u)
+    }
+
+    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
+        let to_corner = self.corner_from(from);
+        if !(to_corner.dot(self.normal) < 0.0) {
+            return 0.0;
+        }
+        self.density(to_corner).unwrap_or_else(|| met.pdf_by_area(f64::from(self.area)))
+    }
+
+    fn middle(&self) -> DVec3 {
+        self.corner + ((self.u + self.v) * 0.5).as_dvec3()
+    }
+}
+
+impl QuadEmitter {
+    /// [`ShapeEmitter::sample`] from a point with this offset to the corner.
+    #[inline(always)]
+    pub(super) fn sample_from(&self, point: Vec3, to_corner: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let by_area = self.by_area(to_corner, u);
         let (offset, factor) = match &self.rectangle {
             Some(rectangle) => {
@@ -56,20 +75,6 @@ impl ShapeEmitter for QuadEmitter {
         LightSamplePoint { direction, target: point + offset, factor: if is_front { factor } else { 0.0 } }
     }
 
-    fn pdf(&self, from: Vec3, met: &LightHit) -> f32 {
-        let to_corner = self.corner_from(from);
-        if !(to_corner.dot(self.normal) < 0.0) {
-            return 0.0;
-        }
-        self.density(to_corner).unwrap_or_else(|| met.pdf_by_area(f64::from(self.area)))
-    }
-
-    fn middle(&self) -> DVec3 {
-        self.corner + ((self.u + self.v) * 0.5).as_dvec3()
-    }
-}
-
-impl QuadEmitter {
     /// A quad from a corner and two edges that are not parallel.
     pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
         let normal = u.cross(v);

@@ -4,7 +4,7 @@ use super::sample_point::LightSamplePoint;
 use super::{AreaLight, Emitter, MeshEmitter, ShapeEmitter};
 use crate::lights::row::{LightRow, row_of};
 use crate::lights::sample::Source;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
+use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 
 /// Makes the row of samples of facets, with a light for each lane.
 macro_rules! row_of_facets {
@@ -38,7 +38,15 @@ impl AreaLight {
         }
         // One loop serves all quads: compilers make no vector instructions of a second one.
         if let Some((quad, of_two)) = self.shape.as_quad() {
-            let mut row = row_by!(quad);
+            // The differences are of double precision: among them, the other operations would come eight at a time.
+            let mut offsets = [[0.0; LANES]; 3];
+            for i in 0..LANES {
+                set_lane(&mut offsets, i, quad.corner_from(lane(points, i)));
+            }
+            let mut row = row_of!(source, i => {
+                let sample = quad.sample_from(lane(points, i), lane(&offsets, i), [u[0][i], u[1][i]]);
+                (sample.direction, sample.target, self.radiance * sample.factor)
+            });
             if let Some(two) = of_two {
                 for i in 0..LANES {
                     row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));

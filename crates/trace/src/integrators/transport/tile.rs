@@ -95,14 +95,22 @@ impl SampleBlock {
         let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
         let Pixels { rect, part } = self.pixels;
         let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(rect.width));
+        // Number the pixels of the part.
+        let mut index = [0; PACKET];
         for lane in 0..PACKET {
             let pixel = by_samples.quotient(slots[lane]);
-            let index = part.index(pixel, rect);
-            let y = by_width.quotient(index);
-            xs[lane] = rect.x.wrapping_add(index.wrapping_sub(y.wrapping_mul(rect.width)));
-            ys[lane] = rect.y.wrapping_add(y);
+            index[lane] = pixel;
             let first = pixel.wrapping_mul(self.samples.len() as u32);
             samples[lane] = self.samples.start.wrapping_add(slots[lane].wrapping_sub(first));
+        }
+        // Number them in the rectangle, apart from the other loops, which then have no branch.
+        if part != Part::All {
+            index = index.map(|pixel| part.index(pixel, rect));
+        }
+        for lane in 0..PACKET {
+            let y = by_width.quotient(index[lane]);
+            xs[lane] = rect.x.wrapping_add(index[lane].wrapping_sub(y.wrapping_mul(rect.width)));
+            ys[lane] = rect.y.wrapping_add(y);
         }
         (xs, ys, samples)
     }
