@@ -46,6 +46,13 @@ pub trait Folds: Copy {
     /// One bit for each lane in which the condition holds.
     fn bits(self, holds: &Truths) -> u32;
 
+    /// Least and greatest number among the lanes whose bits are set, of which there is at least one; of a number that is none, the
+    /// order decides, which is the same for all instructions.
+    fn span(self, row: &Lanes, of: u32) -> [f32; 2];
+
+    /// Reciprocals. Compilers may take a loop of them apart into pairs.
+    fn reciprocals(self, row: &Lanes) -> Lanes;
+
     /// `a · b + c`, rounded once where the processor has an instruction for it, and else twice: for bounds and guesses, whose last
     /// bits decide nothing.
     fn about(self, a: f32, b: f32, c: f32) -> f32;
@@ -53,6 +60,24 @@ pub trait Folds: Copy {
     /// Does work by the same instructions in a function of its own, which all callers share: for work of which a call costs little
     /// and each copy much of the program's size.
     fn call<L: Loops>(self, work: L) -> L::Done;
+}
+
+/// Folds sixteen numbers by halves, which become vector instructions.
+#[macro_export]
+macro_rules! folded {
+    ($row:expr, $better:tt) => {{
+        let mut row = $row;
+        for i in 0..8 {
+            row[i] = if row[i + 8] $better row[i] { row[i + 8] } else { row[i] };
+        }
+        for i in 0..4 {
+            row[i] = if row[i + 4] $better row[i] { row[i + 4] } else { row[i] };
+        }
+        for i in 0..2 {
+            row[i] = if row[i + 2] $better row[i] { row[i + 2] } else { row[i] };
+        }
+        if row[1] $better row[0] { row[1] } else { row[0] }
+    }};
 }
 
 /// Folds by instructions that every processor has.
@@ -78,6 +103,23 @@ impl Folds for PlainFolds {
             row[i] |= row[i + 2];
         }
         row[0] | row[1]
+    }
+
+    #[inline(always)]
+    fn span(self, row: &Lanes, of: u32) -> [f32; 2] {
+        let (holds, other) = (truths(of), row[of.trailing_zeros() as usize % LANES]);
+        let mut all = [other; LANES];
+        take(&holds, row, &mut all);
+        [folded!(all, <), folded!(all, >)]
+    }
+
+    #[inline(always)]
+    fn reciprocals(self, row: &Lanes) -> Lanes {
+        let mut inverse = [0.0; LANES];
+        for i in 0..LANES {
+            inverse[i] = 1.0 / row[i];
+        }
+        inverse
     }
 
     #[inline(always)]

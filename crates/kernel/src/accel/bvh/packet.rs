@@ -5,8 +5,9 @@
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
 use arrayvec::ArrayVec;
+use glimt_base::folded;
 
-use super::top_node::{Beam, folded};
+use super::top_node::Beam;
 use super::{Bvh, Child, DEEP_STACK};
 use crate::accel::{Ends, PACKET};
 use crate::geometry::Aabb;
@@ -41,13 +42,9 @@ struct Stretches {
 
 impl<'a> SlabPacket<'a> {
     #[inline(always)]
-    fn new(rays: &'a RayRows) -> Self {
-        let mut inverse = rays.direction;
-        for row in &mut inverse {
-            for lane in 0..PACKET {
-                row[lane] = 1.0 / row[lane];
-            }
-        }
+    fn new(rays: &'a RayRows, folds: impl Folds) -> Self {
+        let [x, y, z] = &rays.direction;
+        let inverse = [folds.reciprocals(x), folds.reciprocals(y), folds.reciprocals(z)];
         Self { origin: &rays.origin, inverse }
     }
 
@@ -148,8 +145,7 @@ impl Bvh {
         if traced == 0 {
             return (0, [0.0; PACKET]);
         }
-        let one = traced.trailing_zeros() as usize;
-        self.top.met(&Beam::around(slabs.origin, &slabs.inverse, ends, one), folds)
+        self.top.met(&Beam::around(slabs.origin, &slabs.inverse, (ends, traced), folds), folds)
     }
 
     /// Visits the leaves that any of at most [`PACKET`] rays may meet, near ones first. Primitives outside of the tree come
@@ -164,7 +160,7 @@ impl Bvh {
         closest: &mut impl ClosestTest,
         folds: impl Folds,
     ) {
-        let slabs = SlabPacket::new(rays);
+        let slabs = SlabPacket::new(rays, folds);
         let (mut leaf, mut in_leaf) = (outside, traced);
         let mut near = Near::sorted(self.top_met(&slabs, ends, traced, folds));
         let mut stack = Waiting::new();
@@ -226,7 +222,7 @@ impl Bvh {
         any: &mut impl AnyTest,
         folds: impl Folds,
     ) -> u32 {
-        let slabs = SlabPacket::new(rays);
+        let slabs = SlabPacket::new(rays, folds);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
         let (mut subtrees, _) = self.top_met(&slabs, ends, traced, folds);

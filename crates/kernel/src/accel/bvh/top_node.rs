@@ -132,53 +132,20 @@ pub(super) struct Beam {
 }
 
 impl Beam {
-    /// The beam around the rays of a packet that have an end, one of which is number `one`.
+    /// The beam around the rays of a packet that have an end: there is one at least, and their bits are those of `traced`.
     #[inline(always)]
-    pub(super) fn around(origin: &[Row; 3], inverse: &[Row; 3], ends: &Ends, one: usize) -> Self {
+    pub(super) fn around(
+        origin: &[Row; 3],
+        inverse: &[Row; 3],
+        (ends, traced): (&Ends, u32),
+        folds: impl Folds,
+    ) -> Self {
         let [x, y, z] = origin;
-        let origin = [around(x, ends, one), around(y, ends, one), around(z, ends, one)];
+        let origin = [folds.span(x, traced), folds.span(y, traced), folds.span(z, traced)];
         let [x, y, z] = inverse;
-        let inverse = [around(x, ends, one), around(y, ends, one), around(z, ends, one)];
-        Self { origin, inverse, end: greatest(ends) }
+        let inverse = [folds.span(x, traced), folds.span(y, traced), folds.span(z, traced)];
+        Self { origin, inverse, end: folds.span(ends, traced)[1] }
     }
-}
-
-/// Least and greatest number of a row, over the rays that have an end.
-#[inline(always)]
-fn around(row: &Row, ends: &Ends, one: usize) -> [f32; 2] {
-    let (mut traced, other) = (*row, row[one % PACKET]);
-    for i in 0..PACKET {
-        traced[i] = if ends[i] >= 0.0 { traced[i] } else { other };
-    }
-    [least(&traced), greatest(&traced)]
-}
-
-/// Folds sixteen numbers by halves, which become vector instructions.
-macro_rules! folded {
-    ($row:expr, $better:tt) => {{
-        let mut row = $row;
-        for i in 0..8 {
-            row[i] = if row[i + 8] $better row[i] { row[i + 8] } else { row[i] };
-        }
-        for i in 0..4 {
-            row[i] = if row[i + 4] $better row[i] { row[i + 4] } else { row[i] };
-        }
-        for i in 0..2 {
-            row[i] = if row[i + 2] $better row[i] { row[i + 2] } else { row[i] };
-        }
-        if row[1] $better row[0] { row[1] } else { row[0] }
-    }};
-}
-pub(super) use folded;
-
-#[inline(always)]
-fn least(row: &Row) -> f32 {
-    folded!(*row, <)
-}
-
-#[inline(always)]
-fn greatest(row: &Row) -> f32 {
-    folded!(*row, >)
 }
 
 impl Bvh {

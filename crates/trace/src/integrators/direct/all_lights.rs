@@ -11,7 +11,7 @@ use crate::lights::{EmissionTexture, Light, LightRow, Middle, Source, SourceRow}
 use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
 use crate::math::color::luminance;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
+use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane, truths};
 use crate::sampling::Decision;
 use crate::scene::description::Shadows;
 use crate::world::Loops;
@@ -366,13 +366,13 @@ pub fn add_work(tile: &TileContext<'_>, rays: &RayRows, ends: &Ends, traced: u32
     }
 }
 
-/// Adds the values of the lanes whose bits are set.
+/// Adds the values of the lanes whose bits are set, which are chosen by bits as in [`take`](crate::math::lanes::take).
 #[inline(always)]
 pub fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
+    let of = truths(bits);
     for axis in 0..3 {
         for i in 0..LANES {
-            let is_added = bits & 1 << i != 0;
-            sums[axis][i] += if is_added { values[axis][i] } else { 0.0 };
+            sums[axis][i] += f32::from_bits(values[axis][i].to_bits() & of[i]);
         }
     }
 }

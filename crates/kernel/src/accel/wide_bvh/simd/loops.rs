@@ -8,7 +8,7 @@ use super::Instructions;
 pub use crate::math::lanes::Loops;
 use crate::math::lanes::PlainFolds;
 #[cfg(target_arch = "x86_64")]
-use crate::math::lanes::{Folds, LANES, Truths};
+use crate::math::lanes::{Folds, LANES, Lanes, Truths};
 
 impl Instructions {
     /// Does the work by these instructions, or by the best that the processor has.
@@ -56,6 +56,18 @@ impl Folds for Avx2Folds {
     }
 
     #[inline(always)]
+    fn span(self, row: &Lanes, of: u32) -> [f32; 2] {
+        // SAFETY: as above.
+        unsafe { avx2_span(row, of) }
+    }
+
+    #[inline(always)]
+    fn reciprocals(self, row: &Lanes) -> Lanes {
+        // SAFETY: as above.
+        unsafe { avx2_reciprocals(row) }
+    }
+
+    #[inline(always)]
     fn about(self, a: f32, b: f32, c: f32) -> f32 {
         a.mul_add(b, c)
     }
@@ -78,6 +90,18 @@ impl Folds for Avx512Folds {
     fn bits(self, holds: &Truths) -> u32 {
         // SAFETY: a value is made where the processor has AVX-512F, VL, DQ and BW alone.
         unsafe { avx512_bits(holds) }
+    }
+
+    #[inline(always)]
+    fn span(self, row: &Lanes, of: u32) -> [f32; 2] {
+        // SAFETY: as above.
+        unsafe { avx512_span(row, of) }
+    }
+
+    #[inline(always)]
+    fn reciprocals(self, row: &Lanes) -> Lanes {
+        // SAFETY: as above.
+        unsafe { avx512_reciprocals(row) }
     }
 
     #[inline(always)]
@@ -111,10 +135,81 @@ fn avx512_bits(holds: &Truths) -> u32 {
     u32::from(_mm512_movepi32_mask(row))
 }
 
+/// [`Folds::span`] of two halves, in the order of the plain folds.
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx2")]
+fn span_of_halves(low: __m256, high: __m256) -> [f32; 2] {
+    let (least, greatest) = (_mm256_min_ps(high, low), _mm256_max_ps(high, low));
+    let halves = |row: __m256| (_mm256_castps256_ps128(row), _mm256_extractf128_ps::<1>(row));
+    let ((low, high), (below, above)) = (halves(least), halves(greatest));
+    let (least, greatest) = (_mm_min_ps(high, low), _mm_max_ps(above, below));
+    let least = _mm_min_ps(_mm_movehl_ps(least, least), least);
+    let greatest = _mm_max_ps(_mm_movehl_ps(greatest, greatest), greatest);
+    let least = _mm_min_ss(_mm_movehdup_ps(least), least);
+    let greatest = _mm_max_ss(_mm_movehdup_ps(greatest), greatest);
+    [_mm_cvtss_f32(least), _mm_cvtss_f32(greatest)]
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx2")]
+fn avx2_span(row: &Lanes, of: u32) -> [f32; 2] {
+    let other = _mm256_set1_ps(row[of.trailing_zeros() as usize % LANES]);
+    let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    let (low, high) = row.split_at(LANES / 2);
+    let [low, high] = [(low, of), (high, of >> (LANES / 2))].map(|(half, of)| {
+        let own = _mm256_and_si256(_mm256_set1_epi32(of as i32), lanes);
+        let holds = _mm256_castsi256_ps(_mm256_cmpeq_epi32(own, lanes));
+        // SAFETY: eight numbers may be read, at any address.
+        _mm256_blendv_ps(other, unsafe { _mm256_loadu_ps(half.as_ptr()) }, holds)
+    });
+    span_of_halves(low, high)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+fn avx512_span(row: &Lanes, of: u32) -> [f32; 2] {
+    let other = _mm512_set1_ps(row[of.trailing_zeros() as usize % LANES]);
+    // SAFETY: sixteen numbers may be read, at any address.
+    let row = unsafe { _mm512_mask_loadu_ps(other, of as u16, row.as_ptr()) };
+    span_of_halves(_mm512_castps512_ps256(row), _mm512_extractf32x8_ps::<1>(row))
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx2")]
+fn avx2_reciprocals(row: &Lanes) -> Lanes {
+    let mut inverse = [0.0; LANES];
+    for (own, row) in inverse.chunks_exact_mut(8).zip(row.chunks_exact(8)) {
+        // SAFETY: eight numbers may be read and written, at any address.
+        unsafe {
+            let row = _mm256_loadu_ps(row.as_ptr());
+            _mm256_storeu_ps(own.as_mut_ptr(), _mm256_div_ps(_mm256_set1_ps(1.0), row));
+        }
+    }
+    inverse
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
+fn avx512_reciprocals(row: &Lanes) -> Lanes {
+    let mut inverse = [0.0; LANES];
+    // SAFETY: sixteen numbers may be read and written, at any address.
+    unsafe {
+        let row = _mm512_loadu_ps(row.as_ptr());
+        _mm512_storeu_ps(inverse.as_mut_ptr(), _mm512_div_ps(_mm512_set1_ps(1.0), row));
+    }
+    inverse
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::lanes::{Folds, truths};
+    use crate::math::random::signed;
 
     struct Folding(u32);
 
@@ -132,6 +227,42 @@ mod tests {
         for instructions in Instructions::ALL {
             for bits in 0..1 << 16 {
                 assert_eq!(instructions.run(Folding(bits)), bits, "{instructions:?}");
+            }
+        }
+    }
+
+    struct Spanning<'a>(&'a Lanes, u32);
+
+    impl Loops for Spanning<'_> {
+        type Done = ([f32; 2], Lanes);
+
+        #[inline(always)]
+        fn run(self, folds: impl Folds) -> Self::Done {
+            (folds.span(self.0, self.1), folds.reciprocals(self.0))
+        }
+    }
+
+    #[test]
+    fn spans_and_reciprocals_have_the_same_bits_by_all_instructions() {
+        let mut next = signed(21);
+        let odd = [0.0, -0.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-45, f32::MAX];
+        for round in 0..20_000_u32 {
+            let mut row: Lanes = std::array::from_fn(|_| next());
+            for i in 0..round as usize % 4 {
+                row[(round as usize * 7 + i * 5) % LANES] = odd[(round as usize / 4 + i) % odd.len()];
+            }
+            let of = (next().to_bits() >> 3 & 0xffff) | 1 << (round % 16);
+            let each = Instructions::ALL.map(|instructions| instructions.run(Spanning(&row, of)));
+            let bits =
+                |(span, inverse): ([f32; 2], Lanes)| (span.map(f32::to_bits), inverse.map(f32::to_bits));
+            assert!(each.iter().all(|one| bits(*one) == bits(each[0])), "{row:?} {of:b} {each:?}");
+            // Without numbers that are none, they are the least and the greatest.
+            let lanes = || (0..LANES).filter(|i| of >> i & 1 == 1).map(|i| row[i]);
+            if !lanes().any(f32::is_nan) {
+                let ([least, greatest], inverse) = each[0];
+                assert_eq!(lanes().fold(f32::INFINITY, f32::min), least, "{row:?} {of:b}");
+                assert_eq!(lanes().fold(f32::NEG_INFINITY, f32::max), greatest, "{row:?} {of:b}");
+                assert_eq!(inverse[3].to_bits(), (1.0 / row[3]).to_bits());
             }
         }
     }
