@@ -236,6 +236,25 @@ impl Wavefront<'_, '_> {
         self.begin_round();
     }
 
+    /// Shades the hit of one ray of a packet. The path is moved here once: it is large.
+    #[inline(never)]
+    fn shade(&mut self, path: PathRay, (packet, lane): (&PacketHits, usize)) {
+        let (tile, bit) = (self.tile, 1 << lane);
+        match packet.hit(lane) {
+            Some(hit) if packet.plain & bit != 0 => {
+                self.add_own_light(&path, &hit, packet.shining & bit != 0);
+            }
+            Some(hit) => {
+                let surface = packet.surface(self.surfaces, lane);
+                walk(self, path, (hit, surface));
+            }
+            None => {
+                let sky = tile.world.lights.environment().map(|_| packet.sky(lane));
+                self.add_beyond(&path, tile.light_beyond_with(sky, &path));
+            }
+        }
+    }
+
     /// Shades the hits of a packet's rays.
     fn shade_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
         let tile = self.tile;
@@ -276,22 +295,8 @@ impl Wavefront<'_, '_> {
         }
         // Go in the order of the paths, as the contributions to a sample are added in that order.
         for lane in lanes(wanted) {
-            let (of_camera, bit) = (rays.camera_path(tile, lane), 1 << lane);
-            let Some(path) = of_camera.as_ref().or_else(|| rays.of_queue(lane)) else { continue };
-            match packet.hit(lane) {
-                Some(hit) if packet.plain & bit != 0 => {
-                    self.add_own_light(path, &hit, packet.shining & bit != 0);
-                }
-                Some(hit) => {
-                    self.place = rays.place(lane);
-                    let surface = packet.surface(self.surfaces, lane);
-                    walk(self, *path, (hit, surface));
-                }
-                None => {
-                    let sky = tile.world.lights.environment().map(|_| packet.sky(lane));
-                    self.add_beyond(path, tile.light_beyond_with(sky, path));
-                }
-            }
+            self.place = rays.place(lane);
+            self.shade(packet.path(tile, &rays, lane), (&packet, lane));
         }
         // Light the queued vertices while their data are in the cache.
         if self.direct.is_full() {

@@ -56,12 +56,21 @@ impl TileContext<'_> {
     }
 
     /// The path of a camera ray.
+    #[inline]
     pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
-        let around = self.world.glass_around(ray.origin).map(|(body, material)| Inside { body, material });
-        let medium = around.fold(Medium::default(), Medium::entered);
+        let medium =
+            if self.world.is_eye_in_air() { Medium::default() } else { self.medium_of_camera(ray.origin) };
         let state = PathState::CAMERA;
         let cone = Cone { width: 0.0, spread: self.pixel_spread };
         PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, medium, state, cone }
+    }
+
+    /// The glass around a point of the lens.
+    #[cold]
+    #[inline(never)]
+    fn medium_of_camera(&self, point: Vec3) -> Medium {
+        let around = self.world.glass_around(point).map(|(body, material)| Inside { body, material });
+        around.fold(Medium::default(), Medium::entered)
     }
 
     /// The rays of the slots from `first` on, also beyond the last. To be called inside of loops for each instruction set.

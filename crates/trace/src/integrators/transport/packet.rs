@@ -51,15 +51,6 @@ impl PacketSource<'_> {
         }
     }
 
-    /// The path of a camera ray in a lane. `None` for other sources.
-    #[inline(always)]
-    pub fn camera_path(&self, tile: &TileContext<'_>, lane: usize) -> Option<PathRay> {
-        match self {
-            Self::Camera(row, first, ..) => Some(tile.camera_path(row.rays.ray(lane), first + lane as u32)),
-            Self::Paths(..) | Self::Traced(..) => None,
-        }
-    }
-
     /// The path of a queue in a lane. `None` for camera rays.
     #[inline(always)]
     pub fn of_queue(&self, lane: usize) -> Option<&PathRay> {
@@ -120,6 +111,7 @@ impl PacketHits {
     }
 
     /// The path of a lane.
+    #[inline]
     pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
             PacketSource::Camera(row, first, ..) => tile.camera_path(row.rays.ray(lane), first + lane as u32),
