@@ -61,6 +61,7 @@ impl RayRows {
     }
 
     /// The ray in a lane, without an end.
+    #[inline(always)]
     pub fn ray(&self, lane: usize) -> Ray {
         let of = |rows: &[Row; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
         Ray::new(of(&self.origin), of(&self.direction)).leaving(self.start[lane])

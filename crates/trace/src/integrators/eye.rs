@@ -238,7 +238,7 @@ impl Wavefront<'_, '_> {
 
     /// Shades the hit of one ray of a packet. The path is moved here once: it is large.
     #[inline(never)]
-    fn shade(&mut self, path: PathRay, (packet, lane): (&PacketHits, usize)) {
+    fn shade(&mut self, mut path: PathRay, (packet, lane): (&PacketHits, usize)) {
         let (tile, bit) = (self.tile, 1 << lane);
         match packet.hit(lane) {
             Some(hit) if packet.plain & bit != 0 => {
@@ -246,7 +246,7 @@ impl Wavefront<'_, '_> {
             }
             Some(hit) => {
                 let surface = packet.surface(self.surfaces, lane);
-                walk(self, path, (hit, surface));
+                walk(self, &mut path, (hit, surface));
             }
             None => {
                 let sky = tile.world.lights.environment().map(|_| packet.sky(lane));

@@ -176,7 +176,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             let way = lane(&samples.targets, i) - lane(&self.row.from, i);
             let is_beyond = samples.beyond & 1 << i != 0;
             let distance = if is_beyond { f32::MAX } else { way.length() };
-            let left = absorption(self.tile.world, media.get(self.row.medium[i]), distance);
+            let left = absorption(self.tile.world, &media.get(self.row.medium[i]), distance);
             let value = lane(&values, i) * left;
             set_lane(&mut values, i, value);
         }

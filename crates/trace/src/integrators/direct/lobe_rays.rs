@@ -36,7 +36,7 @@ impl Loops for LobeRays<'_> {
         let count = tile.settings.render.shadow_samples;
         let sampler = row.sampler(tile);
         let transmittance = |i: usize, distance: f32| {
-            media.map_or(Vec3::ONE, |media| absorption(tile.world, media.get(row.medium[i]), distance))
+            media.map_or(Vec3::ONE, |media| absorption(tile.world, &media.get(row.medium[i]), distance))
         };
         for repetition in 0..count {
             // Sample a direction in each lobe.

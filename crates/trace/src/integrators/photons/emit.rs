@@ -261,7 +261,7 @@ impl PhotonWavefront<'_> {
         // Shade other surfaces one by one.
         for i in lanes(packet.any & !packet.plain) {
             if let Some(hit) = packet.hit(i) {
-                walk(self, rays[i], (hit, packet.surface(surfaces, i)));
+                walk(self, &mut { rays[i] }, (hit, packet.surface(surfaces, i)));
             }
         }
     }

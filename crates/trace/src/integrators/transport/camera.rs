@@ -56,7 +56,7 @@ impl TileContext<'_> {
     }
 
     /// The path of a camera ray.
-    #[inline]
+    #[inline(always)]
     pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
         let medium =
             if self.world.is_eye_in_air() { Medium::default() } else { self.medium_of_camera(ray.origin) };

@@ -109,7 +109,8 @@ impl Media {
 }
 
 /// Transmittance of glass along a ray to its hit at `distance`.
-pub fn absorption(world: &World, medium: Medium, distance: f32) -> Vec3 {
+#[inline]
+pub fn absorption(world: &World, medium: &Medium, distance: f32) -> Vec3 {
     let glass = medium.glass().and_then(|inside| glass_of(world, inside));
     glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
 }

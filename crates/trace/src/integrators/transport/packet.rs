@@ -111,7 +111,7 @@ impl PacketHits {
     }
 
     /// The path of a lane.
-    #[inline]
+    #[inline(always)]
     pub fn path(&self, tile: &TileContext<'_>, rays: &PacketSource<'_>, lane: usize) -> PathRay {
         match rays {
             PacketSource::Camera(row, first, ..) => tile.camera_path(row.rays.ray(lane), first + lane as u32),

@@ -110,40 +110,41 @@ pub enum OpaqueHit {
     Touching(Hit),
 }
 
-/// Walks from the hit of a path's ray; `surface` is that of the hit, if it is known. No vertex is moved, as vertices are large.
+/// Walks from the hit of a path's ray, which takes the path along; `surface` is that of the hit, if it is known. No path and no
+/// vertex is moved, as they are large.
 #[inline(always)]
 pub fn walk<'a, W: Walker<'a>>(
     walker: &mut W,
-    mut path: PathRay,
+    path: &mut PathRay,
     (mut hit, mut surface): (Hit, Option<SurfacePoint>),
 ) {
     let tile = walker.tile();
-    let (mut way, mut hidden) = (Way::from(&path), 0);
+    let (mut way, mut hidden) = (Way::from(path), 0);
     while hidden < MOST_HIDDEN {
         let has_passed = hidden > 0;
         let mut vertex = match surface.take() {
-            Some(surface) => Vertex::on(tile, &path, &hit, surface),
-            None => Vertex::to_shade(tile, &path, &hit),
+            Some(surface) => Vertex::on(tile, path, &hit, surface),
+            None => Vertex::to_shade(tile, path, &hit),
         };
         // Stop at an opaque surface, or pass it straight on.
         if vertex.material.bsdf.glass().is_none() {
-            path.throughput *= absorption(tile.world, path.medium, hit.shape.t);
+            path.throughput *= absorption(tile.world, &path.medium, hit.shape.t);
             if vertex.material.lets_pass() {
-                match straight(walker, &path, &vertex, (way, hit)) {
+                match straight(walker, path, &vertex, (way, hit)) {
                     Straight::Passes(_) if way.count == MOST_STRAIGHT => return,
                     Straight::Passes(part) => {
                         way = Way { distance: way.distance + hit.shape.t, count: way.count + 1, ..way };
-                        path = passed(path, &vertex, part);
+                        *path = passed(*path, &vertex, part);
                         match tile.world.geometry.closest(&path.ray) {
                             Some(next) => {
-                                walker.pass(&path, Some(next));
+                                walker.pass(path, Some(next));
                                 hit = next;
                                 continue;
                             }
                             None => {
-                                walker.pass(&path, None);
+                                walker.pass(path, None);
                                 path.ray.origin = way.origin;
-                                return walker.reach(&path, Reached::Nothing, has_passed);
+                                return walker.reach(path, Reached::Nothing, has_passed);
                             }
                         }
                     }
@@ -151,30 +152,32 @@ pub fn walk<'a, W: Walker<'a>>(
                     Straight::Stays => {}
                 }
             }
-            path.medium = tile.without_open(path.medium);
+            if tile.world.has_open_glass() {
+                path.medium = tile.without_open(path.medium);
+            }
             let mut far = path.medium;
             if vertex.material.bsdf.lets_through() && tile.world.has_glass() {
                 // Light may come out of glass that touches it.
                 let Crossing { sides, near, far: beyond, .. } =
-                    tile.crossing(&path, &vertex, &hit, walker.crossing());
+                    tile.crossing(path, &vertex, &hit, walker.crossing());
                 (path.medium, far) = (near, beyond);
                 vertex.start_between(sides);
             }
-            let hit = way.straighten(&mut path, hit);
-            return walker.reach(&path, Reached::Opaque(&vertex, OpaqueHit::Own(hit), far), has_passed);
+            let hit = way.straighten(path, hit);
+            return walker.reach(path, Reached::Opaque(&vertex, OpaqueHit::Own(hit), far), has_passed);
         }
         // At glass, find all surfaces that touch here.
         let Crossing { sides, arrived, near, far, opaque } =
-            tile.crossing(&path, &vertex, &hit, walker.crossing());
-        path.throughput *= absorption(tile.world, arrived, hit.shape.t);
+            tile.crossing(path, &vertex, &hit, walker.crossing());
+        path.throughput *= absorption(tile.world, &arrived, hit.shape.t);
         path.medium = near;
         if let Some(touching) = opaque {
-            let vertex = Vertex::touching(tile, &path, (sides, &touching), hit.shape.t);
-            if !vertex.material.lets_pass() || is_touched(walker, &path, &vertex) {
+            let vertex = Vertex::touching(tile, path, (sides, &touching), hit.shape.t);
+            if !vertex.material.lets_pass() || is_touched(walker, path, &vertex) {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
-                let touched = way.straighten(&mut path, touched);
+                let touched = way.straighten(path, touched);
                 let reached = Reached::Opaque(&vertex, OpaqueHit::Touching(touched), far);
-                return walker.reach(&path, reached, has_passed);
+                return walker.reach(path, reached, has_passed);
             }
             path.path = path.next_path(STRAIGHT);
         }
@@ -182,26 +185,26 @@ pub fn walk<'a, W: Walker<'a>>(
         if near.glass() != far.glass() && ior(tile.world, near) != ior(tile.world, far) {
             vertex.start_between(sides);
             let rough = if tile.world.has_rough_glass() {
-                rough(walker, &path, (&vertex, &hit), (sides, far))
+                rough(walker, path, (&vertex, &hit), (sides, far))
             } else {
                 None
             };
-            let hit = way.straighten(&mut path, hit);
-            return walker.reach(&path, Reached::Glass(&vertex, hit, Change { far, rough }), has_passed);
+            let hit = way.straighten(path, hit);
+            return walker.reach(path, Reached::Glass(&vertex, hit, Change { far, rough }), has_passed);
         }
         // Pass on, as nothing changes here.
         (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
         path.state = path.state.hidden();
         path.cone = path.cone.after(hit.shape.t);
-        (way, hidden) = (Way::from(&path), hidden + 1);
+        (way, hidden) = (Way::from(path), hidden + 1);
         let next = tile.world.geometry.closest(&path.ray);
-        walker.pass(&path, next);
+        walker.pass(path, next);
         match next {
             Some(next) => hit = next,
-            None => return walker.reach(&path, Reached::Nothing, true),
+            None => return walker.reach(path, Reached::Nothing, true),
         }
     }
-    walker.reach(&path, Reached::Hidden, true);
+    walker.reach(path, Reached::Hidden, true);
 }
 
 /// The rough surface between a path's medium and that beyond a hit, which refract differently. `None` if it is smooth.
