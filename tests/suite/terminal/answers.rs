@@ -102,6 +102,5 @@ fn bench_draws_its_plot_at_the_end() {
     let folder = Folder::new();
     let mut terminal = measured(&folder, "1,4");
     assert_eq!(terminal.code(), 0);
-    terminal.wait("the plot", has_plot);
-    assert!(!terminal.text().contains('█'), "no bar is left\n{}", terminal.text());
+    terminal.wait("the plot, and no bar", |screen| has_plot(screen) && !screen.contents().contains('█'));
 }

@@ -12,7 +12,7 @@ use crate::geometry::facets::{self, Facets};
 use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
-use crate::math::lanes::Folds;
+use crate::math::lanes::{Folds, TRUE};
 
 /// Most triangles of a mesh that is merged: a larger one is worth its own tree, and an edit that moves it then rebuilds
 /// nothing.
@@ -162,20 +162,13 @@ impl MergedMeshes {
         (met, ends): (u32, &Ends),
         found: &mut HitRows,
     ) {
-        let Some(facets) = self.facets_for(rows, met) else {
-            return self.closest_by_tree(rows, met, ends, found);
-        };
-        let undecided = by.run(Nearest { facets, rows, met, ends, found });
-        if undecided != 0 {
-            self.closest_of_each(rows, undecided, ends, found);
+        let Some(facets) = &self.facets else { return self.closest_by_tree(rows, met, ends, found) };
+        let size = self.bounds().extent();
+        match by.run(Nearest { facets, size, rows, met, ends, found }) {
+            Some(0) => {}
+            Some(undecided) => self.closest_of_each(rows, undecided, ends, found),
+            None => self.closest_by_tree(rows, met, ends, found),
         }
-    }
-
-    /// The facets, if there are few triangles, and the rays in `met` do not go the same way: those that do visit fewer triangles of
-    /// the tree.
-    #[inline]
-    fn facets_for(&self, rows: &RayRows, met: u32) -> Option<&Facets> {
-        self.facets.as_ref().filter(|_| !are_alike(rows, met, self.bounds().extent()))
     }
 
     /// The nearest hits of these rays, one by one.
@@ -210,12 +203,14 @@ impl MergedMeshes {
         (met, ends): (u32, &Ends),
         except: Option<&[u32; PACKET]>,
     ) -> u32 {
-        let Some(facets) = self.facets_for(rows, met) else {
-            return self.any_by_tree(rows, met, ends, except);
-        };
+        let Some(facets) = &self.facets else { return self.any_by_tree(rows, met, ends, except) };
         let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET]);
-        let [hit, undecided] = by.run(Any { facets, rows, met, ends, except: own });
-        if undecided == 0 { hit } else { hit | self.any_of_each(rows, undecided, ends, own) }
+        let size = self.bounds().extent();
+        match by.run(Any { facets, size, rows, met, ends, except: own }) {
+            Some([hit, 0]) => hit,
+            Some([hit, undecided]) => hit | self.any_of_each(rows, undecided, ends, own),
+            None => self.any_by_tree(rows, met, ends, except),
+        }
     }
 
     /// A bit for each of these rays that hits any triangle but its own of `except`, one by one.
@@ -244,29 +239,32 @@ impl MergedMeshes {
     }
 }
 
-/// Whether the rays in `met` start near each other, by the size of a box, and go similar ways.
-fn are_alike(rows: &RayRows, met: u32, size: Vec3) -> bool {
+/// Whether the rays in `met` start near each other, by the size of a box, and go similar ways: then they visit fewer triangles by
+/// the tree than by facets.
+#[inline(always)]
+fn are_alike(rows: &RayRows, met: u32, size: Vec3, folds: impl Folds) -> bool {
     let first = met.trailing_zeros() as usize % PACKET;
     let near = size.element_sum() * ALIKE;
     let along = (0..3).map(|axis| rows.direction[axis][first].abs()).sum::<f32>() * ALIKE;
-    let mut is_alike = true;
+    let from = [0, 1, 2].map(|axis| rows.origin[axis][first]);
+    let way = [0, 1, 2].map(|axis| rows.direction[axis][first]);
+    let ([ox, oy, oz], [dx, dy, dz]) = (&rows.origin, &rows.direction);
+    let mut differs = [0; PACKET];
     for lane in 0..PACKET {
-        let (mut apart, mut aside) = (0.0, 0.0);
-        for axis in 0..3 {
-            apart += (rows.origin[axis][lane] - rows.origin[axis][first]).abs();
-            aside += (rows.direction[axis][lane] - rows.direction[axis][first]).abs();
-        }
-        is_alike &= (met >> lane & 1 == 0) | ((apart <= near) & (aside <= along));
+        let apart = (ox[lane] - from[0]).abs() + (oy[lane] - from[1]).abs() + (oz[lane] - from[2]).abs();
+        let aside = (dx[lane] - way[0]).abs() + (dy[lane] - way[1]).abs() + (dz[lane] - way[2]).abs();
+        differs[lane] = if (apart <= near) & (aside <= along) { 0 } else { TRUE };
     }
-    is_alike
+    folds.bits(&differs) & met == 0
 }
 
 /// Greatest distance of the starts of rays, by the size of all triangles, and of their directions, by their length.
 const ALIKE: f32 = 0.125;
 
-/// [`Facets::closest`].
+/// [`Facets::closest`], if the rays are not alike in a box of this size.
 struct Nearest<'a> {
     facets: &'a Facets,
+    size: Vec3,
     rows: &'a RayRows,
     met: u32,
     ends: &'a Ends,
@@ -274,17 +272,22 @@ struct Nearest<'a> {
 }
 
 impl Loops for Nearest<'_> {
-    type Done = u32;
+    type Done = Option<u32>;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> u32 {
-        self.facets.closest(self.rows, (self.met, self.ends), self.found, folds)
+    fn run(self, folds: impl Folds) -> Option<u32> {
+        let Self { facets, size, rows, met, ends, found } = self;
+        if are_alike(rows, met, size, folds) {
+            return None;
+        }
+        Some(facets.closest(rows, (met, ends), found, folds))
     }
 }
 
-/// [`Facets::any`].
+/// [`Facets::any`], if the rays are not alike in a box of this size.
 struct Any<'a> {
     facets: &'a Facets,
+    size: Vec3,
     rows: &'a RayRows,
     met: u32,
     ends: &'a Ends,
@@ -292,11 +295,15 @@ struct Any<'a> {
 }
 
 impl Loops for Any<'_> {
-    type Done = [u32; 2];
+    type Done = Option<[u32; 2]>;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> [u32; 2] {
-        self.facets.any(self.rows, (self.met, self.ends), self.except, folds)
+    fn run(self, folds: impl Folds) -> Option<[u32; 2]> {
+        let Self { facets, size, rows, met, ends, except } = self;
+        if are_alike(rows, met, size, folds) {
+            return None;
+        }
+        Some(facets.any(rows, (met, ends), except, folds))
     }
 }
 

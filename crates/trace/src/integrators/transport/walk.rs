@@ -77,7 +77,7 @@ pub enum Straight {
 /// Way of a path since its last vertex, if it passed surfaces straight on.
 #[derive(Clone, Copy)]
 struct Way {
-    /// The last vertex.
+    /// The last vertex, if there are any surfaces.
     origin: Vec3,
     /// Distance of the path's current ray from it.
     distance: f32,
@@ -86,8 +86,13 @@ struct Way {
 }
 
 impl Way {
-    fn from(path: &PathRay) -> Self {
-        Self { origin: path.ray.origin, distance: 0.0, count: 0 }
+    /// The way of a path that has passed nothing yet.
+    const DIRECT: Self = Self { origin: Vec3::ZERO, distance: 0.0, count: 0 };
+
+    /// The way behind one more surface, which the path meets at a distance.
+    fn behind(self, path: &PathRay, distance: f32) -> Self {
+        let origin = if self.count == 0 { path.ray.origin } else { self.origin };
+        Self { origin, distance: self.distance + distance, count: self.count + 1 }
     }
 
     /// Makes the path one that comes from its last vertex without a stop; returns its hit.
@@ -119,7 +124,7 @@ pub fn walk<'a, W: Walker<'a>>(
     (mut hit, mut surface): (Hit, Option<SurfacePoint>),
 ) {
     let tile = walker.tile();
-    let (mut way, mut hidden) = (Way::from(path), 0);
+    let (mut way, mut hidden) = (Way::DIRECT, 0);
     while hidden < MOST_HIDDEN {
         let has_passed = hidden > 0;
         let mut vertex = match surface.take() {
@@ -133,7 +138,7 @@ pub fn walk<'a, W: Walker<'a>>(
                 match straight(walker, path, &vertex, (way, hit)) {
                     Straight::Passes(_) if way.count == MOST_STRAIGHT => return,
                     Straight::Passes(part) => {
-                        way = Way { distance: way.distance + hit.shape.t, count: way.count + 1, ..way };
+                        way = way.behind(path, hit.shape.t);
                         *path = passed(*path, &vertex, part);
                         match tile.world.geometry.closest(&path.ray) {
                             Some(next) => {
@@ -196,7 +201,7 @@ pub fn walk<'a, W: Walker<'a>>(
         (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
         path.state = path.state.hidden();
         path.cone = path.cone.after(hit.shape.t);
-        (way, hidden) = (Way::from(path), hidden + 1);
+        (way, hidden) = (Way::DIRECT, hidden + 1);
         let next = tile.world.geometry.closest(&path.ray);
         walker.pass(path, next);
         match next {
