@@ -3,11 +3,13 @@
 use glimt::choice::Choice;
 use glimt::control::CancelToken;
 use glimt::film::Rect;
+use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
 use glimt::geometry::{Ray, SurfacePoint};
 use glimt::integrators::render_tile;
 use glimt::lights::Source;
 use glimt::materials::fresnel::dielectric;
+use glimt::math::transform::Transform;
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::light::Falloff;
 use glimt::scene::description::{Integrator, Shape};
@@ -87,6 +89,71 @@ fn no_convex_shape_hits_itself() {
                 let (hits, tried) = self_hits(&build, &mut random, center, size, 4000);
                 assert!(tried > 0, "{what} of size {size} at {center} is never hit");
                 assert_eq!(hits, 0, "of {tried} rays, {what} of size {size} at {center}");
+            }
+        }
+    }
+}
+
+/// A room from −size/2 to size/2: its corners, and its walls by corners, which go around them as seen from inside.
+fn room(size: DVec3) -> ([DVec3; 8], [[usize; 4]; 6]) {
+    let corner = |i: usize| {
+        size * (DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2 & 1) as f64) - DVec3::splat(0.5))
+    };
+    let walls = [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]];
+    (std::array::from_fn(corner), walls)
+}
+
+/// The room as one mesh of twelve triangles.
+fn room_of_triangles(size: DVec3) -> TriangleMesh {
+    let (corners, walls) = room(size);
+    let triangles = |[a, b, c, d]: [usize; 4]| [[a, b, c], [a, c, d]].map(|three| three.map(|i| i as u32));
+    TriangleMesh {
+        positions: corners.map(DVec3::as_vec3).to_vec(),
+        triangles: walls.into_iter().flat_map(triangles).collect(),
+        ..TriangleMesh::default()
+    }
+}
+
+#[test]
+fn no_ray_leaves_a_closed_room_by_its_edges() {
+    // Rays go to walls right beside edges and corners, and on from there to any side within: they must hit another wall.
+    let mut random = Random(29);
+    for size in [v(1.0, 1.0, 1.0), v(8.0, 0.4, 2.0), v(200.0, 0.02, 0.02), v(3e-3, 5e-3, 4e-3)] {
+        let small = size.min_element();
+        for place in [DVec3::ZERO, v(0.1, 0.1, 0.1), random.direction() * 300.0 * small] {
+            for angles in [DVec3::ZERO, v(20.0, 50.0, -10.0)] {
+                let placed = [DVec3::ONE, angles, place];
+                let mesh = room_of_triangles(size);
+                let world = scene().mesh(mesh, placed, matte(0.5)).world();
+                let transform = Transform::scale_rotate_translate(DVec3::ONE, angles, place);
+                let (mut lost, mut tried) = (0, 0);
+                for _ in 0..3000 {
+                    // Aim at a point beside one, two or three walls.
+                    let within = |random: &mut Random| 1.0 - 2.0 * random.unit();
+                    let mut at = [0; 3].map(|_| 0.495 * within(&mut random));
+                    let from = transform.point(DVec3::from(at) * size);
+                    let near = |random: &mut Random| 0.5 - 10.0_f64.powf(-4.0 - 5.0 * random.unit());
+                    for axis in 0..3 {
+                        let side = if random.unit() < 0.5 { -1.0 } else { 1.0 };
+                        let is_beside = axis == 0 || random.unit() < 0.7;
+                        at[axis] =
+                            if is_beside { side * near(&mut random) } else { 0.5 * within(&mut random) };
+                    }
+                    at.rotate_right((random.unit() * 2.99) as usize);
+                    let to = transform.point(DVec3::from(at) * size);
+                    let from = from.as_vec3();
+                    let ray = Ray::new(from, (to - from.as_dvec3()).as_vec3().normalize());
+                    let Some(hit) = world.geometry.closest(&ray) else {
+                        lost += 1;
+                        continue;
+                    };
+                    let surface = world.geometry.surface(&ray, &hit);
+                    let inwards = if surface.normal.dot(ray.direction) < 0.0 { 1.0 } else { -1.0 };
+                    let next = leaving(&mut random, &surface, surface.normal * inwards);
+                    tried += 1;
+                    lost += u32::from(world.geometry.closest(&next).is_none());
+                }
+                assert!(tried > 2000 && lost == 0, "{lost} of {tried}: {size} at {place}, {angles}");
             }
         }
     }

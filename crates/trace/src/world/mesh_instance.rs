@@ -25,6 +25,8 @@ pub struct MeshInstance {
     pub(super) is_merged: bool,
     /// Number of its first triangle among those of all meshes. `None` if there are more than numbers.
     pub(super) first: Option<u32>,
+    /// [`Transform::inverse_growth`], times the errors of a point between it and the edges.
+    aside: f64,
 }
 
 /// A point of a triangle of an instance.
@@ -41,12 +43,21 @@ pub(super) struct Facet {
     pub(super) normal: Vec3,
     /// Weights of the corners.
     pub(super) barycentric: Vec3,
+    /// Whether a ray that starts here may be beyond a neighbour, see [`MeshInstance::drawn_in`].
+    pub(super) is_beside_edge: bool,
 }
+
+/// Errors of a point between it and the edges of its triangle: rounding a point and moving it off the surface takes two of them.
+const ASIDE: f64 = 4.0;
+
+/// Most of a triangle's height between a point and an edge.
+const MOST_ASIDE: f64 = 0.125;
 
 impl MeshInstance {
     /// An instance of a mesh with its own tree.
     pub fn new(tree: Arc<MeshTree>, transform: Transform, smooth: bool) -> Self {
-        Self { tree, transform, smooth, is_merged: false, first: None }
+        let aside = ASIDE * transform.inverse_growth();
+        Self { tree, transform, smooth, is_merged: false, first: None, aside }
     }
 
     /// The ray in the mesh's coordinates, with the same t.
@@ -191,7 +202,11 @@ impl MeshInstance {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
         let facet = self.facet(vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
-        let Facet { corners: [a, b, c], local: _, point, error, normal, barycentric } = facet;
+        let Facet { corners: [a, b, c], normal, barycentric, .. } = facet;
+        let [point, error] = match facet.is_beside_edge {
+            true => self.drawn_in(&facet, [hit.u, hit.v]),
+            false => [facet.point, facet.error],
+        };
         let (uv, dpdu, dpdv) = if asked.uv {
             self.parametrisation(&mesh.uvs, vertices, barycentric, [b - a, c - a])
         } else {
@@ -250,14 +265,54 @@ impl MeshInstance {
         let (ab, ac) = (b - a, c - a);
         let local = a + ab * f64::from(u) + ac * f64::from(v);
         let point = self.transform.point(local).as_vec3();
+        let error = self.error(point, local, corners);
+        let across = ab.cross(ac);
+        // Compare the squares of distances from the edges with those of the least distance.
+        let least = self.least_aside(error, corners);
+        let bound = least * least / across.length_squared();
+        let (u, v) = (f64::from(u), f64::from(v));
+        let w = 1.0 - u - v;
+        let is_near =
+            |weight: f64, edge: DVec3| (weight < 0.0) | (weight * weight < bound * edge.length_squared());
+        let is_beside_edge = is_near(u, ac) | is_near(v, ab) | is_near(w, ac - ab);
         Facet {
             corners,
             local,
             point,
-            error: self.error(point, local, corners),
-            normal: self.transform.normal(ab.cross(ac)).normalize().as_vec3(),
-            barycentric: Vec3::new(1.0 - u - v, u, v),
+            error,
+            normal: self.transform.normal(across).normalize().as_vec3(),
+            barycentric: Vec3::new(1.0 - u as f32 - v as f32, u as f32, v as f32),
+            is_beside_edge,
         }
+    }
+
+    /// Least distance, in the mesh's coordinates, of a point from the edges of its triangle: errors of the point, and of the test of
+    /// a neighbour as large as the triangle.
+    #[inline(always)]
+    fn least_aside(&self, error: Vec3, [a, b, c]: [DVec3; 3]) -> f64 {
+        let greatest = a.abs().max(b.abs()).max(c.abs()).max_element();
+        self.aside * f64::from(error.max_element()) + ASIDE * f64::from(f32::EPSILON) * greatest
+    }
+
+    /// A point beside an edge, and its error, drawn into the triangle until the errors are aside. Else a ray could start beyond the
+    /// wall that meets this one there, and leave a closed room.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn drawn_in(&self, facet: &Facet, [u, v]: [f32; 2]) -> [Vec3; 2] {
+        let [a, b, c] = facet.corners;
+        let (ab, ac) = (b - a, c - a);
+        let least = self.least_aside(facet.error, facet.corners) / ab.cross(ac).length();
+        let [of_u, of_v, of_w] = [ac, ab, ac - ab].map(|edge| (least * edge.length()).min(MOST_ASIDE));
+        let (u, v) = (f64::from(u).max(of_u), f64::from(v).max(of_v));
+        let excess = (u + v - (1.0 - of_w)).max(0.0);
+        // Lower the weight that has more to give.
+        let (u, v) = if u - of_u > v - of_v { (u - excess, v) } else { (u, v - excess) };
+        let local = a + ab * u + ac * v;
+        let point = self.transform.point(local).as_vec3();
+        if !point.is_finite() {
+            return [facet.point, facet.error];
+        }
+        [point, self.error(point, local, facet.corners)]
     }
 
     /// Shading normal of a smooth mesh: interpolated between those of the corners, on the side of the geometric normal.

@@ -2,10 +2,10 @@
 
 use super::MeshInstance;
 use crate::accel::PACKET;
-use crate::geometry::rows::{HitRows, RayRows};
+use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::materials::UvSet;
-use crate::math::lanes::{Lanes3, lane, set_lane};
+use crate::math::lanes::{Folds, Lanes3, TRUE, lane, set_lane};
 use crate::math::{Vec2, Vec3};
 
 impl MeshInstance {
@@ -19,6 +19,7 @@ impl MeshInstance {
         hits: &HitRows,
         of: u32,
         asked_uvs: Option<UvSet>,
+        folds: impl Folds,
     ) {
         let mesh = &self.tree.loaded().mesh;
         // The other lanes get a triangle as well, without effect.
@@ -30,12 +31,20 @@ impl MeshInstance {
         }
         let corners = of_vertices(&vertices, &mesh.positions);
         let corners_of = |i: usize| [lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)];
-        let mut found = SurfaceRow::EMPTY;
+        let (mut found, mut beside) = (SurfaceRow::EMPTY, [0; PACKET]);
         for i in 0..PACKET {
             let facet = self.facet(corners_of(i), [hits.u[i], hits.v[i]]);
             set_lane(&mut found.point, i, facet.point);
             set_lane(&mut found.error, i, facet.error);
             set_lane(&mut found.normal, i, facet.normal);
+            beside[i] = if facet.is_beside_edge { TRUE } else { 0 };
+        }
+        // Few are beside an edge.
+        for i in lanes(folds.bits(&beside) & of) {
+            let uv = [hits.u[i], hits.v[i]];
+            let [point, error] = self.drawn_in(&self.facet(corners_of(i), uv), uv);
+            set_lane(&mut found.point, i, point);
+            set_lane(&mut found.error, i, error);
         }
         surface.take(of, &found);
         if self.smooth {
@@ -97,7 +106,6 @@ mod tests {
     use crate::geometry::mesh::TriangleMesh;
     use crate::geometry::{Asked, Ray, ShapeHit};
     use crate::math::DVec3;
-    use crate::math::lanes::Folds;
     use crate::math::random::signed as random;
     use crate::math::transform::Transform;
     use crate::scene::description::Accel;
@@ -115,10 +123,10 @@ mod tests {
         type Done = SurfaceRow;
 
         #[inline(always)]
-        fn run(self, _: impl Folds) -> SurfaceRow {
+        fn run(self, folds: impl Folds) -> SurfaceRow {
             let mut surface = SurfaceRow::EMPTY;
             let (rows, _) = RayRows::new(self.rays);
-            self.mesh.fill_surfaces(&mut surface, &rows, self.hits, self.of, Some(self.set));
+            self.mesh.fill_surfaces(&mut surface, &rows, self.hits, self.of, Some(self.set), folds);
             surface
         }
     }

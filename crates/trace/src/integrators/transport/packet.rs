@@ -318,7 +318,7 @@ impl PacketIntersection<'_> {
                 }
                 Object::Mesh(mesh) => {
                     row.set_starts(of, &mesh.scene_numbers(&hits.primitive));
-                    mesh.fill_surfaces(surface, rows, hits, of, asked_uvs);
+                    mesh.fill_surfaces(surface, rows, hits, of, asked_uvs, folds);
                 }
             }
             plain.all |= of;
@@ -383,7 +383,7 @@ impl TileContext<'_> {
                 of |= if self.is_held_by_rows(material as usize) { alike } else { 0 };
             }
             if of != 0 {
-                mesh.fill_surfaces(surface, rows, hits, of, None);
+                mesh.fill_surfaces(surface, rows, hits, of, None, folds);
                 found |= of;
             }
         }
