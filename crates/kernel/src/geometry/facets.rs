@@ -303,7 +303,7 @@ impl Facets {
                 far = greater(far, greater((high - at).abs(), (at - low).abs()));
                 length += rays.direction[axis][i].abs();
             }
-            // An origin that is no number has no bound, which `most` would hide.
+            // For an origin of NaN there is no bound; comparisons with it would leave `most` as it was.
             let sum = rays.origin[0][i] + rays.origin[1][i] + rays.origin[2][i];
             let most = if sum.is_nan() { f32::NAN } else { most };
             errors.plane[i] = PLANE * most;

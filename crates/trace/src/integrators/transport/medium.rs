@@ -18,7 +18,7 @@ pub struct Inside {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Medium {
     inside: [Inside; 4],
-    /// Of 32 bits, so that copies are of whole words: of a word with one byte just written, the copy waits for the cache.
+    /// Number of known glasses. A whole word, as a copy of a word of which one byte was just written waits for the cache.
     count: u32,
 }
 
