@@ -78,8 +78,10 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     if has_title {
         terminal.wait("a title", |_| has(&terminal.bytes(), b"\x1b]2;scene.toml: rendering 0 %"));
     }
-    // The focus goes.
-    terminal.press("\x1b[O");
+    // The focus goes. The help comes after it, which shows that it was read before the scene is saved.
+    terminal.press("\x1b[O?");
+    terminal.wait_for("show or hide this help");
+    terminal.press("?");
     folder.write("scene.toml", SCENE);
     terminal.wait_for_render(1);
     if has_title {
