@@ -80,7 +80,6 @@ impl Scratch {
     }
 }
 
-#[test]
 fn another_kind_of_what_is_no_file_is_a_change() {
     use nix::sys::stat::Mode;
     let scratch = Scratch::new(false);
@@ -130,22 +129,56 @@ const WAYS: [(&str, Save); 6] = [
     }),
 ];
 
-#[test]
-fn each_way_to_save_is_one_change() {
-    // Most of the time is waiting, so that all ways go at once; a thread that fails tells its name.
+/// Does things at once, as most of their time is waiting; a thread that fails tells its name.
+fn side_by_side<T: FnOnce() + Send>(all: impl IntoIterator<Item = (&'static str, T)>) {
     std::thread::scope(|scope| {
-        for (name, save) in WAYS {
-            let three_saves = move || {
-                let scratch = Scratch::new(false);
-                scratch.three_saves(|content| save(scratch.folder.path(), content));
-            };
+        for (name, one) in all {
             let thread = std::thread::Builder::new().name(name.to_owned());
-            thread.spawn_scoped(scope, three_saves).expect("a thread");
+            thread.spawn_scoped(scope, one).expect("a thread");
         }
     });
 }
 
 #[test]
+fn each_way_to_save_is_one_change() {
+    side_by_side(WAYS.map(|(name, save)| {
+        let three_saves = move || {
+            let scratch = Scratch::new(false);
+            scratch.three_saves(|content| save(scratch.folder.path(), content));
+        };
+        (name, three_saves)
+    }));
+}
+
+/// Functions with their names.
+macro_rules! named {
+    ($($own:ident),+ $(,)?) => { [$((stringify!($own), $own as fn())),+] };
+}
+
+#[test]
+fn what_happens_to_watched_files_is_said() {
+    side_by_side(named![
+        another_kind_of_what_is_no_file_is_a_change,
+        polling_sees_three_saves_of_one_length,
+        a_link_whose_target_is_replaced,
+        a_link_that_is_turned_elsewhere,
+        the_same_content_again_and_other_files_are_no_change,
+        a_missing_file_is_watched_until_it_comes_and_said_when_it_goes,
+        a_folder_that_is_removed_and_made_again_is_watched_as_before,
+        another_folder_of_the_same_name_is_watched_by_its_hints,
+        a_change_between_reading_and_watching_is_seen,
+        a_file_that_is_again_what_was_said_of_it_counts_as_changed_where_it_was_read_between,
+        saves_without_a_pause_are_said_now_and_then,
+        a_file_that_is_closed_after_writing_is_whole,
+        a_file_that_is_renamed_into_its_place_is_whole,
+        a_save_by_way_of_a_backup_is_whole_at_its_last_step,
+        a_file_that_is_still_open_is_looked_at_when_it_is_closed,
+        a_file_that_stays_open_is_looked_at_when_it_is_quiet_and_is_not_settled_until_it_is_closed,
+        a_file_that_comes_in_two_pieces_settles_after_the_second,
+        a_file_that_never_ends_settles_at_last,
+    ]);
+}
+
 fn polling_sees_three_saves_of_one_length() {
     let scratch = Scratch::new(true);
     for content in ["1", "2", "3"] {
@@ -154,7 +187,6 @@ fn polling_sees_three_saves_of_one_length() {
     }
 }
 
-#[test]
 fn a_link_whose_target_is_replaced() {
     let scratch = Scratch::new(false);
     fs::create_dir(scratch.path("elsewhere")).expect("a folder");
@@ -170,7 +202,6 @@ fn a_link_whose_target_is_replaced() {
     });
 }
 
-#[test]
 fn a_link_that_is_turned_elsewhere() {
     let scratch = Scratch::new(false);
     fs::write(scratch.path("one"), "1").expect("written");
@@ -183,7 +214,6 @@ fn a_link_that_is_turned_elsewhere() {
     scratch.expect_one();
 }
 
-#[test]
 fn the_same_content_again_and_other_files_are_no_change() {
     let scratch = Scratch::new(false);
     fs::write(scratch.path("a.toml"), "0").expect("written");
@@ -192,7 +222,6 @@ fn the_same_content_again_and_other_files_are_no_change() {
     scratch.expect_none();
 }
 
-#[test]
 fn a_missing_file_is_watched_until_it_comes_and_said_when_it_goes() {
     let scratch = Scratch::new(false);
     let path = scratch.path("mesh.obj");
@@ -204,7 +233,6 @@ fn a_missing_file_is_watched_until_it_comes_and_said_when_it_goes() {
     scratch.expect_one();
 }
 
-#[test]
 fn a_folder_that_is_removed_and_made_again_is_watched_as_before() {
     let scratch = Scratch::new(false);
     let (folder, path) = (scratch.path("sub"), scratch.path("sub/a.toml"));
@@ -223,7 +251,6 @@ fn a_folder_that_is_removed_and_made_again_is_watched_as_before() {
     scratch.three_saves(|content| fs::write(&path, content).expect("written"));
 }
 
-#[test]
 fn another_folder_of_the_same_name_is_watched_by_its_hints() {
     let scratch = impatient();
     let (folder, path) = (scratch.path("sub"), scratch.path("sub/a.toml"));
@@ -240,7 +267,6 @@ fn another_folder_of_the_same_name_is_watched_by_its_hints() {
     scratch.three_saves(|content| fs::write(&path, content).expect("written"));
 }
 
-#[test]
 fn a_change_between_reading_and_watching_is_seen() {
     let scratch = Scratch::new(false);
     let path = scratch.path("b.toml");
@@ -250,7 +276,6 @@ fn a_change_between_reading_and_watching_is_seen() {
     scratch.expect_one();
 }
 
-#[test]
 fn a_file_that_is_again_what_was_said_of_it_counts_as_changed_where_it_was_read_between() {
     let scratch = Scratch::new(false);
     let path = scratch.path("a.toml");
@@ -272,7 +297,6 @@ fn a_file_that_is_again_what_was_said_of_it_counts_as_changed_where_it_was_read_
     scratch.expect_none();
 }
 
-#[test]
 fn saves_without_a_pause_are_said_now_and_then() {
     let scratch = Scratch::new(false);
     let begin = Instant::now();
@@ -295,13 +319,11 @@ fn impatient() -> Scratch {
     Scratch::with(false, Waits { quiet: NEVER, longest: NEVER, ..Waits::default() })
 }
 
-#[test]
 fn a_file_that_is_closed_after_writing_is_whole() {
     let scratch = impatient();
     scratch.three_saves(|content| fs::write(scratch.path("a.toml"), content).expect("written"));
 }
 
-#[test]
 fn a_file_that_is_renamed_into_its_place_is_whole() {
     let scratch = impatient();
     scratch.three_saves(|content| {
@@ -310,7 +332,6 @@ fn a_file_that_is_renamed_into_its_place_is_whole() {
     });
 }
 
-#[test]
 fn a_save_by_way_of_a_backup_is_whole_at_its_last_step() {
     let scratch = impatient();
     scratch.three_saves(|content| {
@@ -329,7 +350,6 @@ fn open(scratch: &Scratch) -> fs::File {
     fs::File::create(scratch.path("a.toml")).expect("opened")
 }
 
-#[test]
 fn a_file_that_is_still_open_is_looked_at_when_it_is_closed() {
     let scratch = impatient();
     let mut file = open(&scratch);
@@ -340,7 +360,6 @@ fn a_file_that_is_still_open_is_looked_at_when_it_is_closed() {
     scratch.expect_one();
 }
 
-#[test]
 fn a_file_that_stays_open_is_looked_at_when_it_is_quiet_and_is_not_settled_until_it_is_closed() {
     let scratch = Scratch::with(false, Waits { settle_open: NEVER, ..Waits::default() });
     let mut file = open(&scratch);
@@ -354,7 +373,6 @@ fn a_file_that_stays_open_is_looked_at_when_it_is_quiet_and_is_not_settled_until
     assert!(matches!(scratch.next(), News::Settled));
 }
 
-#[test]
 fn a_file_that_comes_in_two_pieces_settles_after_the_second() {
     let scratch = Scratch::with(false, Waits { settle: 5 * Waits::default().settle, ..Waits::default() });
     fs::write(scratch.path("a.toml"), "half").expect("written");
@@ -364,7 +382,6 @@ fn a_file_that_comes_in_two_pieces_settles_after_the_second() {
     scratch.expect_one();
 }
 
-#[test]
 fn a_file_that_never_ends_settles_at_last() {
     let waits = Waits { settle_open: NEVER, settle_longest: Duration::from_millis(300), ..Waits::default() };
     let scratch = Scratch::with(false, waits);
