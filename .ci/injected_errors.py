@@ -68,7 +68,7 @@ FAULTS = [
     ("facets without margins", "geometry/facets.rs", "let margin = ⟦slender⟧ * folds.about(", "0.0",
      "accel::facets_tests::what_is_decided_is_what_each_ray_finds_alone"),
     ("rays that start beyond the next wall of a mesh", "world/mesh_instance.rs",
-     "let is_beside_edge = ⟦is_near(u, ac) | is_near(v, ab) | is_near(w, ac - ab)⟧;", "false",
+     "let is_beside_edge = ⟦is_near(u, ac, bound) | is_near(v, ab, bound) | is_near(w, ac - ab, bound)⟧;", "false",
      "closed_forms::robust::no_ray_leaves_a_closed_room_by_its_edges"),
     ("starts in rows unlike those alone", "world/mesh_rows.rs", "for i in lanes(⟦folds.bits(&beside) & of⟧) {", "0",
      "world::mesh_rows::tests::surfaces_side_by_side_have_the_bits_that_each_has_alone"),

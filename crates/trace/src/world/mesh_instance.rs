@@ -25,7 +25,7 @@ pub struct MeshInstance {
     pub(super) is_merged: bool,
     /// Number of its first triangle among those of all meshes. `None` if there are more than numbers.
     pub(super) first: Option<u32>,
-    /// [`Transform::inverse_growth`], times the errors of a point between it and the edges.
+    /// Factor from errors of points to the least distance from edges, in the mesh's coordinates.
     aside: f64,
 }
 
@@ -49,6 +49,13 @@ pub(super) struct Facet {
 
 /// Errors of a point between it and the edges of its triangle: rounding a point and moving it off the surface takes two of them.
 const ASIDE: f64 = 4.0;
+
+/// Whether a point with this weight of a corner is near the edge across from it; `bound` is the square of the least distance over
+/// that of the cross product of two edges.
+#[inline(always)]
+fn is_near(weight: f64, edge: DVec3, bound: f64) -> bool {
+    (weight < 0.0) | (weight * weight < bound * edge.length_squared())
+}
 
 /// Most of a triangle's height between a point and an edge.
 const MOST_ASIDE: f64 = 0.125;
@@ -272,9 +279,7 @@ impl MeshInstance {
         let bound = least * least / across.length_squared();
         let (u, v) = (f64::from(u), f64::from(v));
         let w = 1.0 - u - v;
-        let is_near =
-            |weight: f64, edge: DVec3| (weight < 0.0) | (weight * weight < bound * edge.length_squared());
-        let is_beside_edge = is_near(u, ac) | is_near(v, ab) | is_near(w, ac - ab);
+        let is_beside_edge = is_near(u, ac, bound) | is_near(v, ab, bound) | is_near(w, ac - ab, bound);
         Facet {
             corners,
             local,
