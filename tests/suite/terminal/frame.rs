@@ -82,6 +82,7 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     terminal.press("\x1b[O?");
     terminal.wait_for("show or hide this help");
     terminal.press("?");
+    terminal.wait("no help", |screen| !screen.contents().contains("show or hide this help"));
     folder.write("scene.toml", SCENE);
     terminal.wait_for_render(1);
     if has_title {
@@ -90,7 +91,7 @@ fn through(variables: &[(&str, &str)], has_title: bool) -> Vec<u8> {
     // And comes back. A click on the board, and what it says is copied.
     terminal.press("\x1b[I");
     terminal.press("\x1b[<0;20;10M\x1b[<0;20;10m");
-    terminal.wait_for("radiance");
+    terminal.wait_for("radiance (");
     terminal.press("y");
     terminal.wait("an answer", |screen| {
         let text: String = screen.contents().split_whitespace().collect::<Vec<_>>().join(" ");
