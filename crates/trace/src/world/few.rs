@@ -6,7 +6,6 @@ use crate::accel::{Ends, PACKET};
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::geometry::watertight_rows::ShearedRows;
 use crate::math::lanes::{Folds, lane, set_lane};
-use crate::math::transform::Transform;
 
 /// Most triangles of such a mesh: for more, the tree skips so many that it is faster.
 const FEW: usize = 16;
@@ -66,7 +65,7 @@ impl MeshInstance {
     #[inline(always)]
     fn local_rows(&self, rows: &RayRows) -> RayRows {
         let RayRows { mut origin, mut direction, mut start } = *rows;
-        if self.transform != Transform::IDENTITY {
+        if self.is_moved {
             for i in 0..PACKET {
                 let at = self.transform.inverse_point(lane(&origin, i).as_dvec3()).as_vec3();
                 set_lane(&mut origin, i, at);

@@ -1,0 +1,192 @@
+//! Points of the triangles of an instance: where, how exactly, and by which normals.
+
+use super::MeshInstance;
+use super::placement::Placement;
+use crate::geometry::surface::double_error;
+use crate::math::{DVec3, Vec3};
+
+/// A point of a triangle of an instance.
+pub(super) struct Facet {
+    /// The triangle's corners, in the mesh's coordinates.
+    pub(super) corners: [DVec3; 3],
+    /// The point in the mesh's coordinates.
+    local: DVec3,
+    /// The point in the world.
+    pub(super) point: Vec3,
+    /// [`SurfacePoint::error`].
+    pub(super) error: Vec3,
+    /// [`SurfacePoint::normal`].
+    pub(super) normal: Vec3,
+    /// Weights of the corners.
+    pub(super) barycentric: Vec3,
+    /// Whether a ray that starts here may be beyond a neighbour, see [`MeshInstance::drawn_in`].
+    pub(super) is_beside_edge: bool,
+}
+
+/// Errors of a point between it and the edges of its triangle: rounding a point and moving it off the surface takes two of them.
+pub(super) const ASIDE: f64 = 4.0;
+
+/// Whether a point with this weight of a corner is near the edge across from it; `bound` is the square of the least distance over
+/// that of the cross product of two edges.
+#[inline(always)]
+fn is_near(weight: f64, edge: DVec3, bound: f64) -> bool {
+    (weight < 0.0) | (weight * weight < bound * edge.length_squared())
+}
+
+/// Most of a triangle's height between a point and an edge.
+const MOST_ASIDE: f64 = 0.125;
+
+impl MeshInstance {
+    /// Rounding of a point of a triangle, of the next ray's origin in the mesh's coordinates, and of the numbers from which the
+    /// point is computed. If all of these are near 0, the rounding of double precision counts, by which the sides of the
+    /// triangle are decided. In a tree over several meshes, the rounding of the corners there counts too.
+    #[inline(always)]
+    pub(super) fn error(
+        &self,
+        placement: impl Placement,
+        point: Vec3,
+        local: DVec3,
+        [a, b, c]: [DVec3; 3],
+    ) -> Vec3 {
+        let reach = placement.reach(local.abs());
+        let parts = point.abs() + reach.as_vec3() + placement.shift().abs().as_vec3();
+        let greatest = placement.reach(a.abs().max(b.abs()).max(c.abs()));
+        let of_double = double_error(greatest.max_element());
+        let error = parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE);
+        if self.has_rounded_corners() {
+            error + (greatest + placement.shift().abs()).as_vec3() * f32::EPSILON
+        } else {
+            error
+        }
+    }
+
+    /// Whether rays hit triangles whose corners were rounded after they were placed.
+    #[inline(always)]
+    fn has_rounded_corners(&self) -> bool {
+        self.is_merged && self.is_moved
+    }
+
+    /// A point of a triangle, by its corners in the mesh's coordinates and the weights of the second and the third.
+    #[inline(always)]
+    pub(super) fn facet(&self, placement: impl Placement, corners: [Vec3; 3], [u, v]: [f32; 2]) -> Facet {
+        let corners = corners.map(|corner| corner.as_dvec3());
+        let [a, b, c] = corners;
+        let (ab, ac) = (b - a, c - a);
+        let local = a + ab * f64::from(u) + ac * f64::from(v);
+        let point = placement.point(local).as_vec3();
+        let error = self.error(placement, point, local, corners);
+        let across = ab.cross(ac);
+        // Compare the squares of distances from the edges with those of the least distance.
+        let least = self.least_aside(error, corners);
+        let bound = least * least / across.length_squared();
+        let (u, v) = (f64::from(u), f64::from(v));
+        let w = 1.0 - u - v;
+        let is_beside_edge = is_near(u, ac, bound) | is_near(v, ab, bound) | is_near(w, ac - ab, bound);
+        Facet {
+            corners,
+            local,
+            point,
+            error,
+            normal: placement.normal(across).normalize().as_vec3(),
+            barycentric: Vec3::new(1.0 - u as f32 - v as f32, u as f32, v as f32),
+            is_beside_edge,
+        }
+    }
+
+    /// Least distance, in the mesh's coordinates, of a point from the edges of its triangle: errors of the point, and of the test of
+    /// a neighbour as large as the triangle.
+    #[inline(always)]
+    fn least_aside(&self, error: Vec3, [a, b, c]: [DVec3; 3]) -> f64 {
+        let greatest = a.abs().max(b.abs()).max(c.abs()).max_element();
+        self.aside * f64::from(error.max_element()) + ASIDE * f64::from(f32::EPSILON) * greatest
+    }
+
+    /// A point beside an edge, and its error, drawn into the triangle until the errors are aside. Else a ray could start beyond the
+    /// wall that meets this one there, and leave a closed room.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn drawn_in(&self, placement: impl Placement, facet: &Facet, [u, v]: [f32; 2]) -> [Vec3; 2] {
+        let [a, b, c] = facet.corners;
+        let (ab, ac) = (b - a, c - a);
+        let least = self.least_aside(facet.error, facet.corners) / ab.cross(ac).length();
+        let [of_u, of_v, of_w] = [ac, ab, ac - ab].map(|edge| (least * edge.length()).min(MOST_ASIDE));
+        let (u, v) = (f64::from(u).max(of_u), f64::from(v).max(of_v));
+        let excess = (u + v - (1.0 - of_w)).max(0.0);
+        // Lower the weight that has more to give.
+        let (u, v) = if u - of_u > v - of_v { (u - excess, v) } else { (u, v - excess) };
+        let local = a + ab * u + ac * v;
+        let point = placement.point(local).as_vec3();
+        if !point.is_finite() {
+            return [facet.point, facet.error];
+        }
+        [point, self.error(placement, point, local, facet.corners)]
+    }
+
+    /// Shading normal of a smooth mesh: interpolated between those of the corners, on the side of the geometric normal.
+    #[inline(always)]
+    pub(super) fn shading_normal(placement: impl Placement, facet: &Facet, [a, b, c]: &[Vec3; 3]) -> Vec3 {
+        let Facet { normal, barycentric, .. } = *facet;
+        let interpolated = *a * barycentric.x + *b * barycentric.y + *c * barycentric.z;
+        let bent = placement.normal(interpolated.as_dvec3()).as_vec3();
+        let reciprocal = bent.length_recip();
+        let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
+        let bent = bent * reciprocal;
+        let bent = if bent.dot(normal) < 0.0 { -bent } else { bent };
+        let choose = |bent: f32, normal: f32| if is_told { bent } else { normal };
+        Vec3::new(choose(bent.x, normal.x), choose(bent.y, normal.y), choose(bent.z, normal.z))
+    }
+
+    /// Shadow point of a smooth mesh: the point, lifted towards the viewer to the tangent planes of the vertices that are above
+    /// it. Thereby the facets of a smooth-shaded surface do not shadow what its normals say is lit (Hanika, *Hacking the Shadow
+    /// Terminator*, Ray Tracing Gems II, chapter 4).
+    #[inline(always)]
+    pub(super) fn shadow_point(
+        placement: impl Placement,
+        facet: &Facet,
+        normals: &[Vec3; 3],
+        direction: DVec3,
+    ) -> Vec3 {
+        let point = placement.point(facet.local);
+        let normal = facet.normal.as_dvec3();
+        let side = if normal.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+        let weights = facet.barycentric.to_array();
+        let mut lifted = DVec3::ZERO;
+        for i in 0..3 {
+            let own = placement.normal(normals[i].as_dvec3());
+            let reciprocal = own.length_recip();
+            let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
+            let own = own * if is_told { reciprocal } else { 0.0 };
+            let own = own * side * if own.dot(normal) < 0.0 { -1.0 } else { 1.0 };
+            let height = (placement.point(facet.corners[i]) - point).dot(own);
+            lifted += own * (f64::from(weights[i]) * if height > 0.0 { height } else { 0.0 });
+        }
+        (point + lifted).as_vec3()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::signed as random;
+    use crate::math::transform::Transform;
+    use crate::world::placement::Unmoved;
+
+    #[test]
+    fn a_mesh_that_is_not_moved_is_placed_as_by_the_map_that_changes_nothing() {
+        let mut next = random(17);
+        for _ in 0..10_000 {
+            // Zeros of both signs are common among walls.
+            let mut number = || {
+                let number = f64::from(next());
+                if number.abs() < 0.2 { 0.0 * number } else { number }
+            };
+            let at = DVec3::new(number(), number(), number());
+            let (map, here) = (&Transform::IDENTITY, Unmoved);
+            let bits = |numbers: DVec3| numbers.to_array().map(f64::to_bits);
+            assert_eq!(bits(Placement::point(map, at)), bits(here.point(at)));
+            assert_eq!(Placement::reach(map, at.abs()), here.reach(at.abs()));
+            assert_eq!(bits(Placement::normal(map, at)), bits(here.normal(at)));
+            assert_eq!(map.shift(), here.shift());
+        }
+    }
+}
