@@ -359,6 +359,9 @@ fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitRows, [u32; PACKET])
     (hits, object)
 }
 
+/// Least number of hits of a shape whose surfaces are computed side by side: each alone costs less, if there are fewer.
+const LEAST_TOGETHER: u32 = 4;
+
 impl TileContext<'_> {
     /// Puts the surfaces of hits that are not plain into the row; returns a bit for each that is there.
     #[inline(always)]
@@ -374,7 +377,10 @@ impl TileContext<'_> {
         while left != 0 {
             let (id, of_object) = first_alike(object, left, folds);
             left &= !of_object;
-            let Object::Mesh(mesh) = &self.world.geometry.objects()[id as usize] else { continue };
+            let thing = &self.world.geometry.objects()[id as usize];
+            if matches!(thing, Object::Shape(_)) && of_object.count_ones() < LEAST_TOGETHER {
+                continue;
+            }
             let materials = self.world.row_of_materials(id, of_object, &hits.primitive);
             let (mut of, mut waiting) = (0, of_object);
             while waiting != 0 {
@@ -382,10 +388,17 @@ impl TileContext<'_> {
                 waiting &= !alike;
                 of |= if self.is_held_by_rows(material as usize) { alike } else { 0 };
             }
-            if of != 0 {
-                mesh.fill_surfaces(surface, rows, hits, of, None, folds);
-                found |= of;
+            if of == 0 {
+                continue;
             }
+            let is_filled = match thing {
+                Object::Shape(shape) => surface.fill(shape, rows, hits, of),
+                Object::Mesh(mesh) => {
+                    mesh.fill_surfaces(surface, rows, hits, of, None, folds);
+                    true
+                }
+            };
+            found |= if is_filled { of } else { 0 };
         }
         found
     }
