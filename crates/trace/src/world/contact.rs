@@ -56,12 +56,12 @@ pub struct NearMemory {
 }
 
 /// Query for a contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Meeting {
+#[derive(Clone, Copy, Debug)]
+pub struct Meeting<'a> {
     /// The hit of one of the surfaces.
-    pub hit: Hit,
+    pub hit: &'a Hit,
     /// A point of that surface.
-    pub surface: SurfacePoint,
+    pub surface: &'a SurfacePoint,
     /// Its normal on the side from which a ray comes.
     pub normal: Vec3,
     /// Distance before it within which surfaces may have been missed: the rounding of the ray's t along the normal.
@@ -87,9 +87,9 @@ impl World {
     /// Finds the sides of all surfaces that touch at a point, and visits these in an order that depends on the scene
     /// alone.
     #[inline]
-    pub fn contact(&self, at: &Meeting, memory: &mut NearMemory, visit: impl FnMut(Near)) -> Sides {
+    pub fn contact(&self, at: &Meeting<'_>, memory: &mut NearMemory, visit: impl FnMut(Near)) -> Sides {
         let margin = self.geometry.margin(at);
-        let error = if self.geometry.is_isolated(&at.hit, &at.surface, margin) {
+        let error = if self.geometry.is_isolated(at.hit, at.surface, margin) {
             if self.is_far_side_away(at, margin) {
                 return self.contact_of_one_side(at, visit);
             }
@@ -101,22 +101,22 @@ impl World {
     }
 
     /// Whether a hit is that of a shape of glass whose other sides are far from the surfaces near the point.
-    fn is_far_side_away(&self, at: &Meeting, margin: Vec3) -> bool {
+    fn is_far_side_away(&self, at: &Meeting<'_>, margin: Vec3) -> bool {
         let far = 8.0 * f64::from(margin.max_element());
         let is_away = match &self.geometry.objects()[at.hit.object as usize] {
             Object::Shape(shape) => shape.is_far_side_beyond(at.surface.point.as_dvec3(), far),
             Object::Mesh(_) => false,
         };
-        is_away && self.is_glass(self.material_index(&at.hit) as u32)
+        is_away && self.is_glass(self.material_index(at.hit) as u32)
     }
 
     /// [`World::contact_of`] where [`World::is_far_side_away`], with nothing else near: the side from which the ray comes decides
     /// everything.
-    fn contact_of_one_side(&self, at: &Meeting, mut visit: impl FnMut(Near)) -> Sides {
-        let SurfacePoint { point, error, normal, .. } = at.surface;
+    fn contact_of_one_side(&self, at: &Meeting<'_>, mut visit: impl FnMut(Near)) -> Sides {
+        let SurfacePoint { point, error, normal, .. } = *at.surface;
         let object = at.hit.object;
         if normal.dot(at.normal) > 0.0 {
-            visit(Near::Around { object, material: self.material_index(&at.hit) as u32 });
+            visit(Near::Around { object, material: self.material_index(at.hit) as u32 });
         }
         Sides {
             before: offset_origin(point, error, at.normal, at.normal),
@@ -127,7 +127,7 @@ impl World {
     /// Finds the sides among the given candidates, whose points may be in error by at most `error`.
     pub(super) fn contact_of(
         &self,
-        at: &Meeting,
+        at: &Meeting<'_>,
         (memory, error): (&NearMemory, Vec3),
         mut visit: impl FnMut(Near),
     ) -> Sides {
@@ -241,13 +241,13 @@ impl Geometry {
     const REACH: f32 = 16.0;
 
     /// Distance along each axis within which surfaces that touch a point are searched.
-    pub(super) fn margin(&self, at: &Meeting) -> Vec3 {
+    pub(super) fn margin(&self, at: &Meeting<'_>) -> Vec3 {
         (at.surface.error * Self::REACH).max(Vec3::splat(self.mesh_rounding() + 2.0 * at.lead))
     }
 
     /// Collects the hit itself as the only candidate; returns a bound on each component's distance to it.
-    pub(super) fn only(&self, at: &Meeting, memory: &mut NearMemory) -> Vec3 {
-        let Hit { shape, object } = at.hit;
+    pub(super) fn only(&self, at: &Meeting<'_>, memory: &mut NearMemory) -> Vec3 {
+        let Hit { shape, object } = *at.hit;
         memory.objects.clear();
         memory.triangles.clear();
         match &self.objects()[object as usize] {
@@ -263,7 +263,7 @@ impl Geometry {
     }
 
     /// Collects the shapes and triangles of meshes that may touch a point; returns a bound on each component's distance to them.
-    pub(super) fn search(&self, at: &Meeting, memory: &mut NearMemory) -> Vec3 {
+    pub(super) fn search(&self, at: &Meeting<'_>, memory: &mut NearMemory) -> Vec3 {
         let NearMemory { objects, triangles } = memory;
         objects.clear();
         triangles.clear();

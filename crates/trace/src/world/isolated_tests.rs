@@ -250,7 +250,12 @@ fn what_is_isolated_is_what_a_search_finds_nothing_at() {
             let surface = world.geometry.asked_surface(&ray, &hit, Asked::ALL);
             let facing = surface.normal.dot(ray.direction);
             let normal = if facing > 0.0 { -surface.normal } else { surface.normal };
-            let at = Meeting { hit, surface, normal, lead: hit.shape.t * f32::EPSILON * facing.abs() };
+            let at = Meeting {
+                hit: &hit,
+                surface: &surface,
+                normal,
+                lead: hit.shape.t * f32::EPSILON * facing.abs(),
+            };
             let found = |only: bool| -> (Sides, Vec<Near>) {
                 let (mut memory, mut near) = (NearMemory::default(), Vec::new());
                 let error = if only {

@@ -48,8 +48,18 @@ impl TileContext<'_> {
         let CrossingMemory { around, near: found } = memory;
         found.clear();
         let lead = hit.shape.t * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
-        let meeting = Meeting { hit: *hit, surface: vertex.surface, normal: vertex.normal, lead };
+        let meeting = Meeting { hit, surface: &vertex.surface, normal: vertex.normal, lead };
         let sides = self.world.contact(&meeting, around, |near| found.push(near));
+        // Of closed shapes alone, most hits find at most the one that they enter.
+        let entered = match found[..] {
+            [] => Some(None),
+            [Near::Around { object, material }] => Some(Some(Inside { body: object, material })),
+            [Near::Surface { .. }] | [_, _, ..] => None,
+        };
+        if let Some(entered) = entered.filter(|_| !self.world.has_open_glass()) {
+            let far = self.beyond_closed(path.medium, entered);
+            return Crossing { sides, arrived: path.medium, near: path.medium, far, opaque: None };
+        }
         let [arrived, near, far] = self.media(path.medium, found);
         let opaque = found.iter().filter_map(|near| self.opaque(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
@@ -92,6 +102,20 @@ impl TileContext<'_> {
         // Enter those whose fronts are here, and those around the place.
         let far = crossed(true).chain(around).fold(far, Medium::entered);
         [arrived, near, far]
+    }
+
+    /// The last one of [`TileContext::media`] without open bodies, where nothing is near but perhaps a shape that is entered.
+    #[inline(always)]
+    fn beyond_closed(&self, known: Medium, entered: Option<Inside>) -> Medium {
+        let rest = match known.is_air() {
+            true => known,
+            false => known.retained(|glass| !self.world.is_closed(glass.body)),
+        };
+        match entered {
+            Some(glass) if rest.is_air() => Medium::only(glass),
+            Some(glass) => rest.entered(glass),
+            None => rest,
+        }
     }
 
     /// The surface that counts between two media, at a hit after [`TileContext::crossing`]. `None` if both are air.
