@@ -405,7 +405,7 @@ impl Wavefront<'_, '_> {
     }
 
     /// Shades a rough surface before a medium.
-    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, far: Medium) {
+    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, far: &Medium) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.tile.settings.render.ambient;
         let takes_ambient = ambient != Vec3::ZERO && self.accumulator.takes_ambient(path);
@@ -433,60 +433,60 @@ impl Wavefront<'_, '_> {
 
     /// Queues the vertices of a rough surface for direct light, with the medium behind it.
     #[inline(always)]
-    fn light_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: Medium) {
+    fn light_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: &Medium) {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
         let measure = self.measure_of(path);
-        let lit = ShadingVertex { path, place, vertex, shading, bsdf };
+        let lit = ShadingVertex { path, medium: &path.medium, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, measure, Lit::OneSide { is_dark: false });
         // Light that comes through has a vertex of its own; a share of the light that arrives is that of the viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| measure != Measure::ArrivingShare) {
-            let throughput = path.throughput * through_sheet(tile.world, path.medium, far);
-            let (path, vertex) = (&PathRay { medium: far, throughput, ..*path }, &vertex.behind());
-            let lit = ShadingVertex { path, place, vertex, shading, bsdf: &bsdf };
+            let throughput = path.throughput * through_sheet(tile.world, &path.medium, far);
+            let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.behind());
+            let lit = ShadingVertex { path, medium: far, place, vertex, shading, bsdf: &bsdf };
             self.direct.push(tile, &lit, measure, Lit::OneSide { is_dark: false });
         }
     }
 
     /// Queues the vertices of rough glass: one for each side, or if light samples find nothing on one of them, a single one.
-    fn shade_rough_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: GlassPoint, far: Medium) {
+    fn shade_rough_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: GlassPoint, far: &Medium) {
         if !self.accumulator.takes_reflected() {
             return;
         }
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
         let measure = self.measure_of(path);
-        let near = path.medium;
+        let near = &path.medium;
         let reflection = RoughBsdf::GlassReflection(rough);
         let transmission = RoughBsdf::GlassTransmission(rough);
         // The share of the light that arrives is that of the viewer's side, and counts what does not arrive.
         if measure == Measure::ArrivingShare {
-            let lit = ShadingVertex { path, place, vertex, shading, bsdf: &reflection };
+            let lit = ShadingVertex { path, medium: near, place, vertex, shading, bsdf: &reflection };
             return self.direct.push(tile, &lit, measure, Lit::OneSide { is_dark: false });
         }
         // Without shadows, lamps shine into any body.
         let has_shadows = tile.settings.render.shadows != Shadows::Off;
         let is_dark =
-            |medium: Medium| medium.glass().is_some_and(|inside| tile.world.is_dark_body(inside.body));
+            |medium: &Medium| medium.glass().is_some_and(|inside| tile.world.is_dark_body(inside.body));
         let dark = [near, far].map(|medium| has_shadows && is_dark(medium));
         // Photons land on both sides.
         let is_one = dark != [false; 2] && !tile.behaviour.gathers && vertex.beyond().is_some();
         let is_behind = is_one && dark == [true, false];
-        let sides = |vertex: &Vertex<'_>, is_dark: bool, medium: Medium| match vertex.beyond() {
+        let sides = |vertex: &Vertex<'_>, is_dark: bool, medium| match vertex.beyond() {
             Some(beyond) if is_one => Lit::TwoSides { is_dark, beyond, medium },
             Some(_) | None => Lit::OneSide { is_dark },
         };
         // Queue the viewer's side, unless the vertex of the other one stands for it.
         let behind = (!is_one || is_behind).then(|| (vertex.behind(), shading.behind()));
         if !is_behind {
-            let lit = ShadingVertex { path, place, vertex, shading, bsdf: &reflection };
+            let lit = ShadingVertex { path, medium: near, place, vertex, shading, bsdf: &reflection };
             self.direct.push(tile, &lit, measure, sides(vertex, dark[0], far));
         }
         // Queue the other side likewise.
         if let Some((vertex, shading)) = behind {
-            let path = &PathRay { medium: far, ..*path };
-            let lit = ShadingVertex { path, place, vertex: &vertex, shading, bsdf: &transmission };
+            let lit =
+                ShadingVertex { path, medium: far, place, vertex: &vertex, shading, bsdf: &transmission };
             self.direct.push(tile, &lit, measure, sides(&vertex, dark[1], near));
         }
     }
@@ -504,7 +504,7 @@ impl Wavefront<'_, '_> {
     }
 
     /// Splits a path at a smooth coat, or chooses between the coat and its base as often as the coat reflects.
-    fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, far: Medium) {
+    fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, far: &Medium) {
         let shading = vertex.shading(self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
@@ -528,7 +528,7 @@ impl Wavefront<'_, '_> {
         }
     }
 
-    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: Medium) {
+    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &Medium) {
         let shading = vertex.shading(self.counters);
         let Interface { reflectance, refracted } = interface(self.tile.world, path, vertex, &shading, far);
         let mirrored = |weight: f32| reflected(path, vertex, &shading, Vec3::splat(weight));

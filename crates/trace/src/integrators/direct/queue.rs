@@ -48,7 +48,7 @@ pub struct DirectLightQueue {
 
 /// Sides of a vertex. No light sample finds anything from one that is dark.
 #[derive(Clone, Copy)]
-pub enum Lit {
+pub enum Lit<'m> {
     /// Its light is that of one side.
     OneSide {
         /// Whether it is dark.
@@ -61,7 +61,7 @@ pub enum Lit {
         /// Origin of rays on the other side.
         beyond: Vec3,
         /// The glass around them.
-        medium: Medium,
+        medium: &'m Medium,
     },
 }
 
@@ -146,9 +146,15 @@ impl DirectLightQueue {
 
     /// Adds a vertex.
     #[inline(always)]
-    pub fn push(&mut self, tile: &TileContext<'_>, lit: &ShadingVertex<'_>, measure: Measure, sides: Lit) {
+    pub fn push(
+        &mut self,
+        tile: &TileContext<'_>,
+        lit: &ShadingVertex<'_>,
+        measure: Measure,
+        sides: Lit<'_>,
+    ) {
         self.note_cone(lit.place, lit.vertex.cone);
-        let medium = self.media.number(lit.path.medium);
+        let medium = self.media.number(lit.medium);
         let (row, lane) = match sides {
             Lit::OneSide { is_dark } => self.open_row(lit.bsdf.kind(), (is_dark, false)),
             Lit::TwoSides { is_dark, beyond, medium } => {

@@ -275,7 +275,7 @@ impl PhotonWavefront<'_> {
         kept.push(photon);
     }
 
-    fn shade_surface(&mut self, path: &PathRay, vertex: &Vertex<'_>, (far, lacks_photons): (Medium, bool)) {
+    fn shade_surface(&mut self, path: &PathRay, vertex: &Vertex<'_>, (far, lacks_photons): (&Medium, bool)) {
         match &vertex.material.bsdf {
             // Light samples find direct light.
             Bsdf::Rough(_) if lacks_photons => {}
@@ -299,7 +299,7 @@ impl PhotonWavefront<'_> {
         path: &PathRay,
         vertex: &Vertex<'_>,
         coated: &Coated,
-        (far, lacks_photons): (Medium, bool),
+        (far, lacks_photons): (&Medium, bool),
     ) {
         let shading = vertex.shading(&mut self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
@@ -323,7 +323,7 @@ impl PhotonWavefront<'_> {
         path: &PathRay,
         vertex: &Vertex<'_>,
         rough: &Rough,
-        (far, scattered): (Medium, Option<f32>),
+        (far, scattered): (&Medium, Option<f32>),
     ) {
         let mut bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
         vertex.tint(&mut bsdf);
@@ -338,7 +338,7 @@ impl PhotonWavefront<'_> {
         path: &PathRay,
         vertex: &Vertex<'_>,
         bsdf: RoughBsdf,
-        (far, scattered): (Medium, Option<f32>),
+        (far, scattered): (&Medium, Option<f32>),
     ) {
         let tile = self.tracing.tile;
         // Store the photon; it stands for those that passed the surface as if it were not there.
@@ -351,24 +351,24 @@ impl PhotonWavefront<'_> {
         // Let it wait for being scattered.
         let shading = vertex.shading(&mut self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
-        let medium = self.media.number(path.medium);
+        let medium = self.media.number(&path.medium);
         if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
             self.scatter_open();
             self.open.bsdf.prepare(bsdf.kind());
         }
         let i = self.open.used.trailing_ones() as usize;
-        let lit = ShadingVertex { path, place: 0, vertex, shading, bsdf: &bsdf };
+        let lit = ShadingVertex { path, medium: &path.medium, place: 0, vertex, shading, bsdf: &bsdf };
         self.open.put(i, tile, &lit, Measure::ALL, medium);
         let counts = self.open.landed(i, vertex.to_eye) * by_chance;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
         // It may go on behind the surface, where another medium changes its basic flux.
         let Some((bsdf, shading)) = behind else { return };
         let part = if vertex.material.bsdf.glass().is_some() {
-            let eta = ior(tile.world, far) / ior(tile.world, path.medium);
+            let eta = ior(tile.world, far) / ior(tile.world, &path.medium);
             1.0 / (eta * eta)
         } else {
             // To the viewer's path, this is the way from the other side.
-            through_sheet(tile.world, far, path.medium)
+            through_sheet(tile.world, far, &path.medium)
         };
         let medium = self.media.number(far);
         if self.open_behind.used == ALL || self.open_behind.bsdf.kind() != bsdf.kind() {
@@ -376,12 +376,13 @@ impl PhotonWavefront<'_> {
             self.open_behind.bsdf.prepare(bsdf.kind());
         }
         let i = self.open_behind.used.trailing_ones() as usize;
-        let lit = ShadingVertex { path, place: 0, vertex: &vertex.behind(), shading, bsdf: &bsdf };
+        let lit =
+            ShadingVertex { path, medium: far, place: 0, vertex: &vertex.behind(), shading, bsdf: &bsdf };
         self.open_behind.put(i, tile, &lit, Measure::ALL, medium);
         set_lane(&mut self.open_behind.throughput, i, path.throughput * (counts * part));
     }
 
-    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: Medium) {
+    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &Medium) {
         if !self.goes_on() {
             return;
         }
@@ -390,7 +391,7 @@ impl PhotonWavefront<'_> {
         let Interface { reflectance, refracted } = interface(tile.world, path, vertex, &shading, far);
         match refracted {
             Some(mut ray) if !tile.chooses_reflection(path, reflectance) => {
-                let eta = ior(tile.world, far) / ior(tile.world, path.medium);
+                let eta = ior(tile.world, far) / ior(tile.world, &path.medium);
                 ray.throughput *= 1.0 / (eta * eta);
                 self.push(path, vertex, (shading.normal, eta), ray);
             }
@@ -479,7 +480,7 @@ impl PhotonWavefront<'_> {
 
 /// The largest component of the flux of a photon, in W: a medium of higher index changes the basic flux, but not this.
 fn flux(world: &World, path: &PathRay) -> f32 {
-    let index = ior(world, path.medium);
+    let index = ior(world, &path.medium);
     path.throughput.max_element() * index * index
 }
 

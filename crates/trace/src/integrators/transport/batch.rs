@@ -205,7 +205,7 @@ impl VertexBatch {
         measure: Measure,
         medium: u32,
     ) {
-        let ShadingVertex { path, place, vertex, shading, bsdf } = lit;
+        let ShadingVertex { path, place, vertex, shading, bsdf, .. } = lit;
         // Set the origin of light samples.
         let shadow_origin = vertex.shadow_origin(tile, path.state.only_specular_before);
         set_lane(&mut self.from, i, shadow_origin.point);

@@ -10,10 +10,8 @@ use crate::world::{Hit, Meeting, Near, NearMemory, Sides};
 pub struct Crossing {
     /// Starts of the rays that leave.
     pub sides: Sides,
-    /// The glass that the ray came through.
-    pub arrived: Medium,
-    /// The glass on the side that the ray comes from.
-    pub near: Medium,
+    /// The glass that the ray came through, and the glass on the side that it comes from. `None` if both are as the ray knows.
+    pub before: Option<[Medium; 2]>,
     /// The glass on the other side.
     pub far: Medium,
     /// An opaque surface there, as the ray between the sides hits it.
@@ -57,13 +55,13 @@ impl TileContext<'_> {
             [Near::Surface { .. }] | [_, _, ..] => None,
         };
         if let Some(entered) = entered.filter(|_| !self.world.has_open_glass()) {
-            let far = self.beyond_closed(path.medium, entered);
-            return Crossing { sides, arrived: path.medium, near: path.medium, far, opaque: None };
+            let far = self.beyond_closed(&path.medium, entered);
+            return Crossing { sides, before: None, far, opaque: None };
         }
         let [arrived, near, far] = self.media(path.medium, found);
         let opaque = found.iter().filter_map(|near| self.opaque(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
-        Crossing { sides, arrived, near, far, opaque }
+        Crossing { sides, before: Some([arrived, near]), far, opaque }
     }
 
     /// The media before and beyond the near surfaces. The ray's own record gives the medium before; for closed shapes, their
@@ -106,9 +104,9 @@ impl TileContext<'_> {
 
     /// The last one of [`TileContext::media`] without open bodies, where nothing is near but perhaps a shape that is entered.
     #[inline(always)]
-    fn beyond_closed(&self, known: Medium, entered: Option<Inside>) -> Medium {
+    fn beyond_closed(&self, known: &Medium, entered: Option<Inside>) -> Medium {
         let rest = match known.is_air() {
-            true => known,
+            true => Medium::default(),
             false => known.retained(|glass| !self.world.is_closed(glass.body)),
         };
         match entered {
@@ -119,7 +117,12 @@ impl TileContext<'_> {
     }
 
     /// The surface that counts between two media, at a hit after [`TileContext::crossing`]. `None` if both are air.
-    pub fn boundary(&self, hit: &Hit, [near, far]: [Medium; 2], memory: &CrossingMemory) -> Option<Boundary> {
+    pub fn boundary(
+        &self,
+        hit: &Hit,
+        [near, far]: [&Medium; 2],
+        memory: &CrossingMemory,
+    ) -> Option<Boundary> {
         let later = near.glass().max(far.glass())?;
         let own = self.world.material_index(hit) as u32;
         if self.world.body(hit.object) == later.body && self.world.is_glass(own) {

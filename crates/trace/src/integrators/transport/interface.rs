@@ -38,7 +38,7 @@ pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflect
 /// The part of basic radiance that comes through a sheet without thickness from another medium. Light that enters the denser medium
 /// spreads over fewer directions, or it would gain energy; the way back is as bright as without a change (Veach, *Robust Monte Carlo
 /// Methods for Light Transport Simulation*, 1997, section 5.2).
-pub fn through_sheet(world: &World, near: Medium, far: Medium) -> f32 {
+pub fn through_sheet(world: &World, near: &Medium, far: &Medium) -> f32 {
     let eta = ior(world, far) / ior(world, near);
     (eta * eta).min(1.0)
 }
@@ -57,15 +57,15 @@ pub fn interface(
     path: &PathRay,
     vertex: &Vertex<'_>,
     shading: &Shading,
-    far: Medium,
+    far: &Medium,
 ) -> Interface {
-    let eta = ior(world, far) / ior(world, path.medium);
+    let eta = ior(world, far) / ior(world, &path.medium);
     let (reflectance, direction) = boundary(vertex, shading, path.ray.direction, eta);
     // Rays carry basic radiance, L/n², which refraction does not change.
     let refracted = direction.map(|direction| PathRay {
         ray: vertex.leaving(direction),
         path: path.next_path(REFRACTED),
-        medium: far,
+        medium: *far,
         state: path.state.mirrored(1.0),
         cone: vertex.bent_cone(Bend::Refracted(eta)),
         ..*path

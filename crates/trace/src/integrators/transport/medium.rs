@@ -99,11 +99,11 @@ impl Media {
     }
 
     /// The number of a medium, which it keeps.
-    pub fn number(&mut self, medium: Medium) -> u32 {
+    pub fn number(&mut self, medium: &Medium) -> u32 {
         if medium.is_air() {
             return 0;
         }
-        self.inside.push(medium);
+        self.inside.push(*medium);
         self.inside.len() as u32
     }
 
@@ -122,7 +122,7 @@ pub fn absorption(world: &World, medium: &Medium, distance: f32) -> Vec3 {
 }
 
 /// Index of refraction of a ray's medium.
-pub fn ior(world: &World, medium: Medium) -> f32 {
+pub fn ior(world: &World, medium: &Medium) -> f32 {
     medium.glass().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
 }
 

@@ -359,9 +359,6 @@ fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitRows, [u32; PACKET])
     (hits, object)
 }
 
-/// Least number of hits of a shape whose surfaces are computed side by side: each alone costs less, if there are fewer.
-const LEAST_TOGETHER: u32 = 4;
-
 impl TileContext<'_> {
     /// Puts the surfaces of hits that are not plain into the row; returns a bit for each that is there.
     #[inline(always)]
@@ -378,7 +375,8 @@ impl TileContext<'_> {
             let (id, of_object) = first_alike(object, left, folds);
             left &= !of_object;
             let thing = &self.world.geometry.objects()[id as usize];
-            if matches!(thing, Object::Shape(_)) && of_object.count_ones() < LEAST_TOGETHER {
+            // A hit by itself costs less alone.
+            if matches!(thing, Object::Shape(_)) && of_object.is_power_of_two() {
                 continue;
             }
             let materials = self.world.row_of_materials(id, of_object, &hits.primitive);

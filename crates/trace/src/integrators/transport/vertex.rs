@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use super::cone::{Bend, Cone};
+use super::medium::Medium;
 use super::ray::PathRay;
 use super::tile::TileContext;
 use crate::geometry::ray::offset_origin;
@@ -321,6 +322,8 @@ pub struct Shading {
 pub struct ShadingVertex<'a> {
     /// The path that came here.
     pub path: &'a PathRay,
+    /// The glass around the side that is lit.
+    pub medium: &'a Medium,
     /// Its place in the round's queue.
     pub place: u32,
     /// The vertex.

@@ -23,9 +23,9 @@ pub const MOST_HIDDEN: usize = 64;
 /// Surface at which a walk ends.
 pub enum Reached<'v, 'a> {
     /// An opaque surface, and the medium beyond it.
-    Opaque(&'v Vertex<'a>, OpaqueHit, Medium),
+    Opaque(&'v Vertex<'a>, OpaqueHit, &'v Medium),
     /// A change of glass at a hit.
-    Glass(&'v Vertex<'a>, Hit, Change),
+    Glass(&'v Vertex<'a>, Hit, Change<'v>),
     /// None: the ray leaves the scene.
     Nothing,
     /// One more surface within glass, after [`MOST_HIDDEN`] of them.
@@ -34,9 +34,9 @@ pub enum Reached<'v, 'a> {
 
 /// Change of glass at a surface.
 #[derive(Clone, Copy)]
-pub struct Change {
+pub struct Change<'v> {
     /// The medium beyond it.
-    pub far: Medium,
+    pub far: &'v Medium,
     /// The rough surface there. `None` if it is smooth.
     pub rough: Option<GlassPoint>,
 }
@@ -163,39 +163,44 @@ pub fn walk<'a, W: Walker<'a>>(
             let mut far = path.medium;
             if vertex.material.bsdf.lets_through() && tile.world.has_glass() {
                 // Light may come out of glass that touches it.
-                let Crossing { sides, near, far: beyond, .. } =
-                    tile.crossing(path, &vertex, &hit, walker.crossing());
-                (path.medium, far) = (near, beyond);
-                vertex.start_between(sides);
+                let crossing = tile.crossing(path, &vertex, &hit, walker.crossing());
+                if let Some([_, near]) = crossing.before {
+                    path.medium = near;
+                }
+                far = crossing.far;
+                vertex.start_between(crossing.sides);
             }
             let hit = way.straighten(path, hit);
-            return walker.reach(path, Reached::Opaque(&vertex, OpaqueHit::Own(hit), far), has_passed);
+            return walker.reach(path, Reached::Opaque(&vertex, OpaqueHit::Own(hit), &far), has_passed);
         }
         // At glass, find all surfaces that touch here.
-        let Crossing { sides, arrived, near, far, opaque } =
-            tile.crossing(path, &vertex, &hit, walker.crossing());
-        path.throughput *= absorption(tile.world, &arrived, hit.shape.t);
-        path.medium = near;
+        let Crossing { sides, before, far, opaque } = tile.crossing(path, &vertex, &hit, walker.crossing());
+        let arrived = before.as_ref().map_or(&path.medium, |[arrived, _]| arrived);
+        path.throughput *= absorption(tile.world, arrived, hit.shape.t);
+        if let Some([_, near]) = before {
+            path.medium = near;
+        }
         if let Some(touching) = opaque {
             let vertex = Vertex::touching(tile, path, (sides, &touching), hit.shape.t);
             if !vertex.material.lets_pass() || is_touched(walker, path, &vertex) {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.straighten(path, touched);
-                let reached = Reached::Opaque(&vertex, OpaqueHit::Touching(touched), far);
+                let reached = Reached::Opaque(&vertex, OpaqueHit::Touching(touched), &far);
                 return walker.reach(path, reached, has_passed);
             }
             path.path = path.next_path(STRAIGHT);
         }
         // Stop at a change of glass, if both sides refract differently.
-        if near.glass() != far.glass() && ior(tile.world, near) != ior(tile.world, far) {
+        let near = &path.medium;
+        if near.glass() != far.glass() && ior(tile.world, near) != ior(tile.world, &far) {
             vertex.start_between(sides);
             let rough = if tile.world.has_rough_glass() {
-                rough(walker, path, (&vertex, &hit), (sides, far))
+                rough(walker, path, (&vertex, &hit), (sides, &far))
             } else {
                 None
             };
             let hit = way.straighten(path, hit);
-            return walker.reach(path, Reached::Glass(&vertex, hit, Change { far, rough }), has_passed);
+            return walker.reach(path, Reached::Glass(&vertex, hit, Change { far: &far, rough }), has_passed);
         }
         // Pass on, as nothing changes here.
         (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
@@ -219,11 +224,12 @@ fn rough<'a, W: Walker<'a>>(
     walker: &mut W,
     path: &PathRay,
     (vertex, hit): (&Vertex<'a>, &Hit),
-    (sides, far): (Sides, Medium),
+    (sides, far): (Sides, &Medium),
 ) -> Option<GlassPoint> {
     let tile = walker.tile();
-    let indices = [path.medium, far].map(|medium| ior(tile.world, medium));
-    let boundary = tile.boundary(hit, [path.medium, far], walker.crossing())?;
+    let media = [&path.medium, far];
+    let indices = media.map(|medium| ior(tile.world, medium));
+    let boundary = tile.boundary(hit, media, walker.crossing())?;
     let glass = tile.world.materials[boundary.material as usize].bsdf.glass()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
     let touching = touching.map(|other| Vertex::touching(tile, path, (sides, &other), hit.shape.t));
