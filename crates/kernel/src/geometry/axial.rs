@@ -44,6 +44,12 @@ impl AxialFrame {
         self.axes.transpose() * (point - self.origin)
     }
 
+    /// Height of a point of the world along the axis: the last of its coordinates.
+    #[inline(always)]
+    pub fn height(&self, point: DVec3) -> f64 {
+        self.axes.z_axis.dot(point - self.origin)
+    }
+
     /// Line of a ray, from its point nearest to the origin.
     #[inline(always)]
     pub fn line(&self, ray: &RayF64) -> Line {

@@ -6,6 +6,7 @@ use super::axial::{
     self, AxialFrame, Line, Stretch, across, at_turn, exact_t, is_rounding, radial, ring_shown, turn,
 };
 use super::disk::{BORDER, Disk};
+use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -22,6 +23,18 @@ pub struct Cone {
     /// Length of the side from the tip to the base's border.
     slant: f64,
     capped: bool,
+}
+
+impl Exact for Cone {
+    #[inline(always)]
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+        let point = ray.at(exact_t(hit, self.nearest(ray)));
+        if hit.primitive > 0 {
+            return self.base().exact_near(point, self.reach());
+        }
+        let local = self.frame.local(point);
+        self.exact_side(radial(local.truncate()), self.along(local))
+    }
 }
 
 impl Cone {
@@ -94,14 +107,24 @@ impl Cone {
         let out = radial(local.truncate());
         let (down, along) = self.along(local);
         let around = out.perp() * (-TAU * down.x * along);
+        let ExactPoint { point, normal, reach } = self.exact_side(out, (down, along));
         SurfacePoint::exact(
-            self.frame.point((out * (down.x * along)).extend(down.y * along)),
-            self.frame.vector((out * down.y).extend(-down.x)),
+            point,
+            normal,
             Vec2::new(turn(mirrored(out)) as f32, (1.0 - along / self.slant) as f32),
             self.frame.vector(around.extend(0.0)),
             self.frame.vector((out * -self.radius).extend(-self.height)),
-            self.reach(),
+            reach,
         )
+    }
+
+    /// The side in a direction from the axis, by [`Cone::along`].
+    fn exact_side(&self, out: DVec2, (down, along): (DVec2, f64)) -> ExactPoint {
+        ExactPoint {
+            point: self.frame.point((out * (down.x * along)).extend(down.y * along)),
+            normal: self.frame.vector((out * down.y).extend(-down.x)),
+            reach: self.reach(),
+        }
     }
 
     /// Unit vector from the tip down the side, as (outwards, along the axis), and the distance of a point down the

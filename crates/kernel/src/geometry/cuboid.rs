@@ -97,11 +97,6 @@ impl Cuboid {
         SurfacePoint::exact(point, outwards, uv, self.axes * (u * width), self.axes * (v * height), reach)
     }
 
-    /// [`Cuboid::surface`] without texture coordinates and tangents.
-    pub fn bare_surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        self.exact(ray, hit).bare()
-    }
-
     /// Texture coordinates of a point of the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         let local = self.axes.transpose() * (point - self.center);

@@ -6,6 +6,7 @@ use super::axial::{
     self, AxialFrame, Line, Stretch, across, at_turn, exact_t, is_rounding, radial, ring_shown, turn,
 };
 use super::disk::{BORDER, Disk};
+use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -21,6 +22,18 @@ pub struct Cylinder {
     half_length: f64,
     radius: f64,
     capped: bool,
+}
+
+impl Exact for Cylinder {
+    #[inline(always)]
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+        let point = ray.at(exact_t(hit, self.nearest(ray)));
+        if hit.primitive > 0 {
+            return self.cap(hit.primitive).exact_near(point, self.reach());
+        }
+        let (out, z) = self.chart(point);
+        self.exact_side(out, z)
+    }
 }
 
 impl Cylinder {
@@ -78,18 +91,31 @@ impl Cylinder {
         if hit.primitive > 0 {
             return self.cap(hit.primitive).surface_near(point, self.reach());
         }
-        let local = self.frame.local(point);
-        let out = radial(local.truncate());
-        let z = local.z.clamp(-self.half_length, self.half_length);
-        let v = self.height(z);
+        let (out, z) = self.chart(point);
+        let ExactPoint { point, normal, reach } = self.exact_side(out, z);
         SurfacePoint::exact(
-            self.frame.point((out * self.radius).extend(z)),
-            self.frame.vector(out.extend(0.0)),
-            Vec2::new(turn(out) as f32, v as f32),
+            point,
+            normal,
+            Vec2::new(turn(out) as f32, self.height(z) as f32),
             self.frame.vector((out.perp() * (TAU * self.radius)).extend(0.0)),
             self.frame.vector(DVec3::Z * (2.0 * self.half_length)),
-            self.reach(),
+            reach,
         )
+    }
+
+    /// Direction from the axis, and height, of the point of the side nearest to a point.
+    fn chart(&self, point: DVec3) -> (DVec2, f64) {
+        let local = self.frame.local(point);
+        (radial(local.truncate()), local.z.clamp(-self.half_length, self.half_length))
+    }
+
+    /// The side in a direction from the axis at a height.
+    fn exact_side(&self, out: DVec2, z: f64) -> ExactPoint {
+        ExactPoint {
+            point: self.frame.point((out * self.radius).extend(z)),
+            normal: self.frame.vector(out.extend(0.0)),
+            reach: self.reach(),
+        }
     }
 
     /// v of a point of the side.
@@ -178,8 +204,9 @@ impl Cylinder {
 
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
-        let p = self.frame.local(point);
-        p.z.abs() < self.half_length && p.truncate().length() < self.radius
+        // Most points tell it by their height.
+        self.frame.height(point).abs() < self.half_length
+            && self.frame.local(point).truncate().length() < self.radius
     }
 
     /// The box around it.

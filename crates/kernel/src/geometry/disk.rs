@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use super::axial::{AxialFrame, exact_t, hit};
 use super::local_form::{Extent, Ground, LocalForm};
 use super::rows::{Ends, HitRows, RayRows, accept};
+use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
@@ -19,6 +20,13 @@ pub const BORDER: f64 = 1e-14;
 pub struct Disk {
     frame: AxialFrame,
     radius: f64,
+}
+
+impl Exact for Disk {
+    #[inline(always)]
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+        self.exact_near(ray.at(exact_t(hit, self.nearest(ray))), self.reach())
+    }
 }
 
 impl Disk {
@@ -56,21 +64,25 @@ impl Disk {
     /// The surface at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let t = exact_t(hit, self.nearest(ray));
-        self.surface_near(ray.at(t), self.frame.origin.abs().max_element() + self.radius)
+        self.surface_near(ray.at(t), self.reach())
     }
 
     /// The surface nearest to a point, which was computed from lengths up to `reach`.
     pub fn surface_near(&self, point: DVec3, reach: f64) -> SurfacePoint {
-        let (p, uv) = self.chart(point);
+        let ExactPoint { point: near, normal, .. } = self.exact_near(point, reach);
         let edge = 2.0 * self.radius;
-        SurfacePoint::exact(
-            self.frame.point(p.extend(0.0)),
-            self.normal(),
-            uv.as_vec2(),
-            self.frame.vector(DVec3::X * edge),
-            self.frame.vector(DVec3::Y * edge),
-            reach,
-        )
+        let [across, up] = [DVec3::X, DVec3::Y].map(|axis| self.frame.vector(axis * edge));
+        SurfacePoint::exact(near, normal, self.uv_at(point).as_vec2(), across, up, reach)
+    }
+
+    /// The point of it nearest to a point, which was computed from lengths up to `reach`.
+    pub fn exact_near(&self, point: DVec3, reach: f64) -> ExactPoint {
+        let (p, _) = self.chart(point);
+        ExactPoint { point: self.frame.point(p.extend(0.0)), normal: self.normal(), reach }
+    }
+
+    fn reach(&self) -> f64 {
+        self.frame.origin.abs().max_element() + self.radius
     }
 
     /// A point in the plane of the disk's frame, and its texture coordinates.

@@ -40,7 +40,7 @@ use parallelogram::Parallelogram;
 use plane::Plane;
 use rows::{Ends, HitRows, RayRows};
 use sphere::Sphere;
-use surface_rows::SurfaceRow;
+use surface_rows::{Exact as _, SurfaceRow};
 use torus::Torus;
 use triangle::Triangle;
 
@@ -162,11 +162,7 @@ impl Shape {
     /// The requested parts of the surface at a hit.
     #[inline]
     pub fn asked_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
-        match self {
-            Self::Sphere(sphere) if !asked.uv => sphere.bare_surface(ray, hit),
-            Self::Box(cuboid) if !asked.uv => cuboid.bare_surface(ray, hit),
-            shape => shape.surface(ray, hit),
-        }
+        if asked.uv { self.surface(ray, hit) } else { of_any!(self, it => it.exact(ray, hit)).bare() }
     }
 
     /// The box around it. `None` if the shape is infinite.

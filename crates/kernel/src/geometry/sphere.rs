@@ -79,11 +79,6 @@ impl Sphere {
         SurfacePoint::exact(point, normal, uv, dpdu * self.radius, dpdv * self.radius, reach)
     }
 
-    /// [`Sphere::surface`] without texture coordinates.
-    pub fn bare_surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        self.exact(ray, hit).bare()
-    }
-
     /// Texture coordinates of a point of the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         sphere_parametrisation((point - self.center).normalize_or(DVec3::Y)).0.as_dvec2()

@@ -42,7 +42,7 @@ impl ExactPoint {
     }
 }
 
-/// A shape whose surface is computed without branches.
+/// A shape whose surface is computed in double precision.
 pub trait Exact {
     /// The surface at a hit.
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint;

@@ -6,6 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::axial::{self, AxialFrame, Line, at_turn, exact_t, radial, turn};
 use super::surface::SurfacePoint;
+use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitLine;
@@ -22,6 +23,14 @@ pub struct Torus {
     frame: AxialFrame,
     radius: f64,
     tube: f64,
+}
+
+impl Exact for Torus {
+    #[inline(always)]
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
+        let (out, from_circle) = self.chart(ray.at(exact_t(hit, self.nearest(ray))));
+        self.exact_at(out, from_circle)
+    }
 }
 
 impl Torus {
@@ -96,14 +105,26 @@ impl Torus {
     fn surface_at(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;
+        let ExactPoint { point, normal, reach } = self.exact_at(out, from_circle);
         SurfacePoint::exact(
-            self.frame.point((out * ring).extend(self.tube * up)),
-            self.frame.vector((out * across).extend(up)),
+            point,
+            normal,
             Vec2::new(turn(out) as f32, turn(from_circle) as f32),
             self.frame.vector((out.perp() * (TAU * ring)).extend(0.0)),
             self.frame.vector((out * -up).extend(across) * (TAU * self.tube)),
-            self.reach(),
+            reach,
         )
+    }
+
+    /// [`Torus::surface_at`] without texture coordinates and tangents.
+    fn exact_at(&self, out: DVec2, from_circle: DVec2) -> ExactPoint {
+        let (across, up) = (from_circle.x, from_circle.y);
+        let ring = self.radius + self.tube * across;
+        ExactPoint {
+            point: self.frame.point((out * ring).extend(self.tube * up)),
+            normal: self.frame.vector((out * across).extend(up)),
+            reach: self.reach(),
+        }
     }
 
     /// Point and unit normal at texture coordinates.
