@@ -117,6 +117,11 @@ impl Stretch {
         Some(Self { enter, leave })
     }
 
+    /// Both ends.
+    pub fn ends(&self) -> [f64; 2] {
+        [self.enter.0, self.leave.0]
+    }
+
     fn holds(&self, along: f64) -> bool {
         self.enter.0 <= along && along <= self.leave.0
     }
@@ -198,6 +203,12 @@ pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
         Some((t, part)) if t as f32 == hit.t && part == hit.primitive => t,
         _ => f64::from(hit.t),
     }
+}
+
+/// [`exact_t`] from the crossings of the line with the part that is hit, counted from the line's foot.
+pub fn exact_among(hit: &ShapeHit, line: &Line, crossings: Option<[f64; 2]>) -> f64 {
+    let all = crossings.into_iter().flatten().map(|along| line.start + along);
+    all.into_iter().find(|&t| t as f32 == hit.t).unwrap_or(f64::from(hit.t))
 }
 
 /// Unit vector towards a point in the plane; x for the origin.

@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::axial::{
-    self, AxialFrame, Line, Stretch, across, at_turn, exact_t, is_rounding, radial, ring_shown, turn,
+    self, AxialFrame, Line, Stretch, across, at_turn, exact_among, is_rounding, radial, ring_shown, turn,
 };
 use super::disk::{BORDER, Disk};
 use super::surface_rows::{Exact, ExactPoint};
@@ -28,7 +28,7 @@ pub struct Cone {
 impl Exact for Cone {
     #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
-        let point = ray.at(exact_t(hit, self.nearest(ray)));
+        let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
             return self.base().exact_near(point, self.reach());
         }
@@ -97,9 +97,19 @@ impl Cone {
         })
     }
 
+    /// The point of a hit, with all its digits.
+    fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+        let line = self.frame.line(ray);
+        let crossings = match hit.primitive {
+            0 => self.side_stretch(&line),
+            cap => Stretch::between(&line, (self.height, cap), (self.height, cap)),
+        };
+        ray.at(exact_among(hit, &line, crossings.map(|ends| ends.ends())))
+    }
+
     /// The surface at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let point = ray.at(exact_t(hit, self.nearest(ray)));
+        let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
             return self.base().surface_near(point, self.reach());
         }

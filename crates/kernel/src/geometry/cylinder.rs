@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::axial::{
-    self, AxialFrame, Line, Stretch, across, at_turn, exact_t, is_rounding, radial, ring_shown, turn,
+    self, AxialFrame, Line, Stretch, across, at_turn, exact_among, is_rounding, radial, ring_shown, turn,
 };
 use super::disk::{BORDER, Disk};
 use super::surface_rows::{Exact, ExactPoint};
@@ -27,7 +27,7 @@ pub struct Cylinder {
 impl Exact for Cylinder {
     #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
-        let point = ray.at(exact_t(hit, self.nearest(ray)));
+        let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
             return self.cap(hit.primitive).exact_near(point, self.reach());
         }
@@ -85,9 +85,20 @@ impl Cylinder {
         Some(Stretch::of_side(t0.min(t1), t0.max(t1)))
     }
 
+    /// The point of a hit, with all its digits.
+    fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+        let line = self.frame.line(ray);
+        let height = if hit.primitive == 1 { -self.half_length } else { self.half_length };
+        let crossings = match hit.primitive {
+            0 => self.side_stretch(&line),
+            cap => Stretch::between(&line, (height, cap), (height, cap)),
+        };
+        ray.at(exact_among(hit, &line, crossings.map(|ends| ends.ends())))
+    }
+
     /// The surface at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        let point = ray.at(exact_t(hit, self.nearest(ray)));
+        let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
             return self.cap(hit.primitive).surface_near(point, self.reach());
         }

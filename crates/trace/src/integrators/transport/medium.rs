@@ -52,10 +52,13 @@ impl Medium {
             self.inside.rotate_left(1);
             self.count -= 1;
         }
-        let place = self.known().partition_point(|own| *own <= glass);
-        self.inside[self.count as usize] = glass;
+        let mut place = self.count as usize;
+        while place > 0 && self.inside[place - 1] > glass {
+            self.inside[place] = self.inside[place - 1];
+            place -= 1;
+        }
+        self.inside[place] = glass;
         self.count += 1;
-        self.inside[place..self.count as usize].rotate_right(1);
         self
     }
 
@@ -76,7 +79,14 @@ impl Medium {
 
     /// The medium with only the glasses for which `holds` is true.
     pub fn retained(self, holds: impl Fn(Inside) -> bool) -> Self {
-        self.known().iter().copied().filter(|&glass| holds(glass)).fold(Self::default(), Self::entered)
+        let mut left = Self::default();
+        for &glass in self.known() {
+            if holds(glass) {
+                left.inside[left.count as usize] = glass;
+                left.count += 1;
+            }
+        }
+        left
     }
 }
 
