@@ -392,6 +392,22 @@ mod tests {
     }
 
     #[test]
+    fn surfaces_without_coordinates_are_those_with_them() {
+        for shape in shapes() {
+            for (ray, hit) in hits(&shape).take(1000) {
+                let [bare, full] =
+                    [false, true].map(|uv| shape.asked_surface(&ray, &hit, Asked { uv, shadow_point: true }));
+                let parts =
+                    |of: &SurfacePoint| [of.point, of.error, of.normal, of.shadow_point, of.shading_normal];
+                assert_eq!(parts(&bare), parts(&full), "{shape:?} {ray:?}");
+                let at = ray.at(f64::from(hit.t));
+                let off = (bare.point.as_dvec3() - at).abs().max_element();
+                assert!(off < 1e-5 * (1.0 + at.length()), "{shape:?}: {off}");
+            }
+        }
+    }
+
+    #[test]
     fn what_a_shape_shows_is_the_integral_of_the_cosines() {
         for shape in shapes().into_iter().filter(|shape| !shape.areas().is_empty()) {
             let directions = [DVec3::X, DVec3::NEG_Y, DVec3::new(-0.3, 0.5, 0.8).normalize()];

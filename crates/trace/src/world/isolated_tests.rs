@@ -266,7 +266,7 @@ fn what_is_isolated_is_what_a_search_finds_nothing_at() {
                 (world.contact_of(&at, (&memory, error), |one| near.push(one)), near)
             };
             let searched = found(false);
-            let is_isolated = world.geometry.is_isolated(&hit, &at.surface, world.geometry.margin(&at));
+            let is_isolated = world.geometry.is_isolated(&hit, at.surface, world.geometry.margin(&at));
             if is_isolated {
                 assert_eq!(found(true), searched, "scene {number}, ray {round}: {ray:?}, {hit:?}");
             }

@@ -166,9 +166,17 @@ impl MeshInstance {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::assets::LoadedMesh;
+    use crate::control::CancelToken;
+    use crate::geometry::mesh::TriangleMesh;
+    use crate::geometry::{Asked, Ray, ShapeHit};
     use crate::math::random::signed as random;
     use crate::math::transform::Transform;
+    use crate::scene::description::Accel;
+    use crate::world::MeshTree;
     use crate::world::placement::Unmoved;
 
     #[test]
@@ -187,6 +195,34 @@ mod tests {
             assert_eq!(Placement::reach(map, at.abs()), here.reach(at.abs()));
             assert_eq!(bits(Placement::normal(map, at)), bits(here.normal(at)));
             assert_eq!(map.shift(), here.shift());
+        }
+    }
+
+    #[test]
+    fn points_of_a_moved_mesh_are_between_its_corners() {
+        let mut next = random(23);
+        let mut vector = || DVec3::from_array(std::array::from_fn(|_| f64::from(next())));
+        let mesh = TriangleMesh {
+            positions: (0..30).map(|_| vector().as_vec3()).collect(),
+            triangles: (0..10).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+            ..TriangleMesh::default()
+        };
+        let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+        let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+        let tree = Arc::new(tree);
+        for _ in 0..20 {
+            let transform = Transform::scale_rotate_translate(vector(), vector() * 180.0, vector());
+            let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
+            for primitive in 0..10 {
+                let hit = ShapeHit { primitive, u: 0.5, v: 0.25, t: 1.0 };
+                let surface = mesh.surface(&Ray::new(Vec3::ZERO, Vec3::Z).to_f64(), &hit, Asked::ALL);
+                let [a, b, c] = mesh.tree.loaded().mesh.corners(primitive);
+                let [a, b, c] = [a, b, c].map(|corner| transform.point(corner.as_dvec3()));
+                let off = surface.point.as_dvec3() - (a * 0.25 + b * 0.5 + c * 0.25);
+                assert!(off.abs().cmple(surface.error.as_dvec3()).all(), "{off} {}", surface.error);
+                let across = (b - a).cross(c - a).normalize() * transform.linear.determinant().signum();
+                assert!((surface.normal.as_dvec3() - across).length() < 1e-6, "{across}");
+            }
         }
     }
 }
