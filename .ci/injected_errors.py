@@ -73,7 +73,7 @@ FAULTS = [
     ("starts in rows unlike those alone", "world/mesh_rows.rs", "for i in lanes(⟦folds.bits(&beside) & of⟧) {", "0",
      "world::mesh_rows::tests::surfaces_side_by_side_have_the_bits_that_each_has_alone"),
     ("meshes that stay where they were made", "world/mesh_instance.rs", "let is_moved = ⟦transform != Transform::IDENTITY⟧;", "false",
-     "world::mesh_facet::tests::points_of_a_moved_mesh_are_between_its_corners"),
+     "world::mesh_instance::tests::points_of_a_moved_mesh_are_between_its_corners"),
     ("the other crossing of a round shape", "geometry/axial.rs", "find(|&t| ⟦t as f32 == hit.t⟧)", "true",
      "geometry::cylinder::tests::side_and_caps_from_outside_and_inside"),
     ("rows that say what they do not hold", "integrators/transport/packet.rs", "found |= if ⟦is_filled⟧ { of }", "true",

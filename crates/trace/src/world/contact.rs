@@ -302,8 +302,8 @@ impl MeshInstance {
     fn touch_error(&self, triangle: u32, point: Vec3) -> Vec3 {
         let corners = self.tree.loaded().mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let reach = corners.iter().fold(DVec3::ZERO, |reach, corner| reach.max(corner.abs()));
-        let of_tests =
-            self.error(&self.transform, point, self.transform.inverse_point(point.as_dvec3()), corners);
+        let local = self.transform.inverse_point(point.as_dvec3());
+        let of_tests = self.placed(&self.transform).error(point, local, corners);
         of_tests + self.transform.reach(reach).as_vec3() * f32::EPSILON
     }
 

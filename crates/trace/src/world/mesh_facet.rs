@@ -1,6 +1,5 @@
 //! Points of the triangles of an instance: where, how exactly, and by which normals.
 
-use super::MeshInstance;
 use super::placement::Placement;
 use crate::geometry::surface::double_error;
 use crate::math::{DVec3, Vec3};
@@ -19,7 +18,7 @@ pub(super) struct Facet {
     pub(super) normal: Vec3,
     /// Weights of the corners.
     pub(super) barycentric: Vec3,
-    /// Whether a ray that starts here may be beyond a neighbour, see [`MeshInstance::drawn_in`].
+    /// Whether a ray that starts here may be beyond a neighbour, see [`PlacedMesh::drawn_in`].
     pub(super) is_beside_edge: bool,
 }
 
@@ -36,45 +35,44 @@ fn is_near(weight: f64, edge: DVec3, bound: f64) -> bool {
 /// Most of a triangle's height between a point and an edge.
 const MOST_ASIDE: f64 = 0.125;
 
-impl MeshInstance {
+/// A placed mesh, as far as its triangles need it.
+#[derive(Clone, Copy)]
+pub(super) struct PlacedMesh<P> {
+    /// The placement.
+    pub(super) placement: P,
+    /// Factor from errors of points to the least distance from edges, in the mesh's coordinates.
+    pub(super) aside: f64,
+    /// Whether rays hit triangles whose corners were rounded after they were placed.
+    pub(super) has_rounded_corners: bool,
+}
+
+impl<P: Placement> PlacedMesh<P> {
     /// Rounding of a point of a triangle, of the next ray's origin in the mesh's coordinates, and of the numbers from which the
     /// point is computed. If all of these are near 0, the rounding of double precision counts, by which the sides of the
     /// triangle are decided. In a tree over several meshes, the rounding of the corners there counts too.
     #[inline(always)]
-    pub(super) fn error(
-        &self,
-        placement: impl Placement,
-        point: Vec3,
-        local: DVec3,
-        [a, b, c]: [DVec3; 3],
-    ) -> Vec3 {
-        let reach = placement.reach(local.abs());
-        let parts = point.abs() + reach.as_vec3() + placement.shift().abs().as_vec3();
-        let greatest = placement.reach(a.abs().max(b.abs()).max(c.abs()));
+    pub(super) fn error(&self, point: Vec3, local: DVec3, [a, b, c]: [DVec3; 3]) -> Vec3 {
+        let reach = self.placement.reach(local.abs());
+        let parts = point.abs() + reach.as_vec3() + self.placement.shift().abs().as_vec3();
+        let greatest = self.placement.reach(a.abs().max(b.abs()).max(c.abs()));
         let of_double = double_error(greatest.max_element());
         let error = parts * (2.0 * f32::EPSILON) + Vec3::splat(of_double + f32::MIN_POSITIVE);
-        if self.has_rounded_corners() {
-            error + (greatest + placement.shift().abs()).as_vec3() * f32::EPSILON
+        if self.has_rounded_corners {
+            error + (greatest + self.placement.shift().abs()).as_vec3() * f32::EPSILON
         } else {
             error
         }
     }
 
-    /// Whether rays hit triangles whose corners were rounded after they were placed.
-    #[inline(always)]
-    fn has_rounded_corners(&self) -> bool {
-        self.is_merged && self.is_moved
-    }
-
     /// A point of a triangle, by its corners in the mesh's coordinates and the weights of the second and the third.
     #[inline(always)]
-    pub(super) fn facet(&self, placement: impl Placement, corners: [Vec3; 3], [u, v]: [f32; 2]) -> Facet {
+    pub(super) fn facet(&self, corners: [Vec3; 3], [u, v]: [f32; 2]) -> Facet {
         let corners = corners.map(|corner| corner.as_dvec3());
         let [a, b, c] = corners;
         let (ab, ac) = (b - a, c - a);
         let local = a + ab * f64::from(u) + ac * f64::from(v);
-        let point = placement.point(local).as_vec3();
-        let error = self.error(placement, point, local, corners);
+        let point = self.placement.point(local).as_vec3();
+        let error = self.error(point, local, corners);
         let across = ab.cross(ac);
         // Compare the squares of distances from the edges with those of the least distance.
         let least = self.least_aside(error, corners);
@@ -87,7 +85,7 @@ impl MeshInstance {
             local,
             point,
             error,
-            normal: placement.normal(across).normalize().as_vec3(),
+            normal: self.placement.normal(across).normalize().as_vec3(),
             barycentric: Vec3::new(1.0 - u as f32 - v as f32, u as f32, v as f32),
             is_beside_edge,
         }
@@ -105,7 +103,7 @@ impl MeshInstance {
     /// wall that meets this one there, and leave a closed room.
     #[cold]
     #[inline(never)]
-    pub(super) fn drawn_in(&self, placement: impl Placement, facet: &Facet, [u, v]: [f32; 2]) -> [Vec3; 2] {
+    pub(super) fn drawn_in(&self, facet: &Facet, [u, v]: [f32; 2]) -> [Vec3; 2] {
         let [a, b, c] = facet.corners;
         let (ab, ac) = (b - a, c - a);
         let least = self.least_aside(facet.error, facet.corners) / ab.cross(ac).length();
@@ -115,19 +113,19 @@ impl MeshInstance {
         // Lower the weight that has more to give.
         let (u, v) = if u - of_u > v - of_v { (u - excess, v) } else { (u, v - excess) };
         let local = a + ab * u + ac * v;
-        let point = placement.point(local).as_vec3();
+        let point = self.placement.point(local).as_vec3();
         if !point.is_finite() {
             return [facet.point, facet.error];
         }
-        [point, self.error(placement, point, local, facet.corners)]
+        [point, self.error(point, local, facet.corners)]
     }
 
     /// Shading normal of a smooth mesh: interpolated between those of the corners, on the side of the geometric normal.
     #[inline(always)]
-    pub(super) fn shading_normal(placement: impl Placement, facet: &Facet, [a, b, c]: &[Vec3; 3]) -> Vec3 {
+    pub(super) fn shading_normal(&self, facet: &Facet, [a, b, c]: &[Vec3; 3]) -> Vec3 {
         let Facet { normal, barycentric, .. } = *facet;
         let interpolated = *a * barycentric.x + *b * barycentric.y + *c * barycentric.z;
-        let bent = placement.normal(interpolated.as_dvec3()).as_vec3();
+        let bent = self.placement.normal(interpolated.as_dvec3()).as_vec3();
         let reciprocal = bent.length_recip();
         let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
         let bent = bent * reciprocal;
@@ -140,24 +138,19 @@ impl MeshInstance {
     /// it. Thereby the facets of a smooth-shaded surface do not shadow what its normals say is lit (Hanika, *Hacking the Shadow
     /// Terminator*, Ray Tracing Gems II, chapter 4).
     #[inline(always)]
-    pub(super) fn shadow_point(
-        placement: impl Placement,
-        facet: &Facet,
-        normals: &[Vec3; 3],
-        direction: DVec3,
-    ) -> Vec3 {
-        let point = placement.point(facet.local);
+    pub(super) fn shadow_point(&self, facet: &Facet, normals: &[Vec3; 3], direction: DVec3) -> Vec3 {
+        let point = self.placement.point(facet.local);
         let normal = facet.normal.as_dvec3();
         let side = if normal.dot(direction) > 0.0 { -1.0 } else { 1.0 };
         let weights = facet.barycentric.to_array();
         let mut lifted = DVec3::ZERO;
         for i in 0..3 {
-            let own = placement.normal(normals[i].as_dvec3());
+            let own = self.placement.normal(normals[i].as_dvec3());
             let reciprocal = own.length_recip();
             let is_told = reciprocal.is_finite() & (reciprocal > 0.0);
             let own = own * if is_told { reciprocal } else { 0.0 };
             let own = own * side * if own.dot(normal) < 0.0 { -1.0 } else { 1.0 };
-            let height = (placement.point(facet.corners[i]) - point).dot(own);
+            let height = (self.placement.point(facet.corners[i]) - point).dot(own);
             lifted += own * (f64::from(weights[i]) * if height > 0.0 { height } else { 0.0 });
         }
         (point + lifted).as_vec3()
@@ -166,17 +159,9 @@ impl MeshInstance {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
-    use crate::assets::LoadedMesh;
-    use crate::control::CancelToken;
-    use crate::geometry::mesh::TriangleMesh;
-    use crate::geometry::{Asked, Ray, ShapeHit};
     use crate::math::random::signed as random;
     use crate::math::transform::Transform;
-    use crate::scene::description::Accel;
-    use crate::world::MeshTree;
     use crate::world::placement::Unmoved;
 
     #[test]
@@ -195,34 +180,6 @@ mod tests {
             assert_eq!(Placement::reach(map, at.abs()), here.reach(at.abs()));
             assert_eq!(bits(Placement::normal(map, at)), bits(here.normal(at)));
             assert_eq!(map.shift(), here.shift());
-        }
-    }
-
-    #[test]
-    fn points_of_a_moved_mesh_are_between_its_corners() {
-        let mut next = random(23);
-        let mut vector = || DVec3::from_array(std::array::from_fn(|_| f64::from(next())));
-        let mesh = TriangleMesh {
-            positions: (0..30).map(|_| vector().as_vec3()).collect(),
-            triangles: (0..10).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
-            ..TriangleMesh::default()
-        };
-        let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
-        let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
-        let tree = Arc::new(tree);
-        for _ in 0..20 {
-            let transform = Transform::scale_rotate_translate(vector(), vector() * 180.0, vector());
-            let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
-            for primitive in 0..10 {
-                let hit = ShapeHit { primitive, u: 0.5, v: 0.25, t: 1.0 };
-                let surface = mesh.surface(&Ray::new(Vec3::ZERO, Vec3::Z).to_f64(), &hit, Asked::ALL);
-                let [a, b, c] = mesh.tree.loaded().mesh.corners(primitive);
-                let [a, b, c] = [a, b, c].map(|corner| transform.point(corner.as_dvec3()));
-                let off = surface.point.as_dvec3() - (a * 0.25 + b * 0.5 + c * 0.25);
-                assert!(off.abs().cmple(surface.error.as_dvec3()).all(), "{off} {}", surface.error);
-                let across = (b - a).cross(c - a).normalize() * transform.linear.determinant().signum();
-                assert!((surface.normal.as_dvec3() - across).length() < 1e-6, "{across}");
-            }
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::mesh_facet::{ASIDE, Facet};
+use super::mesh_facet::{ASIDE, Facet, PlacedMesh};
 use super::mesh_rows::uv_between;
 use super::mesh_tree::MeshTree;
 use super::placement::{Placement, Unmoved};
@@ -29,7 +29,7 @@ pub struct MeshInstance {
     /// Whether its coordinates are not the scene's.
     pub(super) is_moved: bool,
     /// Factor from errors of points to the least distance from edges, in the mesh's coordinates.
-    pub(super) aside: f64,
+    aside: f64,
 }
 
 impl MeshInstance {
@@ -174,27 +174,33 @@ impl MeshInstance {
         ((along(0) + along(1) + along(2)) / 3.0) as f32
     }
 
+    /// The mesh by its own placement, given in its kind.
+    #[inline(always)]
+    pub(super) fn placed<P>(&self, placement: P) -> PlacedMesh<P> {
+        PlacedMesh { placement, aside: self.aside, has_rounded_corners: self.is_merged && self.is_moved }
+    }
+
     /// The requested parts of the surface at a hit.
     pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
         match self.is_moved {
-            true => self.surface_in(&self.transform, ray, hit, asked),
-            false => self.surface_in(Unmoved, ray, hit, asked),
+            true => self.surface_in(self.placed(&self.transform), ray, hit, asked),
+            false => self.surface_in(self.placed(Unmoved), ray, hit, asked),
         }
     }
 
     fn surface_in(
         &self,
-        placement: impl Placement,
+        placed: PlacedMesh<impl Placement>,
         ray: &RayF64,
         hit: &ShapeHit,
         asked: Asked,
     ) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
-        let facet = self.facet(placement, vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
+        let facet = placed.facet(vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
         let Facet { corners: [a, b, c], normal, barycentric, .. } = facet;
         let [point, error] = match facet.is_beside_edge {
-            true => self.drawn_in(placement, &facet, [hit.u, hit.v]),
+            true => placed.drawn_in(&facet, [hit.u, hit.v]),
             false => [facet.point, facet.error],
         };
         let (uv, dpdu, dpdv) = if asked.uv {
@@ -206,9 +212,9 @@ impl MeshInstance {
         if self.smooth {
             let normals = self.tree.normals();
             let normals = vertices.map(|vertex| normals[vertex]);
-            shading_normal = Self::shading_normal(placement, &facet, &normals);
+            shading_normal = placed.shading_normal(&facet, &normals);
             if asked.shadow_point {
-                shadow_point = Self::shadow_point(placement, &facet, &normals, ray.direction);
+                shadow_point = placed.shadow_point(&facet, &normals, ray.direction);
             }
         }
         SurfacePoint {
@@ -290,5 +296,43 @@ impl MeshInstance {
             rays[lane] = local(lane);
         }
         rays
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assets::LoadedMesh;
+    use crate::control::CancelToken;
+    use crate::geometry::mesh::TriangleMesh;
+    use crate::math::random::signed as random;
+    use crate::scene::description::Accel;
+
+    #[test]
+    fn points_of_a_moved_mesh_are_between_its_corners() {
+        let mut next = random(23);
+        let mut vector = || DVec3::from_array(std::array::from_fn(|_| f64::from(next())));
+        let mesh = TriangleMesh {
+            positions: (0..30).map(|_| vector().as_vec3()).collect(),
+            triangles: (0..10).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+            ..TriangleMesh::default()
+        };
+        let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+        let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+        let tree = Arc::new(tree);
+        for _ in 0..20 {
+            let transform = Transform::scale_rotate_translate(vector(), vector() * 180.0, vector());
+            let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
+            for primitive in 0..10 {
+                let hit = ShapeHit { primitive, u: 0.5, v: 0.25, t: 1.0 };
+                let surface = mesh.surface(&Ray::new(Vec3::ZERO, Vec3::Z).to_f64(), &hit, Asked::ALL);
+                let [a, b, c] = mesh.tree.loaded().mesh.corners(primitive);
+                let [a, b, c] = [a, b, c].map(|corner| transform.point(corner.as_dvec3()));
+                let off = surface.point.as_dvec3() - (a * 0.25 + b * 0.5 + c * 0.25);
+                assert!(off.abs().cmple(surface.error.as_dvec3()).all(), "{off} {}", surface.error);
+                let across = (b - a).cross(c - a).normalize() * transform.linear.determinant().signum();
+                assert!((surface.normal.as_dvec3() - across).length() < 1e-6, "{across}");
+            }
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Surfaces of a mesh at the hits of a packet, side by side.
 
 use super::MeshInstance;
+use super::mesh_facet::PlacedMesh;
 use super::placement::{Placement, Unmoved};
 use crate::accel::PACKET;
 use crate::geometry::rows::{HitRows, RayRows, lanes};
@@ -22,16 +23,18 @@ impl MeshInstance {
         asked_uvs: Option<UvSet>,
         folds: impl Folds,
     ) {
-        match self.is_moved {
-            true => self.fill_placed(&self.transform, surface, (rays, hits), of, asked_uvs, folds),
-            false => self.fill_placed(Unmoved, surface, (rays, hits), of, asked_uvs, folds),
+        let at = (rays, hits);
+        if self.is_moved {
+            self.fill_placed(self.placed(&self.transform), surface, at, of, asked_uvs, folds);
+        } else {
+            self.fill_placed(self.placed(Unmoved), surface, at, of, asked_uvs, folds);
         }
     }
 
     #[inline(always)]
     fn fill_placed(
         &self,
-        placement: impl Placement,
+        placed: PlacedMesh<impl Placement>,
         surface: &mut SurfaceRow,
         (rays, hits): (&RayRows, &HitRows),
         of: u32,
@@ -50,7 +53,7 @@ impl MeshInstance {
         let corners_of = |i: usize| [lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)];
         let (mut found, mut beside) = (SurfaceRow::EMPTY, [0; PACKET]);
         for i in 0..PACKET {
-            let facet = self.facet(placement, corners_of(i), [hits.u[i], hits.v[i]]);
+            let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
             set_lane(&mut found.point, i, facet.point);
             set_lane(&mut found.error, i, facet.error);
             set_lane(&mut found.normal, i, facet.normal);
@@ -59,7 +62,7 @@ impl MeshInstance {
         // Few are beside an edge.
         for i in lanes(folds.bits(&beside) & of) {
             let uv = [hits.u[i], hits.v[i]];
-            let [point, error] = self.drawn_in(placement, &self.facet(placement, corners_of(i), uv), uv);
+            let [point, error] = placed.drawn_in(&placed.facet(corners_of(i), uv), uv);
             set_lane(&mut found.point, i, point);
             set_lane(&mut found.error, i, error);
         }
@@ -68,17 +71,13 @@ impl MeshInstance {
             let normals = of_vertices(&vertices, self.tree.normals());
             let normals_of = |i: usize| [lane(&normals[0], i), lane(&normals[1], i), lane(&normals[2], i)];
             for i in 0..PACKET {
-                let facet = self.facet(placement, corners_of(i), [hits.u[i], hits.v[i]]);
-                set_lane(
-                    &mut found.shading_normal,
-                    i,
-                    Self::shading_normal(placement, &facet, &normals_of(i)),
-                );
+                let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+                set_lane(&mut found.shading_normal, i, placed.shading_normal(&facet, &normals_of(i)));
             }
             for i in 0..PACKET {
-                let facet = self.facet(placement, corners_of(i), [hits.u[i], hits.v[i]]);
+                let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
                 let direction = lane(&rays.direction, i).as_dvec3();
-                let lifted = Self::shadow_point(placement, &facet, &normals_of(i), direction);
+                let lifted = placed.shadow_point(&facet, &normals_of(i), direction);
                 set_lane(&mut found.shadow_point, i, lifted);
             }
             surface.take_smooth(of, &found);
