@@ -14,7 +14,7 @@
 //! | [`geometry`] | rays, boxes, shapes, hits with error bounds |
 //! | [`accel`] | bounding volume hierarchies over any shapes, which a closure tests, and over triangles, by vector instructions; a k-d tree over triangles |
 //! | [`sampling`] | sample streams, warps, distributions |
-//! | [`materials`] | rough BSDFs in rows (phong, metal, plastic, principled), smooth coats, mirror, glass, panes; opacity; texture lookup, normal maps, heights, Fresnel |
+//! | [`materials`] | rough BSDFs in rows (phong, metal, plastic, principled, frosted glass), smooth coats, mirror, glass, panes; opacity; texture lookup, normal maps, heights, Fresnel |
 //! | [`lights`] | lights without extent (`delta`), from beyond the scene (`infinite`), and shapes that emit (`area`); a tree over many lights; photon emission |
 //! | [`scene`] | the scene file: the definition of its keys, parsing, validation, diagnostics, the lowered description |
 //! | [`assets`] | bytes → meshes, glTF files, textures, orbiter cameras |
@@ -56,9 +56,9 @@
 //!    only real differences. `cli/live.rs` forwards them.
 //! 2. `tui/run.rs` receives it as an event (`tui/event.rs`); `tui/update/mod.rs` notes the change.
 //! 3. `tui/update/request.rs` makes a request; `tui/run.rs` sends it. The first cell that changes is the header's
-//!    (`tui/view/header.rs`): it says that a render runs.
+//!    (`tui/view/header.rs`), which goes to the screen as in step 9: it says that a render runs.
 //! 4. `pipeline/worker.rs`: the mailbox of one request; a newer request cancels the render under way.
-//! 5. `pipeline/engine/mod.rs`: `pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes, textures, accel, lights and photons, each reused
+//! 5. `pipeline/engine/mod.rs`: `pipeline/stages/parse.rs`, `pipeline/plan.rs`, then meshes, glass, textures, accel, lights and photons, each reused
 //!    if its key in `pipeline/keys.rs` is that of before. A broken scene ends here: the picture before it stays.
 //! 6. `pipeline/render/scheduler.rs` starts passes, `pipeline/trace.rs` renders tiles on the pool. A large picture begins with a coarse
 //!    one, `pipeline/render/first_picture.rs`; with photons, `engine/mod.rs` shows one before it traces them.
