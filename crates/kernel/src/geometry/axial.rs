@@ -205,10 +205,16 @@ pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     }
 }
 
-/// [`exact_t`] from the crossings of the line with the part that is hit, counted from the line's foot.
-pub fn exact_among(hit: &ShapeHit, line: &Line, crossings: Option<[f64; 2]>) -> f64 {
-    let all = crossings.into_iter().flatten().map(|along| line.start + along);
-    all.into_iter().find(|&t| t as f32 == hit.t).unwrap_or(f64::from(hit.t))
+/// The t of a hit with all its digits, from the crossings of its line with the part that is hit, counted from the line's foot. `None`
+/// if not exactly one of them is at the distance of the hit.
+pub fn exact_of_part(hit: &ShapeHit, line: &Line, crossings: Option<[f64; 2]>) -> Option<f64> {
+    let [first, second] = crossings?.map(|along| line.start + along);
+    match [first, second].map(|t| t as f32 == hit.t) {
+        [true, true] => (first == second).then_some(first),
+        [true, false] => Some(first),
+        [false, true] => Some(second),
+        [false, false] => None,
+    }
 }
 
 /// Unit vector towards a point in the plane; x for the origin.

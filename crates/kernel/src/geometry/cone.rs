@@ -3,7 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use super::axial::{
-    self, AxialFrame, Line, Stretch, across, at_turn, exact_among, is_rounding, radial, ring_shown, turn,
+    self, AxialFrame, Line, Stretch, across, at_turn, exact_of_part, exact_t, is_rounding, radial,
+    ring_shown, turn,
 };
 use super::disk::{BORDER, Disk};
 use super::surface_rows::{Exact, ExactPoint};
@@ -104,7 +105,8 @@ impl Cone {
             0 => self.side_stretch(&line),
             cap => Stretch::between(&line, (self.height, cap), (self.height, cap)),
         };
-        ray.at(exact_among(hit, &line, crossings.map(|ends| ends.ends())))
+        let exact = exact_of_part(hit, &line, crossings.map(|ends| ends.ends()));
+        ray.at(exact.unwrap_or_else(|| exact_t(hit, self.nearest(ray))))
     }
 
     /// The surface at a hit.
@@ -325,5 +327,25 @@ mod tests {
         let slanting = Cone::new(DVec3::ZERO, DVec3::new(3.0, 4.0, 0.0), 1.0, true).bounds();
         assert!((slanting.min - Vec3::new(-0.8, -0.6, -1.0)).abs().max_element() < 1e-6);
         assert!((slanting.max - Vec3::new(3.0, 4.0, 1.0)).abs().max_element() < 1e-6);
+    }
+
+    /// From afar, both crossings of the side are at the same rounded distance.
+    #[test]
+    fn a_hit_from_afar_is_at_the_crossing_that_counts() {
+        let mut ambiguous = 0;
+        for (i, capped) in (0..4000_u32).flat_map(|i| [(i, true), (i, false)]) {
+            let thin = Cone::new(DVec3::NEG_Z, DVec3::Z, 0.01, capped);
+            let across = f64::from(i) * 0.618_034 % 1.0 - 0.5;
+            let along = f64::from(i) * 0.754_877_7 % 1.0 * 3.0 - 1.5;
+            let at = DVec3::new(0.0, across * 0.02, along);
+            let from = at + DVec3::new(2e5, 0.0, f64::from(i % 7) * 2e5 - 6e5);
+            let ray = Ray::new(from.as_vec3(), (at - from).normalize().as_vec3()).to_f64();
+            let Some((t, part)) = thin.nearest(&ray) else { continue };
+            assert_eq!(thin.exact_point(&ray, &axial::hit((t, part))), ray.at(t), "{thin:?} {ray:?}");
+            let side = thin.side_stretch(&thin.frame.line(&ray)).map(|side| side.ends());
+            let start = thin.frame.line(&ray).start;
+            ambiguous += u32::from(side.is_some_and(|[a, b]| (start + a) as f32 == (start + b) as f32));
+        }
+        assert!(ambiguous > 100, "{ambiguous}");
     }
 }
