@@ -620,15 +620,19 @@ fn warnings_point_to_what_asked_for_them() {
 #[test]
 fn rough_glass_is_warned_of_where_light_goes_straight_through_it() {
     let desk = Desk::new();
-    for (ior, is_warned) in [("1", true), ("1.5", false)] {
+    let point = "position = [0, 3, 0]";
+    let sun = |angle: &str| format!("type = \"directional\"\ndirection = [0, -1, 0]\nangle = {angle}");
+    for (ior, light, is_warned) in
+        [("1", point, true), ("1.5", point, false), ("1", &sun("0"), true), ("1", &sun("3"), false)]
+    {
         let ball = format!(
             "render = {{ integrator = \"path\" }}\ncamera = {{ position = [0, 1, 4], look_at = [0, 0, 0] }}\n\
              [materials.g]\ntype = \"glass\"\nior = {ior}\nroughness = 0.5\n[[sphere]]\nmaterial = \"g\"\n\
-             center = [0, 0, 0]\nradius = 1\n[[light]]\nposition = [0, 3, 0]\n"
+             center = [0, 0, 0]\nradius = 1\n[[light]]\n{light}\n"
         );
         desk.write("ball.toml", ball);
         let stderr = String::from_utf8(desk.run("check ball.toml").stderr).expect("UTF-8");
         let is_named = stderr.contains("warning: path finds no light of a [[light]]");
-        assert_eq!(is_named, is_warned, "{ior}: {stderr}");
+        assert_eq!(is_named, is_warned, "{ior}, {light}: {stderr}");
     }
 }

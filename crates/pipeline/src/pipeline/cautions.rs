@@ -6,7 +6,7 @@ use super::plan::MOST_PHOTONS;
 use super::settings::{Overrides, View};
 use crate::choice::Choice;
 use crate::integrators::RenderSettings;
-use crate::scene::description::{Light, MaterialKind, Scene};
+use crate::scene::description::{MaterialKind, Scene};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::{Loaded, is_model};
 
@@ -86,7 +86,8 @@ fn found(scene: &Scene, settings: &RenderSettings) -> Vec<(Cause, String)> {
         used.map(|index| &scene.materials[index].kind).any(is_one)
     };
     let mut warnings = Vec::new();
-    if finds_all_light && scene.lights.iter().any(Light::sends) && has(&keeps_direction) {
+    let is_sharp_any = scene.lights.iter().any(|light| light.sends() && light.is_sharp());
+    if finds_all_light && is_sharp_any && has(&keeps_direction) {
         let message = "path finds no light of a [[light]] without size that passes mirror or glass before it meets a \
                        surface: what they would throw on it stays dark";
         warnings.push((Cause::Integrator, message.to_owned()));

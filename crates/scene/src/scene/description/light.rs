@@ -75,6 +75,14 @@ impl Light {
         color != Vec3::ZERO
     }
 
+    /// Whether it is without extent, so that no ray finds it.
+    pub fn is_sharp(&self) -> bool {
+        match self {
+            Self::Point(_) | Self::Spot(_) => true,
+            Self::Directional(light) => light.angle == 0.0,
+        }
+    }
+
     /// Whether distance does not weaken it.
     pub fn is_steady(&self) -> bool {
         match self {
