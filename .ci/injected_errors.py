@@ -77,7 +77,7 @@ FAULTS = [
     ("the other crossing of a round shape", "geometry/axial.rs", "[true, true] => ⟦(first == second).then_some(first)⟧,", "Some(first)",
      "geometry::cylinder::tests::a_hit_from_afar_is_at_the_crossing_that_counts"),
     ("rows that say what they do not hold", "integrators/transport/packet.rs", "found |= if ⟦is_filled⟧ { of }", "true",
-     "closed_forms::round::what_enters_a_closed_round_shape_meets_it_from_inside"),
+     "closed_forms::touching::a_drink_in_a_glass"),
     ("closed glass that nobody enters", "integrators/transport/crossing.rs", "Some(glass) if rest.is_air() => ⟦Medium::only(glass)⟧,",
      "rest", "closed_forms::glass::absorption_along_a_slab_and_a_ball"),
     ("spans of the wrong lanes", "accel/wide_bvh/simd/loops.rs", "_mm512_mask_loadu_ps(other, ⟦of as u16⟧, row.as_ptr())", "(of >> 1) as u16",
