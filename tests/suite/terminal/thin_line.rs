@@ -1,6 +1,5 @@
 //! Over a thin line, glimt answers a key at once, whatever is on the way, and the shell returns at once.
 
-use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use super::pty::{Folder, GREEN, RED, SCENE, Terminal};
@@ -124,12 +123,16 @@ fn the_line_is_measured_and_shown() {
         let folder = Folder::new();
         let mut terminal = folder.thin_line(Answers::Terminal);
         terminal.wait_for_render(1);
-        let seen = Cell::new(None);
-        terminal.wait("kB and ms", |screen| {
-            seen.set(measured(screen));
-            seen.get().is_some()
-        });
-        let (size, time) = seen.get().expect("it was waited for");
+        // On a machine that stands still for a second, the first answer comes too late to be measured. Then another picture tells.
+        let mut seen = terminal.settled(measured);
+        for _ in 0..20 {
+            if seen.is_some() {
+                break;
+            }
+            terminal.press("s");
+            seen = terminal.settled(measured);
+        }
+        let (size, time) = seen.expect("bytes and time of the last picture");
         assert!((1..200).contains(&size) && time >= 150, "{size} kB, {time} ms");
         terminal.press("?");
         terminal.wait_for("the terminal's time to answer");

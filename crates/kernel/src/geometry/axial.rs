@@ -117,11 +117,6 @@ impl Stretch {
         Some(Self { enter, leave })
     }
 
-    /// Both ends.
-    pub fn ends(&self) -> [f64; 2] {
-        [self.enter.0, self.leave.0]
-    }
-
     fn holds(&self, along: f64) -> bool {
         self.enter.0 <= along && along <= self.leave.0
     }
@@ -205,16 +200,24 @@ pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     }
 }
 
-/// The t of a hit with all its digits, from the crossings of its line with the part that is hit, counted from the line's foot. `None`
-/// if not exactly one of them is at the distance of the hit.
-pub fn exact_of_part(hit: &ShapeHit, line: &Line, crossings: Option<[f64; 2]>) -> Option<f64> {
-    let [first, second] = crossings?.map(|along| line.start + along);
-    match [first, second].map(|t| t as f32 == hit.t) {
-        [true, true] => (first == second).then_some(first),
-        [true, false] => Some(first),
-        [false, true] => Some(second),
-        [false, false] => None,
-    }
+/// The point of a hit with all its digits, where the line of its ray crosses the part that is hit; by a second intersection if not
+/// exactly one of the crossings is at the distance of the hit.
+pub fn exact_point(
+    (ray, line): (&RayF64, &Line),
+    hit: &ShapeHit,
+    crossings: Option<Stretch>,
+    again: impl FnOnce() -> Option<(f64, u32)>,
+) -> DVec3 {
+    let fitting = crossings.and_then(|Stretch { enter, leave }| {
+        let [first, second] = [enter, leave].map(|(along, _)| line.start + along);
+        match [first, second].map(|t| t as f32 == hit.t) {
+            [true, true] => (first == second).then_some(first),
+            [true, false] => Some(first),
+            [false, true] => Some(second),
+            [false, false] => None,
+        }
+    });
+    ray.at(fitting.unwrap_or_else(|| exact_t(hit, again())))
 }
 
 /// Unit vector towards a point in the plane; x for the origin.
@@ -234,7 +237,7 @@ pub fn at_turn(u: f64) -> DVec2 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::geometry::Ray;
     use crate::geometry::cone::Cone;
@@ -270,5 +273,38 @@ mod tests {
                 assert!(t > 1e-7, "{along} {out}: {t}");
             }
         }
+    }
+
+    /// A thin shape about the z axis from −1 to 1, for [`hits_from_afar`].
+    pub trait Thin {
+        /// The shape with this radius.
+        fn thin(radius: f64, capped: bool) -> Self;
+
+        /// Its nearest hit.
+        fn met(&self, ray: &RayF64) -> Option<(f64, u32)>;
+
+        /// Where the ray is within its side.
+        fn within(&self, ray: &RayF64) -> Option<Stretch>;
+
+        /// The point of a hit, with all its digits.
+        fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3;
+    }
+
+    /// Checks the points of hits from afar, where both crossings of the side are at the same rounded distance.
+    pub fn hits_from_afar<T: Thin + std::fmt::Debug>() {
+        let mut ambiguous = 0;
+        for (i, capped) in (0..4000_u32).flat_map(|i| [(i, true), (i, false)]) {
+            let thin = T::thin(0.01, capped);
+            let across = f64::from(i) * 0.618_034 % 1.0 - 0.5;
+            let along = f64::from(i) * 0.754_877_7 % 1.0 * 3.0 - 1.5;
+            let at = DVec3::new(0.0, across * 0.02, along);
+            let from = at + DVec3::new(2e5, 0.0, f64::from(i % 7) * 2e5 - 6e5);
+            let ray = Ray::new(from.as_vec3(), (at - from).normalize().as_vec3()).to_f64();
+            let Some((t, part)) = thin.met(&ray) else { continue };
+            assert_eq!(thin.exact(&ray, &hit((t, part))), ray.at(t), "{thin:?} {ray:?}");
+            let size = thin.within(&ray).map_or(f64::INFINITY, |side| side.leave.0 - side.enter.0);
+            ambiguous += u32::from((t + size) as f32 == t as f32);
+        }
+        assert!(ambiguous > 100, "{ambiguous}");
     }
 }

@@ -2,10 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::axial::{
-    self, AxialFrame, Line, Stretch, across, at_turn, exact_of_part, exact_t, is_rounding, radial,
-    ring_shown, turn,
-};
+use super::axial::{self, AxialFrame, Line, Stretch, across, at_turn, is_rounding, radial, ring_shown, turn};
 use super::disk::{BORDER, Disk};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -26,7 +23,6 @@ pub struct Cylinder {
 }
 
 impl Exact for Cylinder {
-    #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
@@ -94,8 +90,7 @@ impl Cylinder {
             0 => self.side_stretch(&line),
             cap => Stretch::between(&line, (height, cap), (height, cap)),
         };
-        let exact = exact_of_part(hit, &line, crossings.map(|ends| ends.ends()));
-        ray.at(exact.unwrap_or_else(|| exact_t(hit, self.nearest(ray))))
+        axial::exact_point((ray, &line), hit, crossings, || self.nearest(ray))
     }
 
     /// The surface at a hit.
@@ -233,6 +228,7 @@ impl Cylinder {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
+    use crate::geometry::axial::tests::{Thin, hits_from_afar};
     use crate::math::Vec3;
 
     /// A bar about the axis x = 1, z = 0, from y = 0 to y = 4.
@@ -290,23 +286,26 @@ mod tests {
         assert!((slanting.max - Vec3::new(3.8, 4.6, 1.0)).abs().max_element() < 1e-6);
     }
 
-    /// From afar, both crossings of the side are at the same rounded distance.
+    impl Thin for Cylinder {
+        fn thin(radius: f64, capped: bool) -> Self {
+            Self::new(DVec3::NEG_Z, DVec3::Z, radius, capped)
+        }
+
+        fn met(&self, ray: &RayF64) -> Option<(f64, u32)> {
+            self.nearest(ray)
+        }
+
+        fn within(&self, ray: &RayF64) -> Option<Stretch> {
+            self.side_stretch(&self.frame.line(ray))
+        }
+
+        fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
+            self.exact_point(ray, hit)
+        }
+    }
+
     #[test]
     fn a_hit_from_afar_is_at_the_crossing_that_counts() {
-        let mut ambiguous = 0;
-        for (i, capped) in (0..4000_u32).flat_map(|i| [(i, true), (i, false)]) {
-            let thin = Cylinder::new(DVec3::NEG_Z, DVec3::Z, 0.01, capped);
-            let across = f64::from(i) * 0.618_034 % 1.0 - 0.5;
-            let along = f64::from(i) * 0.754_877_7 % 1.0 * 3.0 - 1.5;
-            let at = DVec3::new(0.0, across * 0.02, along);
-            let from = at + DVec3::new(2e5, 0.0, f64::from(i % 7) * 2e5 - 6e5);
-            let ray = Ray::new(from.as_vec3(), (at - from).normalize().as_vec3()).to_f64();
-            let Some((t, part)) = thin.nearest(&ray) else { continue };
-            assert_eq!(thin.exact_point(&ray, &axial::hit((t, part))), ray.at(t), "{thin:?} {ray:?}");
-            let side = thin.side_stretch(&thin.frame.line(&ray)).map(|side| side.ends());
-            let start = thin.frame.line(&ray).start;
-            ambiguous += u32::from(side.is_some_and(|[a, b]| (start + a) as f32 == (start + b) as f32));
-        }
-        assert!(ambiguous > 100, "{ambiguous}");
+        hits_from_afar::<Cylinder>();
     }
 }

@@ -23,7 +23,6 @@ pub struct Disk {
 }
 
 impl Exact for Disk {
-    #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         self.exact_near(ray.at(exact_t(hit, self.nearest(ray))), self.reach())
     }

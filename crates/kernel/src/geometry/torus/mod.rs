@@ -26,7 +26,6 @@ pub struct Torus {
 }
 
 impl Exact for Torus {
-    #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let (out, from_circle) = self.chart(ray.at(exact_t(hit, self.nearest(ray))));
         self.exact_at(out, from_circle)

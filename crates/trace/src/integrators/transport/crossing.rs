@@ -48,30 +48,32 @@ impl TileContext<'_> {
         let lead = hit.shape.t * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
         let meeting = Meeting { hit, surface: &vertex.surface, normal: vertex.normal, lead };
         let sides = self.world.contact(&meeting, around, |near| found.push(near));
-        // Of closed shapes alone, most hits find at most the one that they enter.
-        let entered = match found[..] {
-            [] => Some(None),
-            [Near::Around { object, material }] => Some(Some(Inside { body: object, material })),
-            [Near::Surface { .. }] | [_, _, ..] => None,
-        };
-        if let Some(entered) = entered.filter(|_| !self.world.has_open_glass()) {
-            let far = self.beyond_closed(&path.medium, entered);
-            return Crossing { sides, before: None, far, opaque: None };
-        }
-        let [arrived, near, far] = self.media(path.medium, found);
+        let (before, far) = self.media(&path.medium, found);
         let opaque = found.iter().filter_map(|near| self.opaque(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
-        Crossing { sides, before: Some([arrived, near]), far, opaque }
+        Crossing { sides, before, far, opaque }
     }
 
     /// The media before and beyond the near surfaces. The ray's own record gives the medium before; for closed shapes, their
     /// geometry gives the medium beyond. A ray that leaves another body was in it, whatever its record says. Of open bodies only
     /// those count that are left or entered here, so that a ray and its reverse see the same, as the ray's way around the others is
-    /// unknown. The first of the media is the one that absorbed on the way here.
-    fn media(&self, known: Medium, found: &[Near]) -> [Medium; 3] {
+    /// unknown. The first of the media is the one that absorbed on the way here; the first two are `None` if both are as known.
+    fn media(&self, known: &Medium, found: &[Near]) -> (Option<[Medium; 2]>, Medium) {
+        let is_told_by_record = |glass: Inside| !self.world.is_closed(glass.body);
+        // Of closed shapes alone, most hits find at most the one that they enter.
+        if !self.world.has_open_glass() {
+            match *found {
+                [] => return (None, known.retained(is_told_by_record)),
+                [Near::Around { object, material }] => {
+                    let entered = Inside { body: object, material };
+                    return (None, known.retained(is_told_by_record).entered(entered));
+                }
+                [Near::Surface { .. }] | [_, _, ..] => {}
+            }
+        }
         // Begin with the record of the ray, without open bodies.
-        let (mut arrived, mut near) = (known, self.without_open(known));
-        let mut far = near.retained(|glass| !self.world.is_closed(glass.body));
+        let (mut arrived, mut near) = (*known, self.without_open(*known));
+        let mut far = near.retained(is_told_by_record);
         let crossed = |as_front: bool| {
             found.iter().filter_map(move |thing| match *thing {
                 Near::Surface { hit, material, is_front } if is_front == as_front => {
@@ -99,21 +101,7 @@ impl TileContext<'_> {
         }
         // Enter those whose fronts are here, and those around the place.
         let far = crossed(true).chain(around).fold(far, Medium::entered);
-        [arrived, near, far]
-    }
-
-    /// The last one of [`TileContext::media`] without open bodies, where nothing is near but perhaps a shape that is entered.
-    #[inline(always)]
-    fn beyond_closed(&self, known: &Medium, entered: Option<Inside>) -> Medium {
-        let rest = match known.is_air() {
-            true => Medium::default(),
-            false => known.retained(|glass| !self.world.is_closed(glass.body)),
-        };
-        match entered {
-            Some(glass) if rest.is_air() => Medium::only(glass),
-            Some(glass) => rest.entered(glass),
-            None => rest,
-        }
+        (Some([arrived, near]), far)
     }
 
     /// The surface that counts between two media, at a hit after [`TileContext::crossing`]. `None` if both are air.

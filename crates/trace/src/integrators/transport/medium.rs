@@ -37,12 +37,6 @@ impl Medium {
         self.known().last().copied()
     }
 
-    /// The medium within a glass in air.
-    pub fn only(glass: Inside) -> Self {
-        let none = Inside::default();
-        Self { inside: [glass, none, none, none], count: 1 }
-    }
-
     /// The medium after entering a glass.
     pub fn entered(mut self, glass: Inside) -> Self {
         if self.count as usize == self.inside.len() {
@@ -158,7 +152,6 @@ mod tests {
             assert_eq!(in_both.left(nine), Some(air.entered(seven)));
             assert_eq!(in_both.left(nine).and_then(|one| one.left(seven)), Some(air));
         }
-        assert_eq!(air.entered(seven), Medium::only(seven));
         assert_eq!(air.left(part(3, 0)), None);
         for deep in [
             (0..6).fold(air, |medium, object| medium.entered(part(object, 0))),
