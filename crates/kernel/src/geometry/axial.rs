@@ -283,7 +283,7 @@ pub(super) mod tests {
         /// Its nearest hit.
         fn met(&self, ray: &RayF64) -> Option<(f64, u32)>;
 
-        /// Where the ray is within its side.
+        /// The interval of the ray within its side.
         fn within(&self, ray: &RayF64) -> Option<Stretch>;
 
         /// The point of a hit, with all its digits.
