@@ -35,7 +35,7 @@ pub struct DirectLightQueue {
     count: usize,
     /// Index of the row for single vertices of each kind of BSDF, of dark ones of each kind, and of both kinds with two sides. If no
     /// row in use has this index, the row is full or there is none.
-    open: [usize; 4 * RoughKind::ALL.len()],
+    open: [[usize; RoughKind::ALL.len()]; 4],
     /// Light of lamps at the vertices of each path of the round.
     arrived: Vec<Vec3>,
     /// Media of the vertices.
@@ -130,7 +130,7 @@ impl DirectLightQueue {
         }
         // Put few vertices together with others of their kind.
         let mut left = row.used;
-        let open = &mut self.open[row.bsdf.kind() as usize];
+        let open = &mut self.open[0][row.bsdf.kind() as usize];
         if let Some(open) = kept.get_mut(*open).filter(|open| open.is_for(row.bsdf.kind(), (false, false))) {
             for lane in lanes(row.used).take((ALL & !open.used).count_ones() as usize) {
                 open.copy(open.used.trailing_ones() as usize, row, lane);
@@ -171,8 +171,7 @@ impl DirectLightQueue {
     fn open_row(&mut self, kind: RoughKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
         let (is_dark, has_two_sides) = which;
         let table = usize::from(is_dark) + 2 * usize::from(has_two_sides);
-        let place = kind as usize + table * RoughKind::ALL.len();
-        let mut number = self.open[place];
+        let mut number = self.open[table][kind as usize];
         let is_open = |row: &VertexBatch| row.used != ALL && row.is_for(kind, which);
         if number >= self.count || !is_open(&self.rows[number]) {
             let row = self.spare();
@@ -180,7 +179,7 @@ impl DirectLightQueue {
             row.bsdf.prepare(kind);
             (row.is_dark, row.has_two_sides) = which;
             number = self.count;
-            self.open[place] = number;
+            self.open[table][kind as usize] = number;
             self.count += 1;
         }
         let row = &mut self.rows[number];
