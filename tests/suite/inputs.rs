@@ -3,6 +3,7 @@
 use std::fs;
 use std::os::unix::fs::symlink;
 
+use glimt::system::machine::ProcessIdentity;
 use serde_json::json;
 
 use super::desk::{Desk, SCENE};
@@ -316,7 +317,12 @@ fn a_report_replaces_reports_and_nothing_else() {
 fn an_input_by_the_name_of_a_temporary_file_stays() {
     let desk = studio();
     let text = fs::read_to_string(desk.path("scene.toml")).expect("the scene");
-    let (scene, camera, stale) = (".s.glimt-1-2.tmp", ".c.glimt-999999-0.tmp", ".a.glimt-999999-1.tmp");
+    let mut ended = std::process::Command::new("true").spawn().expect("true starts");
+    let (machine, process) = (ProcessIdentity::current().machine, ended.id());
+    ended.wait().expect("it ends");
+    let [scene, camera, stale] =
+        ["s", "c", "a"].map(|name| format!(".{name}.glimt-{machine:016x}-{process}-2.tmp"));
+    let (scene, camera, stale) = (scene.as_str(), camera.as_str(), stale.as_str());
     desk.write(scene, text.replace("camera.txt", camera));
     desk.write(camera, desk.bytes("camera.txt"));
     desk.write(stale, "left behind");

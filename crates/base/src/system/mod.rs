@@ -4,6 +4,7 @@
 #[allow(unsafe_code)]
 pub mod abort;
 pub mod file;
+pub mod machine;
 pub mod priority;
 pub mod processor;
 pub mod text;

@@ -129,6 +129,7 @@ fn move_by_steps(from: &Path, to: &Path) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::temporary::tests::{dead_name, foreign_name};
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
@@ -173,16 +174,17 @@ mod tests {
     }
 
     #[test]
-    fn hidden_folders_of_the_dead_are_removed_and_those_of_the_living_stay() {
+    fn only_hidden_folders_of_dead_writers_of_this_machine_are_removed() {
         let directory = tempfile::tempdir().expect("a folder");
         let at = directory.path();
         let living = Hidden::create(at, OsStr::new("a.toml")).expect("a folder");
-        let stale = at.join(".a.toml.glimt-123-4.tmp");
-        fs::create_dir_all(stale.join("a_files")).expect("a folder");
+        let [stale, foreign] = [dead_name("a.toml"), foreign_name("a.toml")].map(|name| at.join(name));
         let other = at.join(".a.toml.tmp");
-        fs::create_dir(&other).expect("a folder");
+        for folder in [&stale, &foreign, &other] {
+            fs::create_dir_all(folder.join("a_files")).expect("a folder");
+        }
         new_files(at, &[(PathBuf::from("b.toml"), b"text")], &CancelToken::new()).expect("written");
-        assert!(living.path.exists() && other.exists() && !stale.exists());
+        assert!(living.path.exists() && other.exists() && foreign.exists() && !stale.exists());
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Temporary files beside a target: named after their writer, locked while it lives, removed when it has died.
+//! Temporary files beside a target: named after their writer's machine and process, locked while it lives, removed when it has
+//! died. Locks alone do not protect them: many network file systems do not share locks between machines.
 
 use std::ffi::{OsStr, OsString};
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -9,6 +10,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use nix::fcntl::OFlag;
+
+use crate::system::machine::ProcessIdentity;
 
 /// Longest file name of nearly every file system.
 const NAME_BYTES: usize = 255;
@@ -24,7 +27,7 @@ pub(super) struct Temporary {
 }
 
 impl Temporary {
-    /// A new, empty, locked file `.NAME.glimt-<process>-<number>.tmp` for a target called `name`.
+    /// Creates an empty, locked file `.NAME.glimt-<machine>-<process>-<number>.tmp` for a target called `name`.
     pub(super) fn create(directory: &Path, name: &OsStr, mode: u32) -> io::Result<Self> {
         for _ in 0..ATTEMPTS {
             let path = directory.join(next_name(name));
@@ -121,27 +124,31 @@ fn nameless(_: &Path) -> io::Result<()> {
     Err(ErrorKind::Unsupported.into())
 }
 
-/// Removes the temporary files of killed writers from a directory. Files of living writers are locked and stay, and so
-/// do kept ones. A file that cannot be removed stays too: it must not prevent the write.
+/// Removes the temporary files of this machine's killed writers from a directory. Files of other machines, of earlier boots and
+/// of living writers stay, and so do kept ones. A file that cannot be removed stays too: it must not prevent the write.
 pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
     let Ok(entries) = fs::read_dir(directory) else { return };
     for entry in entries.flatten() {
         let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
-        if is_file && is_temporary(&entry.file_name()) && !is_kept(&entry.path()) {
+        if is_file && has_dead_writer(&entry.file_name()) && !is_kept(&entry.path()) {
             let _ = remove_if_stale(&entry.path(), |path| fs::remove_file(path));
         }
     }
 }
 
-/// Removes the temporary folders of killed writers from a directory, with what is in them. Folders of living writers are locked.
+/// Removes the temporary folders of this machine's killed writers from a directory, with their contents.
 pub(super) fn remove_stale_folders(directory: &Path) {
     let Ok(entries) = fs::read_dir(directory) else { return };
     for entry in entries.flatten() {
         let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
-        if is_folder && is_temporary(&entry.file_name()) {
+        if is_folder && has_dead_writer(&entry.file_name()) {
             let _ = remove_if_stale(&entry.path(), |path| fs::remove_dir_all(path));
         }
     }
+}
+
+fn has_dead_writer(name: &OsStr) -> bool {
+    writer(name).is_some_and(|writer| writer.has_ended())
 }
 
 fn remove_if_stale(path: &Path, remove: impl Fn(&Path) -> io::Result<()>) -> io::Result<()> {
@@ -165,9 +172,13 @@ fn is_same(file: &File, path: &Path) -> io::Result<bool> {
 }
 
 pub(super) fn next_name(name: &OsStr) -> OsString {
+    name_of(name, &ProcessIdentity::current())
+}
+
+fn name_of(name: &OsStr, writer: &ProcessIdentity) -> OsString {
     static NUMBER: AtomicU64 = AtomicU64::new(0);
     let number = NUMBER.fetch_add(1, Ordering::Relaxed);
-    let ending = format!(".glimt-{}-{number}.tmp", std::process::id());
+    let ending = format!(".glimt-{:016x}-{}-{number}.tmp", writer.machine, writer.process);
     let kept = name.len().min(NAME_BYTES - 1 - ending.len());
     let mut result = OsString::from(".");
     result.push(OsStr::from_bytes(&name.as_bytes()[..kept]));
@@ -175,44 +186,93 @@ pub(super) fn next_name(name: &OsStr) -> OsString {
     result
 }
 
-/// Whether a name is one of [`next_name`]'s.
-fn is_temporary(name: &OsStr) -> bool {
-    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+/// The writer that a temporary name states. `None` for other names, and for those of older versions (`.NAME.glimt-PID-N.tmp`),
+/// which do not say on which machine their writer is.
+fn writer(name: &OsStr) -> Option<ProcessIdentity> {
     let name = name.to_string_lossy();
-    name.strip_prefix('.')
-        .and_then(|rest| rest.strip_suffix(".tmp"))
-        .and_then(|rest| rest.rsplit_once(".glimt-"))
-        .and_then(|(_, numbers)| numbers.split_once('-'))
-        .is_some_and(|(process, number)| is_number(process) && is_number(number))
+    let (_, writer) = name.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once(".glimt-")?;
+    let (machine, numbers) = writer.split_once('-')?;
+    let (process, number) = numbers.split_once('-')?;
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let is_machine = machine.len() == 16 && machine.bytes().all(|byte| byte.is_ascii_hexdigit());
+    if !is_machine || !is_number(process) || !is_number(number) {
+        return None;
+    }
+    Some(ProcessIdentity { machine: u64::from_str_radix(machine, 16).ok()?, process: process.parse().ok()? })
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
+    use std::process::Command;
+
     use super::*;
+
+    /// A temporary name of a process of this machine that has ended.
+    pub(in crate::output) fn dead_name(name: &str) -> OsString {
+        name_of(OsStr::new(name), &dead_process())
+    }
+
+    /// A temporary name of another machine, whose processes cannot be seen from here.
+    pub(in crate::output) fn foreign_name(name: &str) -> OsString {
+        let dead = dead_process();
+        name_of(OsStr::new(name), &ProcessIdentity { machine: dead.machine ^ 1, ..dead })
+    }
+
+    fn dead_process() -> ProcessIdentity {
+        let mut child = Command::new("true").spawn().expect("true starts");
+        let process = child.id();
+        child.wait().expect("it ends");
+        ProcessIdentity { process, ..ProcessIdentity::current() }
+    }
 
     #[test]
     fn names() {
-        for name in ["out.png", "a.glimt-b.png", &"ä".repeat(127)] {
+        for name in ["out.png", "a.glimt-b.png", "a.glimt-1-2.tmp", &"ä".repeat(127)] {
             let temporary = next_name(OsStr::new(name));
-            assert!(is_temporary(&temporary), "{temporary:?}");
+            assert_eq!(writer(&temporary), Some(ProcessIdentity::current()), "{temporary:?}");
             assert!(temporary.len() <= NAME_BYTES);
         }
-        for other in ["out.png", ".out.png.tmp", ".a.glimt-1.tmp", ".a.glimt-1-x.tmp", "a.glimt-1-2.tmp"] {
-            assert!(!is_temporary(OsStr::new(other)), "{other}");
+        let machine = "0123456789abcdef";
+        for other in [
+            "out.png".to_owned(),
+            ".out.png.tmp".to_owned(),
+            ".a.glimt-1-2.tmp".to_owned(),
+            format!(".a.glimt-{machine}-1.tmp"),
+            format!(".a.glimt-{machine}-1-x.tmp"),
+            format!(".a.glimt-{machine}0-1-2.tmp"),
+            format!(".a.glimt-{}g-1-2.tmp", &machine[1..]),
+            format!(".a.glimt-+{}-1-2.tmp", &machine[1..]),
+            format!(".a.glimt-{machine}-1-2-3.tmp"),
+            format!(".a.glimt-{machine}-99999999999-2.tmp"),
+            format!("a.glimt-{machine}-1-2.tmp"),
+        ] {
+            assert_eq!(writer(OsStr::new(&other)), None, "{other}");
         }
     }
 
     #[test]
-    fn a_stale_file_is_removed_and_a_living_one_is_not() {
+    fn only_files_of_dead_writers_of_this_machine_are_removed() {
         let directory = tempfile::tempdir().expect("a directory");
         let living = Temporary::create(directory.path(), OsStr::new("a.png"), 0o666).expect("a file");
-        let stale = directory.path().join(".b.png.glimt-123-4.tmp");
-        fs::write(&stale, "half").expect("a file");
-        let other = directory.path().join(".b.png.tmp");
-        fs::write(&other, "not ours").expect("a file");
+        let write = |name: OsString| {
+            let path = directory.path().join(name);
+            fs::write(&path, "half").expect("a file");
+            path
+        };
+        let stale = write(dead_name("b.png"));
+        // The writers of these may be alive, though nobody has locked them as seen from here.
+        let kept = [
+            write(foreign_name("b.png")),
+            write(next_name(OsStr::new("b.png"))),
+            write(".b.png.glimt-123-4.tmp".into()),
+            write(".b.png.tmp".into()),
+        ];
         remove_stale(directory.path(), &|_| false);
-        assert!(living.path.exists() && other.exists());
+        assert!(living.path.exists());
         assert!(!stale.exists());
+        for path in kept {
+            assert!(path.exists(), "{}", path.display());
+        }
     }
 
     #[test]

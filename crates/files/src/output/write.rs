@@ -23,8 +23,8 @@ pub const STDOUT: &str = "/dev/stdout";
 
 /// Writes a file as a whole: a locked temporary file beside it, synchronised, renamed, the directory synchronised. At any moment,
 /// whatever ends the process, the file is the old one or the new one. Its permissions, access list, attributes and flags stay, as
-/// does its owner if this process may give files away. A link stays, and its target is replaced. Temporary files of killed writers
-/// in the same directory are removed.
+/// does its owner if this process may give files away. A link stays, and its target is replaced. Temporary files of this
+/// machine's killed writers in the same directory are removed.
 ///
 /// Devices, pipes and open descriptors ([`STDOUT`]) are written in place.
 ///

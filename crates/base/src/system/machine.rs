@@ -1,0 +1,66 @@
+//! Identities of machines and processes, for files in folders that several machines share.
+
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::OnceLock;
+
+use nix::errno::Errno;
+use nix::sys::signal::kill;
+use nix::unistd::{Pid, gethostname};
+
+/// A process, told apart from all processes of other machines and of earlier boots.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ProcessIdentity {
+    /// Hash of the host name, the boot and the namespace of process numbers.
+    pub machine: u64,
+    /// The process number, which means something only on `machine`.
+    pub process: u32,
+}
+
+impl ProcessIdentity {
+    /// This process.
+    pub fn current() -> Self {
+        Self { machine: machine(), process: std::process::id() }
+    }
+
+    /// Whether this process is certain to have ended. Processes of other machines never are: nobody here can see them.
+    pub fn has_ended(&self) -> bool {
+        let Ok(number) = i32::try_from(self.process) else { return false };
+        self.machine == machine() && number > 0 && kill(Pid::from_raw(number), None) == Err(Errno::ESRCH)
+    }
+}
+
+/// Hash of everything that tells this machine from others. Containers of one machine differ in their host name or in their
+/// namespace of process numbers.
+fn machine() -> u64 {
+    static MACHINE: OnceLock<u64> = OnceLock::new();
+    *MACHINE.get_or_init(|| {
+        let host = gethostname().unwrap_or_default();
+        let boot = fs::read("/proc/sys/kernel/random/boot_id").unwrap_or_default();
+        let namespace = fs::read_link("/proc/self/ns/pid").unwrap_or_default();
+        let mut hasher = DefaultHasher::new();
+        (host, boot, namespace).hash(&mut hasher);
+        hasher.finish()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::process::Command;
+
+    use super::*;
+
+    #[test]
+    fn only_dead_processes_of_this_machine_have_ended() {
+        let current = ProcessIdentity::current();
+        assert!(!current.has_ended());
+        let mut child = Command::new("true").spawn().expect("true starts");
+        let process = child.id();
+        child.wait().expect("it ends");
+        assert!(ProcessIdentity { process, ..current }.has_ended());
+        assert!(!ProcessIdentity { process, machine: current.machine ^ 1 }.has_ended());
+        for process in [0, u32::MAX] {
+            assert!(!ProcessIdentity { process, ..current }.has_ended(), "{process} is not a process");
+        }
+    }
+}
