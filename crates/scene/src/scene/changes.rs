@@ -10,13 +10,16 @@ pub const MOST_COMPARED_BYTES: usize = 4 << 20;
 /// Characters of a line that are shown at most.
 const MOST: usize = 40;
 
-/// The difference of two texts, such as `sphere.ball.radius 0.5 → 0.7`. Keys have the names of `--set`. For a difference in no key,
-/// and for text that is no TOML, it has the changed lines. `None` if the texts are the same or too long.
-pub fn changes(before: &str, after: &str) -> Option<String> {
+/// The changes between two texts, each in a form such as `sphere.ball.radius 0.5 → 0.7`, with the key as `--set` takes it. If no key
+/// differs, or a text is not TOML, the result names the changed lines. Empty if the texts are the same or too long.
+pub fn changes(before: &str, after: &str) -> Vec<String> {
     if before == after || before.len().max(after.len()) > MOST_COMPARED_BYTES {
-        return None;
+        return Vec::new();
     }
-    keys::changes(before, after).or_else(|| lines(before, after))
+    match keys::changes(before, after) {
+        keys if keys.is_empty() => lines(before, after).into_iter().collect(),
+        keys => keys,
+    }
 }
 
 /// The difference in lines.
@@ -63,7 +66,7 @@ mod tests {
     #[test]
     fn an_edit_outside_of_keys_is_said_by_its_lines() {
         let text = "[sphere]\nradius = 0.5 # half\n# one\ncolor = 1\nlast = 2\n";
-        let said = |from: &str, to: &str| changes(text, &text.replace(from, to));
+        let said = |from: &str, to: &str| changes(text, &text.replace(from, to)).pop();
         assert_eq!(said("x", "y"), None);
         assert_eq!(said("# one", "# two").as_deref(), Some("line 3: # one → # two"));
         assert_eq!(said("# one\n", "").as_deref(), Some("line 3: − # one"));

@@ -10,6 +10,7 @@ mod document;
 mod edit;
 mod facing;
 pub mod fingerprint;
+mod key_path;
 pub mod keys;
 pub mod nearest;
 pub mod outline;
@@ -27,6 +28,7 @@ pub use changes::{MOST_COMPARED_BYTES, changes};
 use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
 pub use facing::MeshBounds;
+pub use key_path::{key_parts, shortened_key, split_key};
 pub use source::{Source, quoted};
 
 /// Scene files over this size, in bytes, are refused.

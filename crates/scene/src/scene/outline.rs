@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use super::key_path;
 use super::keys::key::{Form, KeyInfo, TableInfo, TypeInfo};
 use super::keys::tables;
 use super::toml::{self, Entries, Item, KeyValue, Value};
@@ -157,19 +158,13 @@ impl OutlineTable {
     /// The beginnings of the paths that lead to its keys, as `--set` takes them.
     pub fn paths(&self) -> Vec<String> {
         let table = self.info.name;
-        let name = self.name.as_ref().map(|name| format!("{table}.{}", part(&name.text)));
+        let name = self.name.as_ref().map(|name| format!("{table}.{}", key_path::part(&name.text)));
         match self.info.form {
             Form::Single => vec![table.to_owned()],
             Form::Named => name.into_iter().collect(),
             Form::List => [format!("{table}.{}", self.number)].into_iter().chain(name).collect(),
         }
     }
-}
-
-/// A part of a dotted key, in quotes if it needs them.
-fn part(name: &str) -> String {
-    let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { super::quoted(name) }
 }
 
 #[cfg(test)]

@@ -675,7 +675,7 @@ mod tests {
         // The picture after that has the changes of both.
         edit(&mut history);
         record(&mut history, 6, "radius", true, "render.samples = 8\nradius = 1", Some(true));
-        assert_eq!(changes(&history)[3], "render.samples 64 → 8, + radius = 1");
+        assert_eq!(changes(&history)[3], "render.samples 64 → 8; + radius = 1");
         // The scene's keys tell of a camera that `c` wrote into the scene.
         let camera = CameraChange { fov: Some(30.0), ..CameraChange::default() };
         let text = "render.samples = 8\nradius = 1\ncamera.fov = 30";

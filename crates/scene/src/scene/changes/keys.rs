@@ -1,5 +1,8 @@
 //! Keys that differ in two documents, under the names that `--set` knows them by.
 
+use std::collections::HashMap;
+
+use crate::scene::key_path::{part, shortened_key};
 use crate::scene::sanitize::shortened;
 use crate::scene::toml::{self, Elements, Entries, Item, Value};
 
@@ -11,14 +14,14 @@ const TOLD: usize = 3;
 const VALUE: usize = 48;
 const NAME: usize = 48;
 
-/// The keys whose values differ, with both values; `None` if no key differs or one of the texts is no TOML.
-pub(super) fn changes(before: &str, after: &str) -> Option<String> {
+/// The keys whose values differ, with both values. Empty if no key differs or a text is not TOML.
+pub(super) fn changes(before: &str, after: &str) -> Vec<String> {
     if before.len().max(after.len()) > MOST_BYTES {
-        return None;
+        return Vec::new();
     }
     let ((old, errors), (new, more)) = (toml::parse(before), toml::parse(after));
     if !errors.is_empty() || !more.is_empty() {
-        return None;
+        return Vec::new();
     }
     let mut found = Found { texts: [before, after], told: Vec::new(), count: 0 };
     found.tables("", old.root(), new.root());
@@ -34,12 +37,12 @@ struct Found<'t> {
 }
 
 impl Found<'_> {
-    fn words(self) -> Option<String> {
-        let rest = match self.count - self.told.len() {
-            0 => String::new(),
-            rest => format!(" and {rest} more"),
-        };
-        (self.count > 0).then(|| self.told.join(", ") + &rest)
+    fn words(mut self) -> Vec<String> {
+        let rest = self.count - self.told.len();
+        if let Some(last) = self.told.last_mut().filter(|_| rest > 0) {
+            *last += &format!(" and {rest} more");
+        }
+        self.told
     }
 
     fn tell(&mut self, words: impl FnOnce() -> String) {
@@ -72,7 +75,7 @@ impl Found<'_> {
             _ if is_same(old, new) => {}
             _ => {
                 let [old, new] = [(0, old), (1, new)].map(|(text, value)| self.text(text, value));
-                self.tell(|| format!("{} {old} → {new}", shortened(name, NAME)));
+                self.tell(|| format!("{} {old} → {new}", shortened_key(name, NAME)));
             }
         }
     }
@@ -84,14 +87,17 @@ impl Found<'_> {
         let is_same = |(a, b): &(&Value<'_>, &Value<'_>)| is_same(a, b);
         let start = old.iter().zip(&new).take_while(is_same).count();
         let end = old.iter().rev().zip(new.iter().rev()).take(least - start).take_while(is_same).count();
-        let (old, new) = (&old[start..old.len() - end], &new[start..new.len() - end]);
-        let called = |index: usize, value: &Value<'_>| joined(name, &called(value, start + index + 1));
-        for (index, (old, new)) in old.iter().zip(new).enumerate() {
-            self.values(&called(index, new), old, new);
+        let (old_names, new_names) = (called(&old), called(&new));
+        let changed = |all: &[Value<'_>]| start..all.len() - end;
+        for (index, old) in changed(&old).zip(&old[changed(&old)]) {
+            if let Some(after) = new[changed(&new)].get(index - start) {
+                self.values(&joined(name, &new_names[index]), old, after);
+            }
         }
-        for (sign, text, longer, shorter) in [('+', 1, new, old), ('−', 0, old, new)] {
-            for (index, value) in longer.iter().enumerate().skip(shorter.len()) {
-                self.one_sided(sign, &called(index, value), value, text);
+        let sides = [('+', 1, &new, &new_names, &old), ('−', 0, &old, &old_names, &new)];
+        for (sign, text, longer, names, shorter) in sides {
+            for index in changed(longer).skip(changed(shorter).len()) {
+                self.one_sided(sign, &joined(name, &names[index]), &longer[index], text);
             }
         }
     }
@@ -100,8 +106,9 @@ impl Found<'_> {
     fn whole(&mut self, sign: char, name: &str, value: &Value<'_>, text: usize) {
         match value.item() {
             Item::Array(array) if array.is_of_tables() => {
-                for (index, value) in array.iter().enumerate() {
-                    self.one_sided(sign, &joined(name, &called(&value, index + 1)), &value, text);
+                let all: Vec<Value<'_>> = array.iter().collect();
+                for (element, value) in called(&all).iter().zip(&all) {
+                    self.one_sided(sign, &joined(name, element), value, text);
                 }
             }
             Item::Array(_)
@@ -124,7 +131,7 @@ impl Found<'_> {
             }
         };
         let shown = if is_short { format!(" = {}", self.text(text, value)) } else { String::new() };
-        self.tell(|| format!("{sign} {}{shown}", shortened(name, NAME)));
+        self.tell(|| format!("{sign} {}{shown}", shortened_key(name, NAME)));
     }
 
     /// A value as it is written, in one line.
@@ -143,18 +150,33 @@ impl Found<'_> {
 }
 
 fn joined(name: &str, key: &str) -> String {
-    if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") }
+    if name.is_empty() { part(key) } else { format!("{name}.{}", part(key)) }
 }
 
-/// The name of a shape, else its number, from 1.
-fn called(value: &Value<'_>, number: usize) -> String {
-    if let Item::Table(table) = value.item()
-        && let Some(entry) = table.get("name")
-        && let Item::String(name) = entry.value.item()
-    {
-        return name.to_owned();
+/// The parts of keys that lead to the elements of a list: the name if `--set` finds the element by it, else the number, from 1.
+fn called(all: &[Value<'_>]) -> Vec<String> {
+    let mut counts: HashMap<&str, usize> = HashMap::new();
+    for name in all.iter().filter_map(name_of) {
+        *counts.entry(name).or_default() += 1;
     }
-    number.to_string()
+    let finds = |name: &&str| name.parse::<usize>().is_err() && counts.get(name) == Some(&1);
+    let of = |(number, value): (usize, &Value<'_>)| {
+        name_of(value).filter(finds).map_or_else(|| number.to_string(), str::to_owned)
+    };
+    (1..).zip(all).map(of).collect()
+}
+
+fn name_of<'t>(value: &Value<'t>) -> Option<&'t str> {
+    let Item::Table(table) = value.item() else { return None };
+    match table.get("name")?.value.item() {
+        Item::String(name) => Some(name),
+        Item::Array(_)
+        | Item::Table(_)
+        | Item::Integer { .. }
+        | Item::Float(_)
+        | Item::Boolean(_)
+        | Item::Datetime => None,
+    }
 }
 
 /// Whether two values mean the same.
@@ -191,7 +213,7 @@ mod tests {
     #[track_caller]
     fn said(from: &str, to: &str, words: &str) {
         assert!(SCENE.contains(from), "{from}");
-        assert_eq!(changes(SCENE, &SCENE.replacen(from, to, 1)).as_deref(), Some(words), "{from} → {to}");
+        assert_eq!(changes(SCENE, &SCENE.replacen(from, to, 1)).join("; "), words, "{from} → {to}");
     }
 
     #[test]
@@ -201,6 +223,37 @@ mod tests {
         said("[0.8, 0.02, 0.02]", "\"red\"", "materials.wall.diffuse [0.8, 0.02, 0.02] → \"red\"");
         said("radius = 0.5", "radius = 0.7", "sphere.ball.radius 0.5 → 0.7");
         said("radius = 1", "radius = 3", "sphere.2.radius 1 → 3");
+    }
+
+    #[track_caller]
+    fn changed_to_two(before: &str, words: &str) {
+        assert_eq!(changes(before, &before.replacen("= 1", "= 2", 1)).join("; "), words, "{before}");
+    }
+
+    #[test]
+    fn keys_with_unusual_names_are_quoted() {
+        changed_to_two(
+            "[materials.\"copper ball\"]\nroughness = 1",
+            "materials.\"copper ball\".roughness 1 → 2",
+        );
+        changed_to_two("[materials.\"a.b\"]\nroughness = 1", "materials.\"a.b\".roughness 1 → 2");
+        changed_to_two("[materials.'say \"x\"']\ntint = 1", "materials.\"say \\\"x\\\"\".tint 1 → 2");
+        changed_to_two("[[quad]]\nname = \"back wall\"\nu = 1", "quad.\"back wall\".u 1 → 2");
+        changed_to_two("[[quad]]\nname = \"\"\nu = 1", "quad.\"\".u 1 → 2");
+    }
+
+    /// `--set` takes a number for a place in the list, and refuses a name that two tables have.
+    #[test]
+    fn names_that_set_cannot_find_give_way_to_numbers() {
+        changed_to_two("[[quad]]\nname = \"7\"\nu = 1", "quad.1.u 1 → 2");
+        let twins = "[[quad]]\nname = \"wall\"\nu = 1\n[[quad]]\nname = \"wall\"";
+        changed_to_two(twins, "quad.1.u 1 → 2");
+    }
+
+    #[test]
+    fn long_keys_keep_the_property() {
+        let name = "a material with a very long name indeed, longer than any line";
+        changed_to_two(&format!("[materials.\"{name}\"]\nroughness = 1"), "…roughness 1 → 2");
     }
 
     #[test]
@@ -225,8 +278,9 @@ mod tests {
     #[test]
     fn many_changes_are_counted() {
         let all = SCENE.replace("64", "32").replace("40.0", "41").replace("radius = ", "radius = 1");
-        let words = "render.width 64 → 32, camera.fov 40.0 → 41, sphere.ball.radius 0.5 → 10.5 and 2 more";
-        assert_eq!(changes(SCENE, &all).as_deref(), Some(words));
+        let words =
+            ["render.width 64 → 32", "camera.fov 40.0 → 41", "sphere.ball.radius 0.5 → 10.5 and 2 more"];
+        assert_eq!(changes(SCENE, &all), words);
     }
 
     #[test]
@@ -234,8 +288,8 @@ mod tests {
         for (from, to) in
             [("fov = 40.0", "fov = 40.0 # wide"), ("[0, 1, 4]", "[ 0, 1, 4 ]"), ("\nname", "\n\nname")]
         {
-            assert_eq!(changes(SCENE, &SCENE.replace(from, to)), None, "{to}");
+            assert!(changes(SCENE, &SCENE.replace(from, to)).is_empty(), "{to}");
         }
-        assert_eq!(changes(SCENE, "[render"), None);
+        assert!(changes(SCENE, "[render").is_empty());
     }
 }

@@ -79,8 +79,8 @@ impl Origin {
 
     /// Changes of the files since another one, in words.
     pub(in crate::tui) fn edits(&self, before: &Self) -> Vec<String> {
-        let of_text =
-            before.text.as_deref().zip(self.text.as_deref()).and_then(|(old, new)| changes(old, new));
+        let texts = before.text.as_deref().zip(self.text.as_deref());
+        let of_text = texts.map(|(old, new)| changes(old, new)).unwrap_or_default();
         let is_changed = |file: &&FileRead| {
             before.files.iter().any(|old| old.path == file.path && old.content != file.content)
         };

@@ -2,7 +2,7 @@
 
 use unicode_width::UnicodeWidthStr;
 
-use super::text::shortened;
+use crate::scene::{key_parts, shortened_key, split_key};
 
 /// Words beside a picture.
 pub(super) struct Words {
@@ -19,11 +19,11 @@ enum Form {
     Full,
     /// The key with its new value.
     New,
-    /// The last two names of the key, with its new value.
+    /// The last parts of the key, which name one thing and its property, with its new value.
     Short,
     /// The same of so many changes.
     First(usize),
-    /// The first change, with the key in one line.
+    /// The first change, with the property in one line.
     Cut,
 }
 
@@ -31,7 +31,7 @@ enum Form {
 pub(super) fn fitting(words: &Words, width: usize, rows: [usize; 2]) -> Vec<String> {
     let [few, most] = rows;
     let all = [Form::Full, Form::New, Form::Short];
-    let count = words.changes.iter().map(|change| apart(change).len()).sum();
+    let count = words.changes.len();
     let fewer = (1..count).rev().map(Form::First).chain([Form::Cut]);
     let in_few = all.map(|form| (form, few));
     let in_most = all.into_iter().chain(fewer).map(|form| (form, most));
@@ -52,8 +52,8 @@ pub(super) fn fitting(words: &Words, width: usize, rows: [usize; 2]) -> Vec<Stri
 }
 
 /// Pieces of the changes that stay whole if they fit into a line.
-fn pieces(words: &Words, form: Form, width: usize) -> Vec<String> {
-    let changes: Vec<&str> = words.changes.iter().flat_map(|change| apart(change)).collect();
+fn pieces(words: &Words, form: Form, width: usize) -> Vec<Piece> {
+    let changes = &words.changes;
     let told = match form {
         Form::Full | Form::New | Form::Short => changes.len(),
         Form::First(told) => told,
@@ -63,77 +63,96 @@ fn pieces(words: &Words, form: Form, width: usize) -> Vec<String> {
     for (number, change) in (1..).zip(changes.iter().take(told)) {
         pieces.extend(of_change(change, form, width.saturating_sub(words.head.width())));
         let end = if number < told { ";" } else { "" };
-        if let Some(last) = pieces.last_mut() {
-            *last += end;
+        if let Some(Piece { text, .. }) = pieces.last_mut() {
+            *text += end;
         }
     }
     if told < changes.len() {
-        pieces.push("…".to_owned());
+        pieces.push(Piece::words("…"));
     }
     pieces
 }
 
-/// Pieces of one change: the key, its values; or single words.
-fn of_change(change: &str, form: Form, beside_head: usize) -> Vec<String> {
-    let values = change.rsplit_once(" → ").filter(|_| !change.starts_with("line "));
-    let key = values.and_then(|(before, new)| Some((before.split_once(' ')?, new)));
-    let Some(((key, old), new)) = key else { return change.split(' ').map(str::to_owned).collect() };
-    let new = format!("→ {new}");
-    match form {
-        Form::Full => vec![key.to_owned(), old.to_owned(), new],
-        Form::New => vec![key.to_owned(), new],
-        Form::Short | Form::First(_) => vec![last_names(key).to_owned(), new],
-        Form::Cut => vec![shortened(last_names(key), u16::try_from(beside_head).unwrap_or(u16::MAX)), new],
+/// A piece of a change that stays in one line if it fits.
+struct Piece {
+    text: String,
+    is_key: bool,
+}
+
+impl Piece {
+    fn words(text: impl Into<String>) -> Self {
+        Self { text: text.into(), is_key: false }
     }
-}
 
-/// The last two names of a key: `lamp.emission` of `materials.lamp.emission`.
-fn last_names(key: &str) -> &str {
-    key.rmatch_indices('.').nth(1).map_or(key, |(at, _)| &key[at + 1..])
-}
-
-/// Changes that stand in one text, behind commas that are in no value.
-fn apart(changes: &str) -> Vec<&str> {
-    let (mut parts, mut start, mut depth, mut is_quoted) = (Vec::new(), 0, 0_u32, false);
-    for (at, c) in changes.char_indices() {
-        match c {
-            '"' => is_quoted = !is_quoted,
-            '[' | '{' => depth += 1,
-            ']' | '}' => depth = depth.saturating_sub(1),
-            // A value that is cut.
-            '…' => (depth, is_quoted) = (0, false),
-            ',' if depth == 0 && !is_quoted && changes[at..].starts_with(", ") => {
-                parts.push(&changes[start..at]);
-                start = at + 2;
-            }
-            _ => {}
+    /// The parts that a line can end with: those of a key, or words.
+    fn parts(&self) -> Vec<String> {
+        if !self.is_key {
+            return self.text.split(' ').map(str::to_owned).collect();
         }
+        let mut parts: Vec<String> = key_parts(&self.text).iter().map(|part| format!("{part}.")).collect();
+        if let Some(last) = parts.last_mut() {
+            last.pop();
+        }
+        parts
     }
-    parts.push(&changes[start..]);
-    parts
+}
+
+/// Pieces of one change: the key, its values; or single words.
+fn of_change(change: &str, form: Form, beside_head: usize) -> Vec<Piece> {
+    let words = |text: &str| text.split(' ').map(Piece::words).collect::<Vec<_>>();
+    let key = |key: &str| Piece { text: in_form(key, form, beside_head), is_key: true };
+    if let Some((sign @ ("+" | "−"), rest)) = change.split_once(' ') {
+        let (name, value) = split_key(rest).unwrap_or((rest, ""));
+        let value = if value.is_empty() { Vec::new() } else { words(value) };
+        return [Piece::words(sign), key(name)].into_iter().chain(value).collect();
+    }
+    let of_key = split_key(change).filter(|_| !change.starts_with("line "));
+    let Some((name, old, new)) = of_key.and_then(|(name, values)| {
+        let (old, new) = values.rsplit_once(" → ")?;
+        Some((name, old, new))
+    }) else {
+        return words(change);
+    };
+    let new = Piece::words(format!("→ {new}"));
+    match form {
+        Form::Full => vec![key(name), Piece::words(old), new],
+        Form::New | Form::Short | Form::First(_) | Form::Cut => vec![key(name), new],
+    }
+}
+
+fn in_form(key: &str, form: Form, beside_head: usize) -> String {
+    match form {
+        Form::Full | Form::New => key.to_owned(),
+        Form::Short | Form::First(_) => last_parts(key),
+        Form::Cut => shortened_key(&last_parts(key), beside_head),
+    }
+}
+
+/// The end of a key that names one thing and its property: `lamp.emission` of `materials.lamp.emission`, all of `light.1.direction`.
+fn last_parts(key: &str) -> String {
+    let parts = key_parts(key);
+    let first = parts.len().saturating_sub(2);
+    let is_number = parts[first].parse::<u64>().is_ok();
+    parts[first.saturating_sub(usize::from(is_number))..].join(".")
 }
 
 /// Puts pieces into lines behind a head. Pieces that are too long for a line are broken: keys behind a point, all else between
 /// words.
-fn filled(head: &str, pieces: &[String], width: usize) -> Vec<String> {
+fn filled(head: &str, pieces: &[Piece], width: usize) -> Vec<String> {
     let mut lines = vec![head.to_owned()];
     let mut is_behind_head = true;
     for piece in pieces {
         let room = if is_behind_head { width.saturating_sub(head.width()) } else { width };
-        let is_value = piece.starts_with(['→', '[', '{', '"']) || piece.contains(' ');
-        let parts: Vec<&str> = match piece.width() > room {
-            true if is_value => piece.split(' ').collect(),
-            true => piece.split_inclusive('.').collect(),
-            false => vec![piece.as_str()],
-        };
-        for (number, part) in parts.into_iter().enumerate() {
+        let is_whole = piece.text.width() <= room;
+        let parts = if is_whole { vec![piece.text.clone()] } else { piece.parts() };
+        for (number, part) in parts.iter().enumerate() {
             let Some(line) = lines.last_mut() else { return lines };
-            let gap = if is_behind_head || number > 0 && !is_value { "" } else { " " };
+            let gap = if is_behind_head || number > 0 && piece.is_key { "" } else { " " };
             if line.width() + gap.len() + part.width() <= width {
                 *line += gap;
                 *line += part;
             } else {
-                lines.push(part.to_owned());
+                lines.push(part.clone());
             }
             is_behind_head = false;
         }
@@ -160,7 +179,35 @@ mod tests {
         assert_eq!(lines(" 2", &["camera.fov 40 → 30"], 14), [" 2 camera.fov", "40 → 30"]);
         let long = "materials.a_very_long_name.diffuse [0.123456, 0.234567, 0.3…→ [0.1, 0.2, 0.3]";
         let long = long.replace("…→", "… →");
-        assert_eq!(lines("12", &[&long], 13), ["12 a_very_lo…", "→ [0.1, 0.2,", "0.3]"]);
+        assert_eq!(lines("12", &[&long], 13), ["12 …diffuse →", "[0.1, 0.2,", "0.3]"]);
+    }
+
+    #[test]
+    fn the_property_is_never_left_out() {
+        let quoted = "materials.\"copper ball\".roughness 0.1 → 0.4";
+        let light = "light.1.direction [0, -1, 0] → [0.25, -1, 0.5]";
+        let comes = "+ materials.\"copper ball\".roughness = 0.4";
+        let dotted = "textures.\"a.b → c\".repeat [1, 1] → [2, 2]";
+        for (change, property) in
+            [(quoted, "roughness"), (light, "direction"), (comes, "roughness"), (dotted, "repeat")]
+        {
+            for width in 13..60 {
+                let lines = lines("▸4", &[change], width);
+                assert!(lines.join("").contains(property), "{width}: {lines:?}");
+                assert!(lines.iter().all(|line| line.width() <= width), "{width}: {lines:?}");
+                assert!(!lines.iter().any(|line| line.contains(" 1.direction")), "{width}: {lines:?}");
+            }
+        }
+        assert_eq!(lines("▸4", &[quoted], 26), ["▸4 materials.", "\"copper ball\".roughness", "0.1 → 0.4"]);
+        assert_eq!(lines("▸4", &[quoted], 40).join("|"), "▸4 materials.\"copper ball\".roughness 0.1|→ 0.4");
+    }
+
+    #[test]
+    fn settings_that_are_the_scenes_again_are_one_change() {
+        assert_eq!(
+            lines(" 4", &["back to the scene's integrator, view"], 60),
+            [" 4 back to the scene's integrator, view"]
+        );
     }
 
     #[test]
@@ -176,23 +223,26 @@ mod tests {
     #[test]
     fn several_changes_are_told_as_far_as_there_is_room() {
         let changes =
-            ["camera.fov 40 → 30, materials.lamp.emission [14, 13, 11] → [20, 13, 5]", "shadows hard"];
+            ["camera.fov 40 → 30", "materials.lamp.emission [14, 13, 11] → [20, 13, 5]", "shadows hard"];
         let wide = lines("▸4", &changes, 40).join("|");
         let words =
             "▸4 camera.fov 40 → 30; |materials.lamp.emission [14, 13, 11]|→ [20, 13, 5]; shadows hard";
         assert_eq!(wide, words.replace(" |", "|"));
         assert_eq!(lines("▸4", &changes, 14), ["▸4 camera.fov", "→ 30 …"]);
-        let moved = "camera.position [0, 0, 4] → [0, 0, 3.8], camera.focus 4.0 → 3.8";
-        assert_eq!(lines("▸3", &[moved], 14), ["▸3 camera.", "position", "→ [0, 0, 3.8]", "…"]);
+        let moved = ["camera.position [0, 0, 4] → [0, 0, 3.8]", "camera.focus 4.0 → 3.8"];
+        assert_eq!(lines("▸3", &moved, 14), ["▸3 camera.", "position", "→ [0, 0, 3.8]", "…"]);
     }
 
     #[test]
     fn as_many_changes_are_told_as_there_is_room_for() {
-        let changes = "camera.fov 40 → 25.0, render.samples 64 → 16";
-        assert_eq!(lines(" –", &["unfinished", changes], 14), [" – unfinished;", "camera.fov", "→ 25.0 …"]);
-        let six = "+ render.shadows = \"off\", camera.position [0, 1, 4] → [-0.3773, 0.9512, 3.5904], \
-            camera.fov 40 → 25 and 3 more";
-        let [few, most] = [24, 26].map(|width| lines("10", &[six], width));
+        let changes = ["unfinished", "camera.fov 40 → 25.0", "render.samples 64 → 16"];
+        assert_eq!(lines(" –", &changes, 14), [" – unfinished;", "camera.fov", "→ 25.0 …"]);
+        let six = [
+            "+ render.shadows = \"off\"",
+            "camera.position [0, 1, 4] → [-0.3773, 0.9512, 3.5904]",
+            "camera.fov 40 → 25 and 3 more",
+        ];
+        let [few, most] = [24, 26].map(|width| lines("10", &six, width));
         assert_eq!(
             few,
             ["10 + render.shadows =", "\"off\"; camera.position →", "[-0.3773, 0.9512,", "3.5904] …"]

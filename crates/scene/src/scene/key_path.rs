@@ -1,0 +1,94 @@
+//! Dotted keys in the form that `--set` takes: `materials."copper ball".roughness`.
+
+use unicode_width::UnicodeWidthStr;
+
+use super::sanitize::{shortened, visible};
+use super::source::quoted;
+
+/// One part of a dotted key, in quotes if it is not a bare key.
+pub(super) fn part(name: &str) -> String {
+    let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if !name.is_empty() && name.chars().all(is_bare) { name.to_owned() } else { quoted(name) }
+}
+
+/// The parts of a dotted key, with their quotes. A dot inside quotes belongs to its part.
+pub fn key_parts(key: &str) -> Vec<&str> {
+    let mut rest = key;
+    let mut parts = Vec::new();
+    while let Some(end) = end_of(rest, '.') {
+        parts.push(&rest[..end]);
+        rest = &rest[end + 1..];
+    }
+    parts.push(rest);
+    parts
+}
+
+/// Splits a text that starts with a dotted key at the first blank outside quotes.
+pub fn split_key(text: &str) -> Option<(&str, &str)> {
+    end_of(text, ' ').map(|end| (&text[..end], &text[end + 1..]))
+}
+
+/// Shortens a dotted key to this many columns. Drops the tables at its left first; the last part, the property, is only cut if it
+/// does not fit by itself.
+pub fn shortened_key(key: &str, columns: usize) -> String {
+    let key = visible(key);
+    if key.width() <= columns {
+        return key.into_owned();
+    }
+    let parts = key_parts(&key);
+    let last = parts.len() - 1;
+    // A number means nothing without the list that it counts.
+    let begins_with_number = |skipped: &usize| parts[*skipped].parse::<u64>().is_ok();
+    let tails =
+        (1..=last).filter(|skipped| !begins_with_number(skipped)).map(|skipped| parts[skipped..].join("."));
+    let fitting = tails.map(|tail| format!("…{tail}")).find(|tail| tail.width() <= columns);
+    fitting.unwrap_or_else(|| shortened(parts[last], columns))
+}
+
+/// Index of the first such character outside quotes.
+fn end_of(text: &str, end: char) -> Option<usize> {
+    let (mut is_quoted, mut is_escaped) = (false, false);
+    for (at, c) in text.char_indices() {
+        match c {
+            _ if is_escaped => is_escaped = false,
+            '\\' if is_quoted => is_escaped = true,
+            '"' => is_quoted = !is_quoted,
+            c if c == end && !is_quoted => return Some(at),
+            _ => {}
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quoted_parts_keep_their_dots_and_blanks() {
+        let key = r#"materials."copper \" ball v1.2".roughness"#;
+        assert_eq!(key_parts(key), ["materials", r#""copper \" ball v1.2""#, "roughness"]);
+        assert_eq!(key_parts("light.1.direction"), ["light", "1", "direction"]);
+        assert_eq!(key_parts("camera"), ["camera"]);
+        assert_eq!(split_key(&format!("{key} 0.1 → 0.4")), Some((key, "0.1 → 0.4")));
+        assert_eq!(split_key("camera"), None);
+    }
+
+    #[test]
+    fn the_property_outlives_its_tables() {
+        let key = r#"materials."copper ball".roughness"#;
+        for (columns, shown) in [
+            (40, key),
+            (33, key),
+            (24, r#"…"copper ball".roughness"#),
+            (23, "…roughness"),
+            (20, "…roughness"),
+            (10, "…roughness"),
+            (9, "roughness"),
+            (5, "roug…"),
+        ] {
+            assert_eq!(shortened_key(key, columns), shown, "{columns}");
+        }
+        assert_eq!(shortened_key("light.1.direction", 16), "…direction", "a number without its list");
+    }
+}
