@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 pub(super) use self::display::DisplayState;
-pub(super) use self::overlays::{OverlayState, Pane, Problems, ViewList};
+pub(super) use self::overlays::{Message, OverlayState, Pane, Problems, ViewList};
 pub(super) use self::picture::PictureState;
 pub(super) use self::request::{CameraStep, Origin, RequestState, Toggles, signed_stops};
 pub(super) use self::saving::{PendingChange, SavingState};
@@ -132,8 +132,9 @@ impl State {
         let clock = (self.work.is_running() && !self.work.paused).then(|| self.now + CLOCK);
         let bars = self.work.assets.iter().filter_map(AssetBar::end).min();
         let views = self.overlays.views.as_ref().map(|views| views.until);
+        let notice = self.overlays.message.as_ref().and_then(|message| message.until);
         // An older picture grows older.
         let age = self.picture.history.is_open().then(|| self.now + AGE);
-        [clock, age, self.request.resize_due, bars, views].into_iter().flatten().min()
+        [clock, age, self.request.resize_due, bars, views, notice].into_iter().flatten().min()
     }
 }

@@ -30,11 +30,19 @@ pub(in crate::tui) struct Pane {
     pub scroll: usize,
 }
 
+/// A message to the user.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::tui) struct Message {
+    pub words: String,
+    /// Time at which it disappears without a key. `None` for a fault or a prompt.
+    pub until: Option<Instant>,
+}
+
 /// Texts, and the panes that show them.
 #[derive(Default)]
 pub(in crate::tui) struct OverlayState {
     /// The last message, until the next key.
-    pub message: Option<String>,
+    pub message: Option<Message>,
     /// Errors of the scene. `None` while the scene is valid.
     pub problems: Option<Problems>,
     /// Errors in a file that may still be being written.

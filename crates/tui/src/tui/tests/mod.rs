@@ -8,6 +8,7 @@ mod keys;
 mod layout;
 mod manual;
 mod noise;
+mod notices;
 mod older;
 mod overlay;
 mod pointer;

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use super::request::render;
-use super::say::{notify, say};
+use super::say::{notify, prompt, say};
 use crate::pipeline::protocol::{Command, Kept, MovedCamera};
 use crate::pipeline::settings::CameraChange;
 use crate::scene::description::Pose;
@@ -127,7 +127,7 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
         state.request.move_from_own();
         let saved = saved.join(", ");
         let why = "was saved since the keys moved the camera: press c again to write over it";
-        return notify(state, &format!("error: {saved} {why}"));
+        return prompt(state, &format!("error: {saved} {why}"));
     }
     state.saving.is_camera_of_newest = state.picture.history.is_open();
     vec![Effect::Send(Command::KeepCamera(MovedCamera { camera, own }))]
@@ -140,7 +140,7 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
             state.saving.has_scene_of_model |= is_mesh(&state.request.scene);
-            return notify(state, &format!("error: {}", visible(&why)));
+            return prompt(state, &format!("error: {}", visible(&why)));
         }
     };
     if of_model {
@@ -189,7 +189,7 @@ pub(super) fn undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec
         Ok(path) => path,
         Err(why) => {
             state.saving.camera_refused = Some(state.now);
-            return notify(state, &format!("error: {}", visible(&why)));
+            return prompt(state, &format!("error: {}", visible(&why)));
         }
     };
     state.saving.camera_edits.pop();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::say::{notify, say};
+use super::say::{notify, say, say_until_key};
 use crate::tui::event::Effect;
 use crate::tui::state::{Rendering, State};
 
@@ -70,7 +70,7 @@ pub(super) fn before_and_after(state: &mut State) -> Vec<Effect> {
             let effects = look_at(state, shown);
             let edits = state.picture.history.edits_since_open();
             let edits = if edits.is_empty() { edits } else { format!(", {edits}") };
-            say(state, format!("before the last edit{edits}"));
+            say_until_key(state, format!("before the last edit{edits}"));
             effects
         }
         None => notify(state, "there is no picture from before an edit"),
@@ -95,6 +95,6 @@ fn look_at(state: &mut State, shown: crate::tui::history::Shown) -> Vec<Effect> 
     // The first line says which one it is, and how old, which goes on.
     let older = if state.picture.history.is_oldest_open() { "" } else { "n older, " };
     let words = format!("{}; {older}N newer", state.picture.history.reason_of_open());
-    say(state, words);
+    say_until_key(state, words);
     Vec::new()
 }

@@ -16,13 +16,14 @@ mod worker;
 use std::time::{Duration, Instant};
 
 use self::request::{render, resized_preview};
-use self::say::say;
+pub(super) use self::say::say;
+use self::say::say_until_key;
 use super::ExitStatus;
 use super::event::{Effect, Event, Signal, Source, Window};
 use super::history::Shown;
 use super::options::Changed;
 use super::preview_kind::PreviewKind;
-use super::state::{PendingChange, State};
+use super::state::{Message, PendingChange, State};
 use super::view::layout::Layout;
 use crate::film::Picture;
 use crate::pipeline::protocol::Command;
@@ -43,7 +44,8 @@ pub(super) fn update(state: &mut State, event: Event, now: Instant) -> Vec<Effec
     effects.extend(camera::keep_up(state));
     let is_request = |effect: &Effect| matches!(effect, Effect::Send(Command::Render(_)));
     if was_paused && effects.iter().any(is_request) {
-        let rest = state.overlays.message.take().map_or(String::new(), |message| format!(" · {message}"));
+        let message = state.overlays.message.take();
+        let rest = message.map_or(String::new(), |message| format!(" · {}", message.words));
         say(state, format!("no longer paused{rest}"));
     }
     effects
@@ -105,7 +107,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             Vec::new()
         }
         Event::NoEditor(why) => {
-            say(state, why);
+            say_until_key(state, why);
             Vec::new()
         }
         Event::NoShell => {
@@ -182,6 +184,8 @@ fn tick(state: &mut State) -> Vec<Effect> {
     state.work.assets.retain(|asset| asset.end().is_none_or(|end| now < end));
     state.dirty |= state.work.assets.len() != bars;
     state.dirty |= state.overlays.views.take_if(|views| now >= views.until).is_some();
+    let is_over = |message: &mut Message| message.until.is_some_and(|until| now >= until);
+    state.dirty |= state.overlays.message.take_if(is_over).is_some();
     if state.request.resize_due.is_none_or(|due| state.now < due) {
         return Vec::new();
     }
@@ -207,7 +211,7 @@ fn lost(state: &mut State, source: Source) -> Vec<Effect> {
         Source::Worker => vec![Effect::GiveUp],
         Source::Watcher => {
             worker::settled(state);
-            say(state, "files are no longer watched: r renders again");
+            say_until_key(state, "files are no longer watched: r renders again");
             Vec::new()
         }
         Source::Keys => vec![Effect::Quit(ExitStatus::HANGUP)],

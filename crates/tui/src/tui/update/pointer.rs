@@ -1,6 +1,6 @@
 //! The mouse on the picture, and questions about a place there.
 
-use super::say::{notify, say};
+use super::say::{notify, prompt, say};
 use super::{camera, history, overlay, rectangle};
 use crate::math::decimal::{rounded, step_at};
 use crate::pipeline::protocol::{Command, Picked, Thing};
@@ -107,7 +107,7 @@ pub(super) fn focus(state: &mut State) -> Vec<Effect> {
     }
     if state.selection.is_mouse_on && !state.selection.is_focusing {
         state.selection.is_focusing = true;
-        return notify(
+        return prompt(
             state,
             "click where to focus; f again focuses at the crosshair: the last click, else the middle",
         );

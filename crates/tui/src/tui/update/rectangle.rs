@@ -1,7 +1,7 @@
 //! A rectangle of the picture that is rendered before the rest.
 
 use super::request::render;
-use super::say::{notify, say};
+use super::say::{prompt, say};
 use crate::pipeline::protocol::{Section, Spot};
 use crate::tui::event::Effect;
 use crate::tui::state::State;
@@ -19,7 +19,7 @@ pub(super) fn press(state: &mut State) -> Vec<Effect> {
     }
     if state.selection.is_mouse_on && !state.selection.is_marking {
         state.selection.is_marking = true;
-        return notify(
+        return prompt(
             state,
             "drag a rectangle: it is rendered first; z again takes what is around the crosshair",
         );

@@ -1,16 +1,37 @@
-//! Messages to the person.
+//! Messages to the user.
+
+use std::time::Duration;
 
 use crate::tui::event::Effect;
-use crate::tui::state::State;
+use crate::tui::state::{Message, State};
 
-/// Shows a message until the next key.
-pub(super) fn say(state: &mut State, message: impl Into<String>) {
-    (state.overlays.message, state.selection.facts) = (Some(message.into()), None);
+/// Time for which a notice is shown.
+const NOTICE: Duration = Duration::from_secs(4);
+
+/// Shows a notice: until the next key, for four seconds at most.
+pub(in crate::tui) fn say(state: &mut State, words: impl Into<String>) {
+    let until = Some(state.now + NOTICE);
+    show(state, Message { words: words.into(), until });
+}
+
+/// Shows a message until the next key: a fault, or a prompt for what has to follow.
+pub(super) fn say_until_key(state: &mut State, words: impl Into<String>) {
+    show(state, Message { words: words.into(), until: None });
+}
+
+fn show(state: &mut State, message: Message) {
+    (state.overlays.message, state.selection.facts) = (Some(message), None);
     state.dirty = true;
 }
 
-/// Shows a message; no effect follows.
-pub(super) fn notify(state: &mut State, message: &str) -> Vec<Effect> {
-    say(state, message);
+/// Shows a notice; no effect follows.
+pub(super) fn notify(state: &mut State, words: &str) -> Vec<Effect> {
+    say(state, words);
+    Vec::new()
+}
+
+/// Shows a message until the next key; no effect follows.
+pub(super) fn prompt(state: &mut State, words: &str) -> Vec<Effect> {
+    say_until_key(state, words);
     Vec::new()
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::request::resized_preview;
-use super::say::say;
+use super::say::{say, say_until_key};
 use super::{camera, history, pointer};
 use crate::pipeline::protocol::{
     AssetProgress, CheckpointNews, Event, Failure, LastGoodEnd, Report, Stage, StageReport, Status,
@@ -89,25 +89,27 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             }
             let is_it = |written: &&mut Written| Some(&written.path) == path.as_ref();
             state.saving.written.iter_mut().filter(is_it).for_each(|written| written.is_stale = true);
-            say(state, format!("error: {}", visible(&message)));
+            say_until_key(state, format!("error: {}", visible(&message)));
             state.saving.write_failed =
                 Some(Unwritten { why: message, generation: state.request.generation, is_refused: false });
         }
-        Event::NotKept { message, .. } => say(state, format!("warning: {}", visible(&message))),
+        Event::NotKept { message, .. } => say_until_key(state, format!("warning: {}", visible(&message))),
         Event::Checkpoint { news, .. } => match news {
-            CheckpointNews::Failed { message } => say(state, format!("warning: {}", visible(&message))),
+            CheckpointNews::Failed { message } => {
+                say_until_key(state, format!("warning: {}", visible(&message)))
+            }
             CheckpointNews::Resumed { path, .. } => {
                 say(state, format!("{GOING_ON} {}", visible(&path.to_string_lossy())));
             }
             CheckpointNews::SetAside { path } => {
-                say(
+                say_until_key(
                     state,
                     format!("the checkpoint of another render is {}", visible(&path.to_string_lossy())),
                 );
             }
             CheckpointNews::Unused { path, why } => {
                 let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-                say(state, format!("{} is not used: {}", visible(&name), visible(&why)));
+                say_until_key(state, format!("{} is not used: {}", visible(&name), visible(&why)));
             }
             CheckpointNews::Written { .. }
             | CheckpointNews::Finished { .. }
@@ -275,7 +277,7 @@ fn mended(state: &mut State) {
 
 fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, unchanged: bool) {
     add_earlier_seconds(&mut report);
-    state.overlays.message.take_if(|message| message.starts_with(GOING_ON));
+    state.overlays.message.take_if(|message| message.words.starts_with(GOING_ON));
     mended(state);
     for stage in &report.stages {
         record(state, stage.clone());

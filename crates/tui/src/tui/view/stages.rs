@@ -102,20 +102,28 @@ fn change(state: &State, report: &StageReport) -> String {
     }
 }
 
-/// The stages that count, and how many were reused; in short if there is no room.
+/// The stages that took a noticeable share of the time, and how many were reused; in short or only the longest one if there is no
+/// room. Empty if not even that fits.
 pub(super) fn in_one_line(state: &State, room: u16) -> Line {
-    let line = in_one_line_of(state, true);
-    if width(&line) <= room { line } else { in_one_line_of(state, false) }
+    let done = || state.work.stages.iter().flatten().filter(|it| it.status == Status::Done);
+    let total: f64 = done().map(|it| it.seconds).sum();
+    let longest = done().map(|it| it.seconds).fold(0.0, f64::max);
+    let first = done().find(|it| it.seconds >= longest).map(|it| it.name);
+    let counts = |it: &StageReport| it.seconds >= SMALL * total;
+    let forms = [
+        in_one_line_of(state, true, counts),
+        in_one_line_of(state, false, counts),
+        in_one_line_of(state, false, |it| Some(it.name) == first),
+    ];
+    forms.into_iter().find(|line| width(line) <= room).unwrap_or_default()
 }
 
-fn in_one_line_of(state: &State, is_long: bool) -> Line {
-    let total: f64 =
-        state.work.stages.iter().flatten().filter(|it| it.status == Status::Done).map(|it| it.seconds).sum();
+fn in_one_line_of(state: &State, is_long: bool, counts: impl Fn(&StageReport) -> bool) -> Line {
     let mut line = Line::new();
     let mut reused = 0;
     for report in state.work.stages.iter().flatten() {
         reused += usize::from(report.status == Status::Reused);
-        if report.status == Status::Done && report.seconds >= SMALL * total {
+        if report.status == Status::Done && counts(report) {
             let comma = if line.is_empty() { "" } else { ", " };
             line.push((
                 format!("{comma}{} {}", report.name.name(), seconds(report.seconds)),

@@ -1,4 +1,4 @@
-//! The line under the picture: a message; else how far the render is; else what it took.
+//! The line under the image: progress while a render runs, then its stages and files. A message takes the left part of it.
 
 use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
@@ -23,29 +23,51 @@ const SHORT_HINT: &str = "save it to render again";
 const LEAST_BAR: u16 = 6;
 
 pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Drawn) {
-    let area = layout.under;
-    // What the newest picture took says nothing of an older one.
-    let is_older = state.picture.history.is_open();
-    if message::is_said(state, layout) || is_older && !state.work.is_running() {
-        return;
-    }
-    match state.work.activity {
-        Activity::Running { .. } => bar(state, layout, buffer),
-        Activity::Done => summary(state, layout, buffer, drawn),
-        Activity::Waiting | Activity::Cancelled => {}
-        Activity::Broken if let Some(progress) = goes_on(state) => {
-            let words = format!("the last good scene goes on: {} %", percent(progress.fraction));
+    let area = message::left_under(state, layout);
+    match content(state) {
+        Content::Nothing => {}
+        Content::Bar => bar(state, layout, area, buffer),
+        Content::Summary => summary(state, layout, area, buffer, drawn),
+        Content::Words(words) => {
             put(buffer, area, &[(&words, Tone::Faint)], state.display.depth);
         }
-        Activity::Broken if state.picture.shown.is_some() => {
-            put(
-                buffer,
-                area,
-                &[("the last good picture stays until the errors are fixed", Tone::Faint)],
-                state.display.depth,
-            );
+    }
+}
+
+/// Content of the line.
+enum Content {
+    Nothing,
+    Bar,
+    Summary,
+    Words(String),
+}
+
+fn content(state: &State) -> Content {
+    // What the newest picture took says nothing of an older one.
+    if state.picture.history.is_open() && !state.work.is_running() {
+        return Content::Nothing;
+    }
+    match state.work.activity {
+        Activity::Running { .. } => Content::Bar,
+        Activity::Done => Content::Summary,
+        Activity::Waiting | Activity::Cancelled => Content::Nothing,
+        Activity::Broken if let Some(progress) = goes_on(state) => {
+            Content::Words(format!("the last good scene goes on: {} %", percent(progress.fraction)))
         }
-        Activity::Broken => {}
+        Activity::Broken if state.picture.shown.is_some() => {
+            Content::Words("the last good picture stays until the errors are fixed".to_owned())
+        }
+        Activity::Broken => Content::Nothing,
+    }
+}
+
+/// Columns that a message leaves for the rest of the line.
+pub(super) fn least_columns(state: &State, layout: &Layout) -> u16 {
+    match content(state) {
+        Content::Nothing => 0,
+        Content::Bar => columns(&bar_words(state, layout).1),
+        Content::Summary => file_pieces(state, layout).iter().flatten().map(|(text, _)| columns(text)).sum(),
+        Content::Words(words) => columns(&words),
     }
 }
 
@@ -55,12 +77,10 @@ pub(in crate::tui) fn goes_on(state: &State) -> Option<&RenderProgress> {
     state.work.progress.as_ref().filter(|progress| is_broken && progress.fraction < 1.0)
 }
 
-/// Draws the bar of the loading asset or of the render.
-fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
-    let area = layout.under;
+/// Fraction and words of the loading asset or of the render.
+fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
     let time = state.work.rendering_for(state.now).map_or(String::new(), running);
-    let name = at_work(state).unwrap_or_default();
-    let (fraction, words) = match (&state.work.progress, state.work.assets.last()) {
+    match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
             let RenderProgress { samples, total_samples, .. } = progress;
             // Where noise decides, the total is a guess.
@@ -73,7 +93,13 @@ fn bar(state: &State, layout: &Layout, buffer: &mut Buffer) {
             (stages::fraction(asset), visible(&asset.progress.name).into_owned())
         }
         (None, asset) => (asset.map_or(0.0, stages::fraction), time),
-    };
+    }
+}
+
+/// Draws the bar of the loading asset or of the render.
+fn bar(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer) {
+    let name = at_work(state).unwrap_or_default();
+    let (fraction, words) = bar_words(state, layout);
     let room = area.width.saturating_sub(columns(name) + columns(&words) + 2);
     let noise = state.work.progress.and_then(|progress| progress.noise);
     // A pause ends when somebody wants it to.
@@ -101,9 +127,11 @@ fn noise_words(noise: &NoiseProgress) -> [String; 2] {
 }
 
 /// Draws the stages in one line, and the other facts that the panel does not show.
-fn summary(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Drawn) {
-    let area = layout.under;
-    let mut pieces = stages::in_one_line(state, area.width);
+fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut Drawn) {
+    let of_files = file_pieces(state, layout);
+    // The files come first where there is not room for everything.
+    let room = area.width.saturating_sub(least_columns(state, layout));
+    let mut pieces = stages::in_one_line(state, room);
     let comma = if pieces.is_empty() { "" } else { ", " };
     let mut is_room = |more: Vec<(String, Tone)>| {
         let width: u16 = pieces.iter().chain(&more).map(|(text, _)| columns(text)).sum();
@@ -115,11 +143,9 @@ fn summary(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Draw
         if is_in_no_file(state) {
             is_room(vec![(format!("{comma}unwritten: w writes it"), Tone::Faint)]);
         }
-        for written in files(state) {
-            let name = visible(&written.path.to_string_lossy()).into_owned();
-            let size = format!(" {}", bytes(written.bytes));
-            is_room(vec![(" → ".to_owned(), Tone::Faint), (name, Tone::File), (size, Tone::Faint)]);
-        }
+    }
+    for file in of_files {
+        is_room(file);
     }
     let used = drawn.put(state, area, &pieces, buffer);
     let free = rest(area, used + 2);
@@ -134,6 +160,16 @@ fn summary(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Draw
     let free = Rect { width: free.width.saturating_sub(used + 2), ..free };
     let seen = seen(state).filter(|_| layout.panel.is_empty()).unwrap_or_default();
     put_right(buffer, free, &seen, Tone::Faint, state.display.depth);
+}
+
+/// Name and size of each written file, if the panel does not list them.
+fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
+    let pieces = |written: &Written| {
+        let name = visible(&written.path.to_string_lossy()).into_owned();
+        let size = format!(" {}", bytes(written.bytes));
+        vec![(" → ".to_owned(), Tone::Faint), (name, Tone::File), (size, Tone::Faint)]
+    };
+    files(state).filter(|_| layout.panel.is_empty()).map(pieces).collect()
 }
 
 /// The files that hold the picture at hand.
