@@ -69,11 +69,11 @@ fn make(path: &Path, what: &str) -> Option<&'static [&'static str]> {
                 return None;
             }
             symlink("/proc/kmsg", path).expect("a link");
-            &["is a file of the kernel, as in /proc, not a"]
+            &["is a kernel file, as in /proc, not a"]
         }
         "circle" => {
             symlink(path, path).expect("a link");
-            &["its symbolic links lead in a circle"]
+            &["its symbolic links form a loop"]
         }
         "dangling" => {
             symlink(path.with_file_name("nowhere"), path).expect("a link");

@@ -96,7 +96,7 @@ fn links_in_a_circle_are_an_error() {
     symlink("b.png", directory.path().join("a.png")).expect("a link");
     symlink("a.png", directory.path().join("b.png")).expect("a link");
     let message = refused(&directory.path().join("a.png"));
-    assert!(message.contains("a.png: its symbolic links lead in a circle; "), "{message}");
+    assert!(message.contains("a.png: its symbolic links form a loop; "), "{message}");
 }
 
 #[test]

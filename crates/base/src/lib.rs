@@ -1,4 +1,5 @@
-//! glimt: numbers, colour, random streams, films, names of choices, the operating system. The map of the house is in the crate `glimt`.
+//! Shared foundations of glimt: numbers, color, random samples, films, named choices and the operating
+//! system. The crate `glimt` has the map of the workspace.
 
 pub mod choice;
 pub mod control;

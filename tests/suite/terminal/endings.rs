@@ -45,7 +45,7 @@ fn an_abort_gives_the_terminal_back_and_says_so() {
     let terminal = folder.terminal();
     terminal.wait_for_color("red");
     terminal.signal(Signal::SIGABRT);
-    assert_eq!(terminal.end_saying("error: glimt was ended by SIGABRT"), 1);
+    assert_eq!(terminal.end_saying("error: glimt was aborted (SIGABRT)"), 1);
 }
 
 #[test]

@@ -1,26 +1,26 @@
-//! Values that are chosen by name: the same words in scene files, on the command line and in reports.
+//! Enums whose values have names, shared by scene files, the command line and reports.
 
-/// A closed set of values that are chosen by name. [`choice!`](crate::choice!) writes one.
+/// A closed set of named values, implemented by [`choice!`](crate::choice!).
 pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
     /// All values, in the order in which they are offered.
     const ALL: &'static [Self];
 
-    /// Names that other versions know: refused with their own words.
+    /// Names from other versions, which are rejected with a message of their own.
     const UNAVAILABLE: &'static [&'static str];
 
-    /// Its name.
+    /// Name of the value.
     fn name(self) -> &'static str;
 
-    /// Its meaning, in a few words.
+    /// Short description of the value.
     fn meaning(self) -> &'static str;
 
-    /// The value of this name.
+    /// Finds the value called `name`.
     fn named(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|one| one.name() == name)
     }
 }
 
-/// A choice in a report: its name.
+/// Serializes a choice as its name.
 ///
 /// # Errors
 /// The serializer's errors.
@@ -28,7 +28,8 @@ pub fn serialize<C: Choice, S: serde::Serializer>(choice: &C, serializer: S) -> 
     serializer.serialize_str(choice.name())
 }
 
-/// An enum with its names, and `Choice` for it. The doc comment of a value is also what help says that it means.
+/// Defines an enum with named values and implements `Choice`. Each variant's doc comment is also its
+/// description in the help text.
 ///
 /// ```
 /// glimt_base::choice! {
@@ -97,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn every_value_is_found_by_its_name_and_no_other_word_is_one() {
+    fn values_are_found_only_by_their_names() {
         for &number in Number::ALL {
             assert_eq!(Number::named(number.name()), Some(number));
         }

@@ -1,22 +1,22 @@
-//! A token to stop and pause long work, which polls it, and a sink for its progress.
+//! Cancellation, pausing and progress reporting for long-running work.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Says that the work was stopped; nobody may use what it made.
+/// Error returned by canceled work, whose partial results must not be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("cancelled")]
 pub struct Cancelled;
 
-/// A sink to which long work reports: work units done, work units in all.
+/// Progress callback: receives the work units done and the total.
 pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
 
-/// A sink for work that nobody watches.
+/// Progress callback that ignores all reports.
 pub fn unwatched(_done: u64, _total: u64) {}
 
-/// A flag shared by those who stop or pause work and those who do it. Workers poll [`CancelToken::check`] often
-/// enough that work stops within 10 ms.
+/// Shared flag that cancels or pauses work. Workers poll [`CancelToken::check`] often enough to stop within
+/// 10 ms.
 #[derive(Clone, Debug, Default)]
 pub struct CancelToken(Arc<Shared>);
 
@@ -28,7 +28,7 @@ struct Shared {
     changed: Condvar,
 }
 
-/// Time for which work was held before, and the start of the current hold.
+/// Total length of earlier pauses and the start of the current one.
 #[derive(Debug, Default)]
 struct Held {
     before: Duration,
@@ -36,18 +36,18 @@ struct Held {
 }
 
 impl CancelToken {
-    /// A token that nobody has cancelled.
+    /// Creates a token that is neither canceled nor paused.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Stop the work, for good.
+    /// Cancels the work permanently.
     pub fn cancel(&self) {
         self.0.cancelled.store(true, Ordering::Release);
         self.notify();
     }
 
-    /// Hold the work at its next [`CancelToken::check`], or let it go on.
+    /// Pauses the work at its next [`CancelToken::check`], or resumes it.
     pub fn set_paused(&self, paused: bool) {
         let mut held = self.lock();
         self.0.paused.store(paused, Ordering::Release);
@@ -59,13 +59,13 @@ impl CancelToken {
         self.0.changed.notify_all();
     }
 
-    /// Total time for which the work has been held.
+    /// Total time for which the work has been paused.
     pub fn held(&self) -> Duration {
         let held = self.lock();
         held.before + held.since.map_or(Duration::ZERO, |since| since.elapsed())
     }
 
-    /// Whether the work is being held.
+    /// Whether the work is paused.
     pub fn is_paused(&self) -> bool {
         self.0.paused.load(Ordering::Acquire)
     }
@@ -75,7 +75,7 @@ impl CancelToken {
         self.0.cancelled.load(Ordering::Acquire)
     }
 
-    /// Go on, wait while paused, or stop.
+    /// Returns at once, waits while paused, or reports cancellation.
     ///
     /// # Errors
     /// [`Cancelled`] once [`CancelToken::cancel`] was called.
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cancelling_reaches_every_clone() {
+    fn cancel_reaches_every_clone() {
         let token = CancelToken::new();
         let other = token.clone();
         assert_eq!(other.check(), Ok(()));
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn the_time_for_which_work_is_held_is_known_while_it_is_and_after() {
+    fn paused_time_is_known_during_and_after_a_pause() {
         const HOLD: Duration = Duration::from_millis(20);
         let token = CancelToken::new();
         token.set_paused(false);
@@ -131,11 +131,11 @@ mod tests {
         let after = token.held();
         std::thread::sleep(HOLD);
         assert!(HOLD <= during && during <= after);
-        assert_eq!(token.held(), after, "it works again");
+        assert_eq!(token.held(), after, "the work runs again");
     }
 
     #[test]
-    fn a_paused_worker_waits_and_a_cancel_frees_it() {
+    fn cancel_releases_a_paused_worker() {
         let token = CancelToken::new();
         token.set_paused(true);
         let worker = {

@@ -1,4 +1,4 @@
-//! Sums of blocks in a film: their memory, and the end of a block.
+//! Block sums of a film: memory and completion of blocks.
 
 use super::Rect;
 use super::blocks::Blocks;
@@ -6,7 +6,7 @@ use super::sums::{Film, FilmError, Tile, bytes_needed, is_available};
 use crate::math::DVec3;
 
 impl Tile {
-    /// Puts the sum of a pixel's block aside if that has all its samples.
+    /// Moves a pixel's sum to its block if the block is complete.
     pub(super) fn close_block(&mut self, pixel: usize, blocks: Blocks) {
         let Some(block) = blocks.finished(self.counts[pixel]) else { return };
         let put = |earlier: &mut [Vec<DVec3>], sums: &mut [DVec3]| {
@@ -22,10 +22,10 @@ impl Tile {
 }
 
 impl Film {
-    /// The same empty film, whose samples are added up in this order.
+    /// Sets the summation order of an empty film.
     ///
     /// # Errors
-    /// There is no memory for the sums of the blocks.
+    /// There is not enough memory for the block sums.
     pub fn in_blocks(mut self, blocks: Blocks) -> Result<Self, FilmError> {
         let (crop, kept) = (self.crop(), blocks.kept());
         let more = crop.area() as u64 * (kept * size_of::<DVec3>()) as u64;
@@ -48,14 +48,14 @@ impl Film {
         Ok(self)
     }
 
-    /// Bytes for the sums of a crop whose samples are added up in this order, and for the finished picture of this size.
+    /// Bytes for the sums of a crop with this summation order, and for the finished image of this size.
     pub fn bytes_of((width, height): (u32, u32), crop: Rect, blocks: Blocks) -> (u64, u64) {
         let more = crop.area() as u64 * (blocks.kept() * size_of::<DVec3>()) as u64;
         let picture = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
         (bytes_needed(width, height, crop) - picture + more, picture)
     }
 
-    /// Order in which samples are added up.
+    /// Summation order of the samples.
     pub fn blocks(&self) -> Blocks {
         self.blocks
     }
@@ -69,7 +69,7 @@ mod tests {
     use crate::math::random::unit;
 
     #[test]
-    fn a_sum_is_that_of_its_blocks_however_the_samples_come() {
+    fn block_sums_ignore_sample_grouping() {
         let mut next = unit(3);
         let values: Vec<f32> = (0..41).map(|_| next() * 1e3).collect();
         let add = |blocks: Blocks, counts: &[usize]| {

@@ -1,24 +1,26 @@
-//! Blocks of samples: a pixel's sum is the sum of its blocks, so that machines which render some blocks each get the same bits.
+//! Sample blocks: a pixel's sum is the sum of its blocks, so machines that each render some of the blocks
+//! produce the same bits.
 
 use crate::math::DVec3;
 
-/// Samples of a block.
+/// Samples per block.
 pub const BLOCK: u32 = 16;
 
-/// Order in which the samples of a pixel are added up.
+/// Summation order of a pixel's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Blocks {
-    /// One after the other.
+    /// Adds all samples in sequence.
     #[default]
     Whole,
-    /// In blocks of [`BLOCK`] samples, whose sums are added one after the other.
+    /// Sums blocks of [`BLOCK`] samples and adds the block sums in sequence.
     Added,
-    /// In blocks of [`BLOCK`] samples, whose sums stay apart: so many finished ones at most.
+    /// Sums blocks of [`BLOCK`] samples and keeps the sums separate, for at most this number of finished
+    /// blocks.
     Apart(usize),
 }
 
 impl Blocks {
-    /// Sums of finished blocks that each pixel keeps.
+    /// Number of finished block sums kept per pixel.
     pub fn kept(self) -> usize {
         match self {
             Self::Whole => 0,
@@ -27,7 +29,7 @@ impl Blocks {
         }
     }
 
-    /// Samples that a pixel of `count` samples lacks to the end of its block.
+    /// Samples until the current block ends, for a pixel with `count` samples.
     pub(super) fn samples_to_end(self, count: u32) -> usize {
         match self {
             Self::Whole => usize::MAX,
@@ -35,7 +37,7 @@ impl Blocks {
         }
     }
 
-    /// Number of the sum that a pixel's block is added to when it ends at `count` samples. `None` in the middle of a block.
+    /// Index of the block sum that a block ending at `count` samples is added to, or `None` inside a block.
     pub(super) fn finished(self, count: u32) -> Option<usize> {
         let is_end = count > 0 && count.is_multiple_of(BLOCK);
         match self {
@@ -46,7 +48,7 @@ impl Blocks {
     }
 }
 
-/// Sum over a pixel's finished blocks, in their order, and the one that is not finished.
+/// Adds a pixel's finished blocks in order, then the unfinished one.
 #[cold]
 pub(super) fn total(earlier: &[Vec<DVec3>], sums: &[DVec3], index: usize) -> DVec3 {
     match earlier {

@@ -1,30 +1,30 @@
-//! Tone curves: from linear radiance of any size to display light in [0, 1], linear.
+//! Tone curves: map linear radiance to linear display light in [0, 1].
 //!
-//! Every curve takes components in [0, 1e10], gives components in [0, 1], takes black to black and never
-//! makes a brighter grey darker.
+//! Every curve maps components in [0, 1e10] to [0, 1], preserves black and never makes a brighter gray
+//! darker.
 
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::elementary::{log2, pow};
 
-/// x/(1 + x) on luminance: E. Reinhard et al., "Photographic Tone Reproduction for Digital Images" (2002), eq. 3.
-/// Hue stays until a component is clamped.
+/// x/(1 + x) on luminance: E. Reinhard et al., "Photographic Tone Reproduction for Digital Images" (2002),
+/// eq. 3. Preserves hue until a component is clamped.
 pub(super) fn reinhard(color: Vec3) -> Vec3 {
     clamp(color / (1.0 + luminance(color)))
 }
 
 /// K. Narkowicz, "ACES Filmic Tone Mapping Curve" (2015): a rational fit to the ACES reference and output
-/// transforms, per component, without its optional factor of 0.6 before the curve.
+/// transforms, per component, without the optional exposure factor of 0.6.
 pub(super) fn aces(color: Vec3) -> Vec3 {
     let numerator = color * (2.51 * color + 0.03);
     let denominator = color * (2.43 * color + 0.59) + 0.14;
     clamp(numerator / denominator)
 }
 
-/// T. Sobotka's AgX (2022), its default look: components move towards each other, then a sigmoid over 16.5 stops
-/// about middle grey, then apart again. The matrices are those that B. Wrensch gives for Rec. 709 ("Minimal AgX
-/// Implementation", 2023); the sigmoid is the exact one rather than his polynomial. A display power of 2.2 is undone,
-/// so that the result is linear.
+/// T. Sobotka's AgX (2022) with its default look: an inset matrix, a sigmoid over 16.5 stops around middle
+/// gray, and an outset matrix. The matrices are B. Wrensch's for Rec. 709 ("Minimal AgX Implementation",
+/// 2023); the sigmoid is exact rather than his polynomial fit. The result is linearized with a display gamma
+/// of 2.2.
 pub(super) fn agx(color: Vec3) -> Vec3 {
     let inset = transform(&AGX_INSET, color);
     let encoded = Vec3::from_array(inset.to_array().map(agx_sigmoid_of_stops));
@@ -43,7 +43,7 @@ const AGX_OUTSET: [Vec3; 3] = [
     Vec3::new(-0.098_020_88, 1.151_903_2, -0.098_043_45),
     Vec3::new(-0.099_029_74, -0.098_961_18, 1.151_073_7),
 ];
-/// Stops of [0, 1]: from 10 below middle grey (0.18) to 6.5 above.
+/// Log2 range mapped to [0, 1]: from 10 stops below middle gray (0.18) to 6.5 above.
 const AGX_STOPS: [f32; 2] = [-12.473_931, 4.026_069];
 
 fn agx_sigmoid_of_stops(x: f32) -> f32 {
@@ -51,19 +51,21 @@ fn agx_sigmoid_of_stops(x: f32) -> f32 {
     agx_sigmoid((log2(x.max(f32::MIN_POSITIVE)).clamp(low, high) - low) / (high - low))
 }
 
-/// Slope 2 through (10/16.5, ½), toe and shoulder of powers 3 and 3.25; 0 → 0, 1 → 1.
+/// Slope 2 through (10/16.5, ½), with toe and shoulder powers of 3 and 3.25; maps 0 to 0 and 1 to 1.
 fn agx_sigmoid(x: f32) -> f32 {
     const SLOPE: f32 = 2.0;
     const PIVOT: f32 = 10.0 / 16.5;
     let (sign, run, power) = if x < PIVOT { (-1.0, PIVOT, 3.0) } else { (1.0, 1.0 - PIVOT, 3.25) };
     let rise: f32 = SLOPE * run;
-    // The hyperbola s·t/(1 + tᵖ)^(1/p), t = slope·distance/s, with s chosen so that it ends half a unit from the pivot.
+    // The hyperbola s·t/(1 + tᵖ)^(1/p) with t = slope·distance/s, where s makes the curve end half a unit
+    // from the pivot.
     let scale = rise / pow(pow(rise / 0.5, power) - 1.0, 1.0 / power);
     let term = SLOPE * (x - PIVOT).abs() / scale;
     0.5 + sign * scale * term / pow(1.0 + pow(term, power), 1.0 / power)
 }
 
-/// The matrix with its rows scaled to a sum of 1 (the published digits miss it by 1e-4), so that grey stays grey.
+/// Applies a matrix with its rows normalized to a sum of 1, so that gray stays gray (the published digits are
+/// off by 1e-4).
 fn transform(columns: &[Vec3; 3], v: Vec3) -> Vec3 {
     let [a, b, c] = *columns;
     (a * v.x + b * v.y + c * v.z) / (a + b + c)
@@ -78,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_sigmoid_is_near_the_published_polynomial() {
+    fn agx_sigmoid_matches_the_published_fit() {
         // B. Wrensch's fit of the same curve; its mean squared error is 3.7e-6.
         let polynomial = |x: f32| {
             [15.5, -40.14, 31.96, -6.868, 0.4298, 0.1191, -0.00232].iter().fold(0.0, |sum, c| sum * x + c)
@@ -92,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn the_matrices_undo_each_other() {
+    fn agx_matrices_are_inverses() {
         for color in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE] {
             let back = transform(&AGX_OUTSET, transform(&AGX_INSET, color));
             assert!((back - color).abs().max_element() < 1e-3, "{color}: {back}");

@@ -1,10 +1,11 @@
-//! Sums of samples, tone mapping, pictures.
+//! Sums of samples, tone mapping and finished images.
 //!
-//! Integrators make [`TileSamples`]; a [`Film`] sums them in f64. [`Film::radiance`] is what files hold. [`Previewer`]
-//! shrinks it for the screen while it grows. [`tone::develop`] turns either into a [`Picture`].
+//! Integrators produce [`TileSamples`]; a [`Film`] sums them in f64. Image files contain [`Film::radiance`].
+//! [`Previewer`] scales it for the screen while it renders. [`tone::develop`] turns either into a
+//! [`Picture`].
 //!
-//! All threads of the caller's pool work on large pictures; outside of a pool the caller works alone. The caller
-//! chooses the number of threads.
+//! Large images are processed on all threads of the caller's rayon pool; outside a pool, on the calling
+//! thread. The caller chooses the number of threads.
 
 mod block_sums;
 mod blocks;
@@ -36,24 +37,24 @@ pub use sums::{Film, FilmError, SampleStats};
 
 use crate::math::Vec3;
 
-/// Pixels along a tile's side: 1024 pixels of 40 bytes stay in a core's second-level cache.
+/// Tile width and height in pixels: 1024 pixels of 40 bytes fit in a core's L2 cache.
 pub const TILE_SIZE: u32 = 32;
 
-/// Pixels along the side of a cell of a tile. Each cell gets the samples that its own noise needs. The smaller the cells, the fewer
-/// pixels share the samples of an edge.
+/// Cell width and height in pixels. Each cell of a tile gets as many samples as its own noise needs. The
+/// smaller the cells, the fewer pixels get the samples that an edge needs.
 pub const CELL_SIZE: u32 = 16;
 
 const CELLS_ACROSS: usize = (TILE_SIZE / CELL_SIZE) as usize;
 
-/// Cells of a tile, in rows.
+/// Number of cells in a tile, in row-major order.
 pub const CELLS: usize = CELLS_ACROSS * CELLS_ACROSS;
 
-/// Whether this thread belongs to a pool, whose threads can share work.
+/// Whether the current thread belongs to a rayon pool that can share work.
 fn is_in_pool() -> bool {
     rayon::current_thread_index().is_some()
 }
 
-/// A rectangle of pixels; (0, 0) is the top left one.
+/// A rectangle of pixels; (0, 0) is the top left pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Rect {
     /// First column.
@@ -67,12 +68,12 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// Pixels in it.
+    /// Number of pixels.
     pub fn area(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// The pixels in both, if there are any.
+    /// Pixels in both rectangles, or `None` if they do not overlap.
     pub fn intersection(&self, other: &Self) -> Option<Self> {
         let (x, width) = overlap((self.x, self.width), (other.x, other.width))?;
         let (y, height) = overlap((self.y, self.height), (other.y, other.height))?;
@@ -80,7 +81,7 @@ impl Rect {
     }
 }
 
-/// Intersection of two spans (start, length). In u64, as a start and a length may add up to more than u32 holds.
+/// Intersection of two intervals (start, length). Uses u64, as start + length may overflow u32.
 fn overlap(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
     let end = |(start, length): (u32, u32)| u64::from(start) + u64::from(length);
     let start = a.0.max(b.0);
@@ -88,30 +89,31 @@ fn overlap(a: (u32, u32), b: (u32, u32)) -> Option<(u32, u32)> {
     Some((start, u32::try_from(length).ok()?))
 }
 
-/// Samples that an integrator took in a tile: `samples` radiances for each pixel, one after the other in rows.
+/// Samples that an integrator took in a tile: `samples` consecutive radiances for each pixel, in row-major
+/// order.
 #[derive(Clone, Debug)]
 pub struct TileSamples {
-    /// The pixels.
+    /// Sampled pixels.
     pub pixels: Pixels,
-    /// Samples for each.
+    /// Samples per pixel.
     pub samples: u32,
-    /// `pixels.count() · samples` radiances, at places drawn in proportion to the reconstruction filter.
+    /// `pixels.count() · samples` radiances, at positions drawn in proportion to the absolute pixel filter.
     pub radiance: Vec<Vec3>,
-    /// Samples that lie where the filter is negative. `None` if the filter is negative nowhere.
+    /// Samples in the filter's negative lobes, or `None` if it has none.
     pub negative: Option<NegativeLobes>,
 }
 
-/// Samples where the reconstruction filter is negative. A pixel's value is (1 + `weight`) · mean of the other
-/// samples − `weight` · mean of these. A constant image therefore stays constant, wherever the samples fall.
+/// Samples in the negative lobes of the pixel filter. A pixel's value is (1 + `weight`) · mean of the other
+/// samples − `weight` · mean of these. A constant image therefore stays constant wherever the samples fall.
 #[derive(Clone, Debug)]
 pub struct NegativeLobes {
     /// −∫min(f, 0)/∫f.
     pub weight: f64,
-    /// Whether each radiance lies where the filter is negative.
+    /// Whether each radiance is in a negative lobe.
     pub is_negative: Vec<bool>,
 }
 
-/// Linear radiance, rows from the top, unexposed.
+/// Linear, unexposed radiance in row-major order from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RadianceImage {
     /// Columns.
@@ -123,12 +125,13 @@ pub struct RadianceImage {
 }
 
 impl RadianceImage {
-    /// A picture without light.
+    /// Creates a black image.
     pub fn black(width: u32, height: u32) -> Self {
         Self { width, height, pixels: vec![Vec3::ZERO; width as usize * height as usize] }
     }
 
-    /// Takes over the pixels of a rectangle, in rows. Pixels that are not finite become black, as in a [`Film`].
+    /// Replaces the pixels of a rectangle, given in row-major order. Non-finite pixels become black, as in a
+    /// [`Film`].
     pub fn put(&mut self, rect: Rect, pixels: &[Vec3]) {
         let width = self.width as usize;
         let rows = self.pixels.chunks_exact_mut(width).skip(rect.y as usize);
@@ -140,14 +143,14 @@ impl RadianceImage {
         }
     }
 
-    /// The same picture at another size: every new pixel is the mean over its area of the old ones, exact for
-    /// any ratio, so that the mean of the whole stays.
+    /// Resizes the image with an exact box filter: every new pixel is the mean of the old ones over its area,
+    /// so the mean of the image is preserved.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         resample::resized(self, width, height)
     }
 }
 
-/// An sRGB picture for eyes.
+/// An 8-bit sRGB image for display.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
     /// Columns.
@@ -158,7 +161,7 @@ pub struct Picture {
     pub pixels: Vec<[u8; 3]>,
 }
 
-/// An sRGB picture of 16 bits a channel, for files.
+/// A 16-bit sRGB image for files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture16 {
     /// Columns.
@@ -174,7 +177,7 @@ mod tests {
     use super::Rect;
 
     #[test]
-    fn intersections() {
+    fn rectangles_intersect() {
         let a = Rect { x: 2, y: 3, width: 10, height: 4 };
         let b = Rect { x: 10, y: 0, width: u32::MAX, height: 5 };
         assert_eq!(a.intersection(&b), Some(Rect { x: 10, y: 3, width: 2, height: 2 }));

@@ -1,49 +1,49 @@
-//! Noise of a film: its distance from the converged image, estimated by its own samples.
+//! Noise of a film: its distance from the converged image, estimated from its own samples.
 
 use rayon::prelude::*;
 
 use super::steps::{Convergence, luminance};
 use super::{CELLS, Film, Part, Pixels, is_in_pool};
 
-/// Number of samples that reduces the standard error of means of `count` samples to this part of itself, if its square falls with
-/// this power of the samples.
+/// Number of samples that reduces the standard error of `count` samples by the factor `part`, if the variance
+/// falls with this power of the sample count.
 pub fn samples_by(power: f64, part: f64, count: u32) -> u32 {
     (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
 }
 
-/// Noise in a half of a cell.
+/// Noise in one half of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfNoise {
     /// Mean variance of the pixels' luminance.
     pub variance: f64,
     /// Mean luminance.
     pub mean: f64,
-    /// Samples of each pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Power of the samples with which the variance is expected to fall.
+    /// Expected exponent: the variance falls with this power of the sample count.
     pub power: f64,
 }
 
-/// Noise in a picture.
+/// Noise of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureNoise {
     /// Relative standard error: [`Film::relative_error`].
     pub relative_error: f64,
-    /// Power of the samples with which the square of that error is expected to fall.
+    /// Expected exponent: the squared error falls with this power of the sample count.
     pub power: f64,
 }
 
-/// Sums over pixels for the noise of a picture.
+/// Sums over pixels for the noise of an image.
 #[derive(Clone, Copy, Debug, Default)]
 struct NoiseSums {
     variance: f64,
-    /// Variance that twice as many samples are expected to leave.
+    /// Expected variance after doubling the samples.
     left: f64,
     mean: f64,
 }
 
 impl NoiseSums {
-    /// Power of the samples with which the variance falls by the next doubling; without noise, that of independent samples.
+    /// Expected exponent for the next doubling; without noise, the one for independent samples.
     fn power(self) -> f64 {
         if self.left > 0.0 { libm::log2(self.variance / self.left) } else { 1.0 }
     }
@@ -56,28 +56,28 @@ impl NoiseSums {
 }
 
 impl Film {
-    /// Expected error of the picture so far, relative to its brightness: the root mean square over the pixels of the
-    /// standard error of their luminance, divided by the picture's mean luminance. The changes by the last samples give
-    /// the estimate.
+    /// Estimates the error of the current image relative to its brightness: the root mean square of the
+    /// pixels' standard errors of luminance, divided by the image's mean luminance. The estimate comes from
+    /// the changes caused by the latest samples.
     ///
-    /// Next to 0 if all samples of each pixel are alike. `None` if a pixel has fewer than two samples.
+    /// About 0 if all samples of each pixel are equal. `None` if a pixel has fewer than two samples.
     pub fn relative_error(&self) -> Option<f64> {
         self.noise().map(|noise| noise.relative_error)
     }
 
-    /// [`Film::relative_error`], and the power of the samples with which it falls.
+    /// [`Film::relative_error`] and the exponent with which it falls.
     pub fn noise(&self) -> Option<PictureNoise> {
         let sums @ NoiseSums { variance, mean, .. } = self.noise_sums()?;
         let pixels = self.crop().area() as f64;
         let error = (variance / pixels).sqrt();
-        // A black picture without error has a relative error of 0 too.
+        // A black image without error has a relative error of 0.
         let relative_error = if error == 0.0 { 0.0 } else { error / (mean / pixels) };
         Some(PictureNoise { relative_error, power: sums.power() })
             .filter(|noise| noise.relative_error.is_finite())
     }
 
-    /// Standard error of the mean luminance of a whole picture, whose pixels' errors are independent. `None` for a crop, for
-    /// photons, which make the pixels' errors dependent, and if a pixel has fewer than two samples.
+    /// Standard error of the mean luminance of a complete image with independent pixel errors. `None` for
+    /// crops, for photons (which correlate the pixels' errors), and if a pixel has fewer than two samples.
     pub fn mean_luminance_error(&self) -> Option<f64> {
         let is_whole = (self.crop().width, self.crop().height) == (self.width(), self.height());
         let is_apart = self.convergence == Convergence::Stratified;
@@ -85,7 +85,7 @@ impl Film {
         Some(sums.variance.sqrt() / self.crop().area() as f64).filter(|error| error.is_finite())
     }
 
-    /// Sums over all pixels.
+    /// Sums the noise over all pixels.
     fn noise_sums(&self) -> Option<NoiseSums> {
         let of_tile = |tile: usize| {
             let mut sums = NoiseSums::default();
@@ -111,13 +111,13 @@ impl Film {
         self.of_tiles(of_tile).into_iter().try_fold(NoiseSums::default(), add)
     }
 
-    /// Calls `tell` for each tile and returns the answers in the tiles' order. In a pool its threads share the work.
+    /// Calls `tell` for every tile, in parallel inside a rayon pool, and returns the results in tile order.
     pub fn of_tiles<T: Send>(&self, tell: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
         let tiles = 0..self.tile_count();
         if is_in_pool() { tiles.into_par_iter().map(tell).collect() } else { tiles.map(tell).collect() }
     }
 
-    /// Noise in a half of a cell. `None` if the half has no pixels, or one with fewer than two samples.
+    /// Noise in one half of a cell. `None` if the half has no pixels, or one with fewer than two samples.
     pub fn half_noise(&self, number: usize, half: usize) -> Option<HalfNoise> {
         let tile = self.tile(number / CELLS);
         let (mut pixels, mut samples, mut sum) = (0_u32, u32::MAX, 0.0);
@@ -131,21 +131,22 @@ impl Film {
         Some(HalfNoise { variance: variance / pixels, mean: sum / pixels, samples, power: libm::log2(rate) })
     }
 
-    /// Factor by which the last doubling reduced the variance of a tile's pixels, over the halves of its cells that had it. `None`
-    /// if there are not enough steps.
+    /// Factor by which the last doubling reduced the variance of a tile, over the half-cells that have
+    /// completed it. `None` if there are not enough steps.
     pub fn tile_fall(&self, tile: usize) -> Option<f64> {
         let tile = self.tile(tile);
         tile.steps.fall(tile.steps.level_count(), &[0, 1])
     }
 
-    /// Relative spread to expect of the variance that one half of all cells of a tile measures: 1 if a single pixel decides it,
-    /// less the more pixels share it. Cells that have fewer samples than others do not count.
+    /// Expected relative standard deviation of the variance measured over one half of a tile's cells: 1 if a
+    /// single pixel dominates, less if many pixels contribute. Cells with fewer samples than others are
+    /// ignored.
     pub fn tile_spread(&self, tile: usize, half: usize) -> f64 {
         let tile = self.tile(tile);
         tile.steps.spread(tile.steps.level_count(), &[half])
     }
 
-    /// Noise in one half of all cells of a tile. `None` as in [`Film::half_noise`].
+    /// Noise over one half of all cells of a tile. `None` as in [`Film::half_noise`].
     pub fn tile_noise(&self, tile: usize, half: usize) -> Option<HalfNoise> {
         let (mut pixels, mut samples, mut sums) = (0.0, u32::MAX, NoiseSums::default());
         for cell in CELLS * tile..CELLS * (tile + 1) {
@@ -161,9 +162,10 @@ impl Film {
         (pixels > 0.0).then_some(HalfNoise { variance, mean, samples, power })
     }
 
-    /// Error of a half of a cell after the first `count` samples of each of its pixels, a power of two: the mean over the pixels of
-    /// the variance of their luminance over luminance² + [`RELMSE_LEAST`](crate::math::color::RELMSE_LEAST), and the power of the
-    /// samples with which it falls. `None` for fewer than two samples, for more than the pixels have, and if the half has no pixels.
+    /// Error of a half-cell after the first `count` samples per pixel, where `count` is a power of two: the
+    /// mean of luminance variance / (luminance² + [`RELMSE_LEAST`](crate::math::color::RELMSE_LEAST)) over
+    /// the pixels, and the exponent with which it falls. `None` for fewer than two samples, for more than the
+    /// pixels have, and if the half has no pixels.
     pub fn half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
         let tile = self.tile(number / CELLS);
         let pixels = self.half_pixel_count(number, half);
@@ -171,17 +173,17 @@ impl Film {
         (pixels > 0).then(|| (sum / pixels as f64, libm::log2(rate)))
     }
 
-    /// Convergence of this film's noise.
+    /// Assumed convergence of this film's noise.
     pub fn convergence(&self) -> Convergence {
         self.convergence
     }
 
-    /// Number of pixels in a half of a cell.
+    /// Number of pixels in one half of a cell.
     pub fn half_pixel_count(&self, cell: usize, half: usize) -> usize {
         self.cell_rect(cell).map_or(0, |rect| Part::Half(half).count(rect.area()))
     }
 
-    /// Indices, in its tile, of the pixels of a half of a cell.
+    /// Indices within the tile of the pixels of a half-cell.
     fn half_pixels(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
         let (tile, rect) = (self.tile_rect(cell / CELLS), self.cell_rect(cell));
         let part = Part::Half(half);
@@ -192,7 +194,7 @@ impl Film {
         })
     }
 
-    /// Mean luminance of the picture. `None` if a pixel has no sample.
+    /// Mean luminance of the image, or `None` if a pixel has no samples.
     pub fn mean_luminance(&self) -> Option<f64> {
         let of_tile = |tile: usize| {
             let tile = self.tile(tile);
@@ -213,7 +215,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// A film of one row, each pixel with its grey samples.
+    /// A film of one row, with the given gray samples for each pixel.
     fn film(pixels: &[&[f32]]) -> Film {
         let film = Film::new(pixels.len() as u32, 1, None).expect("a film");
         for (x, values) in pixels.iter().enumerate() {
@@ -228,11 +230,12 @@ mod tests {
     }
 
     #[test]
-    fn the_error_is_that_of_the_last_steps_over_the_mean_of_the_picture() {
-        // Steps of 1 and 0.5, which leave a variance as large; mean luminance 3.
+    fn error_follows_from_the_last_steps() {
+        // Steps of 1 and 0.5 leave variances of the same size; mean luminance 3.
         let error = film(&[&[4.0, 6.0], &[0.5, 1.5]]).relative_error().expect("an estimate");
         assert!((error - (1.25_f64 / 2.0).sqrt() / 3.0).abs() < 1e-6, "{error}");
-        // 1, 2, 3, 6: steps from 1 to 1.5 to 3, and one from 3 to 4.5 in the second half.
+        // Samples 1, 2, 3, 6: the mean steps from 1 to 1.5 to 3; within the second half it steps from 3 to
+        // 4.5.
         let error = film(&[&[1.0, 2.0, 3.0, 6.0]]).relative_error().expect("an estimate");
         let before = 0.5 * (0.5 * 0.5 + 1.5 * 1.5);
         let expected = ((1.5_f64 * 1.5 + before) / 3.0).sqrt() / 3.0;
@@ -240,18 +243,19 @@ mod tests {
     }
 
     #[test]
-    fn a_half_that_has_stopped_does_not_tell_how_noise_fell() {
-        // Of two pixels, each a half of its own, the first has steps of 1 and 0.5, the other a single one of 3.
+    fn finished_halves_do_not_affect_the_fall() {
+        // Two pixels, each in a half of its own: one with steps of 1 and 0.5, the other with a single step of
+        // 3.
         let film = film(&[&[1.0, 3.0, 2.0, 4.0], &[1.0, 7.0]]);
         assert_eq!(film.tile_fall(0), Some(4.0));
         assert_eq!(self::film(&[&[1.0, 3.0], &[1.0, 7.0]]).tile_fall(0), None, "one step");
     }
 
     #[test]
-    fn what_few_pixels_tell_is_known_to_be_unsure() {
+    fn spread_is_large_for_few_pixels() {
         let one: &[f32] = &[0.0, 8.0];
         let none: &[f32] = &[1.0, 1.0];
-        // The halves take turns along a row.
+        // The halves alternate along a row.
         let of = |pixels: &[&[f32]]| film(pixels).tile_spread(0, 0);
         assert_eq!(of(&[one, one, none, none, none, none, none, none]), 1.0);
         assert_eq!(of(&[one; 8]), 0.5);
@@ -259,8 +263,8 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_of_a_picture_errs_less_than_its_pixels() {
-        // Variances 1 and 0.25 of two pixels.
+    fn image_mean_has_a_smaller_error_than_pixels() {
+        // Two pixels with variances 1 and 0.25.
         let film = film(&[&[4.0, 6.0], &[0.5, 1.5]]);
         let error = film.mean_luminance_error().expect("an estimate");
         assert!((error - 1.25_f64.sqrt() / 2.0).abs() < 1e-6, "{error}");
@@ -271,8 +275,8 @@ mod tests {
     }
 
     #[test]
-    fn independent_samples_have_the_error_that_their_variance_says_whatever_they_are_taken_for() {
-        // Falls that may be chance are believed a little.
+    fn independent_samples_have_the_expected_error() {
+        // Falls that may be due to chance are only partly trusted.
         let mut next = unit(5);
         for count in [16, 64, 100, 1024] {
             let pixels: Vec<Vec<f32>> = (0..4000).map(|_| (0..count).map(|_| next()).collect()).collect();
@@ -285,8 +289,8 @@ mod tests {
         }
     }
 
-    /// A film of 64 × 64 pixels and the true root mean square error of their means. `sample` makes the sample of a number for a
-    /// pixel with random bits of its own; `truth` is the mean of all samples.
+    /// A film of 64 × 64 pixels, and the true root-mean-square error of their means. `sample` returns the
+    /// sample with a given number for a pixel's random bits; `truth` is the expected value.
     fn square(count: u32, truth: f64, mut sample: impl FnMut(u32, u32) -> f32) -> (Film, f64) {
         const SIDE: u32 = 64;
         let film = Film::new(SIDE, SIDE, None).expect("a film");
@@ -307,19 +311,19 @@ mod tests {
         (film, (square / f64::from(SIDE * SIDE)).sqrt() / truth)
     }
 
-    /// The ratio of the estimate to the truth.
+    /// Ratio of the estimated to the true error.
     fn reported(count: u32, truth: f64, sample: impl FnMut(u32, u32) -> f32) -> f64 {
         let (film, exact) = square(count, truth, sample);
         film.relative_error().expect("an estimate") / exact
     }
 
-    /// Points of a van der Corput sequence, shifted for each pixel: each doubling fills the gaps.
+    /// A van der Corput sequence, XOR-shifted per pixel: each doubling fills the gaps.
     fn filling(number: u32, bits: u32) -> f32 {
         ((number.reverse_bits() >> 8) ^ bits) as f32 / 16_777_216.0
     }
 
     #[test]
-    fn the_error_is_true_for_noise_that_falls_fast_or_slowly() {
+    fn error_is_right_for_fast_and_slow_convergence() {
         for count in [16, 64, 256] {
             let mut next = unit(5);
             let independent = reported(count, 0.5, |_, _| next());
@@ -330,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_is_true_where_few_samples_are_bright() {
+    fn error_is_right_for_rare_bright_samples() {
         for count in [16, 64, 256] {
             let mut next = unit(17);
             let rare = |number, bits| if next() < 1e-3 { 100.0 } else { filling(number, bits) };
@@ -340,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn how_noise_will_fall_is_told_too() {
+    fn convergence_rate_is_estimated() {
         let power =
             |sample: &mut dyn FnMut(u32, u32) -> f32| square(64, 0.5, sample).0.noise().expect("noise").power;
         let mut next = unit(5);
@@ -350,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn it_does_not_depend_on_brightness() {
+    fn error_is_independent_of_brightness() {
         let noise = |scale: f32| {
             let values: Vec<f32> = (0..50).map(|i| scale * (i * 7 % 10) as f32).collect();
             film(&[&values]).relative_error().expect("an estimate")
@@ -359,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_told_of_single_samples_and_equal_ones_have_no_error() {
+    fn single_samples_have_no_estimate() {
         assert_eq!(film(&[&[1.0, 2.0], &[1.0]]).relative_error(), None);
         assert_eq!(Film::new(40, 2, None).expect("a film").relative_error(), None);
         assert_eq!(film(&[&[0.0, 0.0]]).relative_error(), Some(0.0));

@@ -1,13 +1,13 @@
-//! Halves of a cell that look alike, so that the noise of one holds for the other too.
+//! Statistically similar halves of a cell, so that the noise measured in one half is valid for the other.
 
 use super::Rect;
 
-/// Some pixels of a rectangle.
+/// A subset of a rectangle's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pixels {
-    /// Rectangle that the pixels are in.
+    /// The enclosing rectangle.
     pub rect: Rect,
-    /// Part of the rectangle: all its pixels, or a half.
+    /// The selected half, or all pixels.
     pub part: Part,
 }
 
@@ -18,12 +18,12 @@ impl From<Rect> for Pixels {
 }
 
 impl Pixels {
-    /// Number of the pixels.
+    /// Number of selected pixels.
     pub fn count(&self) -> usize {
         self.part.count(self.rect.area())
     }
 
-    /// Column and row, in the picture, of the pixel of a number.
+    /// Column and row in the image of the selected pixel `number`.
     #[inline]
     pub fn place(&self, number: u32) -> (u32, u32) {
         let index = self.part.index(number, self.rect);
@@ -31,18 +31,18 @@ impl Pixels {
     }
 }
 
-/// All pixels of a rectangle, or half of them: one of every two neighbours in its rows, the left and the right one in turns.
-/// Therefore no edge (level, upright or aslant) lies in one half alone.
+/// All pixels of a rectangle, or half of them: one pixel of each horizontal pair, alternating between left
+/// and right. No horizontal, vertical or diagonal edge is therefore in one half only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Every pixel.
     All,
-    /// One half: the first, 0, or the other one, 1.
+    /// Half 0 or half 1.
     Half(usize),
 }
 
 impl Part {
-    /// Number of pixels in this part of `area` pixels.
+    /// Number of selected pixels in a rectangle of `area` pixels.
     pub fn count(self, area: usize) -> usize {
         match self {
             Self::All => area,
@@ -50,19 +50,19 @@ impl Part {
         }
     }
 
-    /// Index in the rectangle, row after row, of the pixel of a number.
+    /// Row-major index in the rectangle of the selected pixel `number`.
     #[inline(always)]
     pub fn index(self, number: u32, rect: Rect) -> u32 {
         match self {
             Self::All => number,
-            // If their number is odd, the last pixel is in the first half.
+            // If the area is odd, the last pixel belongs to the first half.
             Self::Half(half) => {
                 (2 * number + (swaps(number, rect.width) ^ half as u32)).min(rect.area() as u32 - 1)
             }
         }
     }
 
-    /// The half that contains the pixel of an index in a rectangle.
+    /// Half that contains the pixel at `index` of a rectangle.
     pub fn half_of(index: u32, rect: Rect) -> usize {
         let area = rect.area() as u32;
         let is_alone = index + 1 == area && area % 2 == 1;
@@ -70,7 +70,7 @@ impl Part {
     }
 }
 
-/// Whether the right one of a pair of neighbours is in the first half; it changes every two rows.
+/// Whether the right pixel of a pair is in the first half, which changes every two rows.
 #[inline(always)]
 fn swaps(pair: u32, width: u32) -> u32 {
     (pair / width) & 1
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn halves_have_every_pixel_once() {
+    fn halves_partition_the_pixels() {
         for (width, height) in [(32, 32), (1, 1), (1, 7), (31, 32), (5, 5), (17, 30), (32, 1)] {
             let rect = Rect { x: 3, y: 8, width, height };
             let mut seen = vec![0; rect.area()];
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_lie_in_both_halves() {
+    fn lines_are_split_between_both_halves() {
         let rect = Rect { x: 0, y: 0, width: 8, height: 8 };
         let half = |x: u32, y: u32| Part::half_of(y * 8 + x, rect);
         for line in 0..8 {

@@ -1,34 +1,35 @@
-//! The pilot of a picture: a few fixed pixels whose first samples say how bright it is. Noise is held against that brightness, and
-//! each machine that renders some tiles of the picture knows it from the same pixels.
+//! Brightness prepass: a fixed subset of pixels whose first samples estimate the image's brightness. Noise
+//! thresholds are relative to it, and all machines that render parts of an image compute the same value.
 
 use super::steps::luminance;
 use super::{Film, Quantity, Rect, TileSamples};
 use crate::math::random::scrambled;
 
-/// Pixels of a pilot, unless the picture has fewer.
+/// Number of prepass pixels, unless the image has fewer.
 const PIXELS: u64 = 4096;
 
-/// Samples of each pixel of a pilot.
+/// Samples per prepass pixel.
 pub const PILOT_SAMPLES: u32 = 16;
 
-/// The pilot of a picture or a crop.
+/// Brightness prepass of an image or crop.
 #[derive(Clone, Copy, Debug)]
 pub struct Pilot {
     crop: Rect,
 }
 
 impl Pilot {
-    /// The pilot for these pixels.
+    /// Creates the prepass for the pixels of `crop`.
     pub fn new(crop: Rect) -> Self {
         Self { crop }
     }
 
-    /// Number of its pixels.
+    /// Number of prepass pixels.
     pub fn count(&self) -> u64 {
         PIXELS.min(self.crop.area() as u64)
     }
 
-    /// Column and row of a pixel: one at random in each of equal runs of the pixels, row after row.
+    /// Column and row of a prepass pixel: pseudo-randomly chosen in one of `count` equal runs of the
+    /// row-major pixels.
     pub fn place(&self, number: u64) -> (u32, u32) {
         let (area, count) = (self.crop.area() as u64, self.count().max(1));
         let (start, end) = (number * area / count, (number + 1) * area / count);
@@ -37,7 +38,7 @@ impl Pilot {
         (self.crop.x + (index % width) as u32, self.crop.y + (index / width) as u32)
     }
 
-    /// Mean luminance of the pilot by the first samples of a film. `None` if one of its pixels has no sample.
+    /// Mean luminance of the prepass pixels in a film, or `None` if one of them has no samples.
     pub fn of_film(&self, film: &Film) -> Option<f64> {
         self.mean(|number| {
             let (x, y) = self.place(number);
@@ -45,13 +46,14 @@ impl Pilot {
         })
     }
 
-    /// Mean of the luminances of its pixels.
+    /// Mean of the prepass pixels' luminances.
     pub fn mean(&self, luminance_of: impl Fn(u64) -> Option<f64>) -> Option<f64> {
         let sum: Option<f64> = (0..self.count()).map(luminance_of).sum();
         sum.map(|sum| sum / self.count() as f64)
     }
 
-    /// Luminance of a pixel of the pilot by its samples alone, as a film has it. `None` without samples.
+    /// Luminance of a prepass pixel from its samples, with the same rounding as in a film. `None` without
+    /// samples.
     pub fn luminance(mut samples: TileSamples) -> Option<f64> {
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
         samples.pixels = rect.into();
@@ -69,7 +71,7 @@ mod tests {
     use crate::math::Vec3;
 
     #[test]
-    fn its_pixels_are_spread_over_the_picture() {
+    fn prepass_pixels_are_spread_over_the_image() {
         for crop in [(4096, 2048), (97, 501), (64, 64), (3, 5)] {
             let pilot = Pilot::new(Rect { x: 7, y: 9, width: crop.0, height: crop.1 });
             let places: HashSet<_> = (0..pilot.count()).map(|number| pilot.place(number)).collect();
@@ -82,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_film_and_single_pixels_tell_the_same_brightness() {
+    fn film_and_single_pixels_have_equal_brightness() {
         let crop = Rect { x: 0, y: 0, width: 40, height: 3 };
         let film = Film::new(40, 3, None).expect("a film");
         let value =

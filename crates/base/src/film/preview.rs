@@ -1,4 +1,4 @@
-//! Preview of the picture so far, at the size of a screen, many times a second.
+//! Screen-sized previews of a film, updated many times per second.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -10,9 +10,9 @@ use super::resample::Axis;
 use super::{Film, Quantity, RadianceImage, is_in_pool};
 use crate::math::{DVec3, Vec3};
 
-/// Shrinks (or enlarges) a film by area, exactly for any ratio. It remembers each tile's share, so that a picture costs
-/// only what changed since the one before. Pixels without samples have no weight; the base shows in new pixels that
-/// cover no others.
+/// Resizes a film with an exact box filter. It caches each tile's contribution, so an update only costs as
+/// much as the tiles that changed. Pixels without samples have no weight; preview pixels that cover only such
+/// pixels show the base image.
 #[derive(Debug)]
 pub struct Previewer {
     quantity: Quantity,
@@ -20,13 +20,13 @@ pub struct Previewer {
     height: u32,
     film_id: Option<u64>,
     shares: Vec<Share>,
-    /// The tile to look at next.
+    /// Next tile to check.
     next: usize,
-    /// Whether every tile of this film has been looked at.
+    /// Whether every tile of this film has been checked.
     is_whole: bool,
 }
 
-/// Share of one tile in the pixels of the preview that it covers.
+/// Contribution of one tile to the preview pixels it covers.
 #[derive(Clone, Debug, Default)]
 struct Share {
     revision: u64,
@@ -35,58 +35,58 @@ struct Share {
     y: u32,
     /// Columns.
     width: u32,
-    /// Weighted sums and their weights, in rows.
+    /// Weighted sums in row-major order.
     cells: Vec<Weighted>,
 }
 
-/// A weighted sum and the sum of its weights: 16 bytes for each pixel of a preview.
+/// A weighted sum and the sum of its weights: 16 bytes per preview pixel.
 type Weighted = (Vec3, f32);
 
-/// The same in double precision, while it is summed up.
+/// Like [`Weighted`], in double precision for summation.
 type Sum = (DVec3, f64);
 
-/// Rows that are summed up at a time, so that there is no second copy of all shares.
+/// Rows summed at a time, which avoids a second copy of the whole preview.
 const BAND_ROWS: u32 = 32;
 
-/// Tiles that one thread takes up between two looks at the clock: less than a millisecond of work.
+/// Tiles per thread between checks of the clock: less than a millisecond of work.
 const TILES_AT_ONCE: usize = 32;
 
 impl Previewer {
-    /// A previewer for pictures of this size, of at least one pixel.
+    /// Creates a previewer for images of this size, at least one pixel.
     pub fn new(width: u32, height: u32) -> Self {
         Self::of(Quantity::Radiance, width, height)
     }
 
-    /// A previewer that shows this quantity.
+    /// Creates a previewer for the given quantity.
     pub fn of(quantity: Quantity, width: u32, height: u32) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self { quantity, width, height, film_id: None, shares: Vec::new(), next: 0, is_whole: false }
     }
 
-    /// Quantity that its pictures show.
+    /// Quantity shown in the previews.
     pub fn quantity(&self) -> Quantity {
         self.quantity
     }
 
-    /// Columns and rows of its pictures.
+    /// Columns and rows of the previews.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
 
-    /// Bytes that it remembers.
+    /// Bytes used by the cache.
     pub fn memory_bytes(&self) -> u64 {
         let cells: usize = self.shares.iter().map(|share| share.cells.capacity()).sum();
         (cells * size_of::<Weighted>() + self.shares.capacity() * size_of::<Share>()) as u64
     }
 
-    /// Whether every tile of the film has been taken up at least once, so that [`Previewer::picture`] leaves nothing
-    /// out, though it may be a little behind.
+    /// Whether every tile of the film has been processed at least once, so that [`Previewer::picture`] has no
+    /// gaps, though it may be slightly outdated.
     pub fn is_whole(&self) -> bool {
         self.is_whole
     }
 
-    /// Takes up the film's changes, until `deadline` at the latest, and returns whether that was all of them. The rest
-    /// comes first next time. Without a deadline it takes up everything. Each call may have another film.
+    /// Processes changed tiles until `deadline` and returns whether none are left. The next call continues
+    /// with the rest. Without a deadline, processes all changes. The film may differ between calls.
     pub fn update(&mut self, film: &Film, deadline: Option<Instant>) -> bool {
         if self.film_id != Some(film.id()) {
             self.film_id = Some(film.id());
@@ -109,8 +109,8 @@ impl Previewer {
         true
     }
 
-    /// Picture of everything taken up. `base`, the coarse first picture of any size, shows in pixels without samples;
-    /// black without a base.
+    /// Builds the preview from the processed tiles. Pixels without samples show `base`, a coarse image of any
+    /// size, or black without a base.
     pub fn picture(&self, base: Option<&RadianceImage>) -> RadianceImage {
         let width = self.width as usize;
         let mut pixels = Vec::with_capacity(width * self.height as usize);
@@ -121,7 +121,7 @@ impl Previewer {
             for share in &self.shares {
                 share.add_to(&mut band, rows.clone(), self.width);
             }
-            // The base is enlarged only if some of it shows.
+            // Enlarge the base only if some of it is visible.
             if band.iter().any(|(_, weight)| *weight <= 0.0) {
                 base = base.map(|base| match (base.width, base.height) == (self.width, self.height) {
                     true => base,
@@ -139,7 +139,7 @@ impl Previewer {
     }
 }
 
-/// Takes up these tiles, the first of which is `first`.
+/// Updates these tiles, of which the first has index `first`.
 fn refresh(shares: &mut [Share], first: usize, (film, quantity): (&Film, Quantity), axes: [Axis; 2]) {
     let refresh = |(i, share): (usize, &mut Share)| {
         if film.tile(first + i).revision != share.revision {
@@ -186,7 +186,7 @@ impl Share {
         self.cells.extend(sums.into_iter().map(|(sum, weight)| (sum.as_vec3(), weight as f32)));
     }
 
-    /// Adds this share in these rows of the picture.
+    /// Adds this contribution to the given rows of the preview.
     fn add_to(&self, band: &mut [Sum], rows: Range<u32>, picture_width: u32) {
         let width = self.width.max(1) as usize;
         let first = rows.start.saturating_sub(self.y) as usize;
@@ -206,7 +206,7 @@ mod tests {
     use super::*;
     use crate::film::{Rect, TileSamples};
 
-    /// A film whose pixel (x, y) has one sample of `value`; none if `value` is `None`.
+    /// A film with one sample of `value` in pixel (x, y), or no sample if `value` is `None`.
     fn film(width: u32, height: u32, crop: Option<Rect>, value: impl Fn(u32, u32) -> Option<f32>) -> Film {
         let film = Film::new(width, height, crop).expect("a small film");
         for tile in 0..film.tile_count() {
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_stays_and_the_picture_is_that_of_plain_resizing() {
+    fn preview_equals_the_resized_image() {
         let film = film(77, 45, None, |x, y| Some(pattern(x, y)));
         let whole = film.radiance();
         for (width, height) in [(1, 1), (2, 3), (13, 7), (40, 45), (77, 45), (100, 91)] {
@@ -258,8 +258,8 @@ mod tests {
     }
 
     #[test]
-    fn pixels_without_samples_have_no_weight_and_the_base_shows_in_their_place() {
-        // The left half is rendered, but for every other row.
+    fn base_shows_in_pixels_without_samples() {
+        // Every other row of the left half is rendered.
         let film = film(64, 64, None, |x, y| (x < 32 && y % 2 == 0).then_some(5.0));
         let base = RadianceImage { width: 1, height: 1, pixels: vec![Vec3::splat(2.0)] };
         let picture = preview(&film, 8, 8, Some(&base));
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crop_lands_where_it_belongs() {
+    fn crops_are_previewed_in_place() {
         let film = film(100, 60, Some(Rect { x: 50, y: 30, width: 500, height: 500 }), |_, _| Some(1.0));
         let picture = preview(&film, 10, 6, None);
         for (i, pixel) in picture.pixels.iter().enumerate() {
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn a_used_previewer_sees_changes_and_other_films() {
+    fn previewer_sees_changes_and_new_films() {
         let mut previewer = Previewer::new(9, 5);
         let first = film(70, 40, None, |x, _| (x < 20).then_some(1.0));
         let mut picture = |film: &Film| {
@@ -298,12 +298,12 @@ mod tests {
         first.add(1, &samples);
         let changed = picture(&first);
         assert_eq!(changed, preview(&first, 9, 5, None));
-        assert!(changed.pixels.iter().any(|p| p.x == 0.0 && p.y == 1.0), "the new tile shows");
+        assert!(changed.pixels.iter().any(|p| p.x == 0.0 && p.y == 1.0), "the new tile is visible");
         let second = film(30, 50, None, |x, y| Some(pattern(x, y)));
         assert_eq!(picture(&second), preview(&second, 9, 5, None));
     }
 
-    /// 46 × 46 tiles, each as bright as its number.
+    /// 46 × 46 tiles, each with its index as its radiance.
     fn tiled() -> Film {
         let film = Film::new(32 * 46, 32 * 46, None).expect("a film");
         for tile in 0..film.tile_count() {
@@ -323,12 +323,12 @@ mod tests {
     }
 
     #[test]
-    fn many_tiles_are_the_same_in_parallel() {
+    fn parallel_previews_are_identical() {
         let film = tiled();
         let alone = preview(&film, 23, 23, None);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("a pool");
         assert_eq!(pool.install(|| preview(&film, 23, 23, None)), alone);
-        // Each new pixel covers 2×2 tiles of consecutive numbers in two rows.
+        // Each preview pixel covers 2×2 tiles: two consecutive indices in each of two rows.
         for (i, pixel) in alone.pixels.iter().enumerate() {
             let (column, row) = (2 * (i % 23), 2 * (i / 23));
             let expected = (row * 46 + column) as f32 + 23.5;
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn an_update_stops_at_its_deadline_and_goes_on_where_it_was() {
+    fn updates_stop_at_the_deadline_and_resume() {
         let film = tiled();
         let mut previewer = Previewer::new(23, 23);
         let past = Instant::now();
@@ -348,7 +348,7 @@ mod tests {
         }
         assert!(previewer.is_whole());
         assert_eq!(previewer.picture(None), preview(&film, 23, 23, None));
-        // Changes behind the place reached come in the next round.
+        // Changes behind the current position are processed in the next round.
         previewer.update(&film, Some(past));
         let rect = film.tile_rect(0).expect("a tile");
         film.add(

@@ -1,32 +1,34 @@
-//! Quantities that a picture can show: the samples' mean, or numbers about the samples.
+//! Quantities that a film can display: the mean radiance or statistics of the samples.
 
 use super::steps::{Convergence, pixel_variance};
 use super::sums::{Tile, tile_grid, tile_rect};
 use super::{Film, RadianceImage, Rect, TILE_SIZE};
 use crate::math::{DVec3, Vec3};
 
-/// A quantity that a film shows of its samples.
+/// A displayable quantity of a film.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quantity {
-    /// The picture: the samples' mean.
+    /// Mean radiance: the image itself.
     #[default]
     Radiance,
-    /// Number of samples of each pixel.
+    /// Number of samples per pixel.
     Samples,
     /// Expected standard error of each pixel's luminance.
     Error,
 }
 
-/// Half width, in pixels, of the window over which squared steps are averaged: one pixel's step is a single noisy value.
+/// Half width, in pixels, of the window over which squared steps are averaged, as a single pixel's step is
+/// very noisy.
 const REACH: usize = 2;
 
 impl Film {
-    /// The picture so far: the mean of every pixel's samples; black outside the crop and in pixels without samples.
+    /// Current image: the mean of every pixel's samples, black outside the crop and in pixels without
+    /// samples.
     pub fn radiance(&self) -> RadianceImage {
         self.image(Quantity::Radiance)
     }
 
-    /// The picture of this quantity.
+    /// Image of a quantity.
     pub fn image(&self, quantity: Quantity) -> RadianceImage {
         let mut image = RadianceImage::black(self.width(), self.height());
         for i in 0..self.tile_count() {
@@ -45,7 +47,7 @@ impl Film {
         image
     }
 
-    /// One pixel of [`Film::image`]. `None` if it has no sample or lies outside the crop.
+    /// One pixel of [`Film::image`]. `None` if it has no samples or is outside the crop.
     pub fn pixel(&self, quantity: Quantity, x: u32, y: u32) -> Option<Vec3> {
         let Rect { x: left, y: top, width, height } = self.crop();
         let (right, down) = (x.checked_sub(left)?, y.checked_sub(top)?);
@@ -62,7 +64,8 @@ impl Film {
 }
 
 impl Tile {
-    /// Value of a quantity for the pixel of an index, in a tile of so many columns. `None` if the pixel has no sample.
+    /// Value of a quantity at a pixel index, in a tile with this number of columns. `None` if the pixel has
+    /// no samples.
     pub(super) fn value(&self, quantity: Quantity, (index, columns): (usize, usize)) -> Option<DVec3> {
         match quantity {
             Quantity::Radiance => self.mean(index),
@@ -71,7 +74,7 @@ impl Tile {
         }
     }
 
-    /// Standard error of a pixel; 0 for a single sample, which says nothing about it.
+    /// Standard error of a pixel; 0 for a single sample, which carries no information about it.
     fn error(&self, index: usize, columns: usize) -> Option<f64> {
         let count = self.count(index);
         let rows = self.counts.len() / columns.max(1);
@@ -102,7 +105,7 @@ mod tests {
     use crate::film::TileSamples;
     use crate::math::random::unit;
 
-    /// 20 × 20 pixels with so many grey samples each.
+    /// A film of 20 × 20 pixels with `count` gray samples each.
     fn film(count: u32, mut next: impl FnMut(u32) -> f32) -> Film {
         let film = Film::new(20, 20, None).expect("a film");
         let rect = Rect { x: 0, y: 0, width: 20, height: 20 };
@@ -112,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_of_a_pixel_is_that_of_its_mean() {
+    fn pixel_error_is_the_error_of_its_mean() {
         let mut next = unit(9);
         for count in [2, 16, 100] {
             let errors = film(count, |_| next()).image(Quantity::Error).pixels;
@@ -120,12 +123,12 @@ mod tests {
             let mean = (errors.iter().map(|error| f64::from(error.x).powi(2)).sum::<f64>() / 400.0).sqrt();
             assert!((0.9..1.15).contains(&(mean / exact)), "{count}: {mean} {exact}");
             let spread = errors.iter().filter(|error| f64::from(error.x) < 0.25 * exact).count();
-            assert!(spread < 20, "{count}: {spread} pixels are told to be far better than they are");
+            assert!(spread < 20, "{count}: the error of {spread} pixels is far underestimated");
         }
     }
 
     #[test]
-    fn what_is_certain_has_no_error_and_noise_stays_where_it_is() {
+    fn noise_does_not_spread_to_certain_pixels() {
         let mut next = unit(3);
         // The right half is noisy.
         let half = film(16, |pixel| if pixel % 20 < 10 { 0.4 } else { next() });

@@ -1,11 +1,11 @@
-//! Box resampling by area, exact for any ratio.
+//! Exact box-filter resampling for any size ratio.
 
 use rayon::prelude::*;
 
 use super::{RadianceImage, is_in_pool};
 use crate::math::DVec3;
 
-/// Map from the pixels of one axis to those of another length.
+/// Mapping of pixels along one axis to another resolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Axis {
     from: u64,
@@ -13,13 +13,13 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// The map from a length to another one, both ≥ 1 pixels.
+    /// Maps `from` pixels to `to` pixels, both at least 1.
     pub(super) fn new(from: u32, to: u32) -> Self {
         Self { from: u64::from(from.max(1)), to: u64::from(to.max(1)) }
     }
 
-    /// New pixels that the old pixel `index` covers, each with the covered amount. Both axes are measured in units of
-    /// 1/(from·to) of the whole, so that every overlap is a whole number and nothing is rounded.
+    /// New pixels covered by the old pixel `index`, each with the amount of overlap. Lengths are in units of
+    /// 1/(from·to) of the axis, so every overlap is an exact integer.
     pub(super) fn covered(self, index: u32) -> impl Iterator<Item = (u32, f64)> + Clone {
         let (start, end) = (u64::from(index) * self.to, (u64::from(index) + 1) * self.to);
         (start / self.from..end.div_ceil(self.from)).map(move |new| {
@@ -38,7 +38,7 @@ pub(super) fn resized(image: &RadianceImage, width: u32, height: u32) -> Radianc
         return image.clone();
     }
     let (width, height) = (width.max(1), height.max(1));
-    // Each new pixel gathers the old ones that it covers: the same overlaps, by the inverse map.
+    // Gather the old pixels that each new pixel covers: the same overlaps, through the inverse mapping.
     let columns = Axis::new(image.width, width).inverse();
     let rows = Axis::new(image.height, height).inverse();
     let pixel = |i: usize| {
@@ -68,11 +68,11 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn three_pixels_into_two() {
+    fn three_pixels_shrink_to_two() {
         let image =
             RadianceImage { width: 3, height: 1, pixels: vec![Vec3::X, Vec3::splat(3.0), Vec3::splat(6.0)] };
         let smaller = image.resized(2, 1);
-        // The middle pixel belongs to both by half: (2·a + 1·b)/3.
+        // Half of the middle pixel belongs to each: (2·a + 1·b)/3.
         assert!((smaller.pixels[0] - Vec3::new(5.0, 3.0, 3.0) / 3.0).abs().max_element() < 1e-6);
         assert!((smaller.pixels[1] - Vec3::splat(5.0)).abs().max_element() < 1e-6);
         let larger = image.resized(9, 4);
@@ -82,7 +82,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_pixel_is_given_away_whole_and_every_new_one_is_filled(from in 1_u32..70, to in 1_u32..70) {
+        fn overlaps_conserve_pixel_areas(from in 1_u32..70, to in 1_u32..70) {
             let axis = Axis::new(from, to);
             let mut filled = vec![0.0; to as usize];
             for old in 0..from {

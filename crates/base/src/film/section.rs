@@ -1,11 +1,11 @@
-//! A part of the picture, pixel by pixel.
+//! Unscaled sections of a film.
 
 use super::{Film, Quantity, RadianceImage, Rect};
 use crate::math::Vec3;
 
 impl Film {
-    /// Copies these pixels as they are. `base`, a picture of the whole at any size, shows in pixels without samples; black
-    /// without a base.
+    /// Copies a rectangle of pixels without scaling. Pixels without samples show `base`, a full image of any
+    /// size, or black without a base.
     pub fn section(&self, quantity: Quantity, rect: Rect, base: Option<&RadianceImage>) -> RadianceImage {
         let mut image = RadianceImage::black(rect.width, rect.height);
         if let Some(base) = base {
@@ -51,7 +51,7 @@ mod tests {
     use crate::film::TileSamples;
 
     #[test]
-    fn a_section_is_the_pixels_of_the_whole_and_the_base_shows_in_holes() {
+    fn sections_match_the_image_and_show_the_base() {
         let film = Film::new(100, 70, None).expect("a film");
         for tile in (0..film.tile_count()).filter(|tile| tile % 2 == 0) {
             let rect = film.tile_rect(tile).expect("a tile");

@@ -1,20 +1,20 @@
-//! The sRGB curve as a table to bytes: the same bytes as the formula, without a power per channel.
+//! Table-based sRGB encoding to bytes: the same bytes as the formula, without a power function per channel.
 
 use std::sync::LazyLock;
 
 use crate::math::color;
 
-/// Everything below 2⁻¹³ is byte 0: the first step is at 0.5/(255·12.92) ≈ 1.5e-4.
+/// Values below 2⁻¹³ encode to byte 0: the first step is at 0.5/(255·12.92) ≈ 1.5e-4.
 const FIRST_EXPONENT_BITS: u32 = (127 - 13) << 23;
 const ONE_BITS: u32 = 127 << 23;
-/// A bucket spans 1/256 of an octave, over which the curve rises by less than one byte.
+/// Each bucket covers 1/256 of an octave, over which the curve rises by less than one byte.
 const BUCKET_SHIFT: u32 = 23 - 8;
 const BUCKETS: usize = ((ONE_BITS - FIRST_EXPONENT_BITS) >> BUCKET_SHIFT) as usize;
 
 struct ByteTable {
-    /// The byte at the start of each bucket.
+    /// Byte at the start of each bucket.
     start: [u8; BUCKETS],
-    /// The bits of the first float that becomes byte `i` or more.
+    /// Bits of the smallest float that encodes to byte `i` or more.
     threshold: [u32; 256],
 }
 
@@ -30,7 +30,8 @@ static TABLE: LazyLock<ByteTable> = LazyLock::new(|| {
     table
 });
 
-/// Finds the bits by bisection over the floats in [0, 1], whose bits are in the order of the floats.
+/// Smallest float in [0, 1] that encodes to `byte` or more, as bits. Bisects over the bits, which sort like
+/// the floats.
 fn first_bits_of(byte: usize) -> u32 {
     let (mut low, mut high) = (0, ONE_BITS);
     while low < high {
@@ -44,7 +45,7 @@ fn first_bits_of(byte: usize) -> u32 {
     low
 }
 
-/// A linear component, clamped to [0, 1], as an sRGB byte; NaN becomes 0. The same as
+/// Encodes a linear component, clamped to [0, 1], as an sRGB byte. NaN becomes 0. Gives the same results as
 /// [`color::linear_to_srgb8`], several times faster.
 pub fn linear_to_srgb8(linear: f32) -> u8 {
     let bits = linear.to_bits();
@@ -64,8 +65,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_gives_the_bytes_of_the_formula() {
-        // Every 61st float of [0, 2), and the neighbours of every step.
+    fn table_matches_the_formula() {
+        // Every 61st float in [0, 2) and the neighbors of every step.
         let spread = (0..=128 << 23).step_by(61);
         let steps = TABLE.threshold.iter().flat_map(|&bits| bits.saturating_sub(40)..=bits + 40);
         for value in spread.chain(steps).map(f32::from_bits) {
@@ -74,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn values_outside_the_range_are_clamped() {
+    fn out_of_range_values_are_clamped() {
         for value in [-0.0, -1e-30, -1.0, f32::NEG_INFINITY, f32::NAN, -f32::NAN, f32::MIN_POSITIVE, 1e-45] {
             assert_eq!(linear_to_srgb8(value), 0, "{value:e}");
         }

@@ -1,44 +1,47 @@
-//! Steps of the pixels' means as their samples double, and the variance that these steps forecast.
+//! Convergence estimation: changes of the pixel means as their samples double, and the variance predicted
+//! from them.
 
 use super::CELLS;
 use crate::math::DVec3;
 use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_LEAST};
 
-/// Relative luminance in double precision, so that sums of its squares and squares of its sums agree.
+/// Relative luminance in double precision, so that sums of squares and squared sums are consistent.
 pub(super) fn luminance(radiance: DVec3) -> f64 {
     radiance.dot(LUMINANCE_WEIGHTS.as_dvec3())
 }
 
-/// Squared steps of a tile's pixel means: the changes of each mean when its samples doubled.
+/// Squared steps of a tile's pixel means: how much each mean changed when its samples doubled.
 ///
-/// The samples of a pixel are not independent: each doubling fills the gaps between the samples before. Therefore the variance
-/// of single samples overestimates the noise, and two halves with separate scrambles would lose what the gaps are worth. But
-/// let M be the mean of 2n samples, A the mean of the first n and B that of the others. (A − M)² = (A − B)²/4 has the
-/// expectation V(n) − V(2n) for any dependence between A and B, as V(2n) = (V(A) + V(B))/4 + Cov/2 and V(A) = V(B) = V(n).
+/// The samples of a pixel are not independent: each doubling fills the gaps between earlier samples. The
+/// sample variance therefore overestimates the noise, while splitting the samples into two halves with
+/// separate scrambles would lose the benefit of the stratification. Instead, let M be the mean of 2n samples,
+/// A the mean of the first n and B the mean of the others. (A − M)² = (A − B)²/4 has the expectation V(n) −
+/// V(2n) for any correlation of A and B, as V(2n) = (V(A) + V(B))/4 + Cov/2 and V(A) = V(B) = V(n).
 ///
-/// The same pixels measure the rate at which V falls: the first n samples and the others each contain one more such step, with
-/// the expectation V(n/2) − V(n). The mean of these two over the first step is the rate. A bright sample that comes once is in
-/// all three steps: it says a rate of two, as rare light does, however few pixels meet it.
+/// The same pixels measure the rate at which V falls: the first n samples and the others each contain another
+/// such step, with the expectation V(n/2) − V(n). The rate is the mean of these two divided by the first
+/// step. A rare bright sample affects all three steps and leads to a rate of two, as for independent samples,
+/// however few pixels contain one.
 #[derive(Debug, Default)]
 pub(super) struct Steps {
-    /// Luminance of each pixel at the last power of two of its samples.
+    /// Luminance of each pixel at its last power-of-two sample count.
     last: Vec<f32>,
-    /// Luminance of each pixel half way from there to the next power of two.
+    /// Luminance of each pixel halfway from there to the next power of two.
     half_way: Vec<f32>,
     /// Squared steps to 2, 4, 8, … samples, for each half of each cell.
     levels: Vec<[[LevelSums; 2]; CELLS]>,
-    /// The last step of each pixel.
+    /// Last step of each pixel.
     recent: Vec<f32>,
 }
 
-/// Sums over pixels of their squared steps to one power of two of samples.
+/// Sums over pixels of the squared steps to one power-of-two sample count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct LevelSums {
     /// Steps of the mean of all samples.
     outer: f64,
     /// Steps within the second half of the samples.
     inner: f64,
-    /// Squares of the `outer` steps, which tell how few pixels the sum hangs on.
+    /// Squares of the `outer` steps, which show how few pixels dominate the sum.
     outer_squares: f64,
     /// Sum of the `outer` steps, each divided by luminance² + [`RELMSE_LEAST`].
     relative: f64,
@@ -46,7 +49,7 @@ struct LevelSums {
     relative_inner: f64,
 }
 
-/// Squared steps to a power of two, and those one doubling earlier.
+/// Squared steps to a power of two, and the steps one doubling earlier.
 #[derive(Clone, Copy, Debug, Default)]
 struct StepPair {
     last: f64,
@@ -55,7 +58,7 @@ struct StepPair {
 }
 
 impl Steps {
-    /// Empty steps with memory reserved for so many pixels. `None` if the memory cannot be had.
+    /// Empty steps with memory reserved for `area` pixels. `None` if the allocation fails.
     pub(super) fn reserved(area: usize) -> Option<Self> {
         let reserved = || {
             let mut values = Vec::new();
@@ -65,19 +68,19 @@ impl Steps {
         Some(Self { last: reserved()?, half_way: reserved()?, recent: reserved()?, levels: Vec::new() })
     }
 
-    /// Makes room for so many pixels; cannot fail if the memory was reserved.
+    /// Resizes to `area` pixels. Cannot fail if the memory was reserved.
     pub(super) fn fill(&mut self, area: usize) {
         for values in [&mut self.last, &mut self.half_way, &mut self.recent] {
             values.resize(area, 0.0);
         }
     }
 
-    /// Number of doublings of which it has steps.
+    /// Number of doublings with recorded steps.
     pub(super) fn level_count(&self) -> usize {
         self.levels.len()
     }
 
-    /// Gives all numbers as words of 32 bits, in the order in which [`Steps::read`] takes them.
+    /// Serializes all numbers as 32-bit words in the order that [`Steps::read`] expects.
     pub(super) fn words(&self, put: &mut impl FnMut(u32)) {
         for values in [&self.last, &self.half_way, &self.recent] {
             values.iter().for_each(|value| put(value.to_bits()));
@@ -91,7 +94,7 @@ impl Steps {
         }
     }
 
-    /// The steps of these words, for so many pixels and doublings.
+    /// Deserializes steps for `area` pixels and `levels` doublings.
     pub(super) fn read<E>(
         area: usize,
         levels: usize,
@@ -121,7 +124,8 @@ impl Steps {
         self.recent.get(pixel).map_or(0.0, |step| f64::from(*step) * f64::from(*step))
     }
 
-    /// Samples that a pixel of `count` samples lacks to the next count that is noted: a power of two, or half way to the next one.
+    /// Samples that a pixel of `count` samples needs to reach the next recorded count: a power of two or
+    /// halfway to the next one.
     pub(super) fn samples_to_next(count: u32) -> usize {
         let count = u64::from(count);
         let power = (count + 1).next_power_of_two();
@@ -130,7 +134,8 @@ impl Steps {
         (next - count) as usize
     }
 
-    /// Notes the luminance of a pixel (with its cell and half) at a count that [`Steps::samples_to_next`] leads to.
+    /// Records the luminance of a pixel in the given cell and half, at a count determined by
+    /// [`Steps::samples_to_next`].
     pub(super) fn note(&mut self, (pixel, cell, half): (usize, usize, usize), count: u32, luminance: f64) {
         let rounded = luminance as f32;
         if !count.is_power_of_two() {
@@ -158,7 +163,7 @@ impl Steps {
         self.last[pixel] = rounded;
     }
 
-    /// Steps of a half of a cell to 2^`level` samples.
+    /// Steps of a half-cell to 2^`level` samples.
     fn pair(&self, level: usize, (cell, half): (usize, usize), is_relative: bool) -> Option<StepPair> {
         let of = |level: usize| self.levels.get(level.checked_sub(1)?).map(|cells| cells[cell][half]);
         let parts = |sums: LevelSums| match is_relative {
@@ -170,15 +175,15 @@ impl Steps {
         Some(StepPair { last, before })
     }
 
-    /// Steps of a half of a cell to 2^`level` samples, and those one, two and three doublings earlier.
+    /// Steps of a half-cell to 2^`level` samples, and those one, two and three doublings earlier.
     fn last_four(&self, level: usize, at: (usize, usize), is_relative: bool) -> Option<[f64; 4]> {
         let StepPair { last, before } = self.pair(level, at, is_relative)?;
         let earlier = |back: usize| self.pair(level.checked_sub(back)?, at, is_relative)?.before;
         Some([last, before?, earlier(1)?, earlier(2)?])
     }
 
-    /// Factor by which four times as many samples reduced the variance, at 2^`level` samples, over this half of all cells. `None`
-    /// as in [`Steps::fall`], which gives the factor for twice as many.
+    /// Factor by which quadrupling the samples to 2^`level` reduced the variance, over one half of all cells.
+    /// `None` as in [`Steps::fall`], which returns the factor for doubling.
     fn fourfold_fall(&self, level: usize, half: usize) -> Option<f64> {
         let mut sums = [0.0; 4];
         for cell in 0..CELLS {
@@ -188,13 +193,14 @@ impl Steps {
             }
         }
         let [last, before, third, fourth] = sums;
-        // Compare with the same step at four times fewer samples, and carefully with two steps together.
+        // Compare with the same step at a quarter of the samples and, more cautiously, with two steps
+        // together.
         let fall = (third / last).max(CAREFUL * (third + fourth) / (last + before));
         Some(fall).filter(|fall| fall.is_finite() && *fall > 0.0)
     }
 
-    /// Relative spread to expect of the sum of the steps to 2^`level` samples, over these halves of all cells: 1 if a single pixel
-    /// decides it, less the more pixels share it. Cells that have fewer samples do not count.
+    /// Expected relative standard deviation of the sum of the steps to 2^`level` samples over these halves of
+    /// all cells: 1 if a single pixel dominates, less if many contribute. Ignores cells with fewer samples.
     pub(super) fn spread(&self, level: usize, halves: &[usize]) -> f64 {
         let Some(cells) = level.checked_sub(1).and_then(|index| self.levels.get(index)) else { return 1.0 };
         let sums = cells.iter().flat_map(|cell| halves.iter().map(|half| cell[*half]));
@@ -203,14 +209,14 @@ impl Steps {
         if sum > 0.0 { squares.sqrt() / sum } else { 0.0 }
     }
 
-    /// Trust in a fall, from 0 to 1.
+    /// Confidence in a measured fall, from 0 to 1.
     fn trust(&self, level: usize, halves: &[usize]) -> f64 {
         let spread = self.spread(level, halves);
         1.0 / (1.0 + DOUBT * spread * spread)
     }
 
-    /// Factor by which the doubling to 2^`level` samples reduced the variance, over these halves of all cells. `None` if it is not
-    /// known. Cells that have fewer samples do not count.
+    /// Factor by which doubling the samples to 2^`level` reduced the variance, over these halves of all
+    /// cells. `None` if it is unknown. Ignores cells with fewer samples.
     pub(super) fn fall(&self, level: usize, halves: &[usize]) -> Option<f64> {
         let (mut last, mut before) = (0.0, 0.0);
         for (cell, half) in (0..CELLS).flat_map(|cell| halves.iter().map(move |half| (cell, *half))) {
@@ -224,46 +230,48 @@ impl Steps {
     }
 }
 
-/// Convergence: the law by which the variance of a pixel's mean falls with its samples.
+/// Convergence model: how the variance of a pixel's mean falls with its sample count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Convergence {
-    /// The samples of a pixel fill each other's gaps. Twice as many divide the variance by 2 in places of rare light, by 2.8 at
-    /// edges and in penumbras, by 4 and more in smooth places. The steps between pairs of doublings measure it.
+    /// Stratified samples that fill each other's gaps. Doubling them divides the variance by 2 for rare
+    /// light, by 2.8 at edges and in penumbras, and by 4 or more in smooth regions. The steps between pairs
+    /// of doublings measure the factor.
     #[default]
     Stratified,
-    /// Each sample has photons of its own, which the pixels share. In the end the photons' variance falls as that of independent
-    /// samples, while that of the camera paths falls faster at first.
+    /// Each sample has its own photons, which the pixels share. Eventually the photons' variance falls as for
+    /// independent samples, while the camera paths' variance initially falls faster.
     Photons,
 }
 
-/// Factor by which twice as many independent samples reduce the variance.
+/// Factor by which doubling independent samples reduces the variance.
 const INDEPENDENT_RATE: f64 = 2.0;
 
-/// Largest fall by a doubling that is believed.
+/// Maximum plausible fall for one doubling.
 const MOST_FALL: f64 = 12.0;
 
-/// Largest fall that is taken for that of independent samples: by chance, few bright pixels seem to fall as fast.
+/// Maximum fall attributed to independent samples: a few bright pixels can fall this fast by chance.
 const CHANCE_FALL: f64 = 2.3;
 
-/// Part of a fall beyond [`CHANCE_FALL`] that is expected of the next doubling: the smooth parts of a tile converge first, and the
-/// rest falls slower.
+/// Fraction of a fall beyond [`CHANCE_FALL`] that is expected to continue: the smooth parts of a tile
+/// converge first, and the rest falls more slowly.
 const LASTING: f64 = 0.65;
 
-/// Distrust in a fall that few pixels decide, per square of its [`Steps::spread`].
+/// Penalty for a fall measured from few pixels, per squared [`Steps::spread`].
 const DOUBT: f64 = 2.0;
 
-/// Part of the fall by two steps together that is believed.
+/// Fraction of the fall over two steps that is trusted.
 const CAREFUL: f64 = 0.8;
 
-/// Factor by which four times as many independent samples reduce the variance; then the fall up to which chance is taken for the
-/// cause, the part of a fall beyond it that goes on, and the largest rate.
+/// Factor by which quadrupling independent samples reduces the variance, followed by the maximum fall
+/// attributed to chance, the fraction of a larger fall that continues, and the maximum rate.
 const FOURFOLD_RATE: f64 = 4.0;
 const FOURFOLD_CHANCE: f64 = 5.2;
 const FOURFOLD_LASTING: f64 = 1.2;
 const FOURFOLD_MOST: f64 = 40.0;
 
 impl Convergence {
-    /// Power of the samples with which the variance of most pictures falls in the long run, whatever the last steps say.
+    /// Long-term exponent with which the variance of most images falls with the sample count, regardless of
+    /// the latest steps.
     pub fn usual_power(self) -> f64 {
         match self {
             Self::Stratified => 1.432_959_407_276_106_2,
@@ -271,21 +279,24 @@ impl Convergence {
         }
     }
 
-    /// Factor by which the doubling to 2^`level` samples reduced the variance, in these halves of a tile.
+    /// Factor by which doubling the samples to 2^`level` reduced the variance in these halves of a tile.
     fn fall(steps: &Steps, level: usize, halves: &[usize]) -> f64 {
         steps.fall(level, halves).map_or(INDEPENDENT_RATE, |fall| fall.clamp(INDEPENDENT_RATE, MOST_FALL))
     }
 
-    /// Factor by which twice as many samples as 2^`level` are expected to reduce the variance, in these halves of a tile.
+    /// Factor by which doubling the samples beyond 2^`level` is expected to reduce the variance in these
+    /// halves of a tile.
     pub(super) fn rate(steps: &Steps, level: usize, halves: &[usize]) -> f64 {
         rate_after(Self::fall(steps, level, halves), steps.trust(level, halves))
     }
 
-    /// Variance of the means of `count` samples of one half of a cell, summed over its pixels, and the rate at which it falls.
+    /// Variance of the means of `count` samples in a half-cell, summed over its pixels, and the rate at which
+    /// it falls.
     ///
-    /// The variance is the geometric mean of two forecasts. One goes by doublings: by the last step, and by the forecast from the
-    /// two steps before it, as each has a spread. But points in base 2 fill squares at powers of 4, so that every other doubling
-    /// gains more. The other forecast therefore goes by four times as many samples.
+    /// The variance is the geometric mean of two predictions. One is based on doublings: the last step, and
+    /// its prediction from the two steps before it, as each is noisy. But base-2 sequences are best
+    /// stratified at powers of 4, so every other doubling gains more. The other prediction is therefore based
+    /// on quadrupled sample counts.
     pub(super) fn variance(
         steps: &Steps,
         (cell, half): (usize, usize),
@@ -305,8 +316,8 @@ impl Convergence {
         Some((variance, rate))
     }
 
-    /// Variance of the means of 2^`level` samples of one half of a cell, summed over its pixels, by its fall with four times as
-    /// many samples. `None` for fewer than 16 samples.
+    /// Variance of the means of 2^`level` samples in a half-cell, summed over its pixels, predicted from its
+    /// fall over quadrupled sample counts. `None` for fewer than 16 samples.
     fn by_four(steps: &Steps, level: usize, at: (usize, usize), is_relative: bool) -> Option<f64> {
         let [last, before, ..] = steps.last_four(level, at, is_relative)?;
         let fall = steps.fourfold_fall(level, at.1).unwrap_or(FOURFOLD_RATE);
@@ -316,15 +327,15 @@ impl Convergence {
     }
 }
 
-/// Rate to expect after a fall with this trust.
+/// Expected rate after a fall with this confidence.
 fn rate_after(fall: f64, trust: f64) -> f64 {
     INDEPENDENT_RATE + LASTING * (fall - CHANCE_FALL).max(0.0) * trust
 }
 
-/// Variance of a mean of `count` ≥ 2 samples, from the squared step to the last power of two of them and the rate at which it
-/// falls.
+/// Variance of a mean of `count` ≥ 2 samples, from the squared step to the last power of two and the rate at
+/// which the variance falls.
 pub(super) fn pixel_variance(step: f64, count: u32, rate: f64) -> f64 {
-    // Between powers of two it falls as for independent samples.
+    // Between powers of two, the variance falls as for independent samples.
     let part = f64::from(1_u32 << count.ilog2()) / f64::from(count);
     step / (rate - 1.0) * part
 }

@@ -1,4 +1,4 @@
-//! Tiles of a film as bytes, from which the same film can be made again: little-endian numbers, one pixel after the other.
+//! Binary serialization of film tiles: little-endian numbers, pixel by pixel.
 
 use std::sync::atomic::Ordering;
 
@@ -7,26 +7,26 @@ use super::sums::{Negative, Tile};
 use super::{CELLS, Film, Part};
 use crate::math::DVec3;
 
-/// Bytes that are no tile of such a film.
+/// Error for bytes that are not a tile of the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("these bytes are no tile of the picture")]
+#[error("these bytes are not a tile of the image")]
 pub struct Malformed;
 
-/// A tile that was read back, whose blocks may be added to those of others.
+/// A deserialized tile, whose blocks can be merged with other tiles' blocks.
 #[derive(Debug, Default)]
 pub struct StoredTile {
     tile: Tile,
 }
 
 impl StoredTile {
-    /// Reads a tile of so many pixels.
+    /// Reads a tile of `area` pixels.
     ///
     /// # Errors
-    /// [`Malformed`] if there are too few bytes, too many, or numbers that no tile has.
+    /// [`Malformed`] if there are too few or too many bytes, or invalid counts.
     pub fn read(bytes: &[u8], area: usize) -> Result<Self, Malformed> {
         let mut from = Bytes(bytes);
         let (blocks, is_signed, levels) = (from.count()?, from.count()? == 1, from.count()?);
-        // Nothing is reserved for numbers that are not there.
+        // Check the length before reserving memory.
         if blocks.checked_mul(area * size_of::<DVec3>()).is_none_or(|all| all > bytes.len()) || levels > 32 {
             return Err(Malformed);
         }
@@ -43,15 +43,15 @@ impl StoredTile {
         if from.0.is_empty() { Ok(Self { tile }) } else { Err(Malformed) }
     }
 
-    /// Sums of blocks that it holds: finished ones, and one that is not if a pixel has samples of it.
+    /// Number of block sums: the finished ones and the one in progress, which may be empty.
     pub fn block_count(&self) -> usize {
         self.tile.earlier.len() + 1
     }
 
-    /// Adds one of the blocks of a tile of as many pixels to this one, which is a sum of blocks.
+    /// Adds one block of another tile to this tile, which accumulates blocks.
     ///
     /// # Errors
-    /// [`Malformed`] if the tiles have not as many pixels, or the block is not there.
+    /// [`Malformed`] if the tiles differ in size or the block does not exist.
     pub fn add_block(&mut self, of: &Self, block: usize) -> Result<(), Malformed> {
         let area = of.tile.sums.len();
         if self.tile.sums.is_empty() {
@@ -75,7 +75,7 @@ impl StoredTile {
         Ok(())
     }
 
-    /// Counts the samples of a tile, of whose blocks those that count were added.
+    /// Adds the sample counts of a tile whose blocks have been added.
     pub fn add_counts(&mut self, of: &Self) {
         self.tile.counts.iter_mut().zip(&of.tile.counts).for_each(|(own, other)| *own += other);
         if let (Some(own), Some(other)) = (&mut self.tile.negative, &of.tile.negative) {
@@ -84,7 +84,7 @@ impl StoredTile {
     }
 }
 
-/// Sums of one of the blocks.
+/// Sums of one block.
 fn block_of<'a>(earlier: &'a [Vec<DVec3>], sums: &'a [DVec3], block: usize) -> Option<&'a [DVec3]> {
     match block.cmp(&earlier.len()) {
         std::cmp::Ordering::Less => Some(&earlier[block]),
@@ -98,7 +98,7 @@ fn add_up(sums: &mut [DVec3], others: &[DVec3]) {
 }
 
 impl Film {
-    /// Appends all that a tile holds; returns whether it has samples.
+    /// Appends a tile's serialized content to `bytes` and returns whether it has samples.
     pub fn store(&self, tile: usize, bytes: &mut Vec<u8>) -> bool {
         let tile = self.tile(tile);
         if tile.counts.is_empty() {
@@ -119,10 +119,10 @@ impl Film {
         true
     }
 
-    /// Puts a tile in the place of its own.
+    /// Replaces a tile with a deserialized one.
     ///
     /// # Errors
-    /// [`Malformed`] if it is no tile of this film.
+    /// [`Malformed`] if the tile does not fit this film.
     pub fn restore(&self, tile: usize, stored: StoredTile) -> Result<(), Malformed> {
         let area = self.tile_rect(tile).ok_or(Malformed)?.area();
         let Tile { sums, earlier, counts, negative, steps, .. } = stored.tile;
@@ -136,7 +136,7 @@ impl Film {
         Ok(())
     }
 
-    /// Samples that each pixel of a half of a cell has; 0 for a half without pixels.
+    /// Samples per pixel in one half of a cell, or 0 if the half has no pixels.
     pub fn half_samples(&self, cell: usize, half: usize) -> u32 {
         let (Some(tile), Some(rect)) = (self.tile_rect(cell / CELLS), self.cell_rect(cell)) else { return 0 };
         if Part::Half(half).count(rect.area()) == 0 {
@@ -147,7 +147,7 @@ impl Film {
         self.tile(cell / CELLS).count((y * tile.width + x) as usize)
     }
 
-    /// Adds to [`Film::non_finite_samples`] those of restored tiles.
+    /// Adds the non-finite samples of restored tiles to [`Film::non_finite_samples`].
     pub fn add_non_finite(&self, samples: u64) {
         self.non_finite_samples.fetch_add(samples, Ordering::Relaxed);
     }
@@ -174,7 +174,7 @@ fn put_sums(bytes: &mut Vec<u8>, sums: &[DVec3], earlier: &[Vec<DVec3>]) {
     }
 }
 
-/// Appends numbers of `N` bytes, which is much faster together than one after the other.
+/// Appends numbers of `N` bytes. Resizing once is much faster than appending one at a time.
 fn put_all<const N: usize>(bytes: &mut Vec<u8>, numbers: impl ExactSizeIterator<Item = [u8; N]>) {
     let start = bytes.len();
     bytes.resize(start + N * numbers.len(), 0);
@@ -183,7 +183,7 @@ fn put_all<const N: usize>(bytes: &mut Vec<u8>, numbers: impl ExactSizeIterator<
     }
 }
 
-/// The rest of the bytes that are read.
+/// Remaining bytes of the input.
 struct Bytes<'a>(&'a [u8]);
 
 impl Bytes<'_> {
@@ -222,7 +222,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::unit;
 
-    /// Adds samples `range` of a fixed random sequence for each pixel to a film of 40 × 33 pixels.
+    /// Adds the samples `range` of a fixed random sequence to each pixel of a film of 40 × 33 pixels.
     fn add(film: &Film, range: std::ops::Range<u32>, is_signed: bool) {
         for tile in 0..film.tile_count() {
             let rect = film.tile_rect(tile).expect("a tile");
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn a_film_goes_on_from_what_was_stored() {
+    fn restored_films_continue_identically() {
         for (blocks, is_signed) in
             [(Blocks::Whole, false), (Blocks::Whole, true), (Blocks::Added, true), (Blocks::Apart(2), true)]
         {
@@ -278,11 +278,11 @@ mod tests {
     }
 
     #[test]
-    fn blocks_that_are_added_are_the_whole() {
+    fn merged_blocks_equal_the_whole() {
         for is_signed in [false, true] {
             let whole = film(Blocks::Added);
             add(&whole, 0..2 * BLOCK + 5, is_signed);
-            // One machine has the first and the last block, another the one between them.
+            // One machine renders the first and last blocks, another the middle one.
             let (outer, inner) = (film(Blocks::Apart(1)), film(Blocks::Apart(1)));
             add(&outer, 0..BLOCK, is_signed);
             add(&outer, 2 * BLOCK..2 * BLOCK + 5, is_signed);
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_or_longer_is_no_tile() {
+    fn malformed_tiles_are_rejected() {
         let film = film(Blocks::Added);
         add(&film, 0..9, true);
         let (bytes, area) = (stored(&film, 0), film.tile_rect(0).expect("a tile").area());

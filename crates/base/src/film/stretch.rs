@@ -1,51 +1,51 @@
-//! Stretch of numbers without a brightness of their own (distances, amounts) to the range in view.
+//! Range mapping: maps data without an inherent brightness (distances, counts) to the range in view.
 
 use super::RadianceImage;
 use crate::math::Vec3;
 
-/// Map from numbers to brightnesses.
+/// Mapping of data values to brightness.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Stretch {
-    /// No stretch: the numbers as they are.
+    /// Leaves the values unchanged.
     #[default]
     None,
-    /// A stretch whose range is not yet known; black until [`Stretch::of_picture`] sets it.
+    /// A mapping whose range is still unknown; gives black until [`Stretch::of_picture`] sets it.
     Unknown(Kind),
-    /// A stretch to this range.
+    /// A mapping to the given range.
     To(Kind, Range),
 }
 
-/// Kind of the numbers.
+/// Meaning of the data values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Distances: the nearest is white, the farthest dark, 0 stands for nothing and is black.
+    /// Distances: the nearest is white, the farthest dark, and 0 (nothing hit) black.
     Distances,
-    /// Amounts: 0 is black, the largest white.
+    /// Amounts: 0 is black and the largest white.
     Amounts,
 }
 
-/// Range of the numbers in view.
+/// Range of the values in view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Least number; 0 for amounts.
+    /// Minimum, which is 0 for amounts.
     pub least: f32,
-    /// Greatest number.
+    /// Maximum.
     pub greatest: f32,
-    /// Bias b of the curve between them, see [`Range::part`].
+    /// Bias b of the curve between them; see [`Range::part`].
     bias: f32,
 }
 
-/// Brightness of the farthest distance.
+/// Brightness of the largest distance.
 const DARKEST: f32 = 0.1;
 
-/// Least brightness of the median number.
+/// Minimum brightness of the median value.
 const QUARTER: f32 = 0.25;
 
-/// Least bias: no curve is steeper.
+/// Minimum bias, which limits the steepness of the curve.
 const LEAST_BIAS: f32 = 1e-3;
 
 impl Stretch {
-    /// The stretch to the numbers in this picture.
+    /// Sets the range from the values in an image.
     pub fn of_picture(self, image: &RadianceImage) -> Self {
         match self {
             Self::None | Self::To(..) => self,
@@ -53,7 +53,7 @@ impl Stretch {
         }
     }
 
-    /// Range that it stretches to. `None` if it is not known, or nothing is stretched.
+    /// Range of the mapping, or `None` if it is unknown or values are left unchanged.
     pub fn range(&self) -> Option<Range> {
         match self {
             Self::None | Self::Unknown(_) => None,
@@ -61,7 +61,7 @@ impl Stretch {
         }
     }
 
-    /// Brightnesses of the numbers of a pixel.
+    /// Maps the values of a pixel to brightness.
     pub fn apply(&self, numbers: Vec3) -> Vec3 {
         let each = |of: &dyn Fn(f32) -> f32| Vec3::from_array(numbers.to_array().map(of));
         match self {
@@ -95,21 +95,22 @@ impl Range {
         Self { bias: bias.clamp(LEAST_BIAS, 1.0), ..linear }
     }
 
-    /// Least and greatest number.
+    /// Minimum and maximum.
     pub fn ends(&self) -> [f32; 2] {
         [self.least, self.greatest]
     }
 
-    /// Place of a number in the range, from 0 to 1: linear if at least half of the numbers in view lie beyond the first quarter;
-    /// else by the curve x/(x + b(1 − x)) that brings half of them there (Schlick, *Fast Alternatives to Perlin's Bias and Gain
-    /// Functions*, Graphics Gems IV, 1994). Thereby objects keep a range of their own before a plane that goes on to the horizon.
+    /// Position of a value in the range, from 0 to 1. Linear if at least half of the values in view are
+    /// beyond the first quarter; otherwise the curve x/(x + b(1 − x)), which moves half of them there
+    /// (Schlick, *Fast Alternatives to Perlin's Bias and Gain Functions*, Graphics Gems IV, 1994). Objects
+    /// therefore keep distinct shades in front of a plane that extends to the horizon.
     fn part(&self, number: f32) -> f32 {
         let range = self.greatest - self.least;
         let x = if range > 0.0 { ((number - self.least) / range).clamp(0.0, 1.0) } else { 0.0 };
         if self.bias < 1.0 { x / (x + self.bias * (1.0 - x)) } else { x }
     }
 
-    /// Brightness of a distance. A distance below the range belongs to a pixel that is partly empty.
+    /// Brightness of a distance. A pixel with a distance below the range is partly empty.
     fn nearness(&self, distance: f32) -> f32 {
         if distance < self.least {
             return if self.least.is_finite() { distance / self.least } else { distance.min(1.0) };
@@ -118,8 +119,8 @@ impl Range {
     }
 }
 
-/// Distances in view. Pixels at the border of empty space are averages of distances and nothing: they count only if there are
-/// no others.
+/// Distances in view. Pixels at the border of empty space average distances with zeros, so they count only if
+/// there are no others.
 fn distances(image: &RadianceImage) -> Vec<f32> {
     let (width, height) = (image.width as usize, image.height as usize);
     let at = |x: usize, y: usize| image.pixels[y * width + x].x;
@@ -152,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_go_from_white_to_dark() {
+    fn near_is_white_and_far_is_dark() {
         assert_near(&shown(Kind::Distances, &[2.0, 4.0, 6.0]), &[1.0, 0.55, 0.1]);
         assert_near(&shown(Kind::Distances, &[3.0; 4]), &[1.0; 4]);
         assert_near(&shown(Kind::Distances, &[0.0; 4]), &[0.0; 4]);
@@ -163,29 +164,29 @@ mod tests {
     }
 
     #[test]
-    fn things_that_are_thinner_than_pixels_have_a_range_too() {
+    fn objects_thinner_than_pixels_have_a_range() {
         let range =
             Stretch::Unknown(Kind::Distances).of_picture(&picture(&[0.0, 2.0, 0.0, 6.0, 0.0])).range();
         assert_eq!(range.map(|range| range.ends()), Some([2.0, 6.0]));
     }
 
     #[test]
-    fn a_horizon_leaves_what_is_before_it_its_shades() {
-        // A floor seen from a height of 1: rows of 1/row, the last ones far away.
+    fn objects_before_a_horizon_keep_their_shades() {
+        // A floor seen from a height of 1: row distances of 200/row, with the last ones far away.
         let numbers: Vec<f32> = (1..=200).map(|row| 200.0 / row as f32).collect();
         let shown = shown(Kind::Distances, &numbers);
-        assert!(shown[199] == 1.0 && (shown[0] - 0.1).abs() < 1e-6, "both ends are there");
-        // Half of the rows are at 1 … 2: a linear stretch over 1 … 200 would make all of them white.
+        assert!(shown[199] == 1.0 && (shown[0] - 0.1).abs() < 1e-6, "both ends are used");
+        // Half of the rows are at 1 … 2: a linear mapping over 1 … 200 would make all of them white.
         assert!((shown[99] - (1.0 - 0.9 * 0.25)).abs() < 0.01, "{}", shown[99]);
-        assert!(shown.windows(2).all(|pair| pair[0] < pair[1]), "none is like another");
+        assert!(shown.windows(2).all(|pair| pair[0] < pair[1]), "all shades differ");
     }
 
     #[test]
-    fn amounts_go_from_black_to_white() {
+    fn amounts_range_from_black_to_white() {
         assert_near(&shown(Kind::Amounts, &[0.0, 1.0, 2.0, 4.0]), &[0.0, 0.25, 0.5, 1.0]);
         assert_near(&shown(Kind::Amounts, &[16.0; 3]), &[1.0; 3]);
         assert_near(&shown(Kind::Amounts, &[0.0; 3]), &[0.0; 3]);
-        // One pixel that is worth a thousand others does not make the others black.
+        // One very large value does not turn the others black.
         let shown = shown(Kind::Amounts, &[1.0, 1.0, 1.0, 1000.0]);
         assert!((shown[0] - 0.25).abs() < 0.01 && shown[3] == 1.0, "{shown:?}");
     }

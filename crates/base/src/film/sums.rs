@@ -1,4 +1,4 @@
-//! The film: f64 sums of every pixel's samples, in tiles that many threads fill without sharing.
+//! The film: f64 sums of every pixel's samples, in independently locked tiles.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
@@ -9,28 +9,28 @@ use super::steps::{Convergence, Steps, luminance};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 
-/// Reasons for which a film cannot be made.
+/// Reasons why a film cannot be created.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FilmError {
     /// There is not enough memory.
     #[error(
-        "a picture of {width}×{height} pixels needs {:.1} GB of memory, which this machine does not give; \
+        "a {width}×{height} image needs {:.1} GB of memory, more than this machine has available; \
          make it smaller{}", *.bytes as f64 / 1e9,
-        way_out(*.crop_helps)
+        remedy(*.crop_helps)
     )]
     Memory {
         /// Columns.
         width: u32,
         /// Rows.
         height: u32,
-        /// Bytes for the sums and the finished picture.
+        /// Bytes for the sums and the finished image.
         bytes: u64,
-        /// Whether a crop would help: there is room for the finished picture, which a crop does not make smaller, and
-        /// there is no crop yet.
+        /// Whether a crop would help: the finished image, whose size does not depend on the crop, fits in
+        /// memory and there is no crop yet.
         crop_helps: bool,
     },
-    /// The picture would have no pixels.
-    #[error("there are no pixels to render: the picture is {width}×{height} and the crop lies outside of it")]
+    /// The image would have no pixels.
+    #[error("there are no pixels to render: the crop is outside the {width}×{height} image")]
     Empty {
         /// Columns.
         width: u32,
@@ -39,28 +39,28 @@ pub enum FilmError {
     },
 }
 
-fn way_out(crop_helps: bool) -> &'static str {
+fn remedy(crop_helps: bool) -> &'static str {
     if crop_helps {
-        ", or render a part of it by a crop"
+        ", or render only part of it with a crop"
     } else {
-        "; a crop of it is as large, with black around it"
+        "; a crop would need as much, because the rest stays black"
     }
 }
 
-/// Samples per pixel.
+/// Sample counts over all pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleStats {
-    /// Samples of the pixel with the fewest.
+    /// Minimum over all pixels.
     pub min: u32,
     /// Mean over all pixels.
     pub mean: f64,
-    /// Samples of the pixel with the most.
+    /// Maximum over all pixels.
     pub max: u32,
 }
 
-/// Sums of samples for the pixels of a picture, or of a crop of it. Tiles are numbered in rows from the top left of the
-/// crop. Any thread may add to any tile and take a snapshot at any time. The sums of a tile have the same bits if its
-/// samples come in the same order, however they are grouped.
+/// Sums of samples for the pixels of an image or a crop of it. Tiles are numbered in row-major order from the
+/// top left of the crop. Any thread may add to any tile and read the film at any time. A tile's sums have the
+/// same bits for samples added in the same order, regardless of how they are grouped.
 #[derive(Debug)]
 pub struct Film {
     width: u32,
@@ -74,33 +74,33 @@ pub struct Film {
     pub(super) blocks: Blocks,
 }
 
-/// Sums of one tile, in rows; empty until its first samples come, so that the thread that renders the tile is the first
-/// to touch its memory.
+/// Sums of one tile in row-major order. Empty until the first samples arrive, so the thread that renders the
+/// tile is the first to touch its memory.
 #[derive(Debug, Default)]
 pub(super) struct Tile {
     pub(super) sums: Vec<DVec3>,
     pub(super) counts: Vec<u32>,
-    /// Sums of finished blocks of samples: none, one for all of them, or one for each; see [`Blocks`].
+    /// Sums of finished sample blocks: none, one for all blocks, or one for each; see [`Blocks`].
     pub(super) earlier: Vec<Vec<DVec3>>,
-    /// Sums of the samples in the filter's negative lobes. `None` before the first of them.
+    /// Sums of the samples in the filter's negative lobes. `None` until the first one.
     pub(super) negative: Option<Negative>,
     pub(super) steps: Steps,
-    /// Counter that grows whenever the tile changes.
+    /// Incremented whenever the tile changes.
     pub(super) revision: u64,
 }
 
-/// Sums of the samples in a filter's negative lobes, which are in no other sum.
+/// Sums of the samples in a filter's negative lobes, which are excluded from all other sums.
 #[derive(Debug)]
 pub(super) struct Negative {
     pub(super) weight: f64,
     pub(super) sums: Vec<DVec3>,
     pub(super) counts: Vec<u32>,
-    /// Sums of finished blocks, as those of the tile.
+    /// Sums of finished blocks, as in [`Tile`].
     pub(super) earlier: Vec<Vec<DVec3>>,
 }
 
 impl Negative {
-    /// Empty sums of a tile whose film keeps the sums of so many blocks apart.
+    /// Creates zero sums for a tile with `blocks` separate block sums.
     pub(super) fn new(weight: f64, area: usize, blocks: usize) -> Self {
         let (sums, counts) = (vec![DVec3::ZERO; area], vec![0; area]);
         Self { weight, earlier: vec![sums.clone(); blocks], sums, counts }
@@ -108,7 +108,8 @@ impl Negative {
 }
 
 impl Tile {
-    /// Mean of a pixel's samples, weighted by sign if the filter has negative lobes. `None` if the pixel has no sample.
+    /// Mean of a pixel's samples, weighted by sign if the filter has negative lobes. `None` if the pixel has
+    /// no samples.
     #[inline]
     pub(super) fn mean(&self, index: usize) -> Option<DVec3> {
         let count = self.count(index);
@@ -135,7 +136,7 @@ impl Tile {
         if self.earlier.is_empty() { self.sums[index] } else { total(&self.earlier, &self.sums, index) }
     }
 
-    /// Makes room for the tile's pixels. Cannot fail: the memory was reserved when the film was made.
+    /// Resizes to the tile's pixels. Cannot fail, as the memory was reserved when the film was created.
     pub(super) fn fill(&mut self, area: usize) {
         self.sums.resize(area, DVec3::ZERO);
         self.earlier.iter_mut().for_each(|sums| sums.resize(area, DVec3::ZERO));
@@ -143,8 +144,8 @@ impl Tile {
         self.steps.fill(area);
     }
 
-    /// Adds samples of one pixel of a half of a cell in their order and returns how many are not finite. `is_negative` marks the
-    /// samples in negative lobes, if the filter has such of this weight.
+    /// Adds samples in order to one pixel, in the given cell and half, and returns the number of non-finite
+    /// ones. `lobes` is the negative lobes' weight and a flag per sample.
     fn add(
         &mut self,
         (index, cell, half): (usize, usize, usize),
@@ -155,7 +156,7 @@ impl Tile {
         let mut non_finite = 0;
         let mut rest = 0..radiances.len();
         while !rest.is_empty() {
-            // Add up to the next count at which the mean is noted or a block ends.
+            // Stop at the next count at which the mean is recorded or a block ends.
             let to_note = Steps::samples_to_next(self.counts[index]);
             let left = match blocks {
                 Blocks::Whole => to_note,
@@ -195,7 +196,7 @@ impl Tile {
     }
 }
 
-/// Adds the finite radiances and returns how many are not finite.
+/// Adds the finite radiances and returns the number of non-finite ones.
 fn add_up(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
     let all = radiances.iter().fold(*sum, |sum, radiance| sum + radiance.as_dvec3());
     if all.is_finite() {
@@ -214,16 +215,16 @@ fn add_up(sum: &mut DVec3, radiances: &[Vec3]) -> u64 {
 }
 
 impl Film {
-    /// A film without samples for a picture of this size, or for the part of it that `crop` covers.
+    /// Creates an empty film for an image of this size, or for the part of it covered by `crop`.
     ///
     /// # Errors
-    /// [`FilmError`] if the crop lies outside of the picture, or if there is not enough memory for the sums and the
-    /// finished picture.
+    /// [`FilmError`] if the crop is outside the image, or if there is not enough memory for the sums and the
+    /// finished image.
     pub fn new(width: u32, height: u32, crop: Option<Rect>) -> Result<Self, FilmError> {
         Self::within(u64::MAX, width, height, crop)
     }
 
-    /// [`Film::new`], if no more than `most_bytes` may be taken.
+    /// Like [`Film::new`], but uses at most `most_bytes` of memory.
     ///
     /// # Errors
     /// [`FilmError`] as in [`Film::new`].
@@ -251,60 +252,60 @@ impl Film {
         })
     }
 
-    /// The same film with this convergence of its noise.
+    /// Sets the convergence model of the noise.
     pub fn converging(self, convergence: Convergence) -> Self {
         Self { convergence, ..self }
     }
 
-    /// Columns of the whole picture.
+    /// Columns of the full image.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows of the whole picture.
+    /// Rows of the full image.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// Pixels that are rendered.
+    /// Pixels to render.
     pub fn crop(&self) -> Rect {
         self.crop
     }
 
-    /// Tiles of the crop.
+    /// Number of tiles in the crop.
     pub fn tile_count(&self) -> usize {
         self.tiles.len()
     }
 
-    /// Pixels of a tile, in the whole picture. `None` beyond the last tile.
+    /// Pixels of a tile in the full image, or `None` beyond the last tile.
     pub fn tile_rect(&self, tile: usize) -> Option<Rect> {
         (tile < self.tiles.len()).then(|| tile_rect(self.crop, tile))
     }
 
-    /// Number of cells of the crop: [`CELLS`] for each tile. Cells of its last tiles may have no pixels.
+    /// Number of cells: [`CELLS`] per tile, some of which may have no pixels in the last tiles.
     pub fn cell_count(&self) -> usize {
         CELLS * self.tiles.len()
     }
 
-    /// Pixels of a cell, in the whole picture. `None` if it has no pixels.
+    /// Pixels of a cell in the full image, or `None` if it has no pixels.
     pub fn cell_rect(&self, cell: usize) -> Option<Rect> {
         cell_rect(self.tile_rect(cell / CELLS)?, cell % CELLS)
     }
 
-    /// Indices of all tiles, from the middle of the crop outwards in rings; sorted at the first call.
+    /// Indices of all tiles in rings from the center of the crop outward. Computed on the first call.
     pub fn tile_order(&self) -> &[usize] {
         self.order.get_or_init(|| rings(self.crop))
     }
 
-    /// Bytes that its sums take.
+    /// Bytes used by the sums.
     pub fn memory_bytes(&self) -> u64 {
         let tile = size_of::<Mutex<Tile>>() + size_of::<usize>();
         let pixel = SUM_BYTES + self.blocks.kept() * size_of::<DVec3>();
         (self.crop.area() * pixel + self.tiles.len() * tile) as u64
     }
 
-    /// Adds samples to a tile, each by itself and in their order. A sample with a NaN or an infinity counts as black
-    /// and in [`Film::non_finite_samples`]. Pixels outside of the tile are left out.
+    /// Adds samples to a tile one by one, in order. A sample with a NaN or an infinity counts as black and in
+    /// [`Film::non_finite_samples`]. Pixels outside the tile are ignored.
     pub fn add(&self, tile: usize, samples: &TileSamples) {
         let Some(rect) = self.tile_rect(tile) else { return };
         if samples.samples == 0 || samples.pixels.rect.width == 0 {
@@ -329,7 +330,7 @@ impl Film {
         self.non_finite_samples.fetch_add(non_finite, Ordering::Relaxed);
     }
 
-    /// Statistics of the samples of the crop's pixels.
+    /// Sample counts over the pixels of the crop.
     pub fn samples(&self) -> SampleStats {
         let (mut min, mut max, mut total) = (u32::MAX, 0, 0_u64);
         for tile in &self.tiles {
@@ -346,17 +347,17 @@ impl Film {
         SampleStats { min, mean: total as f64 / self.crop.area() as f64, max }
     }
 
-    /// Number of samples with a NaN or an infinity, which counted as black.
+    /// Number of samples with a NaN or an infinity, which were counted as black.
     pub fn non_finite_samples(&self) -> u64 {
         self.non_finite_samples.load(Ordering::Relaxed)
     }
 
-    /// A number that tells films apart.
+    /// Unique identifier of this film.
     pub(super) fn id(&self) -> u64 {
         self.id
     }
 
-    /// Locks a tile, so that nobody else adds to it. A thread that panicked leaves sums that are whole.
+    /// Locks a tile. Ignores poisoning, as a panicking thread leaves the sums consistent.
     pub(super) fn tile(&self, tile: usize) -> MutexGuard<'_, Tile> {
         lock(&self.tiles[tile])
     }
@@ -371,7 +372,7 @@ fn index_in(rect: Rect, x: u32, y: u32) -> Option<usize> {
     (x < rect.width && y < rect.height).then(|| y as usize * rect.width as usize + x as usize)
 }
 
-/// The cell of a tile that contains a pixel, and the cell's pixels.
+/// Cell of a tile that contains a pixel, and the cell's pixels.
 fn cell_at(tile: Rect, x: u32, y: u32) -> (usize, Rect) {
     let (column, row) = ((x - tile.x) / CELL_SIZE, (y - tile.y) / CELL_SIZE);
     let cell = row as usize * CELLS_ACROSS + column as usize;
@@ -397,7 +398,7 @@ pub(super) fn tile_rect(crop: Rect, tile: usize) -> Rect {
 
 fn rings(crop: Rect) -> Vec<usize> {
     let (columns, rows) = tile_grid(crop);
-    // Twice the distance from the middle, so that it is a whole number.
+    // Use twice the distance from the center, which is an integer.
     let offset = |index: usize, length: usize| 2 * index as i64 - (length as i64 - 1);
     let place = |tile: usize| {
         let (x, y) = (offset(tile % columns, columns), offset(tile / columns, rows));
@@ -408,23 +409,23 @@ fn rings(crop: Rect) -> Vec<usize> {
     places.into_iter().map(|(_, _, tile)| tile).collect()
 }
 
-/// Bytes for one pixel: its sum, count, last two noted means and last step.
+/// Bytes per pixel: its sum, count, last two recorded means and last step.
 const SUM_BYTES: usize = size_of::<DVec3>() + 3 * size_of::<f32>() + size_of::<u32>();
 
-/// Bytes for the sums of the crop, and for the whole picture as radiance and as sRGB.
+/// Bytes for the sums of the crop and for the full image as radiance and as sRGB.
 pub(super) fn bytes_needed(width: u32, height: u32, crop: Rect) -> u64 {
     let pixel = size_of::<Vec3>() + size_of::<[u8; 3]>();
     let whole = u64::from(width) * u64::from(height);
     (crop.area() as u64).saturating_mul(SUM_BYTES as u64).saturating_add(whole.saturating_mul(pixel as u64))
 }
 
-/// Whether so many bytes can be had at once.
+/// Whether an allocation of this size succeeds.
 pub(super) fn is_available(bytes: u64) -> bool {
     usize::try_from(bytes).is_ok_and(|bytes| Vec::<u8>::new().try_reserve_exact(bytes).is_ok())
 }
 
-/// Allocates the tiles. Asks for all the memory at once first, as a system that promises more than it has refuses only
-/// that.
+/// Allocates the tiles. Requests all the memory in one allocation first, as a system that overcommits memory
+/// refuses only that.
 fn allocate(width: u32, height: u32, crop: Rect) -> Option<Vec<Mutex<Tile>>> {
     if !is_available(bytes_needed(width, height, crop)) {
         return None;

@@ -4,7 +4,8 @@ use std::sync::atomic::AtomicBool;
 
 use super::*;
 
-/// Samples `first..first + count` of every pixel, of very different sizes so that the order of sums matters.
+/// Samples `first..first + count` of every pixel, of widely varying magnitudes so that summation order
+/// matters.
 fn samples(rect: Rect, first: u32, count: u32) -> TileSamples {
     let value = |x: u32, y: u32, sample: u32| {
         let mixed = (x.wrapping_mul(73) ^ y.wrapping_mul(19) ^ sample.wrapping_mul(2_654_435_761)) % 1000;
@@ -26,7 +27,7 @@ fn bits(image: &RadianceImage) -> Vec<[u32; 3]> {
     image.pixels.iter().map(|p| p.to_array().map(f32::to_bits)).collect()
 }
 
-/// Samples of one pixel; the film has one row of tiles.
+/// Sample count of one pixel of a film with a single row of tiles.
 fn pixel_samples(film: &Film, x: u32, y: u32) -> u32 {
     let tile = (x / TILE_SIZE) as usize;
     let rect = film.tile_rect(tile).expect("a tile");
@@ -51,7 +52,7 @@ fn sum_bits(film: &Film) -> Vec<[u64; 3]> {
 }
 
 #[test]
-fn any_grouping_of_samples_gives_the_same_bits() {
+fn grouping_of_samples_does_not_change_bits() {
     let at_once = filled(&[24]);
     for passes in [&[1; 24][..], &[1, 2, 4, 8, 9], &[23, 1]] {
         let film = filled(passes);
@@ -62,7 +63,7 @@ fn any_grouping_of_samples_gives_the_same_bits() {
 }
 
 #[test]
-fn tiles_cover_the_crop_once() {
+fn tiles_partition_the_crop() {
     let crop = Rect { x: 5, y: 7, width: 70, height: 1000 };
     let film = Film::new(100, 60, Some(crop)).expect("a film");
     assert_eq!(film.crop(), Rect { height: 53, ..crop });
@@ -82,7 +83,7 @@ fn tiles_cover_the_crop_once() {
 }
 
 #[test]
-fn rings_grow_from_the_middle() {
+fn tile_order_grows_from_the_center() {
     let film = Film::new(32 * 9, 32 * 6, None).expect("a film");
     let rings: Vec<_> = film.tile_order().iter().map(|tile| (tile % 9).abs_diff(4)).collect();
     assert!(rings[..2].iter().all(|&ring| ring == 0), "{rings:?}");
@@ -90,13 +91,13 @@ fn rings_grow_from_the_middle() {
 }
 
 #[test]
-fn tiles_are_sorted_once() {
+fn tile_order_is_computed_once() {
     let film = Film::new(32 * 9, 32 * 6, None).expect("a film");
     assert!(std::ptr::eq(film.tile_order(), film.tile_order()));
 }
 
 #[test]
-fn the_mean_of_each_pixel_and_how_many() {
+fn pixels_have_means_and_counts() {
     let film = Film::new(40, 2, None).expect("a film");
     let add = |x: u32, values: &[f32]| {
         let radiance = values.iter().map(|&v| Vec3::splat(v)).collect();
@@ -118,7 +119,7 @@ fn the_mean_of_each_pixel_and_how_many() {
 }
 
 #[test]
-fn what_is_not_finite_is_black_and_counted() {
+fn non_finite_samples_are_black_and_counted() {
     let film = Film::new(1, 1, None).expect("a film");
     let radiance = vec![
         Vec3::splat(4.0),
@@ -133,7 +134,7 @@ fn what_is_not_finite_is_black_and_counted() {
 }
 
 #[test]
-fn samples_that_do_not_fit_the_tile_do_no_harm() {
+fn samples_outside_the_tile_are_ignored() {
     let film = Film::new(33, 1, None).expect("a film");
     let wide = Rect { x: 30, y: 0, width: 9, height: 3 };
     film.add(
@@ -153,7 +154,7 @@ fn samples_that_do_not_fit_the_tile_do_no_harm() {
 }
 
 #[test]
-fn a_panic_in_a_thread_that_holds_a_tile_costs_nothing() {
+fn panics_while_holding_a_tile_are_harmless() {
     let film = filled(&[3]);
     let before = bits(&film.radiance());
     std::thread::scope(|scope| {
@@ -170,7 +171,7 @@ fn a_panic_in_a_thread_that_holds_a_tile_costs_nothing() {
 }
 
 #[test]
-fn snapshots_while_threads_add() {
+fn snapshots_are_consistent_during_rendering() {
     let film = Film::new(200, 100, None).expect("a film");
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
@@ -211,17 +212,20 @@ fn snapshots_while_threads_add() {
 }
 
 #[test]
-fn a_film_that_does_not_fit_is_an_error_that_says_what_to_do() {
+fn oversized_films_report_what_to_do() {
     let error = Film::new(u32::MAX, u32::MAX, None).expect_err("no machine has this");
     assert!(error.to_string().contains("4294967295×4294967295"), "{error}");
     assert!(error.to_string().contains("smaller"), "{error}");
-    assert!(error.to_string().ends_with("; a crop of it is as large, with black around it"), "{error}");
+    assert!(
+        error.to_string().ends_with("; a crop would need as much, because the rest stays black"),
+        "{error}"
+    );
     let cropped = |most_bytes, crop| Film::within(most_bytes, 100, 100, crop).expect_err("too little");
     let part = Rect { x: 0, y: 0, width: 50, height: 100 };
-    let way_out = ", or render a part of it by a crop";
-    assert!(cropped(200_000, None).to_string().ends_with(way_out));
-    assert!(!cropped(200_000, Some(part)).to_string().ends_with(way_out));
-    assert!(!cropped(100_000, None).to_string().ends_with(way_out));
+    let remedy = ", or render only part of it with a crop";
+    assert!(cropped(200_000, None).to_string().ends_with(remedy));
+    assert!(!cropped(200_000, Some(part)).to_string().ends_with(remedy));
+    assert!(!cropped(100_000, None).to_string().ends_with(remedy));
     assert_eq!(Film::new(0, 5, None).expect_err("no pixels"), FilmError::Empty { width: 0, height: 5 });
     let outside = Rect { x: 10, y: 0, width: 1, height: 1 };
     assert!(Film::new(10, 5, Some(outside)).is_err());

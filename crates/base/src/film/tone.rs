@@ -1,4 +1,4 @@
-//! From radiance to display values: exposure, tone curve, clamp, sRGB.
+//! Conversion of radiance to display values: exposure, tone curve, clamp, sRGB.
 
 use rayon::prelude::*;
 
@@ -36,30 +36,30 @@ pub enum Transfer {
     /// The sRGB curve (IEC 61966-2-1).
     #[default]
     Srgb,
-    /// Identity: the display gets the values as they are.
+    /// Passes the values through unchanged.
     Identity,
 }
 
-/// Map from radiance to display values.
+/// Mapping of radiance to display values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
-    /// Exposure: radiance is multiplied by 2 to this power.
+    /// Exposure in stops: radiance is multiplied by 2 to this power.
     pub exposure_stops: f32,
-    /// Tone curve that then brings it into [0, 1].
+    /// Tone curve, applied after exposure, with results in [0, 1].
     pub curve: Tonemap,
     /// Encoding of the result.
     pub transfer: Transfer,
-    /// Stretch of numbers that have no brightness of their own.
+    /// Range mapping for data without an inherent brightness.
     pub stretch: Stretch,
 }
 
-/// Largest radiance: far above everything that any curve tells apart, far below what overflows inside one.
+/// Maximum radiance: far above the point where every curve saturates, and far below overflow.
 const BRIGHTEST: f32 = 1e10;
-/// Fewest pixels for which it pays to wake other threads.
+/// Minimum number of pixels for which waking other threads pays off.
 const PARALLEL_PIXELS: usize = 1 << 18;
 
 impl ToneMapping {
-    /// Tone mapping of pictures of numbers, whose values are display values: it only clamps them.
+    /// Tone mapping for data images, whose values are display values: only clamps.
     pub const DATA: Self = Self {
         exposure_stops: 0.0,
         curve: Tonemap::None,
@@ -67,12 +67,12 @@ impl ToneMapping {
         stretch: Stretch::None,
     };
 
-    /// The tone mapping of this whole picture: numbers are stretched to their range in it.
+    /// Resolves the range mapping with the values in this image.
     pub fn of_picture(self, image: &RadianceImage) -> Self {
         Self { stretch: self.stretch.of_picture(image), ..self }
     }
 
-    /// Linear display light in [0, 1] of one colour, whatever comes in; NaN and negative components count as 0.
+    /// Linear display light in [0, 1] for any input color. NaN and negative components count as 0.
     pub fn apply(&self, radiance: Vec3) -> Vec3 {
         self.exposed(radiance, exp2(self.exposure_stops))
     }
@@ -90,7 +90,7 @@ impl ToneMapping {
     }
 }
 
-/// Develops a picture of 8 bits a channel.
+/// Converts an image to 8 bits per channel.
 pub fn develop(image: &RadianceImage, tone: &ToneMapping) -> Picture {
     let pixels = match tone.transfer {
         Transfer::Srgb => map_pixels(image, tone, |color| color.to_array().map(linear_to_srgb8)),
@@ -101,7 +101,7 @@ pub fn develop(image: &RadianceImage, tone: &ToneMapping) -> Picture {
     Picture { width: image.width, height: image.height, pixels }
 }
 
-/// Develops a picture of 16 bits a channel.
+/// Converts an image to 16 bits per channel.
 pub fn develop16(image: &RadianceImage, tone: &ToneMapping) -> Picture16 {
     let quantise = |x: f32| (x * 65535.0 + 0.5) as u16;
     let pixels = match tone.transfer {
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_brighter_grey_is_never_darker() {
+    fn curves_are_monotonic_in_gray() {
         for &curve in Tonemap::ALL {
             let mut before = grey(curve, 0.0);
             assert!(before.abs() < 1e-6, "{curve:?} takes black to {before}");
@@ -155,20 +155,20 @@ mod tests {
     }
 
     #[test]
-    fn known_values() {
+    fn curves_have_known_values() {
         assert_eq!(grey(Tonemap::None, 0.25), 0.25);
         assert!((grey(Tonemap::Reinhard, 1.0) - 0.5).abs() < 1e-6);
         assert!((grey(Tonemap::Reinhard, 3.0) - 0.75).abs() < 1e-6);
-        // On luminance: pure red of radiance 1 has 0.2126 of it.
+        // Reinhard works on luminance: pure red of radiance 1 has a luminance of 0.2126.
         let red = tone(Tonemap::Reinhard).apply(Vec3::X);
         assert!((red - Vec3::X / 1.2126).abs().max_element() < 1e-6);
         assert!((grey(Tonemap::Aces, 1.0) - 2.54 / 3.16).abs() < 1e-6);
-        // Middle grey is the sigmoid's pivot, ½ in a display of power 2.2.
+        // Middle gray is the sigmoid's pivot, ½ on a display with gamma 2.2.
         assert!((grey(Tonemap::Agx, 0.18) - 0.5_f32.powf(2.2)).abs() < 1e-3);
     }
 
     #[test]
-    fn agx_takes_bright_saturated_light_towards_white() {
+    fn agx_desaturates_bright_light() {
         let blue = tone(Tonemap::Agx).apply(Vec3::new(0.0, 0.0, 1000.0));
         assert!(blue.min_element() > 0.3 && blue.z > 0.9, "{blue}");
     }
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_wraps() {
+    fn hostile_values_stay_in_range() {
         let hostile =
             [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 1e30, f32::MAX, 0.0, 1e-45];
         for &curve in Tonemap::ALL {
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn data_is_clamped_and_nothing_else() {
+    fn data_is_only_clamped() {
         let pixels = vec![
             Vec3::new(0.5, 0.0, 1.0),
             Vec3::new(-3.0, f32::NAN, 7.0),
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn sixteen_bits_refine_eight() {
+    fn sixteen_bits_agree_with_eight() {
         let pixels: Vec<_> = (0..=1000).map(|i| Vec3::splat(i as f32 / 1000.0)).collect();
         let image = RadianceImage { width: 1001, height: 1, pixels };
         let coarse = develop(&image, &tone(Tonemap::None)).pixels;
@@ -229,11 +229,11 @@ mod tests {
                 "{eight:?} {sixteen:?}"
             );
         }
-        assert!(fine.windows(2).all(|pair| pair[0] < pair[1]), "every thousandth is told apart");
+        assert!(fine.windows(2).all(|pair| pair[0] < pair[1]), "every thousandth is distinct");
     }
 
     #[test]
-    fn work_is_shared_within_the_callers_pool_and_nowhere_else() {
+    fn work_stays_in_the_callers_pool() {
         let pixels = vec![Vec3::ONE; PARALLEL_PIXELS + 7];
         let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
         let threads = || {
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn many_pixels_are_the_same_as_one_by_one() {
+    fn parallel_images_match_single_pixels() {
         let pixels: Vec<_> = (0..PARALLEL_PIXELS + 7).map(|i| Vec3::splat(i as f32 * 1e-5)).collect();
         let image = RadianceImage { width: pixels.len() as u32, height: 1, pixels };
         let mapping = tone(Tonemap::Aces);

@@ -1,4 +1,4 @@
-//! Colours: linear Rec. 709 RGB as [`Vec3`], and the sRGB curve.
+//! Color: linear Rec. 709 RGB as [`Vec3`], and the sRGB transfer function.
 
 use std::sync::LazyLock;
 
@@ -6,47 +6,47 @@ use glam::Vec3;
 
 use super::elementary::pow;
 
-/// Term added to the square of a reference in relMSE, so that errors of black pixels stay finite: errors below a radiance of 0.1
-/// count as they are, above it relative to the reference.
+/// Added to the squared reference in relMSE so that errors of black pixels stay finite: below a radiance of
+/// 0.1, errors are effectively absolute; above it, relative.
 pub const RELMSE_LEAST: f64 = 0.01;
 
-/// Weights of linear Rec. 709 primaries in relative luminance (IEC 61966-2-1).
+/// Contribution of each linear Rec. 709 primary to relative luminance (IEC 61966-2-1).
 pub const LUMINANCE_WEIGHTS: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
 
-/// Relative luminance of a linear colour.
+/// Relative luminance of a linear color.
 pub fn luminance(color: Vec3) -> f32 {
     color.dot(LUMINANCE_WEIGHTS)
 }
 
-/// One sRGB component in [0, 1] to linear (IEC 61966-2-1).
+/// Decodes an sRGB component in [0, 1] to linear (IEC 61966-2-1).
 pub fn srgb_to_linear(encoded: f32) -> f32 {
     if encoded <= 0.04045 { encoded / 12.92 } else { pow((encoded + 0.055) / 1.055, 2.4) }
 }
 
-/// One linear component in [0, 1] to sRGB (IEC 61966-2-1).
+/// Encodes a linear component in [0, 1] as sRGB (IEC 61966-2-1).
 pub fn linear_to_srgb(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
-/// [`linear_to_srgb`] in double precision, for measures of error.
+/// [`linear_to_srgb`] in double precision, for error metrics.
 pub fn linear_to_srgb_f64(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
-/// A linear component, clamped to [0, 1], as an sRGB byte; NaN becomes 0.
+/// Encodes a linear component, clamped to [0, 1], as an sRGB byte. NaN becomes 0.
 pub fn linear_to_srgb8(linear: f32) -> u8 {
     let encoded = linear_to_srgb(linear.clamp(0.0, 1.0));
-    // A float to integer cast saturates and takes NaN to 0.
+    // Float-to-integer casts saturate and map NaN to 0.
     (encoded * 255.0 + 0.5) as u8
 }
 
-/// An sRGB byte triple as a linear colour.
+/// Decodes an sRGB byte triple to a linear color.
 #[inline]
 pub fn srgb8_to_linear(bytes: [u8; 3]) -> Vec3 {
     Vec3::from_array(bytes.map(|byte| LINEAR_OF_SRGB8[usize::from(byte)]))
 }
 
-/// [`srgb_to_linear`] of each byte.
+/// Lookup table of [`srgb_to_linear`] for every byte.
 pub static LINEAR_OF_SRGB8: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
 
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_byte_survives_the_round_trip() {
+    fn bytes_survive_the_round_trip() {
         for byte in 0..=255_u8 {
             let linear = srgb_to_linear(f32::from(byte) / 255.0);
             assert_eq!(linear_to_srgb8(linear), byte);
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn known_values_of_the_curve() {
+    fn srgb_curve_has_known_values() {
         assert!((srgb_to_linear(0.5) - 0.214_041_14).abs() < 1e-6);
         assert!((linear_to_srgb(0.18) - 0.461_356).abs() < 1e-5);
         assert!((linear_to_srgb_f64(0.18) - 0.461_356_129_500_442).abs() < 1e-12);

@@ -1,13 +1,13 @@
-//! Numbers of few decimals, as a person would write them.
+//! Rounds numbers to a few decimals for people to read.
 
-/// Rounds to a multiple of a power of ten: to the number nearest to its few decimals.
+/// Rounds to a multiple of `step`, a power of ten, and returns the `f64` nearest to that decimal number.
 pub fn rounded(number: f64, step: f64) -> f64 {
     let digits = libm::round(-libm::log10(step)).max(0.0) as usize;
     let whole = libm::round(number / step) * step;
     format!("{whole:.digits$}").parse().unwrap_or(whole) + 0.0
 }
 
-/// Last decimal of coordinates at this distance from the point of view: a power of ten, from 1e-5 to 1e-4 of the
+/// Decimal step for coordinates at `distance` from the viewpoint: a power of ten between 1e-5 and 1e-4 of the
 /// distance.
 pub fn step_at(distance: f64) -> f64 {
     libm::pow(10.0, libm::floor(libm::log10(distance)) - 4.0)
@@ -18,7 +18,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short_and_near() {
+    fn rounded_numbers_are_short_and_close() {
         for (number, step, text) in [
             (1.234_567, 1e-4, "1.2346"),
             (-1e-9, 1e-4, "0"),

@@ -1,5 +1,6 @@
-//! Elementary functions without branches and without the system's library: the same bits on every machine, and vector
-//! instructions in loops. They work in `f64` inside if that makes the `f32` result right but for its rounding.
+//! Branch-free elementary functions that do not use libm: they give the same bits on every machine and
+//! vectorize in loops. Some compute in `f64` internally so that the `f32` result is correct up to its final
+//! rounding.
 
 use std::f32::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 use std::f64::consts::LN_2;
@@ -13,7 +14,8 @@ pub fn pow(x: f32, y: f32) -> f32 {
     if (y == 0.0) | (x == 1.0) { 1.0 } else { power }
 }
 
-/// xʸ for normal x > 0, with a relative error of at most 1e-11 · y; 0 or ∞ if it is so in `f32`.
+/// xʸ for normal x > 0, with a relative error of at most 1e-11 · y. Underflows to 0 and overflows to ∞ where
+/// `f32` does.
 #[inline(always)]
 pub fn power_f64(x: f64, y: f64) -> f64 {
     exp2_f64(y * log2_f64(x))
@@ -25,19 +27,19 @@ pub fn exp2(x: f32) -> f32 {
     exp2_f64(f64::from(x)) as f32
 }
 
-/// Binary logarithm of x > 0 that is not subnormal, within one ulp.
+/// Binary logarithm of x > 0, for x not subnormal, within one ulp.
 #[inline(always)]
 pub fn log2(x: f32) -> f32 {
     log2_f64(f64::from(x)) as f32
 }
 
-/// Binary logarithm of a normal x > 0 within 1e-11: from the exponent, and for the rest m in [√½, √2) from the series
-/// of 2·artanh((m − 1)/(m + 1)).
+/// Binary logarithm of a normal x > 0, within 1e-11. Splits off the exponent and evaluates the series of
+/// 2·artanh((m − 1)/(m + 1)) for the remaining factor m in [√½, √2).
 #[inline(always)]
 fn log2_f64(x: f64) -> f64 {
     const SQRT_HALF: u64 = 0x3fe6_a09e_667f_3bcd;
     const MANTISSA: u64 = (1 << 52) - 1;
-    // The sum of 2⁵² and a whole number below 2⁵² has that number in its last bits.
+    // In 2⁵² plus an integer below 2⁵², the integer occupies the low bits.
     const WHOLE: u64 = 0x4330_0000_0000_0000;
     let shifted = x.to_bits().wrapping_add(0x3ff0_0000_0000_0000 - SQRT_HALF);
     let exponent = f64::from_bits((shifted >> 52) | WHOLE) - (f64::from_bits(WHOLE) + 1023.0);
@@ -50,11 +52,11 @@ fn log2_f64(x: f64) -> f64 {
     exponent + series * (2.0 / LN_2)
 }
 
-/// 2ˣ with a relative error of 1e-11. x is clamped to [−200, 200], beyond which `f32` is 0 or ∞. By the whole part, and
-/// for the rest in [−½, ½] by Taylor's series.
+/// 2ˣ with a relative error of 1e-11. Clamps x to [−200, 200], beyond which `f32` is 0 or ∞, splits off the
+/// integer part and uses a Taylor series for the rest in [−½, ½].
 #[inline(always)]
 fn exp2_f64(x: f64) -> f64 {
-    // 1.5·2⁵²: a sum with it is rounded to a whole number, in its last bits.
+    // 1.5·2⁵²: adding it rounds to an integer, which is then in the low bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     let x = if x < 200.0 { x } else { 200.0 };
     let x = if x > -200.0 { x } else { -200.0 };
@@ -66,8 +68,8 @@ fn exp2_f64(x: f64) -> f64 {
     f64::from_bits(series.to_bits().wrapping_add(sum.to_bits() << 52))
 }
 
-/// Arc cosine of x in [−1, 1] within 2 ulp: near 0 by the arc sine, beyond ½ by the arc sine of the half angle (with the
-/// polynomial of Moshier's Cephes library).
+/// Arc cosine of x in [−1, 1] within 2 ulp. Uses the arc sine near 0 and the arc sine of the half angle
+/// beyond ½, with the polynomial of Moshier's Cephes library.
 #[inline(always)]
 pub fn acos(x: f32) -> f32 {
     let size = x.abs();
@@ -79,14 +81,14 @@ pub fn acos(x: f32) -> f32 {
     let p = 7.495_300_3e-2 + z * (4.547_002_6e-2 + z * p);
     let arcsine = s + s * z * (1.666_675_2e-1 + z * p);
     let of_size = if is_large { 2.0 * arcsine } else { FRAC_PI_2 - arcsine };
-    // The rounding errors of π/2 and π as `f32`.
+    // Rounding errors of π/2 and π as `f32`.
     let rest = if is_large { 0.0 } else { -4.371_139e-8 };
     let negative = if is_large { PI - (of_size + 8.742_278e-8) } else { FRAC_PI_2 + (arcsine + rest) };
     if x < 0.0 { negative } else { of_size + rest }
 }
 
-/// Angle of (x, y) from the x axis in [−π, π], within 3 ulp; 0 at (0, 0). By the arc tangent of a number in [0, 1], reduced
-/// to ±tan(π/8) (with the polynomial of Moshier's Cephes library).
+/// Angle of (x, y) from the x axis in [−π, π], within 3 ulp; 0 at (0, 0). Computes the arc tangent of a ratio
+/// in [0, 1], reduced to ±tan(π/8), with the polynomial of Moshier's Cephes library.
 #[inline(always)]
 pub fn atan2(y: f32, x: f32) -> f32 {
     const TAN_EIGHTH: f32 = 0.414_213_57;
@@ -101,18 +103,18 @@ pub fn atan2(y: f32, x: f32) -> f32 {
     let p = 1.997_771_1e-1 + z * (-1.387_768_6e-1 + z * 8.053_744_5e-2);
     let rest = t + t * z * (-3.333_295e-1 + z * p);
     let first = if is_far { FRAC_PI_2 * 0.5 + rest } else { rest };
-    // The rounding errors of π/2 and π as `f32`.
+    // Rounding errors of π/2 and π as `f32`.
     let quarter = if is_steep { FRAC_PI_2 - (first + 4.371_139e-8) } else { first };
     let half = if x < 0.0 { PI - (quarter + 8.742_278e-8) } else { quarter };
     half.copysign(y)
 }
 
-/// Sine and cosine of an angle of at most 1000, within 1.2e-7. The angle is reduced to [−π/4, π/4] around a multiple of π/2,
-/// which is subtracted in three parts (Cody and Waite, *Software Manual for the Elementary Functions*, 1980). There the
-/// polynomials are those of Moshier's Cephes library.
+/// Sine and cosine of an angle of magnitude at most 1000, within 1.2e-7. Subtracts the nearest multiple of
+/// π/2 in three parts (Cody and Waite, *Software Manual for the Elementary Functions*, 1980), then uses the
+/// polynomials of Moshier's Cephes library on [−π/4, π/4].
 #[inline(always)]
 pub fn sin_cos(angle: f32) -> (f32, f32) {
-    // 1.5·2²³, as above.
+    // 1.5·2²³: adding it rounds to an integer, as in `exp2_f64`.
     const ROUND: f32 = 12_582_912.0;
     let sum = angle * FRAC_2_PI + ROUND;
     let (k, quarter) = (sum - ROUND, sum.to_bits());
@@ -130,7 +132,7 @@ pub fn sin_cos(angle: f32) -> (f32, f32) {
 mod tests {
     use super::*;
 
-    /// Error of a result, in units of the last place of the exact one.
+    /// Error of `value` in units in the last place of the exact result.
     fn ulps(value: f32, exact: f64) -> f64 {
         let near = exact as f32;
         let ulp = f64::from((near.abs().next_up() - near.abs()).max(f32::MIN_POSITIVE * f32::EPSILON));
@@ -138,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn arc_cosines_of_all_numbers_by_steps() {
+    fn acos_is_within_two_ulp() {
         let mut worst = 0.0_f64;
         for bits in (0..=1.0_f32.to_bits()).step_by(101).chain([1.0_f32.to_bits(), 0.5_f32.to_bits()]) {
             let x = f32::from_bits(bits);
@@ -151,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_all_around() {
+    fn atan2_is_within_three_ulp() {
         let mut worst = 0.0_f64;
         for i in 0..400_000 {
             let angle = f64::from(i) / 400_000.0 * std::f64::consts::TAU - std::f64::consts::PI;
@@ -170,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn powers_and_logarithms() {
+    fn powers_and_logarithms_are_within_one_ulp() {
         let mut worst = [0.0_f64; 3];
         for i in 0..2_000_000_u32 {
             let spread = i.wrapping_mul(2_654_435_761);
@@ -184,7 +186,7 @@ mod tests {
             worst[2] = worst[2].max(ulps(log2(x), libm::log2(f64::from(x))));
         }
         assert!(worst.iter().all(|worst| *worst <= 1.0), "{worst:?} ulp");
-        // Lobes of every width.
+        // Cosine lobes of every width.
         for (i, shininess) in (1..4000).flat_map(|i| [1.0, 7.5, 300.0, 1e5].map(|n| (i, n))) {
             let x = 1.0 - i as f32 * 1e-6;
             assert!(ulps(pow(x, shininess), libm::pow(f64::from(x), f64::from(shininess))) <= 1.0);
@@ -192,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn powers_at_the_ends() {
+    fn powers_are_exact_in_edge_cases() {
         assert_eq!([pow(0.0, 2.0), pow(0.0, 0.0), pow(3.0, 0.0), pow(1.0, f32::MAX)], [0.0, 1.0, 1.0, 1.0]);
         assert_eq!([pow(0.5, 1e30), pow(2.0, 1e30), pow(2.0, 3.0)], [0.0, f32::INFINITY, 8.0]);
         assert_eq!([exp2(0.0), exp2(-3.0), exp2(200.0), exp2(-300.0)], [1.0, 0.125, f32::INFINITY, 0.0]);
@@ -200,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn sines_and_cosines_all_around() {
+    fn sin_cos_is_accurate_over_many_turns() {
         for i in -200_000..=200_000_i32 {
             let angle = i as f32 * 1e-4;
             let (sin, cos) = sin_cos(angle);

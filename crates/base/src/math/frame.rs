@@ -28,7 +28,7 @@ impl Frame {
         }
     }
 
-    /// Transforms a direction from this frame's coordinates to those in which the frame is given.
+    /// Transforms a direction from this frame's coordinates to world coordinates.
     #[inline(always)]
     pub fn to_world(&self, local: Vec3) -> Vec3 {
         self.s * local.x + self.t * local.y + self.n * local.z
@@ -54,7 +54,7 @@ mod tests {
     }
 
     #[test]
-    fn orthonormal_near_the_south_pole_where_older_methods_break() {
+    fn frames_are_orthonormal_near_the_south_pole() {
         assert_orthonormal(Vec3::new(3.85e-4, 3.85e-4, -0.999_999_9).normalize());
         assert_orthonormal(Vec3::NEG_Z);
         assert_orthonormal(Vec3::Z);

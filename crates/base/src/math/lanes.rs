@@ -1,68 +1,69 @@
-//! Several numbers at a time: loops without branches over arrays, which compilers turn into vector instructions. Every lane
-//! gets the bits that it would get alone.
+//! Packets of 16 numbers, processed in branch-free loops over arrays that compilers vectorize. Each lane gets
+//! the same bits as the scalar computation would.
 
 use super::Vec3;
 
-/// Number of lanes.
+/// Number of lanes in a packet.
 pub const LANES: usize = 16;
 
-/// One number for each of several samples.
+/// One `f32` per lane.
 pub type Lanes = [f32; LANES];
 
-/// Vectors, one array for each coordinate.
+/// One vector per lane, as one array per coordinate.
 pub type Lanes3 = [Lanes; 3];
 
-/// The vector of a lane.
+/// Returns the vector in lane `i`.
 #[inline(always)]
 pub fn lane(vectors: &Lanes3, i: usize) -> Vec3 {
     Vec3::new(vectors[0][i], vectors[1][i], vectors[2][i])
 }
 
-/// Sets the vector of a lane.
+/// Sets the vector in lane `i`.
 #[inline(always)]
 pub fn set_lane(vectors: &mut Lanes3, i: usize, v: Vec3) {
     (vectors[0][i], vectors[1][i], vectors[2][i]) = (v.x, v.y, v.z);
 }
 
-/// A mask: [`TRUE`] or 0 for each lane.
+/// Lane mask: [`TRUE`] or 0 for each lane.
 pub type Truths = [u32; LANES];
 
-/// Value of a lane of [`Truths`] in which the condition holds.
+/// Mask value of a selected lane.
 pub const TRUE: u32 = u32::MAX;
 
-/// Work in loops without branches over rows. What it calls in its loops must be inlined, and no closure, or it is compiled
-/// without the instructions.
+/// A computation in branch-free loops over packets, compiled once per instruction set. Everything called in
+/// its loops must be inlined and must not be a closure, or it is compiled without the instruction set's
+/// features.
 pub trait Loops {
-    /// Result of the work.
+    /// Result of the computation.
     type Done;
 
-    /// Does the work, folding rows by these instructions.
+    /// Runs the computation with this instruction set.
     fn run(self, folds: impl Folds) -> Self::Done;
 }
 
-/// Instructions that fold rows. A value is the right to use them: for instructions that a processor may lack, values exist only
-/// if the processor has them.
+/// Token for an instruction set, with its cross-lane operations. A token for instructions that a processor
+/// may lack can only be created if the processor has them.
 pub trait Folds: Copy {
-    /// One bit for each lane in which the condition holds.
+    /// Packs a mask into bits, one per lane.
     fn bits(self, holds: &Truths) -> u32;
 
-    /// Least and greatest number among the lanes whose bits are set, of which there is at least one; of a number that is none, the
-    /// order decides, which is the same for all instructions.
+    /// Minimum and maximum over the lanes set in `of`, which must not be 0. For NaN the result depends on
+    /// lane order, identically on every instruction set.
     fn span(self, row: &Lanes, of: u32) -> [f32; 2];
 
-    /// Reciprocals. Compilers may take a loop of them apart into pairs.
+    /// Reciprocal of every lane. A plain loop may be compiled to divisions of lane pairs.
     fn reciprocals(self, row: &Lanes) -> Lanes;
 
-    /// `a · b + c`, rounded once where the processor has an instruction for it, and else twice: for bounds and guesses, whose last
-    /// bits decide nothing.
+    /// `a · b + c`, rounded once if the processor has a fused multiply-add and twice otherwise. Only for
+    /// bounds and initial guesses, where the last bits do not matter.
     fn about(self, a: f32, b: f32, c: f32) -> f32;
 
-    /// Does work by the same instructions in a function of its own, which all callers share: for work of which a call costs little
-    /// and each copy much of the program's size.
+    /// Runs a kernel in a function of its own that all callers share. Use it if the call overhead is small
+    /// compared with the kernel and inlined copies would bloat the binary.
     fn call<L: Loops>(self, work: L) -> L::Done;
 }
 
-/// Folds sixteen numbers by halves, which become vector instructions.
+/// Reduces 16 numbers pairwise by halves, which compiles to vector instructions.
 #[macro_export]
 macro_rules! folded {
     ($row:expr, $better:tt) => {{
@@ -80,13 +81,13 @@ macro_rules! folded {
     }};
 }
 
-/// Folds by instructions that every processor has.
+/// Portable implementation, for every processor.
 #[derive(Clone, Copy)]
 pub struct PlainFolds;
 
 impl Folds for PlainFolds {
-    /// Folds by halves. Compilers take sums of single bits apart into a test of one lane after the other; the hint has them finish
-    /// the vector first.
+    /// Reduces by halves. Compilers turn sums of single bits into a test of each lane in sequence;
+    /// `black_box` makes them finish the vector first.
     #[inline(always)]
     fn bits(self, holds: &Truths) -> u32 {
         let mut row = std::hint::black_box(*holds);
@@ -133,7 +134,7 @@ impl Folds for PlainFolds {
     }
 }
 
-/// Mask of the lanes whose bits are set.
+/// Expands bits into a mask.
 #[inline(always)]
 pub fn truths(bits: u32) -> Truths {
     let mut holds = [0; LANES];
@@ -143,8 +144,8 @@ pub fn truths(bits: u32) -> Truths {
     holds
 }
 
-/// Takes the new numbers in the lanes of the mask. Works by bits: for `if` and `else`, compilers may choose between places
-/// in memory, one lane after the other.
+/// Replaces the lanes of `own` selected by the mask with those of `new`. Uses bit operations, as compilers
+/// may turn `if` and `else` into a per-lane choice between memory addresses.
 #[inline(always)]
 pub fn take(holds: &Truths, new: &Lanes, own: &mut Lanes) {
     for i in 0..LANES {
@@ -152,7 +153,7 @@ pub fn take(holds: &Truths, new: &Lanes, own: &mut Lanes) {
     }
 }
 
-/// [`take`] for whole numbers.
+/// [`take`] for integers.
 #[inline(always)]
 pub fn take_u32(holds: &Truths, new: &[u32; LANES], own: &mut [u32; LANES]) {
     for i in 0..LANES {
@@ -165,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lanes_of_bits_are_taken() {
+    fn masks_select_their_lanes() {
         for expected in 0..1_u32 << LANES {
             let holds = std::array::from_fn(|i| if expected >> i & 1 == 1 { TRUE } else { 0 });
             assert_eq!(PlainFolds.bits(&holds), expected);

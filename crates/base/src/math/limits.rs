@@ -1,11 +1,11 @@
-//! Limits for the numbers of a scene, whichever file they come from.
+//! Limits on the numbers in a scene, regardless of the file format.
 
 use super::DVec3;
 
-/// Largest magnitude of any number: products of two larger ones overflow 32-bit floats.
+/// Largest allowed magnitude: products of two larger numbers overflow 32-bit floats.
 pub const LARGEST: f64 = 1e18;
 
-/// Shortest length that is not 0: products of two shorter ones underflow.
+/// Shortest nonzero length: products of two shorter ones underflow.
 pub const SHORTEST: f64 = 1e-18;
 
 /// Length of a vector, even if its square underflows or overflows.
@@ -14,7 +14,7 @@ pub fn length(vector: DVec3) -> f64 {
     if largest > 0.0 { (vector / largest).length() * largest } else { 0.0 }
 }
 
-/// Whether a length is above 0, yet too short to work with.
+/// Whether a length is nonzero but too short to compute with.
 pub fn is_too_short(length: f64) -> bool {
     length != 0.0 && length.abs() < SHORTEST
 }
@@ -24,7 +24,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lengths_are_right_where_their_squares_are_not() {
+    fn lengths_survive_overflowing_squares() {
         assert_eq!(length(DVec3::ZERO), 0.0);
         for scale in [1e-300, 1e-200, 1.0, 1e200] {
             assert!((length(DVec3::new(3.0, -4.0, 12.0) * scale) / (13.0 * scale) - 1.0).abs() < 1e-15);

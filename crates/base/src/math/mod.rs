@@ -1,4 +1,4 @@
-//! Numbers, vectors, transforms and colour: what every other room may use.
+//! Numbers, vectors, transforms and color, available to all other modules.
 
 pub mod color;
 pub mod decimal;

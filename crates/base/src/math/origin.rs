@@ -1,17 +1,17 @@
-//! Origin of coordinates for single precision.
+//! Local coordinate origins for single precision.
 
 use super::DVec3;
 use super::float::power_of_two_below;
 
-/// Step of the grid of origins, in sizes of the scene around: at that distance, single precision errs by a millionth of
-/// the size.
+/// Step of the grid of origins, in scene sizes: at this distance, single precision errs by a millionth of the
+/// size.
 const STEP: f64 = 64.0;
 
-/// Factor that keeps sizes like 1, 2 and 5 away from the powers of two, at which the step changes.
+/// Keeps typical sizes such as 1, 2 and 5 away from the powers of two, where the step changes.
 const OFF_POWERS: f64 = 1.37;
 
-/// Origin for a scene of this size around a place: 0 near 0, and far from it on a grid whose step is a power of two.
-/// Therefore moving numbers there rounds nothing, and small changes of the place change nothing.
+/// Local origin for a scene of this size around `place`: 0 near 0, and otherwise on a grid whose step is a
+/// power of two. Subtracting the origin is therefore exact, and small changes of `place` leave it unchanged.
 pub fn origin_near(place: DVec3, size: f64) -> DVec3 {
     let step = STEP * power_of_two_below(size * OFF_POWERS);
     // Adding 0 turns −0 into 0.
@@ -24,20 +24,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn near_zero_it_is_zero_and_elsewhere_within_half_a_step() {
+    fn origin_is_zero_or_within_half_a_step() {
         assert_eq!(origin_near(DVec3::new(20.0, -20.0, 0.0), 1.0), DVec3::ZERO);
         let far = DVec3::new(1e8, -3e5, 7.0);
         for size in [0.1, 1.0, 5.0, 1e3] {
             let origin = origin_near(far, size);
             assert!((far - origin).abs().max_element() <= 0.5 * STEP * OFF_POWERS * size, "{size}: {origin}");
-            // Doubled numbers have the doubled origin.
+            // Doubling all numbers doubles the origin.
             assert_eq!(origin_near(far * 2.0, size * 2.0), origin * 2.0);
         }
         assert_eq!(origin_near(far, 5.0), origin_near(far + DVec3::ONE, 5.0 * (1.0 - 1e-12)));
     }
 
     #[test]
-    fn what_has_no_size_or_place_starts_at_zero() {
+    fn invalid_scenes_have_origin_zero() {
         for (place, size) in [
             (1e8, 0.0),
             (1e8, f64::NAN),

@@ -1,13 +1,13 @@
-//! Pseudo-random numbers for tests.
+//! Simple pseudo-random numbers for tests and fixed sampling patterns.
 
-/// A number that looks random, and the same on every machine (the finaliser of `MurmurHash3`).
+/// Hashes `number` to 64 well-mixed bits, identically on every machine (the finalizer of `MurmurHash3`).
 pub fn scrambled(number: u64) -> u64 {
     let mix = |x: u64, factor: u64| (x ^ (x >> 33)).wrapping_mul(factor);
     let mixed = mix(mix(number.wrapping_add(1), 0xff51_afd7_ed55_8ccd), 0xc4ce_b9fe_1a85_ec53);
     mixed ^ (mixed >> 33)
 }
 
-/// A linear congruential generator (Knuth's MMIX), by its upper 24 bits: numbers in [0, 1).
+/// Uniform numbers in [0, 1) from the upper 24 bits of a linear congruential generator (Knuth's MMIX).
 pub fn unit(seed: u64) -> impl FnMut() -> f32 {
     let mut state = seed;
     move || {
@@ -16,7 +16,7 @@ pub fn unit(seed: u64) -> impl FnMut() -> f32 {
     }
 }
 
-/// Numbers of [`unit()`], spread over [−1, 1).
+/// Uniform numbers in [−1, 1), from [`unit()`].
 pub fn signed(seed: u64) -> impl FnMut() -> f32 {
     let mut unit = unit(seed);
     move || unit() * 2.0 - 1.0

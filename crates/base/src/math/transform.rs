@@ -1,4 +1,4 @@
-//! Affine transforms in double precision, inverted once.
+//! Affine transforms in double precision, stored with their inverses.
 
 use glam::{DMat3, DVec3, Vec3Swizzles as _};
 
@@ -14,11 +14,11 @@ pub struct Transform {
 }
 
 impl Transform {
-    /// The map that changes nothing.
+    /// The identity transform.
     pub const IDENTITY: Self =
         Self { linear: DMat3::IDENTITY, translation: DVec3::ZERO, inverse_linear: DMat3::IDENTITY };
 
-    /// Scale first, then rotate about x, then y, then z (degrees), then translate. Scales must not be 0.
+    /// Scales, rotates about x, then y, then z (in degrees), then translates. Scales must not be 0.
     pub fn scale_rotate_translate(scale: DVec3, degrees: DVec3, translation: DVec3) -> Self {
         let rotation = rotation_xyz(degrees);
         Self {
@@ -28,64 +28,65 @@ impl Transform {
         }
     }
 
-    /// The map of a linear part whose determinant is not 0, then a translation.
+    /// Applies an invertible linear map, then translates.
     pub fn affine(linear: DMat3, translation: DVec3) -> Self {
         Self { linear, translation, inverse_linear: linear.inverse() }
     }
 
-    /// The map, given from coordinates that start at `inside` to coordinates that start at `outside`.
+    /// Rewrites the map for input coordinates relative to `inside` and output coordinates relative to
+    /// `outside`.
     #[inline]
     pub fn between(self, inside: DVec3, outside: DVec3) -> Self {
         Self { translation: self.translation + self.linear * inside - outside, ..self }
     }
 
-    /// Transforms a point to the outside.
+    /// Transforms a point.
     #[inline]
     pub fn point(&self, p: DVec3) -> DVec3 {
         self.linear * p + self.translation
     }
 
-    /// Transforms a direction to the outside.
+    /// Transforms a direction.
     #[inline]
     pub fn vector(&self, v: DVec3) -> DVec3 {
         self.linear * v
     }
 
-    /// Transforms bounds on the components of directions to the outside.
+    /// Transforms bounds on the magnitudes of a vector's components.
     pub fn reach(&self, reach: DVec3) -> DVec3 {
         let DMat3 { x_axis, y_axis, z_axis } = self.linear;
         x_axis.abs() * reach.x + y_axis.abs() * reach.y + z_axis.abs() * reach.z
     }
 
-    /// Transforms a normal to the outside, by the inverse transpose; not normalised.
+    /// Transforms a normal with the inverse transpose, without normalizing it.
     #[inline]
     pub fn normal(&self, n: DVec3) -> DVec3 {
         self.inverse_linear.transpose() * n
     }
 
-    /// Transforms a point from the outside.
+    /// Applies the inverse to a point.
     #[inline]
     pub fn inverse_point(&self, p: DVec3) -> DVec3 {
         self.inverse_linear * (p - self.translation)
     }
 
-    /// Transforms a direction from the outside.
+    /// Applies the inverse to a direction.
     #[inline]
     pub fn inverse_vector(&self, v: DVec3) -> DVec3 {
         self.inverse_linear * v
     }
 
-    /// Greatest factor by which distances grow on the way from the outside.
+    /// Upper bound on the factor by which the inverse lengthens vectors.
     pub fn inverse_growth(&self) -> f64 {
         let DMat3 { x_axis, y_axis, z_axis } = self.inverse_linear.transpose();
         let lengths = DVec3::new(x_axis.length(), y_axis.length(), z_axis.length());
-        // Rows at right angles, as those of a scale before a rotation: the longest tells it.
+        // Orthogonal rows, as in a scale followed by a rotation: the longest row is exact.
         let products = DVec3::new(x_axis.dot(y_axis), y_axis.dot(z_axis), z_axis.dot(x_axis));
         let is_straight = products.abs().cmple(lengths * lengths.yzx() * 1e-9).all();
         if is_straight { lengths.max_element() * (1.0 + 1e-8) } else { lengths.length() }
     }
 
-    /// Whether the map turns right-handed axes into left-handed ones.
+    /// Whether the map reverses handedness.
     pub fn mirrors(&self) -> bool {
         self.linear.determinant() < 0.0
     }
@@ -106,8 +107,8 @@ pub fn sin_cos_degrees(angle: f64) -> (f64, f64) {
     }
 }
 
-/// Rotation by `degrees.x` about x, then `degrees.y` about y, then `degrees.z` about z. Multiples of 90°
-/// are exact.
+/// Rotation by `degrees.x` about x, then `degrees.y` about y, then `degrees.z` about z. Exact for multiples
+/// of 90°.
 pub fn rotation_xyz(degrees: DVec3) -> DMat3 {
     let exact = |axis: DVec3, angle: f64| {
         let (sin, cos) = sin_cos_degrees(angle);
@@ -144,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn inverse_undoes_the_map() {
+    fn inverse_undoes_the_transform() {
         let t = Transform::scale_rotate_translate(
             DVec3::new(2.0, 0.5, -3.0),
             DVec3::new(10.0, 20.0, 30.0),
@@ -158,7 +159,7 @@ mod tests {
             inverse_linear: DMat3::from_cols(DVec3::X, DVec3::new(3.0, 1.0, 0.0), DVec3::Z),
             ..t
         };
-        assert!(sheared.inverse_growth() >= 3.3027, "the greatest singular value");
+        assert!(sheared.inverse_growth() >= 3.3027, "at least the largest singular value");
         // A normal stays perpendicular to a transformed tangent.
         assert!(t.normal(DVec3::Y).dot(t.vector(DVec3::new(1.0, 0.0, 2.0))).abs() < 1e-12);
     }

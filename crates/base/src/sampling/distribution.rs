@@ -1,14 +1,14 @@
-//! Discrete distributions.
+//! One-dimensional discrete distributions.
 
-/// Chooses an index in proportion to weights.
+/// Samples an index in proportion to its weight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Discrete {
-    /// Cumulative sums: of the weights up to and with each index.
+    /// Cumulative sums of the weights, including each index.
     sums: Vec<f64>,
 }
 
 impl Discrete {
-    /// A distribution from weights ≥ 0. `None` if their sum is 0.
+    /// Creates a distribution from weights ≥ 0, or `None` if their sum is 0 or not finite.
     pub fn new(weights: impl IntoIterator<Item = f64>) -> Option<Self> {
         let sums: Vec<f64> = weights
             .into_iter()
@@ -25,13 +25,14 @@ impl Discrete {
         self.sums.last().copied().unwrap_or(0.0)
     }
 
-    /// The probability of an index.
+    /// Probability of `index`.
     pub fn share(&self, index: usize) -> f64 {
         let before = if index == 0 { 0.0 } else { self.sums[index - 1] };
         (self.sums[index] - before) / self.total()
     }
 
-    /// The index that `u` in [0, 1) falls on, and the place of `u` in its share, in [0, 1).
+    /// Samples an index with `u` in [0, 1). Also returns the position of `u` within the index's share, in [0,
+    /// 1).
     pub fn sample(&self, u: f32) -> (usize, f32) {
         let target = f64::from(u) * self.total();
         let index = self.sums.partition_point(|&sum| sum <= target).min(self.sums.len() - 1);
@@ -47,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn indices_come_as_often_as_their_weights_and_empty_ones_never() {
+    fn indices_are_sampled_in_proportion_to_weights() {
         let distribution = Discrete::new([1.0, 0.0, 3.0, 0.0]).expect("some weight");
         let mut counts = [0; 4];
         let mut rests = 0.0;

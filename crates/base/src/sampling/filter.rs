@@ -1,5 +1,5 @@
-//! Pixel filters by importance sampling: samples are placed in proportion to the filter, and those of one sign all
-//! count alike (Ernst, Stamminger, Greiner, *Filter Importance Sampling*, 2006).
+//! Filter importance sampling: samples are drawn in proportion to the pixel filter, so all samples of one
+//! sign have equal weight (Ernst, Stamminger, Greiner, *Filter Importance Sampling*, 2006).
 
 use std::sync::LazyLock;
 
@@ -20,18 +20,18 @@ choice! {
     }
 }
 
-/// A place relative to the pixel's centre, in pixels, drawn in proportion to |f|, with f's sign there.
+/// A position relative to the pixel center, in pixels, drawn in proportion to |f|, with the sign of f there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilterSample {
-    /// Offset from the centre.
+    /// Offset from the pixel center.
     pub offset: Vec2,
-    /// Whether the filter is negative there. A pixel is (1 + w) · mean of the positive samples − w · mean of the negative ones,
-    /// with w from [`PixelFilter::negative_weight`].
+    /// Whether the filter is negative there. The pixel value is (1 + w) · mean of the positive samples − w ·
+    /// mean of the negative ones, with w from [`PixelFilter::negative_weight`].
     pub is_negative: bool,
 }
 
 impl PixelFilter {
-    /// Warps a point of the unit square to a sample of the filter.
+    /// Maps a point of the unit square to a filter sample.
     #[inline]
     pub fn sample(self, u: Vec2) -> FilterSample {
         match self {
@@ -42,7 +42,8 @@ impl PixelFilter {
         }
     }
 
-    /// Warps points of the unit square in place and passes each sample, with its number, to `each`.
+    /// Maps points of the unit square to filter samples in place and passes each sample, with its index, to
+    /// `each`.
     #[inline(always)]
     pub fn sample_row<const N: usize>(
         self,
@@ -62,7 +63,7 @@ impl PixelFilter {
         }
     }
 
-    /// −∫min(f, 0)/∫f over the plane. `None` if f is nowhere negative.
+    /// −∫min(f, 0)/∫f over the plane, or `None` if f is never negative.
     pub fn negative_weight(self) -> Option<f64> {
         match self {
             Self::Box | Self::Tent | Self::Gaussian => None,
@@ -72,7 +73,7 @@ impl PixelFilter {
     }
 }
 
-/// A point of density 1 − |x| on [−1, 1].
+/// Samples the pdf 1 − |x| on [−1, 1].
 #[inline(always)]
 fn tent(u: f32) -> f32 {
     let (is_left, twice) = (u < 0.5, 2.0 * u);
@@ -97,7 +98,7 @@ static MITCHELL: LazyLock<Tabulated> = LazyLock::new(|| {
     })
 });
 
-/// A tabulated even function in one dimension, sampled by its absolute value.
+/// A tabulated even function in one dimension, sampled in proportion to its absolute value.
 struct Tabulated {
     radius: f64,
     sums: Vec<f64>,
@@ -143,7 +144,7 @@ mod tests {
 
     /// Moments over a fine grid: weights average to 1, offsets to 0, their squares to ∫x²f/∫f.
     #[test]
-    fn every_filter_has_its_weight_and_width() {
+    fn filters_have_the_expected_moments() {
         let n = 2048;
         for (filter, moment) in [
             (PixelFilter::Box, 1.0 / 12.0),

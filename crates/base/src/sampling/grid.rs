@@ -1,35 +1,36 @@
-//! A distribution over the cells of a grid.
+//! Piecewise-constant distributions over the cells of a grid.
 
-/// Chooses a cell in proportion to weights: first its row, then its column. Every cell with a weight gets at least a small
-/// share of the mean around it, so that `f32` numbers can reach it.
+/// Samples a row, then a column in it, in proportion to the weights. Every cell with a nonzero weight gets at
+/// least a small share of its row's mean, so that `f32` numbers can reach it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     columns: usize,
-    /// Cumulative probabilities: of all rows before each, and 1.
+    /// Cumulative probabilities of the rows before each row, followed by 1.
     rows: Vec<f32>,
-    /// Cumulative probabilities of the columns in each row, `columns + 1` a row.
+    /// Cumulative probabilities of the columns in each row, `columns + 1` values per row.
     in_row: Vec<f32>,
-    /// Starts of the search for a row, and for a column in each row: see [`guide`].
+    /// Guide tables for the search of a row, and of a column in each row; see [`guide`].
     row_guide: Vec<u32>,
     column_guide: Vec<u32>,
 }
 
-/// A point of a grid.
+/// A sampled point of a grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InGrid {
     /// The cell's column.
     pub column: usize,
     /// The cell's row.
     pub row: usize,
-    /// Place in the cell, along the row and across it, in [0, 1).
+    /// Position in the cell, along the row and across it, in [0, 1).
     pub rest: [f32; 2],
 }
 
-/// Least share, in means, of a cell or row with a weight.
+/// Smallest share of a cell or row with a nonzero weight, relative to the mean share.
 const LEAST: f64 = 1.0 / 64.0;
 
 impl Grid {
-    /// A distribution from rows of weights ≥ 0, all of the same length. `None` if there are no rows or their sum is 0.
+    /// Creates a distribution from rows of weights ≥ 0, all of the same length. Returns `None` if their sum
+    /// is 0 or not finite.
     pub fn new(columns: usize, rows: impl Iterator<Item = Vec<f64>>) -> Option<Self> {
         let (mut in_row, mut totals) = (Vec::new(), Vec::new());
         for weights in rows {
@@ -45,7 +46,7 @@ impl Grid {
         Some(Self { columns, rows, in_row, row_guide, column_guide })
     }
 
-    /// The point that two numbers in [0, 1) lead to: the first along the row, the second to the row.
+    /// Samples a point with two numbers in [0, 1): the first selects the column, the second the row.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> InGrid {
         let (row, across) = find(&self.rows, &self.row_guide, u[1]);
@@ -54,13 +55,13 @@ impl Grid {
         InGrid { column, row, rest: [along, across] }
     }
 
-    /// Probability of choosing a row.
+    /// Probability of sampling `row`.
     #[inline(always)]
     pub fn row_probability(&self, row: usize) -> f32 {
         self.rows[row + 1] - self.rows[row]
     }
 
-    /// Probability of choosing a column, once its row is chosen.
+    /// Probability of sampling `column` given its row.
     #[inline(always)]
     pub fn column_probability(&self, row: usize, column: usize) -> f32 {
         let sums = self.columns_of(row);
@@ -74,7 +75,7 @@ impl Grid {
     }
 }
 
-/// Appends cumulative shares to a list (of all weights before each, then 1) and returns the sum of the weights.
+/// Appends the normalized cumulative sums of the weights (exclusive, then 1) and returns the total weight.
 fn add_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
     let total: f64 = weights.iter().sum();
     let least = total / weights.len().max(1) as f64 * LEAST;
@@ -89,8 +90,8 @@ fn add_sums(weights: &[f64], sums: &mut Vec<f32>) -> f64 {
     total
 }
 
-/// Guide table: [0, 1) is cut into as many equal parts as there are shares; gives the share that the start of each part falls on
-/// (Chen and Asau, *On Generating Random Variates from an Empirical Distribution*, 1974).
+/// Guide table: divides [0, 1) into as many equal parts as there are shares and yields the share at the start
+/// of each part (Chen and Asau, *On Generating Random Variates from an Empirical Distribution*, 1974).
 fn guide(sums: &[f32]) -> impl Iterator<Item = u32> {
     let (count, mut place) = (sums.len() - 1, 0);
     (0..count).map(move |part| {
@@ -99,8 +100,8 @@ fn guide(sums: &[f32]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// The last share, from `place` on, that does not start beyond `u`. It is mostly `place` or the next: these two steps are made
-/// without a branch, which no processor could predict.
+/// Last share, from `place` on, that starts at or before `u`. It is usually `place` or the next one, so the
+/// first two steps avoid branches, which would be unpredictable.
 #[inline(always)]
 fn last_from(sums: &[f32], mut place: usize, u: f32) -> usize {
     for _ in 0..2 {
@@ -113,10 +114,10 @@ fn last_from(sums: &[f32], mut place: usize, u: f32) -> usize {
     place
 }
 
-/// The share that `u` in [0, 1) falls on, and the place of `u` in it, in [0, 1).
+/// Finds the share that contains `u` in [0, 1), and the position of `u` in it, in [0, 1).
 #[inline(always)]
 fn find(sums: &[f32], guide: &[u32], u: f32) -> (usize, f32) {
-    // Rounding may lead to the part after that of `u`, so start one earlier.
+    // Rounding may lead to the part after the one that contains `u`, so start one part earlier.
     let part = ((u * guide.len() as f32) as usize).saturating_sub(1);
     let first = last_from(sums, guide[part] as usize, u);
     let rest = (u - sums[first]) / (sums[first + 1] - sums[first]);
@@ -129,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_come_as_often_as_their_weights_and_empty_ones_never() {
+    fn cells_are_sampled_in_proportion_to_weights() {
         let weights = [[0.0, 1.0, 0.0, 3.0], [0.0; 4], [4.0, 0.0, 8.0, 0.0]];
         let grid = Grid::new(4, weights.iter().map(|row| row.to_vec())).expect("some weight");
         let mut counts = [[0; 4]; 3];
@@ -156,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_dark_beside_something_bright_is_within_reach() {
+    fn dark_cells_next_to_bright_ones_are_reachable() {
         let mut row = vec![1e-3; 4096];
         row[77] = 1e12;
         let grid = Grid::new(4096, [row].into_iter()).expect("some weight");
@@ -168,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn every_number_leads_to_the_last_share_that_starts_before_it() {
+    fn find_returns_the_share_that_contains_u() {
         for count in [1_usize, 2, 3, 7, 64, 1000] {
             let weight = |i: usize| match i % 5 {
                 0 | 3 => 0.0,
@@ -189,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_no_distribution() {
+    fn empty_grids_have_no_distribution() {
         assert_eq!(Grid::new(2, [vec![0.0, 0.0]].into_iter()), None);
         assert_eq!(Grid::new(2, std::iter::empty()), None);
     }

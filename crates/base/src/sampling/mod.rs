@@ -1,4 +1,5 @@
-//! Sample streams, warps and distributions. Random numbers are a function of (seed, pixel, sample, dimension).
+//! Sample streams, warps and distributions. Random numbers are a function of seed, pixel, sample and
+//! dimension.
 
 pub mod distribution;
 pub mod filter;

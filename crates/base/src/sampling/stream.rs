@@ -1,43 +1,44 @@
-//! Owen-scrambled Sobol points, padded: every decision of a path draws from a sequence of its own, scrambled anew
-//! (Burley, *Practical Hash-based Owen Scrambling*, JCGT 2020).
+//! Padded, Owen-scrambled Sobol points: every random decision of a path has its own independently scrambled
+//! sequence (Burley, *Practical Hash-based Owen Scrambling*, JCGT 2020).
 
 use crate::math::Vec2;
 
-/// A random decision at a vertex of a path. Numbers of different decisions are independent; those of one decision are
-/// well distributed over the samples of a pixel. Every random number belongs to a decision.
+/// A random decision at a path vertex. Numbers for different decisions are independent; numbers for the same
+/// decision are well distributed over a pixel's samples. Every random number belongs to one decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decision {
     /// Position in the pixel.
     Pixel,
     /// Position on the lens.
     Lens,
-    /// Position on the light of this number.
+    /// Position on the light with this index.
     Light(u32),
-    /// Choice of a light, if not all are sampled.
+    /// Choice of a light, unless all lights are sampled.
     Pick,
     /// Position on the chosen light.
     Picked,
-    /// Choice of the picked lights that get shadow rays.
+    /// Choice of the selected lights that get shadow rays.
     Trace,
     /// Choice between reflection and refraction.
     Choice,
-    /// Choice whether a surface is there.
+    /// Stochastic transparency: whether the surface is opaque here.
     Opacity,
-    /// Choice of the lobe to go on in.
+    /// Choice of the BSDF lobe to sample.
     Lobe,
     /// Direction within a lobe.
     Direction,
-    /// Russian roulette after scattering by a lobe.
+    /// Russian roulette after sampling a BSDF lobe.
     Roulette,
-    /// Russian roulette after a mirror or glass: a decision apart from that at the next vertex, which has the same path number.
+    /// Russian roulette after a specular surface. Separate from `Roulette`, as the next vertex has the same
+    /// path number.
     Spared,
-    /// Choice of the vertices that look up photons, if there are many on the way.
+    /// Choice of the vertices that look up photons, if the path has several.
     Gather,
-    /// Position, in a kernel, of the trial of this number that looks for surface.
+    /// Position in a density kernel of the trial with this index, which searches for a surface.
     Trial(u32),
-    /// Choice of a photon's light, and of a piece of it.
+    /// Choice of a photon's light and of a part of it.
     Lamp,
-    /// Choice of whether to aim a photon, and of its target.
+    /// Whether to aim a photon, and at which target.
     Aim,
     /// Starting position of a photon on its light.
     Start,
@@ -46,7 +47,7 @@ pub enum Decision {
 }
 
 impl Decision {
-    /// Dimension of the decision at a vertex; `path` tells the paths of one sample apart.
+    /// Sobol dimension of this decision; `path` distinguishes the paths of one sample.
     #[inline(always)]
     fn dimension(self, path: u32) -> u32 {
         let number = match self {
@@ -73,30 +74,30 @@ impl Decision {
     }
 }
 
-/// Path number of a sample's decisions in the camera.
+/// Path number for the decisions made in the camera.
 pub const CAMERA_PATH: u32 = 0;
 
-/// The random numbers of one sample of a pixel.
+/// Random numbers of one sample of a pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct PixelSampler {
     seed: u32,
     sample: u32,
 }
 
-/// Hash of a pixel of the whole picture.
+/// Hashes a pixel's coordinates in the full image.
 #[inline(always)]
 fn pixel_seed(seed: u32, x: u32, y: u32) -> u32 {
     mix(mix(mix(seed) ^ x) ^ y.rotate_left(16))
 }
 
 impl PixelSampler {
-    /// The numbers of sample `sample` of pixel (x, y) of the whole picture.
+    /// Creates the sampler for sample `sample` of pixel (x, y) of the full image.
     #[inline]
     pub fn new(seed: u32, x: u32, y: u32, sample: u32) -> Self {
         Self { seed: pixel_seed(seed, x, y), sample }
     }
 
-    /// Two numbers in [0, 1) for one decision.
+    /// Returns two numbers in [0, 1) for one decision.
     #[inline]
     pub fn pair(&self, path: u32, decision: Decision) -> Vec2 {
         let [[x], [y]] = scrambled([self.sample], [mix(self.seed ^ decision.dimension(path)) ^ mix(0)]);
@@ -104,7 +105,7 @@ impl PixelSampler {
     }
 }
 
-/// [`PixelSampler`]s of some samples, side by side.
+/// A packet of [`PixelSampler`]s.
 #[derive(Clone, Copy, Debug)]
 pub struct SamplerRow<const N: usize> {
     seeds: [u32; N],
@@ -112,7 +113,7 @@ pub struct SamplerRow<const N: usize> {
 }
 
 impl<const N: usize> SamplerRow<N> {
-    /// The numbers of samples of pixels (x, y) of the whole picture.
+    /// Creates the samplers for samples of pixels (x, y) of the full image.
     #[inline(always)]
     pub fn new(seed: u32, x: &[u32; N], y: &[u32; N], samples: &[u32; N]) -> Self {
         let mut seeds = [0; N];
@@ -122,8 +123,8 @@ impl<const N: usize> SamplerRow<N> {
         Self { seeds, samples: *samples }
     }
 
-    /// Two numbers in [0, 1) for each sample, for one of the `of` repetitions of a decision: well distributed over repetitions
-    /// and samples together. Every 2³² points are scrambled anew.
+    /// Returns two numbers in [0, 1) per sample for one of the `of` repetitions of a decision, well
+    /// distributed over repetitions and samples together. The scramble changes every 2³² points.
     #[inline(always)]
     pub fn pairs(&self, paths: &[u32; N], decision: Decision, repetition: u32, of: u32) -> [[f32; N]; 2] {
         let (mut indices, mut seeds) = ([0; N], [0; N]);
@@ -136,10 +137,10 @@ impl<const N: usize> SamplerRow<N> {
     }
 }
 
-/// Points of the first two dimensions of Sobol's sequence, with their order and both coordinates scrambled.
+/// Points of the first two Sobol dimensions, with their order and both coordinates Owen-scrambled.
 #[inline(always)]
 fn scrambled<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> [[f32; N]; 2] {
-    // Each step runs over all lanes before the next one, so that compilers make vector instructions of it.
+    // Run each step over all lanes before the next one so that compilers vectorize it.
     let mut places = indices;
     for (place, &seed) in places.iter_mut().zip(&seeds) {
         *place = owen(place.reverse_bits(), seed).reverse_bits();
@@ -154,14 +155,16 @@ fn scrambled<const N: usize>(indices: [u32; N], seeds: [u32; N]) -> [[f32; N]; 2
     points
 }
 
-/// The upper 24 of reversed bits as a fraction in [0, 1); few enough that vectors convert them as signed numbers.
+/// Converts the upper 24 of bit-reversed bits to a fraction in [0, 1). 24 bits fit signed conversion, which
+/// is what vector units have.
 #[inline(always)]
 fn unit(bits: u32) -> f32 {
     (bits.reverse_bits() >> 8) as i32 as f32 * (1.0 / (1 << 24) as f32)
 }
 
-/// The second coordinate with its bits reversed. Bit j is the sum of those bits k of the index for which C(k, j) is odd,
-/// which holds if k has every bit of j. The first coordinate, reversed, is the index itself.
+/// Second Sobol coordinate with its bits reversed. Bit j is the sum (mod 2) of the index bits k for which
+/// C(k, j) is odd, which is the case if k has every bit of j. The first coordinate, reversed, is the index
+/// itself.
 #[inline(always)]
 fn pascal(mut bits: u32) -> u32 {
     for (shift, lacking) in
@@ -172,8 +175,9 @@ fn pascal(mut bits: u32) -> u32 {
     bits
 }
 
-/// Owen scrambling of reversed bits by a hash in which each bit depends on lower ones only (Laine and Karras,
-/// *Stratified Sampling for Stochastic Transparency*, 2011; constants of Vegdahl, *Building a Better LK Hash*, 2021).
+/// Owen scrambling of reversed bits with a hash in which each bit depends only on lower ones (Laine and
+/// Karras, *Stratified Sampling for Stochastic Transparency*, 2011; constants of Vegdahl, *Building a Better
+/// LK Hash*, 2021).
 #[inline(always)]
 fn owen(mut bits: u32, seed: u32) -> u32 {
     bits ^= bits.wrapping_mul(0x3d20_adea);
@@ -208,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn repetitions_are_one_sequence_also_where_it_is_scrambled_anew() {
+    fn repetitions_continue_one_sequence() {
         for (sample, n) in [(0, 3), (7, 5), (9, 1), (u32::MAX / 3, 6), (u32::MAX / 2, 3)] {
             let own = PixelSampler::new(2, 3, 4, sample);
             for (i, point) in points(2, [3, 4, sample], Decision::Choice, n).enumerate() {
@@ -226,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn powers_of_two_are_stratified_and_pixels_differ() {
+    fn power_of_two_counts_are_stratified() {
         // 64 points, one in each cell of every grid of 64: 64×1, 32×2, … 1×64.
         for n in [1_u32, 16] {
             let all = (0..64 / n).flat_map(|sample| points(3, [10, 20, sample], Decision::Light(2), n));
@@ -245,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn the_second_dimension_is_sobol_s() {
+    fn second_dimension_matches_sobol() {
         // Direction numbers v₀ = ½, vₖ = vₖ₋₁ ⊕ vₖ₋₁/2.
         for index in (0..5000).chain([u32::MAX, 0x8000_0001]) {
             let (mut sum, mut direction) = (0, 1_u32 << 31);
@@ -258,8 +262,8 @@ mod tests {
     }
 
     #[test]
-    fn each_group_of_repetitions_has_one_in_each_part() {
-        // Take any 32 of a decision's repetitions, from a multiple of 32 on, for any number of groups a sample has.
+    fn aligned_repetition_groups_are_stratified() {
+        // Check every aligned group of 32 repetitions, for several numbers of groups per sample.
         for (sample, of) in [(0, 32), (5, 96), (77, 160), (1 << 27, 64)] {
             let row = SamplerRow::new(3, &[7; 16], &[9; 16], &[sample; 16]);
             let paths = std::array::from_fn(|i| i as u32);
@@ -277,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn scrambles_of_many_pixels_are_uniform() {
+    fn scrambles_are_uniform_over_pixels() {
         let (mut sums, mut product, n) = ([0.0; 2], 0.0, 40_000_u32);
         for pixel in 0..n {
             let place = [pixel % 200, pixel / 200, 7];
@@ -294,7 +298,8 @@ mod tests {
 
     #[test]
     fn decisions_are_independent() {
-        // Mean over 64 pixels of the correlation of first coordinates over a pixel's samples: a shared scramble would give 1.
+        // Mean correlation of first coordinates over a pixel's samples, for 64 pixels. A shared scramble
+        // would give 1.
         let others =
             [(0, Decision::Light(1)), (0, Decision::Choice), (1, Decision::Light(0)), (0, Decision::Pixel)];
         let (mut products, samples, pixels) = ([0.0; 4], 1024, 64);
@@ -306,7 +311,7 @@ mod tests {
             }
         }
         let count = f64::from(samples * pixels);
-        // Five times what independent pairs of numbers give at most.
+        // Five standard errors of the mean for independent pairs.
         let allowed = 5.0 / count.sqrt();
         assert!(products.iter().all(|product: &f64| (product / count).abs() < allowed), "{products:?}");
     }

@@ -1,24 +1,25 @@
-//! Warps of the unit square.
+//! Maps from the unit square to disks, triangles, cones and hemispheres.
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use crate::math::elementary::sin_cos;
 use crate::math::{Vec2, Vec3};
 
-/// A uniform point of the unit disk (Shirley and Chiu, *A Low Distortion Map Between Disk and Square*, 1997).
+/// Maps the unit square uniformly to the unit disk (Shirley and Chiu, *A Low Distortion Map Between Disk and
+/// Square*, 1997).
 #[inline(always)]
 pub fn disk(u: Vec2) -> Vec2 {
     let offset = u * 2.0 - Vec2::ONE;
     let is_wide = offset.x.abs() > offset.y.abs();
     let (radius, across) = if is_wide { (offset.x, offset.y) } else { (offset.y, offset.x) };
-    // In the middle both are 0.
+    // Both are 0 at the center.
     let part = FRAC_PI_4 * (across / if radius == 0.0 { 1.0 } else { radius });
     let (sin, cos) = sin_cos(if is_wide { part } else { FRAC_PI_2 - part });
     Vec2::new(cos, sin) * radius
 }
 
-/// Uniform barycentric weights of a triangle, with little distortion (Heitz, *A Low-Distortion Map Between
-/// Triangle and Square*, 2019).
+/// Maps the unit square to uniform barycentric coordinates (Heitz, *A Low-Distortion Map Between Triangle and
+/// Square*, 2019).
 pub fn triangle(u: Vec2) -> Vec3 {
     let (b0, b1) = if u.x < u.y {
         let b0 = u.x * 0.5;
@@ -30,7 +31,8 @@ pub fn triangle(u: Vec2) -> Vec3 {
     Vec3::new(b0, b1, 1.0 - b0 - b1)
 }
 
-/// A uniform direction in a cone about z, given 1 − cos of its half angle, which keeps its digits for narrow cones.
+/// Samples a uniform direction in a cone around z. The cone is given as 1 − cos of its half angle, which
+/// stays accurate for narrow cones.
 #[inline(always)]
 pub fn cone(u: [f32; 2], one_minus_cos_max: f32) -> Vec3 {
     let one_minus_cos = u[0] * one_minus_cos_max;
@@ -39,15 +41,17 @@ pub fn cone(u: [f32; 2], one_minus_cos_max: f32) -> Vec3 {
     Vec3::new(sin * cos_phi, sin * sin_phi, 1.0 - one_minus_cos)
 }
 
-/// A unit vector with z > 0 and density cos θ/π (Malley's method: *Physically Based Rendering*, 4th ed., section 13.6.3).
+/// Samples a direction with z > 0 and pdf cos θ/π (Malley's method: *Physically Based Rendering*, 4th ed.,
+/// section 13.6.3).
 #[inline(always)]
 pub fn cosine(u: [f32; 2]) -> Vec3 {
     let at = disk(Vec2::from_array(u));
     at.extend((1.0 - at.length_squared()).max(0.0).sqrt())
 }
 
-/// A point of the unit square with a density that is bilinear between values ≥ 0 at its corners (0, 0), (1, 0), (0, 1), (1, 1),
-/// not all 0 (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th edition, A.5.1).
+/// Samples a point of the unit square with a pdf that is bilinear between values ≥ 0 at the corners (0, 0),
+/// (1, 0), (0, 1), (1, 1), not all 0 (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th edition,
+/// A.5.1).
 #[inline(always)]
 pub fn bilinear(u: [f32; 2], corners: &[f32; 4]) -> [f32; 2] {
     let [a, b, c, d] = *corners;
@@ -55,13 +59,13 @@ pub fn bilinear(u: [f32; 2], corners: &[f32; 4]) -> [f32; 2] {
     [linear(u[0], a + (c - a) * y, b + (d - b) * y), y]
 }
 
-/// A number in [0, 1] with a density that is linear between values ≥ 0 at both ends.
+/// Samples a number in [0, 1] with a pdf that is linear between values ≥ 0 at both ends.
 #[inline(always)]
 fn linear(u: f32, first: f32, last: f32) -> f32 {
     let sum = first + last;
     let first = if sum > 0.0 { first / sum } else { 0.5 };
     let square = first * first + u * (1.0 - 2.0 * first);
-    // If both the first and u are 0, the result is 0.
+    // If both `first` and `u` are 0, the result is 0.
     (u / (first + square.max(f32::MIN_POSITIVE).sqrt())).min(1.0)
 }
 
@@ -74,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn the_disk_is_uniform() {
+    fn disk_samples_are_uniform() {
         let inner = grid().filter(|&u| disk(u).length() < 0.5).count();
         let right = grid().filter(|&u| disk(u).x > 0.0).count();
         assert_eq!(inner, 2500);
@@ -84,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn the_triangle_is_uniform() {
+    fn triangle_samples_are_uniform() {
         let mean = grid().map(triangle).sum::<Vec3>() / 10_000.0;
         assert!((mean - Vec3::splat(1.0 / 3.0)).length() < 2e-3);
         let corner = grid().filter(|&u| triangle(u).x > 0.5).count();
@@ -92,16 +96,16 @@ mod tests {
     }
 
     #[test]
-    fn the_cosine_is_the_density() {
+    fn cosine_samples_match_their_pdf() {
         let moment = |of: fn(Vec3) -> f32| grid().map(|u| of(cosine(u.to_array()))).sum::<f32>() / 1e4;
-        // ∫cos²/π, ∫cos³/π, and nothing to any side.
+        // ∫cos²/π, ∫cos³/π, and 0 along x and y.
         assert!((moment(|d| d.z) - 2.0 / 3.0).abs() < 1e-3 && (moment(|d| d.z * d.z) - 0.5).abs() < 1e-3);
         assert!(moment(|d| d.x).abs() < 1e-3 && moment(|d| d.y).abs() < 1e-3);
         assert!(grid().all(|u| (cosine(u.to_array()).length() - 1.0).abs() < 1e-6));
     }
 
     #[test]
-    fn the_cone_is_uniform_over_solid_angle_also_when_narrow() {
+    fn cone_samples_are_uniform_even_if_narrow() {
         for one_minus_cos in [2.0, 0.5, 1e-9] {
             let cone = |u: Vec2| cone(u.to_array(), one_minus_cos);
             let z = grid().map(|u| 1.0 - f64::from(cone(u).z)).sum::<f64>() / 10_000.0;
@@ -114,8 +118,8 @@ mod tests {
     }
 
     #[test]
-    fn bilinear_densities_are_met() {
-        // Shares of strips and cells by integrals of the density.
+    fn bilinear_samples_match_their_pdf() {
+        // Compare shares of strips and cells with integrals of the pdf.
         for corners in
             [[1.0, 1.0, 1.0, 1.0], [0.0, 3.0, 0.0, 1.0], [5.0, 0.0, 0.0, 0.0], [1e30, 2e30, 3e30, 0.5e30]]
         {

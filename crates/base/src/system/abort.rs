@@ -1,8 +1,8 @@
-//! The end of a process by abort(3), as after a failed allocation: glimt restores the terminal, writes a sentence, and
+//! Handles abort(3), for example after a failed allocation: glimt restores the terminal, prints a message and
 //! exits with code 1.
 //!
-//! `unsafe` code is here and in the SIMD kernels alone. Everything that runs in the handler is async-signal-safe
-//! (signal-safety(7)): no lock, no allocation.
+//! Only this module and the SIMD kernels contain `unsafe` code. Everything that runs in the handler is
+//! async-signal-safe (signal-safety(7)): it neither locks nor allocates.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::fmt::Write;
@@ -15,19 +15,19 @@ use nix::unistd::{pause, write};
 use signal_hook::consts::SIGABRT;
 use signal_hook::low_level;
 
-/// Size in bytes of the last allocation that was refused; 0 if none was.
+/// Size in bytes of the last refused allocation, or 0.
 static REFUSED_BYTES: AtomicUsize = AtomicUsize::new(0);
 
-/// Restores the terminal, by async-signal-safe calls alone.
+/// Restores the terminal, using only async-signal-safe calls.
 static GIVE_BACK: OnceLock<fn()> = OnceLock::new();
 
-/// Exit code of work that failed.
+/// Exit code for failed work.
 const FAILED: i32 = 1;
 
-/// The system's allocator, which remembers what it refused.
+/// The system allocator, extended to record refused allocations.
 pub struct Allocator;
 
-/// Remembers the size if the allocation was refused.
+/// Records `bytes` if the allocation was refused.
 #[inline(always)]
 fn noted(memory: *mut u8, bytes: usize) -> *mut u8 {
     if memory.is_null() {
@@ -63,26 +63,26 @@ unsafe impl GlobalAlloc for Allocator {
     }
 }
 
-/// Catches SIGABRT: from now on an abort ends the process with exit code 1 and a sentence on stderr.
+/// Installs the SIGABRT handler: an abort then prints a message to stderr and exits with code 1.
 ///
 /// # Errors
-/// The handler cannot be set up.
+/// The handler cannot be installed.
 pub fn catch() -> io::Result<()> {
-    // SAFETY: `last_words` makes async-signal-safe calls alone.
+    // SAFETY: `last_words` makes only async-signal-safe calls.
     unsafe { low_level::register(SIGABRT, last_words) }.map(drop)
 }
 
-/// Sets the function that restores the terminal before the sentence is written. It may only make async-signal-safe
-/// calls. The first one that is set stays.
+/// Sets the function that restores the terminal before the message is printed. It may only make
+/// async-signal-safe calls. Later calls have no effect.
 pub fn give_back_by(give_back: fn()) {
     let _ = GIVE_BACK.set(give_back);
 }
 
-/// Whether a thread is already at its last words.
+/// Whether a thread is already running the handler.
 static IS_ENDING: AtomicBool = AtomicBool::new(false);
 
-/// Restores the terminal, says why the process ends, and ends it. If memory is out, several threads abort at once: the first one
-/// speaks, the others wait until the process is gone.
+/// Restores the terminal, prints the reason and exits. Several threads may abort at once when memory runs
+/// out: the first one prints, the others wait for the process to end.
 fn last_words() {
     while IS_ENDING.swap(true, Ordering::AcqRel) {
         pause();
@@ -91,12 +91,12 @@ fn last_words() {
         give_back();
     }
     let mut sentence = Sentence::default();
-    // A sentence that does not fit is cut.
+    // A message that does not fit is truncated.
     let _ = match REFUSED_BYTES.load(Ordering::Relaxed) {
-        0 => writeln!(sentence, "error: glimt was ended by SIGABRT"),
+        0 => writeln!(sentence, "error: glimt was aborted (SIGABRT)"),
         bytes => writeln!(
             sentence,
-            "error: out of memory: {} MB more were refused; a smaller image or scene, or a higher limit (`ulimit -v`) helps",
+            "error: out of memory: an allocation of {} MB failed; use a smaller image or scene, or raise the limit (`ulimit -v`)",
             bytes.div_ceil(1_000_000)
         ),
     };
@@ -105,7 +105,7 @@ fn last_words() {
     low_level::exit(FAILED);
 }
 
-/// Text on the stack.
+/// Text buffer on the stack.
 struct Sentence {
     bytes: [u8; 256],
     length: usize,
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sentence_is_cut_where_it_does_not_fit() {
+    fn messages_that_do_not_fit_are_truncated() {
         let mut sentence = Sentence::default();
         assert!(write!(sentence, "{}", "a".repeat(200)).is_ok());
         assert!(write!(sentence, "{}", "b".repeat(100)).is_err());

@@ -1,5 +1,5 @@
-//! The operating system: its errors in plain words, characters that a terminal shows, files that have an end, priorities and
-//! processor time of threads, the end by abort.
+//! The operating system: error messages, printable characters, regular files, thread priorities, CPU time and
+//! abort handling.
 
 #[allow(unsafe_code)]
 pub mod abort;
@@ -12,16 +12,18 @@ pub mod threads;
 
 use std::io::{Error, ErrorKind};
 
-/// An error of the file system as part of a sentence: in small letters, without its number.
+/// Describes a file-system error as part of a sentence: in lower case, without the error number.
 pub fn in_words(error: &Error) -> String {
     #[cfg(unix)]
     if error.raw_os_error() == Some(nix::libc::ELOOP) {
-        return "its symbolic links lead in a circle".to_owned();
+        return "its symbolic links form a loop".to_owned();
     }
     match error.kind() {
         ErrorKind::NotADirectory => "a part of its path is a file, not a folder".to_owned(),
-        // The system did not refuse this: it never saw the name, which has a zero in it.
-        ErrorKind::InvalidInput if error.raw_os_error().is_none() => "that is no name of a file".to_owned(),
+        // The system never saw this name: it contains a NUL byte.
+        ErrorKind::InvalidInput if error.raw_os_error().is_none() => {
+            "that is not a valid file name".to_owned()
+        }
         _ => {
             let text = error.to_string();
             let mut letters = text.split(" (os error").next().unwrap_or(&text).chars();
@@ -35,14 +37,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_have_no_numbers_and_no_capitals() {
+    fn error_texts_have_no_numbers_or_capitals() {
         let said = |number: i32| in_words(&Error::from_raw_os_error(number));
         assert_eq!(said(nix::libc::ENOENT), "no such file or directory");
         assert_eq!(said(nix::libc::EACCES), "permission denied");
-        assert_eq!(said(nix::libc::ELOOP), "its symbolic links lead in a circle");
+        assert_eq!(said(nix::libc::ELOOP), "its symbolic links form a loop");
         assert_eq!(said(nix::libc::ENOTDIR), "a part of its path is a file, not a folder");
         let zero = std::fs::metadata("a\0b").expect_err("no name");
-        assert_eq!(in_words(&zero), "that is no name of a file");
+        assert_eq!(in_words(&zero), "that is not a valid file name");
         assert_eq!(in_words(&Error::other("The disk is on fire")), "the disk is on fire");
     }
 }

@@ -1,10 +1,10 @@
-//! Priorities of threads.
+//! Thread priorities.
 //!
-//! A nice value says how much a thread yields to others: with 10 more, it gets a tenth of the share when both want a
-//! processor.
+//! A nice value determines how much a thread yields to others: a value 10 higher leaves about a tenth of the
+//! share when both want the processor.
 
-/// Raises the nice value of this thread and of those that it starts from now on; outside Linux that of the whole process
-/// (nice(2), sched(7)). With 0, or if the system refuses, nothing changes.
+/// Raises the nice value of this thread and the threads it starts from now on, or of the whole process
+/// outside Linux (nice(2), sched(7)). Does nothing for 0 or if the system refuses.
 pub fn give_way(steps: u8) {
     #[cfg(unix)]
     if steps > 0 {
@@ -14,7 +14,7 @@ pub fn give_way(steps: u8) {
     let _ = steps;
 }
 
-/// Raises the nice value of this thread, if threads have one of their own; else nothing changes.
+/// Raises the nice value of this thread on systems with per-thread nice values. Does nothing elsewhere.
 pub fn give_way_alone(steps: u8) {
     if cfg!(target_os = "linux") {
         give_way(steps);

@@ -1,14 +1,14 @@
-//! Processor time.
+//! CPU time of threads and processes.
 
 use nix::time::{ClockId, clock_gettime};
 
-/// Processor seconds that this thread has used. Time of other threads, and time in which it waited, do not count. 0 if the system
-/// does not measure it.
+/// CPU seconds used by this thread, or 0 if the system does not measure them. Waiting time and other threads
+/// do not count.
 pub fn seconds_of_thread() -> f64 {
     seconds_by(ClockId::CLOCK_THREAD_CPUTIME_ID)
 }
 
-/// Processor seconds that all threads of this process have used. 0 if the system does not measure it.
+/// CPU seconds used by all threads of this process, or 0 if the system does not measure them.
 pub fn seconds_of_process() -> f64 {
     seconds_by(ClockId::CLOCK_PROCESS_CPUTIME_ID)
 }
@@ -25,11 +25,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sleep_is_no_work() {
+    fn sleeping_uses_no_cpu_time() {
         let (begin, before) = (Instant::now(), seconds_of_thread());
         std::thread::sleep(Duration::from_millis(30));
         let slept = seconds_of_thread() - before;
-        // The loop is bounded, as the system may have no such clock.
+        // Bound the loop, as the system may lack this clock.
         let worked = (0..10_000_000).any(|_| seconds_of_thread() - before > slept + 0.01);
         assert!(worked || before == 0.0, "{slept}");
         assert!(begin.elapsed().as_secs_f64() >= slept + 0.03, "{slept}");

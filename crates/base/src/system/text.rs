@@ -1,7 +1,7 @@
-//! Characters that a terminal shows as they are.
+//! Characters that terminals print unchanged.
 
-/// Whether a terminal shows this character as itself, in its place: no control character, nothing invisible, nothing
-/// that turns the direction of writing.
+/// Whether a terminal prints this character in place: it is not a control character, invisible, or a change
+/// of writing direction.
 pub fn is_plain(c: char) -> bool {
     !matches!(c,
         '\0'..='\u{1f}'

@@ -1,4 +1,4 @@
-//! Threads that the system does not start.
+//! Checks and messages for threads that the system cannot start.
 
 use std::fmt::Display;
 use std::io::Error;
@@ -7,14 +7,15 @@ use nix::sys::resource::{Resource, getrlimit};
 
 use super::in_words;
 
-/// Bytes of address space that a thread's stack takes, the default of the standard library.
+/// Address space used by a thread's stack: the standard library's default.
 const STACK_BYTES: u64 = 2 << 20;
 
-/// Fails if the stacks of so many threads are more than the process may have. Asked before the first one starts: the standard
-/// library ends the process if a thread that has started finds no room for its signal stack.
+/// Checks that the stacks of `threads` threads fit in the process's address-space limit. Must run before the
+/// first thread starts: the standard library ends the process if a started thread has no room for its signal
+/// stack.
 ///
 /// # Errors
-/// The system's error for a thread that does not start.
+/// The error that the system returns for a thread it cannot start.
 pub fn check_room(threads: usize) -> Result<(), Error> {
     let Ok((limit, _)) = getrlimit(Resource::RLIMIT_AS) else { return Ok(()) };
     if (threads as u64).saturating_mul(STACK_BYTES) > limit {
@@ -23,7 +24,8 @@ pub fn check_room(threads: usize) -> Result<(), Error> {
     Ok(())
 }
 
-/// Says why `what` could not be started, and the way out: a limit on memory (for stacks) or on the number of threads refuses it.
+/// Explains why `what` could not be started and how to fix it: raise a limit on memory (for stacks) or on the
+/// number of threads, or use fewer.
 pub fn not_started(what: &str, is_number_chosen: bool, error: &impl Display) -> String {
     let why = in_words(&Error::other(error.to_string()));
     let fewer = if is_number_chosen { "use fewer (--threads 1), or " } else { "" };
@@ -37,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_way_out_is_said() {
+    fn message_says_how_to_fix_it() {
         let error = Error::from_raw_os_error(nix::libc::EAGAIN);
         let limits = "raise the limits on memory and on processes (ulimit -v, ulimit -u)";
         assert_eq!(

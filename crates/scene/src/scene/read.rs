@@ -286,7 +286,7 @@ mod tests {
         nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
         assert!(message(&pipe).message.contains("pipe"));
         #[cfg(target_os = "linux")]
-        assert!(message(Path::new("/proc/kmsg")).message.contains("file of the kernel"));
+        assert!(message(Path::new("/proc/kmsg")).message.contains("kernel file"));
         let circle = folder.path().join("circle.toml");
         std::os::unix::fs::symlink(&circle, &circle).expect("a link");
         assert!(message(&circle).message.contains("circle"));

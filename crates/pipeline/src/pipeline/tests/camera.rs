@@ -247,7 +247,7 @@ fn a_kept_camera_keeps_the_attributes_of_the_file() {
 
 #[test]
 fn a_file_that_would_lose_something_keeps_its_camera() {
-    for (why, is_linked) in [("has other names", true), ("is read-only", false)] {
+    for (why, is_linked) in [("has other hard links", true), ("is read-only", false)] {
         let mut bench = Bench::new(SCENE);
         let path = bench.path("scene.toml");
         if is_linked {
