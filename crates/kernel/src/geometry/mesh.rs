@@ -14,6 +14,8 @@ pub struct TriangleMesh {
     pub normals: Vec<Vec3>,
     /// Vertex texture coordinates, or empty; v = 0 is the bottom row of an image.
     pub uvs: Vec<Vec2>,
+    /// How vertices share normals that are computed, or empty: then each has its own, in the group [`NormalGroup::BY_ANGLE`].
+    pub normal_groups: Vec<NormalGroup>,
     /// Second set of vertex texture coordinates, or empty.
     pub second_uvs: Vec<Vec2>,
     /// Vertex colours in sRGB, or empty.
@@ -22,6 +24,22 @@ pub struct TriangleMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Material of each triangle as an index into the file's own list, with `u32::MAX` for no material; or empty.
     pub materials: Vec<u32>,
+}
+
+/// The computed normal of a vertex.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NormalGroup {
+    /// Vertices with the same number have one normal. Less than the number of vertices in the file's order.
+    pub normal: u32,
+    /// Smoothing group. Normals at one place are joined if they are of the same group and agree within 45 degrees.
+    pub group: u32,
+}
+
+impl NormalGroup {
+    /// The group of vertices without one.
+    pub const BY_ANGLE: u32 = 0;
+    /// The group of flat faces, whose normals are joined with no others.
+    pub const FLAT: u32 = u32::MAX;
 }
 
 impl TriangleMesh {
@@ -63,6 +81,7 @@ impl TriangleMesh {
         size_of_val(self.positions.as_slice())
             + size_of_val(self.normals.as_slice())
             + size_of_val(self.uvs.as_slice())
+            + size_of_val(self.normal_groups.as_slice())
             + size_of_val(self.second_uvs.as_slice())
             + size_of_val(self.colors.as_slice())
             + size_of_val(self.triangles.as_slice())

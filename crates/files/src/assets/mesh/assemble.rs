@@ -10,7 +10,7 @@ use super::places::shared;
 use super::polygon::triangulate;
 use crate::assets::{AssetError, Dropped, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::mesh::TriangleMesh;
+use crate::geometry::mesh::{NormalGroup, TriangleMesh};
 use crate::math::origin::origin_near;
 use crate::math::{DVec3, Vec2, Vec3};
 
@@ -66,12 +66,13 @@ impl Faces {
     }
 }
 
-/// A mesh file's numbers. `normals`, `uvs`, `second_uvs` and `colors` are empty or one for each position; a normal of zero is missing.
+/// A mesh file's numbers. `normals`, `normal_groups`, `uvs`, `second_uvs` and `colors` are empty or one for each position; a normal of zero is missing.
 /// `face_materials` is empty or one for each face.
 #[derive(Debug, Default)]
 pub(in crate::assets) struct Parsed {
     pub(in crate::assets) positions: Vec<DVec3>,
     pub(in crate::assets) normals: Vec<Vec3>,
+    pub(in crate::assets) normal_groups: Vec<NormalGroup>,
     pub(in crate::assets) uvs: Vec<Vec2>,
     pub(in crate::assets) second_uvs: Vec<Vec2>,
     /// In sRGB.
@@ -87,6 +88,33 @@ pub(in crate::assets) struct Parsed {
     pub(in crate::assets) pictures: Vec<PathBuf>,
 }
 
+/// The range of the colors of a file whose format does not say it: 0 to 1, or 0 to 255.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::assets) struct ColorRange {
+    greatest: f64,
+    has_fractions: bool,
+}
+
+impl ColorRange {
+    pub(in crate::assets) fn add(&mut self, parts: [f64; 3]) {
+        for part in parts.into_iter().filter(|part| part.is_finite()) {
+            self.greatest = self.greatest.max(part);
+            self.has_fractions |= part.fract() != 0.0;
+        }
+    }
+
+    /// The number that stands for 1. Fractions up to 2 are colors brighter than 1.
+    pub(in crate::assets) fn one(&self) -> f64 {
+        let are_bytes = self.greatest > 2.0 || (self.greatest > 1.0 && !self.has_fractions);
+        if are_bytes { 255.0 } else { 1.0 }
+    }
+
+    /// A color of this range in bytes.
+    pub(in crate::assets) fn bytes(&self, parts: [f64; 3]) -> [u8; 3] {
+        color_bytes(parts.map(|part| part / self.one()))
+    }
+}
+
 /// A vertex colour of parts from 0 to 1 in sRGB, in bytes; what is not a number is 0.
 pub(in crate::assets) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
     parts.map(|part| (part.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
@@ -97,6 +125,7 @@ pub(in crate::assets) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result
     let Parsed {
         positions,
         normals,
+        normal_groups,
         uvs,
         second_uvs,
         colors,
@@ -125,6 +154,7 @@ pub(in crate::assets) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result
         origin,
         positions,
         normals,
+        normal_groups,
         uvs,
         second_uvs,
         colors,
@@ -292,6 +322,7 @@ fn drop_unused_vertices(mesh: &mut TriangleMesh) {
     }
     retain_used(&mut mesh.positions, &new_index);
     retain_used(&mut mesh.normals, &new_index);
+    retain_used(&mut mesh.normal_groups, &new_index);
     retain_used(&mut mesh.uvs, &new_index);
     retain_used(&mut mesh.second_uvs, &new_index);
     retain_used(&mut mesh.colors, &new_index);

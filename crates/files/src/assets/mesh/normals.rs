@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::places;
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::mesh::TriangleMesh;
+use crate::geometry::mesh::{NormalGroup, TriangleMesh};
 use crate::math::{DVec3, Vec3};
 
 /// Least cosine between normals of one surface: vertices at one place belong together if their own normals agree within
@@ -21,18 +21,37 @@ const COMPARED: usize = 64;
 const BATCH: usize = 1 << 16;
 
 /// A unit normal for each vertex, weighted by angle, on the front side of the faces around it. Vertices that the file
-/// separates at one place get one normal if their own agree within 45 degrees. If faces cancel each other, the vertex
+/// separates at one place get one normal if they are of one [`NormalGroup`] and their own normals agree within 45 degrees. If faces cancel each other, the vertex
 /// gets one face's normal. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Vec3>, Cancelled> {
-    let sums = weighted_sums(mesh, token)?;
-    let groups = places::shared(&mesh.positions, token)?;
+    let mut sums = weighted_sums(mesh, token)?;
+    let groups = &mesh.normal_groups;
+    let firsts = first_of_each_normal(groups);
+    for (vertex, first) in firsts.iter().enumerate().filter(|(vertex, first)| vertex != *first) {
+        let own = std::mem::take(&mut sums[vertex]);
+        sums[*first] += own;
+    }
+    let places = places::shared(&mesh.positions, token)?;
     let mut joined = sums.clone();
-    for group in &groups {
+    for place in &places {
         token.check()?;
-        join(group, &sums, &mut joined);
+        if groups.is_empty() {
+            join(place, &sums, &mut joined);
+        } else {
+            let group = |vertex: &u32| groups[*vertex as usize].group;
+            let is_joined = |vertex: &&u32| {
+                firsts[**vertex as usize] == **vertex as usize && group(vertex) != NormalGroup::FLAT
+            };
+            let mut place: Vec<u32> = place.iter().filter(is_joined).copied().collect();
+            place.sort_by_key(group);
+            place.chunk_by(|a, b| group(a) == group(b)).for_each(|place| join(place, &sums, &mut joined));
+        }
+    }
+    for (vertex, first) in firsts.into_iter().enumerate() {
+        joined[vertex] = joined[first];
     }
     let mut normals = vec![Vec3::ZERO; sums.len()];
     for (normals, sums) in normals.chunks_mut(BATCH).zip(joined.chunks(BATCH)) {
@@ -46,19 +65,34 @@ pub fn vertex_normals(mesh: &TriangleMesh, token: &CancelToken) -> Result<Vec<Ve
     Ok(normals)
 }
 
+/// The first vertex that has the normal of each vertex; empty without groups.
+fn first_of_each_normal(groups: &[NormalGroup]) -> Vec<usize> {
+    let numbers = groups.iter().map(|group| group.normal as usize + 1).max().unwrap_or(0);
+    let mut firsts = vec![usize::MAX; numbers];
+    let first_of = |(vertex, group): (usize, &NormalGroup)| {
+        let first = &mut firsts[group.normal as usize];
+        *first = vertex.min(*first);
+        *first
+    };
+    groups.iter().enumerate().map(first_of).collect()
+}
+
 /// Whether a mesh without normals is of flat faces, as a box is: the normals of the faces around most vertices cancel in part.
 pub(in crate::assets) fn is_faceted(mesh: &TriangleMesh) -> bool {
     /// Least length of the mean of the unit normals around a vertex of a smooth surface: a cone of 32 degrees about them.
     const LEAST: f32 = 0.85;
-    if !mesh.normals.is_empty() {
+    let groups = &mesh.normal_groups;
+    if !mesh.normals.is_empty() || groups.iter().any(|group| group.group != NormalGroup::BY_ANGLE) {
         return false;
     }
+    let firsts = first_of_each_normal(groups);
     let mut sums = vec![(Vec3::ZERO, 0_u32); mesh.positions.len()];
     for corners in &mesh.triangles {
         let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize]);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         for corner in corners {
-            let (sum, count) = &mut sums[*corner as usize];
+            let vertex = firsts.get(*corner as usize).copied().unwrap_or(*corner as usize);
+            let (sum, count) = &mut sums[vertex];
             *sum += normal;
             *count += 1;
         }

@@ -1,121 +1,155 @@
-//! OBJ by `tobj`, which makes one index of the three that a corner has. Faults that it accepts or cannot report are
-//! checked here.
+//! OBJ (Wavefront, *Object Files*, 1995): polygons with an index of their own for each part of a corner, which become vertices
+//! with one index. `tobj` reads the material libraries.
 
-mod fault;
-mod input;
+mod build;
 mod libraries;
+mod statements;
+mod vertex;
+mod words;
 
 use std::cell::RefCell;
+use std::collections::{BTreeSet, HashMap};
+use std::path::Path;
 
-use super::assemble::{Parsed, assemble, color_bytes};
+use super::assemble::{Parsed, assemble};
 use super::text::with_line_feeds;
 use super::{AssetError, LoadedMesh, Source};
 use crate::assets::FileMaterial;
 use crate::assets::contain::contain;
-use crate::math::{DVec2, DVec3, Vec2, Vec3};
-use fault::first_fault;
-use input::{Chunks, Survey};
+use build::{Run, build};
 use libraries::{Found, Libraries};
-
-/// Options that leave faces as they are: this program cuts polygons, and counts points and lines among the faces.
-const OPTIONS: tobj::LoadOptions =
-    tobj::LoadOptions { single_index: true, triangulate: false, ignore_points: false, ignore_lines: false };
+use statements::{Change, Corner, NONE, Smoothing, Statements, face_start};
 
 pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
     parse_lines(&Source { bytes: &with_line_feeds(source.bytes), ..*source })
 }
 
 fn parse_lines(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
-    let survey = Survey::of(source.bytes, source.watch.token)?;
-    let used = &survey.used_materials;
-    let libraries = Libraries { source, used, found: RefCell::default(), failed: RefCell::default() };
-    let mut reader = Chunks::new(source, &survey.text);
-    let result = contain(|| tobj::load_obj_buf(&mut reader, &OPTIONS, |name| libraries.load(name)));
-    source.watch.token.check()?;
-    if let Some(error) = libraries.failed.into_inner() {
-        return Err(error);
-    }
-    let Ok(Ok((models, materials))) = result else {
-        let reason = match result {
-            Ok(Err(error)) => error.to_string(),
-            Err(panic) => panic,
-            Ok(Ok(_)) => String::new(),
-        };
-        return Err(first_fault(source).unwrap_or_else(|| source.wrong(reason)));
+    let mut statements = Statements::read(source)?;
+    let materials = Materials::of(source, &statements.changes)?;
+    let runs = runs(&statements, &materials.used);
+    let mut parsed = Parsed {
+        materials: materials.all,
+        material_warnings: materials.warnings,
+        companions: materials.found.files,
+        pictures: materials.found.pictures,
+        warnings: std::mem::take(&mut statements.warnings),
+        ..Parsed::default()
     };
-    let Found { materials: known, resolved, warnings: mut material_warnings, missing, files, pictures } =
-        libraries.found.into_inner();
-    let materials: Vec<FileMaterial> = materials.map_or(Vec::new(), |found| {
-        found.iter().filter_map(|material| known.get(&material.name).cloned()).collect()
-    });
-    if !missing {
-        let unknown = used.difference(&resolved);
-        material_warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
-    }
-    let mut parsed =
-        Parsed { materials, material_warnings, companions: files, pictures, ..Parsed::default() };
-    join(&models, &mut parsed);
+    build(&statements, &runs, &mut parsed);
+    parsed.warnings.extend(gaps(source, &statements, &runs));
+    drop(statements);
     assemble(source, parsed)
 }
 
-/// Joins the models (one for each object, group and material) into one mesh.
-fn join(models: &[tobj::Model], parsed: &mut Parsed) {
-    let vertices = |model: &tobj::Model| model.mesh.positions.len() / 3;
-    let any_uvs = models.iter().any(|model| !model.mesh.texcoords.is_empty());
-    let any_normals = models.iter().any(|model| !model.mesh.normals.is_empty());
-    let any_colors = models.iter().any(|model| !model.mesh.vertex_color.is_empty());
-    let any_materials = models.iter().any(|model| model.mesh.material_id.is_some());
-    for model in models {
-        let mesh = &model.mesh;
-        let base = parsed.positions.len() as u32;
-        let end = parsed.positions.len() + vertices(model);
-        parsed.positions.extend(mesh.positions.chunks_exact(3).map(DVec3::from_slice));
-        if any_uvs && whole(mesh.texcoords.len(), 2 * vertices(model), model, "texture coordinates", parsed) {
-            parsed.uvs.extend(mesh.texcoords.chunks_exact(2).map(|uv| DVec2::from_slice(uv).as_vec2()));
+/// The materials of an OBJ.
+struct Materials {
+    all: Vec<FileMaterial>,
+    /// The material of each `usemtl` statement, [`NONE`] without one.
+    used: Vec<u32>,
+    warnings: Vec<String>,
+    found: Found,
+}
+
+impl Materials {
+    /// Loads the libraries and looks up the materials. A library counts from its statement on, and before it for names that no
+    /// earlier library has.
+    fn of(source: &Source<'_>, changes: &[(usize, Change)]) -> Result<Self, AssetError> {
+        let name_of = |change: &Change| match change {
+            Change::Material(name) if !name.is_empty() => Some(name.clone()),
+            Change::Material(_) | Change::Library(_) | Change::Object | Change::Smoothing(_) => None,
+        };
+        let names: BTreeSet<String> = changes.iter().filter_map(|(_, change)| name_of(change)).collect();
+        let libraries =
+            Libraries { source, used: &names, found: RefCell::default(), failed: RefCell::default() };
+        let mut known = HashMap::new();
+        let mut loaded = Vec::new();
+        let mut used = Vec::new();
+        for (_, change) in changes {
+            match change {
+                Change::Library(name) => {
+                    let result = contain(|| libraries.load(Path::new(name)));
+                    source.watch.token.check()?;
+                    if let Some(error) = libraries.failed.take() {
+                        return Err(error);
+                    }
+                    let result = result.map_err(|panic| source.wrong(panic))?;
+                    let (materials, places) = result.map_err(|error| source.wrong(error.to_string()))?;
+                    known.extend(places.into_iter().map(|(name, place)| (name, place + loaded.len())));
+                    loaded.extend(materials);
+                }
+                Change::Material(name) => used.push((name, known.get(name).copied())),
+                Change::Object | Change::Smoothing(_) => {}
+            }
         }
-        if any_normals && whole(mesh.normals.len(), 3 * vertices(model), model, "normals", parsed) {
-            let normals = mesh.normals.chunks_exact(3).map(|normal| DVec3::from_slice(normal).as_vec3());
-            parsed.normals.extend(normals);
+        let place = |(name, found): (&String, Option<usize>)| found.or_else(|| known.get(name).copied());
+        let used = used.into_iter().map(|used| place(used).map_or(NONE, |place| place as u32)).collect();
+        let mut found = libraries.found.into_inner();
+        let mut warnings = std::mem::take(&mut found.warnings);
+        if !found.missing {
+            let unknown = names.difference(&found.resolved);
+            warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
         }
-        if any_colors {
-            let colors = mesh.vertex_color.chunks_exact(3).map(DVec3::from_slice);
-            parsed.colors.extend(colors.map(|color| color_bytes(color.to_array())));
-        }
-        parsed.colors.resize(if any_colors { end } else { 0 }, [u8::MAX; 3]);
-        parsed.uvs.resize(if any_uvs { end } else { 0 }, Vec2::ZERO);
-        parsed.normals.resize(if any_normals { end } else { 0 }, Vec3::ZERO);
-        add_faces(mesh, base, parsed);
-        if any_materials {
-            let material = mesh.material_id.map_or(u32::MAX, |id| id as u32);
-            parsed.face_materials.resize(parsed.faces.len(), material);
-        }
+        let material = |material: &tobj::Material| found.materials.get(&material.name).cloned();
+        let all = loaded.iter().filter_map(material).collect();
+        Ok(Self { all, used, warnings, found })
     }
 }
 
-/// Whether every corner of a model has the attribute; `tobj` drops gaps, so that a part cannot be assigned.
-fn whole(found: usize, wanted: usize, model: &tobj::Model, what: &str, parsed: &mut Parsed) -> bool {
-    if found != wanted && found > 0 {
-        let name = &model.name;
-        parsed
-            .warnings
-            .push(format!("some corners of {name:?} have {what} and some have none: ignored there"));
+/// Divides the faces into runs at every change.
+fn runs(statements: &Statements, materials: &[u32]) -> Vec<Run> {
+    let mut materials = materials.iter();
+    let mut runs = vec![Run { faces: 0, material: NONE, smoothing: Smoothing::Unsaid, is_object: false }];
+    let mut before = 0;
+    let end = statements.arities.len();
+    for (faces, change) in
+        statements.changes.iter().map(|(at, change)| (*at, Some(change))).chain([(end, None)])
+    {
+        let Some(last) = runs.last_mut() else { continue };
+        last.faces = faces - before;
+        let mut next = Run { faces: 0, is_object: false, ..*last };
+        before = faces;
+        match change {
+            Some(Change::Object) => next.is_object = true,
+            Some(Change::Material(_)) => {
+                next.material = materials.next().copied().unwrap_or(NONE);
+                next.is_object = next.material != last.material;
+            }
+            Some(Change::Smoothing(smoothing)) => next.smoothing = *smoothing,
+            Some(Change::Library(_)) | None => {}
+        }
+        runs.push(next);
     }
-    found == wanted
+    runs
 }
 
-fn add_faces(mesh: &tobj::Mesh, base: u32, parsed: &mut Parsed) {
-    let mut corners = mesh.indices.iter();
-    let triangles = mesh.indices.len() / 3;
-    let arities: &mut dyn Iterator<Item = usize> = if mesh.face_arities.is_empty() {
-        parsed.faces.reserve(triangles);
-        &mut std::iter::repeat_n(3, triangles)
-    } else {
-        &mut mesh.face_arities.iter().map(|arity| *arity as usize)
+/// Warns of objects in which some corners have texture coordinates and others have none.
+fn gaps(source: &Source<'_>, statements: &Statements, runs: &[Run]) -> Option<String> {
+    let (mut face, mut corner) = (0, 0);
+    let (mut first, mut count) = (None, 0);
+    for object in runs.chunk_by(|_, next| !next.is_object) {
+        let (mut lacking, mut has_some) = (Vec::new(), false);
+        for _ in 0..object.iter().map(|run| run.faces).sum() {
+            let end = corner + statements.arities[face] as usize;
+            let has_uvs = |corner: &Corner| corner[1] != NONE;
+            let corners = &statements.corners[corner..end];
+            has_some |= corners.iter().any(has_uvs);
+            if !corners.iter().all(has_uvs) {
+                lacking.push(face);
+            }
+            (face, corner) = (face + 1, end);
+        }
+        if has_some {
+            first = first.or(lacking.first().copied());
+            count += lacking.len();
+        }
+    }
+    let line = source.line(face_start(source, first?));
+    let faces = match count {
+        1 => format!("line {line}: a face has"),
+        _ => format!("line {line} and {} more faces have", count - 1),
     };
-    for arity in arities {
-        corners.by_ref().take(arity).for_each(|corner| parsed.faces.corner(base + corner));
-        parsed.faces.close(arity);
-    }
+    Some(format!("{faces} corners without texture coordinates: (0, 0) is used there"))
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@ use super::*;
 use crate::assets::Dropped;
 use crate::assets::mesh::load;
 use crate::control::{CancelToken, unwatched};
+use crate::math::{Vec2, Vec3};
 use std::fs;
 
 fn read_with(files: &[(&str, &[u8])]) -> Result<LoadedMesh, AssetError> {
@@ -82,13 +83,10 @@ fn groups_without_normals_get_them_when_others_have_some() {
     let text = format!("{SQUARE}vn 0 0 -1\no one\nf 1//1 2//1 3//1\no two\nf 1 3 4\n");
     let mesh = read(&text).expect("whole").mesh;
     assert_eq!(mesh.normals, [Vec3::NEG_Z, Vec3::NEG_Z, Vec3::NEG_Z, Vec3::Z, Vec3::Z, Vec3::Z]);
-    let mixed = format!("{SQUARE}vt 0 1\no one\nf 1/1 2 3\n");
-    let loaded = read(&mixed).expect("whole");
-    assert!(loaded.warnings[0].contains("\"one\"") && loaded.mesh.uvs.iter().all(|uv| *uv == Vec2::ZERO));
 }
 
 #[test]
-fn what_tobj_accepts_is_dropped_and_counted() {
+fn unusable_faces_are_dropped_and_counted() {
     let text = format!("{SQUARE}v nan 0 0\nv 1e999 0 0\nf 1 2 3\nf 1 2 5\nf 1 2 6\nf 1 2\nf 1\nf 1 1 2\n");
     let loaded = read(&text).expect("one face is good");
     assert_eq!(loaded.dropped, Dropped { non_finite: 2, degenerate: 3 });
@@ -160,24 +158,180 @@ fn keywords_may_be_indented_and_followed_by_tabs() {
 }
 
 #[test]
-fn colours_and_weights_behind_coordinates() {
-    // Some vertices with a colour, some without.
-    let text = "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 1 1 1 # white\nf 1 2 3\n";
-    let mesh = read(text).expect("whole").mesh;
-    assert_eq!((mesh.positions[2], mesh.colors.len()), (Vec3::Y, 0));
-    // All of them with a colour, and corners that differ in texture coordinates.
-    let text = "v 0 0 0 1 0 0\nv 1 0 0 0 0.2 0\nv 0 1 0 1 1 1 # white\nvt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/2 3/1 2/1\n";
-    let mesh = read(text).expect("whole").mesh;
-    assert_eq!(mesh.colors, [[255, 0, 0], [0, 51, 0], [255, 255, 255], [255, 0, 0]]);
-    // Words are no colours.
-    let text = "v 0 0 0 a b c\nv 1 0 0 a b c\nv 0 1 0 a b c\nf 1 2 3\n";
-    assert_eq!(read(text).expect("whole").mesh.colors.len(), 0);
-    assert_eq!(
-        read("v 0 0 0 2\nv 1 0 0 2\nv 0 1 0 0.5\nf 1 2 3\n").expect("whole").mesh.positions[2],
-        Vec3::Y * 2.0
-    );
+fn weights_divide_coordinates() {
+    for tail in ["2", "2 9 9 9 1"] {
+        let text = format!("v 0 0 0 {tail}\nv 1 0 0 {tail}\nv 0 1 0 0.5\nf 1 2 3\n");
+        let mesh = read(&text).expect("whole").mesh;
+        assert_eq!(mesh.positions, [Vec3::ZERO, Vec3::X * 0.5, Vec3::Y * 2.0]);
+    }
     assert_eq!(says("v 0 0 0\nv 1 0 0 0\nv 0 1 0\nf 1 2 3\n"), ":2: the weight of a vertex is 0");
-    assert_eq!(says("v 0 0 0 1 0\n"), ":1: coordinates are followed by one weight or three colours");
+    assert_eq!(says("v 0 0 0 1 0\n"), ":1: coordinates are followed by one weight or three colors");
+}
+
+#[test]
+fn colors_follow_coordinates_in_every_dialect() {
+    let colors = |tails: [&str; 3]| {
+        let [a, b, c] = tails;
+        let text = format!("v 0 0 0 {a}\nv 1 0 0 {b}\nv 0 1 0 {c} # x\nf 1 2 3\n");
+        let loaded = read(&text).unwrap_or_else(|error| panic!("{error}: {text}"));
+        assert_eq!(loaded.mesh.positions, [Vec3::ZERO, Vec3::X, Vec3::Y], "{text}");
+        (loaded.mesh.colors, loaded.warnings)
+    };
+    let plain = [[255, 0, 0], [0, 51, 0], [255; 3]];
+    assert_eq!(colors(["1 0 0", "0 0.2 0", "1 1 1"]), (plain.to_vec(), vec![]));
+    assert_eq!(colors(["255 0 0", "0 51 0", "255 255 255"]), (plain.to_vec(), vec![]));
+    // An alpha, or a weight and an alpha, which say nothing.
+    assert_eq!(colors(["1 0 0 1", "0 0.2 0 1", "1 1 1 1"]), (plain.to_vec(), vec![]));
+    assert_eq!(colors(["1 1 0 0 1", "1 0 0.2 0 1", "1 1 1 1 1"]), (plain.to_vec(), vec![]));
+    // A missing color is white.
+    assert_eq!(colors(["1 0 0", "0 0.2 0", ""]), (plain.to_vec(), vec![]));
+    assert_eq!(colors(["", "0 51 0", "1 1 1"]).0, [[255; 3], [0, 51, 0], [1; 3]]);
+    // Colors slightly above 1 are no bytes.
+    assert_eq!(colors(["1.5 0 0", "0 0.2 0", "1 1 1"]).0, plain);
+    assert_eq!(colors(["", "", ""]), (vec![], vec![]));
+    let ignored = vec!["line 1: a vertex has more than coordinates and a color: ignored".to_owned()];
+    assert_eq!(colors(["a b c", "a b c", "a b c"]), (vec![], ignored.clone()));
+    assert_eq!(colors(["1 0 0 1 1 1", "0 0.2 0", ""]), (plain.to_vec(), ignored));
+    let faded = vec!["the alpha of the vertex colors is ignored".to_owned()];
+    assert_eq!(colors(["1 0 0 1", "0 0.2 0 0.5", "1 1 1 1"]), (plain.to_vec(), faded));
+}
+
+#[test]
+fn colors_of_some_objects_stay_with_them() {
+    let text = "o a\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0 1\no b\nv 0 0 1\nf 2 3 4\no a\nf 1 2 3\n";
+    let mesh = read(text).expect("whole").mesh;
+    let red = [255, 0, 0];
+    assert_eq!(mesh.colors, [red, [0, 0, 255], [255; 3], red, red, [0, 0, 255]]);
+}
+
+#[test]
+fn painted_comments_give_colors() {
+    let square =
+        |paint: &str| read(&format!("{SQUARE}#MRGB {paint}\nf 1 2 3 4\n")).expect("whole").mesh.colors;
+    assert_eq!(
+        square("ffff0000ff00ff00ff0000ffff010203"),
+        [[255, 0, 0], [0, 255, 0], [0, 0, 255], [1, 2, 3]]
+    );
+    assert_eq!(square("ffff0000\n#MRGB 00010203"), [[255, 0, 0], [1, 2, 3], [255; 3], [255; 3]]);
+    assert_eq!(square("none"), Vec::<[u8; 3]>::new());
+}
+
+/// Two squares that meet at a right angle along the edge from (1, 0, 0) to (1, 1, 0).
+const CORNER: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 -1\nv 1 1 -1\n";
+
+/// Normals of the corners of two faces.
+fn shaded(text: &str) -> Vec<Vec3> {
+    let mesh = read(text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh;
+    let normals = crate::assets::mesh::vertex_normals(&mesh, &CancelToken::new()).expect("nobody cancels");
+    let normals = if mesh.normals.is_empty() { normals } else { mesh.normals.clone() };
+    mesh.triangles.as_flattened().iter().map(|vertex| normals[*vertex as usize]).collect()
+}
+
+#[test]
+fn smoothing_groups_decide_which_edges_are_hard() {
+    let with = |a: &str, b: &str| shaded(&format!("{CORNER}{a}\nf 1 2 3\n{b}\nf 3 2 5\n"));
+    let flat = [Vec3::Z, Vec3::Z, Vec3::Z, Vec3::X, Vec3::X, Vec3::X];
+    for (a, b) in [
+        ("s off", ""),
+        ("s 0", ""),
+        ("s 1", "s 2"),
+        ("s", ""),
+        ("s OFF", "o b"),
+        ("s off", "s 3"),
+        ("s 7", "s 0"),
+    ] {
+        assert_eq!(with(a, b), flat, "{a:?}, {b:?}");
+    }
+    let smooth = with("", "");
+    assert_ne!(smooth, flat);
+    // A group continues through objects and materials, and may be named in several places.
+    for (a, b) in
+        [("s 1", ""), ("s on", "s 1"), ("s 1", "o b"), ("s 1", "g b\nusemtl b"), ("s 2", "s 1\ns 2")]
+    {
+        assert_eq!(with(a, b), smooth, "{a:?}, {b:?}");
+    }
+    let textured = |s: &str| shaded(&format!("{CORNER}vt 0 0\nvt 1 1\n{s}\nf 1/1 2/1 3/1\nf 3/2 2/2 5/2\n"));
+    assert_eq!(textured("s 1"), smooth, "a seam of the texture is no edge");
+    assert_eq!(textured("s off"), flat);
+    let loaded = read(&format!("{CORNER}s 1\ns sharp\nf 1 2 3\n")).expect("whole");
+    assert_eq!(loaded.warnings, ["line 8: expected a smoothing group or `off`, found \"sharp\": ignored"]);
+}
+
+#[test]
+fn flat_faces_are_flat_where_others_nearly_agree() {
+    // A fold of 11 degrees, across which the vertices of smooth faces share normals.
+    let fold = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\n";
+    let normals = shaded(&format!("{fold}s off\nf 1 2 3 4\nf 2 5 3\n"));
+    assert_eq!(normals[..6], [Vec3::Z; 6]);
+    assert!(normals[6..].iter().all(|normal| *normal == normals[6] && normal.x < 0.0), "{normals:?}");
+    let hard = shaded(&format!("{fold}s 1\nf 1 2 3 4\ns 2\nf 2 5 3\n"));
+    assert_eq!(hard, normals);
+    // Vertices apart at one place are joined in a group, where their normals nearly agree.
+    let apart = fold.to_owned() + "v 1 0 0\nv 1 1 0\n";
+    let joined = shaded(&format!("{apart}s 1\nf 1 2 3 4\nf 6 5 7\n"));
+    assert_eq!(joined, shaded(&format!("{fold}f 1 2 3 4\nf 2 5 3\n")));
+    assert_eq!(shaded(&format!("{apart}s 1\nf 1 2 3 4\ns 2\nf 6 5 7\n")), normals);
+}
+
+#[test]
+fn smoothing_groups_leave_the_files_own_normals_alone() {
+    let normals = shaded(&format!("{CORNER}vn 0 1 0\ns off\nf 1//1 2//1 3//1\nf 3 2 5\n"));
+    assert_eq!(normals, [Vec3::Y, Vec3::Y, Vec3::Y, Vec3::X, Vec3::X, Vec3::X]);
+}
+
+#[test]
+fn each_corner_keeps_the_texture_coordinates_that_it_has() {
+    let head = format!("{SQUARE}vt 0.25 0.5\nvt 1 0\nvt 0 1\n");
+    let uvs = |faces: &str| {
+        let loaded = read(&format!("{head}{faces}")).expect("whole");
+        let mesh = &loaded.mesh;
+        let corners = mesh.triangles.as_flattened().iter().map(|vertex| mesh.uvs[*vertex as usize]);
+        (corners.collect::<Vec<_>>(), loaded.warnings)
+    };
+    let [a, b, c] = [Vec2::new(0.25, 0.5), Vec2::X, Vec2::Y];
+    let none = [Vec2::ZERO; 3];
+    let warns =
+        |lines: &str| vec![format!("{lines} corners without texture coordinates: (0, 0) is used there")];
+    let (found, warnings) = uvs("f 1 2 3\nf 1/1 3/2 4/3\nf 1 2 3\n");
+    assert_eq!(found, [none, [a, b, c], none].concat());
+    assert_eq!(warnings, warns("line 8 and 1 more faces have"));
+    let (found, warnings) = uvs("f 1/1 2/2 3\n");
+    assert_eq!((found, warnings), (vec![a, b, Vec2::ZERO], warns("line 8: a face has")));
+    // Objects without any are nothing to warn of.
+    let (found, warnings) = uvs("o one\nf 1 2 3\no two\nf 1/1 3/2 4/3\n");
+    assert_eq!((found, warnings), ([none, [a, b, c]].concat(), vec![]));
+}
+
+#[test]
+fn each_corner_keeps_the_normal_that_it_has() {
+    let text = format!("{SQUARE}vn 0 0 -1\nvn 0 1 0\nf 1//1 2//2 3\nf 1 3 4//2\n");
+    let mesh = read(&text).expect("whole").mesh;
+    let corners: Vec<Vec3> =
+        mesh.triangles.as_flattened().iter().map(|v| mesh.normals[*v as usize]).collect();
+    assert_eq!(corners, [Vec3::NEG_Z, Vec3::Y, Vec3::Z, Vec3::Z, Vec3::Z, Vec3::Y]);
+}
+
+#[test]
+fn a_face_may_precede_its_vertices() {
+    let mesh = read(&format!("f 1 2 3\n{SQUARE}f -4 -2 -1\n")).expect("whole").mesh;
+    assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(says(&format!("f 1 2 5\n{SQUARE}")), ":1: vertex 5 is out of range: there are 4, from 1");
+    assert_eq!(says(&format!("f -1 2 3\n{SQUARE}")), ":1: vertex -1 is out of range: there are 0, from 1");
+}
+
+#[test]
+fn a_library_may_follow_its_use() {
+    let text = format!("{SQUARE}usemtl red\nf 1 2 3\nmtllib a.mtl\n");
+    let files = [("a.obj", text.as_bytes()), ("a.mtl", &b"newmtl green\nnewmtl red\nKd 1 0 0\n"[..])];
+    let loaded = read_with(&files).expect("whole");
+    assert_eq!(loaded.mesh.materials, [1]);
+    assert!(loaded.material_warnings.is_empty(), "{:?}", loaded.material_warnings);
+}
+
+#[test]
+fn free_form_surfaces_are_named() {
+    let loaded = read(&format!("{SQUARE}f 1 2 3\ncstype bezier\nsurf 0 1 0 1 1 2 3 4\n")).expect("a face");
+    assert_eq!(loaded.warnings, ["line 7: free-form curves and surfaces (`surf`) are left out"]);
 }
 
 #[test]
@@ -261,13 +415,5 @@ fn a_usemtl_without_a_name_ends_the_material() {
 #[test]
 fn a_colour_that_is_no_number_has_its_line() {
     let said = says("v 0 0 0 1 1 1\nv 1 0 0 nan nan nan\nv 0 1 0 1 1 1\nf 1 2 3\n");
-    assert_eq!(said, ":2: the colours of a vertex are finite numbers");
-}
-
-#[test]
-fn a_survey_heeds_the_token() {
-    let token = CancelToken::new();
-    assert!(Survey::of(b"f 1 2 3\n", &token).is_ok());
-    token.cancel();
-    assert!(Survey::of(b"f 1 2 3\n", &token).is_err());
+    assert_eq!(said, ":2: the colors of a vertex are finite numbers");
 }

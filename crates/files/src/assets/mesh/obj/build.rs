@@ -1,0 +1,115 @@
+//! From the statements of an OBJ to vertices with one index.
+
+use std::collections::HashMap;
+
+use super::super::assemble::Parsed;
+use super::statements::{Corner, NONE, Smoothing, Statements};
+use crate::geometry::mesh::NormalGroup;
+use crate::math::{Vec2, Vec3};
+
+/// Consecutive faces that share the statements before them.
+pub(super) struct Run {
+    /// Number of faces.
+    pub(super) faces: usize,
+    pub(super) material: u32,
+    pub(super) smoothing: Smoothing,
+    /// Whether an object, a group or a material begins here, with vertices of its own.
+    pub(super) is_object: bool,
+}
+
+/// Adds the faces of all runs. A corner becomes a vertex for each combination of its indices in an object.
+pub(super) fn build(statements: &Statements, runs: &[Run], parsed: &mut Parsed) {
+    let has = |part: usize| statements.corners.iter().any(|corner| corner[part] != NONE);
+    let smooths = |run: &Run| run.faces > 0 && run.smoothing != Smoothing::Unsaid;
+    let mut builder = Builder {
+        statements,
+        has_uvs: has(1),
+        has_normals: has(2),
+        has_colors: statements.vertices.has_colors(),
+        has_smoothing: runs.iter().any(smooths),
+        has_materials: runs.iter().any(|run| run.material != NONE),
+        vertices: HashMap::new(),
+        normals: HashMap::new(),
+        parsed,
+        face: 0,
+        corner: 0,
+    };
+    runs.iter().for_each(|run| builder.run(run));
+}
+
+/// Smoothing group of a vertex, and for a flat one the number of its face from 1.
+type Tag = (u32, u32);
+
+struct Builder<'a> {
+    statements: &'a Statements,
+    has_uvs: bool,
+    has_normals: bool,
+    has_colors: bool,
+    has_smoothing: bool,
+    has_materials: bool,
+    /// Vertices of the current object.
+    vertices: HashMap<(Corner, Tag), u32>,
+    /// Normal of each position in a smoothing group, in all objects.
+    normals: HashMap<(u32, u32), u32>,
+    parsed: &'a mut Parsed,
+    face: usize,
+    corner: usize,
+}
+
+impl Builder<'_> {
+    fn run(&mut self, run: &Run) {
+        if run.is_object {
+            self.vertices.clear();
+        }
+        for _ in 0..run.faces {
+            let arity = self.statements.arities[self.face] as usize;
+            self.face += 1;
+            for corner in &self.statements.corners[self.corner..self.corner + arity] {
+                let vertex = self.vertex(*corner, run.smoothing);
+                self.parsed.faces.corner(vertex);
+            }
+            self.parsed.faces.close(arity);
+            self.corner += arity;
+        }
+        if self.has_materials {
+            self.parsed.face_materials.resize(self.parsed.faces.len(), run.material);
+        }
+    }
+
+    fn vertex(&mut self, corner: Corner, smoothing: Smoothing) -> u32 {
+        let has_normal = corner[2] != NONE;
+        let tag = match smoothing {
+            Smoothing::Flat if !has_normal => (NormalGroup::FLAT, self.face as u32),
+            Smoothing::Group(group) if !has_normal => (group.min(NormalGroup::FLAT - 1), 0),
+            Smoothing::Flat | Smoothing::Group(_) | Smoothing::Unsaid => (NormalGroup::BY_ANGLE, 0),
+        };
+        let next = self.parsed.positions.len() as u32;
+        let vertex = *self.vertices.entry((corner, tag)).or_insert(next);
+        if vertex == next {
+            self.add(corner, tag.0);
+        }
+        vertex
+    }
+
+    fn add(&mut self, corner: Corner, group: u32) {
+        let [position, uv, normal] = corner.map(|index| index as usize);
+        let Statements { vertices, uvs, normals, .. } = self.statements;
+        let index = self.parsed.positions.len() as u32;
+        self.parsed.positions.push(vertices.positions[position]);
+        if self.has_uvs {
+            self.parsed.uvs.push(uvs.get(uv).copied().unwrap_or(Vec2::ZERO));
+        }
+        if self.has_normals {
+            self.parsed.normals.push(normals.get(normal).copied().unwrap_or(Vec3::ZERO));
+        }
+        if self.has_colors {
+            self.parsed.colors.push(vertices.color_of(position));
+        }
+        if self.has_smoothing {
+            let is_shared = group != NormalGroup::FLAT && group != NormalGroup::BY_ANGLE;
+            let key = (corner[0], group);
+            let normal = if is_shared { *self.normals.entry(key).or_insert(index) } else { index };
+            self.parsed.normal_groups.push(NormalGroup { normal, group });
+        }
+    }
+}

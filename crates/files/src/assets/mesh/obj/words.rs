@@ -1,0 +1,132 @@
+//! Statements of an OBJ and their words.
+
+use fast_float2::parse;
+
+/// A position in the text of an OBJ.
+pub(super) struct Words<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Words<'a> {
+    pub(super) fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, at: 0 }
+    }
+
+    /// Byte offset of the next word.
+    pub(super) fn at(&self) -> usize {
+        self.at
+    }
+
+    /// Moves to the first word of the next statement. Returns false at the end of the text.
+    pub(super) fn next_statement(&mut self) -> bool {
+        let rest = &self.bytes[self.at..];
+        self.at += rest.iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+        self.at < self.bytes.len()
+    }
+
+    /// The next word of this statement. A statement ends with its line or at a comment; a backslash at the end of a line
+    /// continues it on the next one.
+    pub(super) fn word(&mut self) -> Option<&'a [u8]> {
+        loop {
+            match self.bytes.get(self.at)? {
+                b'\n' | b'#' => return None,
+                b'\\' => match self.continuation(self.at) {
+                    Some(next) => self.at = next,
+                    None => break,
+                },
+                byte if byte.is_ascii_whitespace() => self.at += 1,
+                _ => break,
+            }
+        }
+        let ends = |at: usize| match self.bytes[at] {
+            b'#' => true,
+            b'\\' => self.continuation(at).is_some(),
+            byte => byte.is_ascii_whitespace(),
+        };
+        let end = (self.at + 1..self.bytes.len()).find(|at| ends(*at)).unwrap_or(self.bytes.len());
+        let word = &self.bytes[self.at..end];
+        self.at = end;
+        Some(word)
+    }
+
+    /// The rest of this statement as one name, which may contain blanks and `#`.
+    pub(super) fn name(&mut self) -> String {
+        let mut name = String::new();
+        loop {
+            let line = self.line();
+            let text = line.trim_ascii_end();
+            let Some(text) = text.strip_suffix(b"\\").filter(|_| self.at < self.bytes.len()) else {
+                name.push_str(&String::from_utf8_lossy(text));
+                return name.trim().to_owned();
+            };
+            name.push_str(&String::from_utf8_lossy(text));
+            name.push(' ');
+            self.at += 1;
+        }
+    }
+
+    /// The rest of this line.
+    pub(super) fn line(&mut self) -> &'a [u8] {
+        let rest = &self.bytes[self.at..];
+        let line = &rest[..memchr::memchr(b'\n', rest).unwrap_or(rest.len())];
+        self.at += line.len();
+        line
+    }
+
+    /// The start of the next line if only blanks follow the backslash at `at`.
+    fn continuation(&self, at: usize) -> Option<usize> {
+        let rest = &self.bytes[at + 1..];
+        let blanks = rest.iter().take_while(|byte| byte.is_ascii_whitespace() && **byte != b'\n').count();
+        (rest.get(blanks) == Some(&b'\n')).then_some(at + blanks + 2)
+    }
+}
+
+/// A word as a number. Overflow gives infinity; `nan` and `inf` are numbers.
+pub(super) fn number(word: &[u8]) -> Option<f64> {
+    parse(word).ok()
+}
+
+/// A word as a whole number.
+pub(super) fn whole(word: &[u8]) -> Option<i64> {
+    std::str::from_utf8(word).ok()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn statements(text: &str) -> Vec<Vec<String>> {
+        let mut words = Words::new(text.as_bytes());
+        let mut found = Vec::new();
+        while words.next_statement() {
+            let statement = std::iter::from_fn(|| words.word());
+            found.push(statement.map(|word| String::from_utf8_lossy(word).into_owned()).collect());
+            words.line();
+        }
+        found
+    }
+
+    #[test]
+    fn backslashes_continue_statements_and_comments_end_them() {
+        assert_eq!(
+            statements("f 1 2\\\n3 \\ \n 4# x \\\nv 1\r\n"),
+            [vec!["f", "1", "2", "3", "4"], vec!["v", "1"]]
+        );
+        assert_eq!(statements("f 1\\2 \\"), [vec!["f", "1\\2", "\\"]]);
+        assert_eq!(statements("# a \\\nf 1"), [vec![], vec!["f", "1"]]);
+    }
+
+    #[test]
+    fn names_keep_blanks_and_number_signs() {
+        let name = |text: &str| {
+            let mut words = Words::new(text.as_bytes());
+            words.word();
+            words.name()
+        };
+        assert_eq!(name("usemtl\ta #2 \r\nf"), "a #2");
+        assert_eq!(name("mtllib a.mtl \\\n b.mtl\nf"), "a.mtl   b.mtl");
+        assert_eq!(name("mtllib folder\\"), "folder\\");
+        assert_eq!(name("usemtl"), "");
+    }
+}
