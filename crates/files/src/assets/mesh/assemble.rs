@@ -133,7 +133,7 @@ pub(in crate::assets) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result
         has_corners_apart,
         face_materials,
         materials,
-        warnings,
+        mut warnings,
         material_warnings,
         companions,
         pictures,
@@ -145,7 +145,8 @@ pub(in crate::assets) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result
     let most_triangles = TriangleMesh::MOST_TRIANGLES as usize;
     let mut cutter = Cutter::new(&positions, &face_materials, most_triangles);
     cutter.cut_all(source, &faces)?;
-    let Cutter { triangles, triangle_materials, dropped, .. } = cutter;
+    let Cutter { triangles, triangle_materials, dropped, crossing, .. } = cutter;
+    warnings.extend(crossing_faces(crossing));
     if triangles.is_empty() {
         return Err(source.wrong(no_usable_face(faces.len(), dropped)));
     }
@@ -193,6 +194,19 @@ fn no_usable_face(faces: usize, dropped: Dropped) -> String {
     )
 }
 
+/// The warning of polygons that cross themselves.
+fn crossing_faces((count, first): (u64, usize)) -> Option<String> {
+    let number = first + 1;
+    match count {
+        0 => None,
+        1 => Some(format!("face {number} crosses itself: its triangles may overlap")),
+        _ => Some(format!(
+            "face {number} and {} more cross themselves: their triangles may overlap",
+            count - 1
+        )),
+    }
+}
+
 struct Cutter<'a> {
     positions: &'a [Vec3],
     materials: &'a [u32],
@@ -200,6 +214,8 @@ struct Cutter<'a> {
     triangles: Vec<[u32; 3]>,
     triangle_materials: Vec<u32>,
     dropped: Dropped,
+    /// Polygons that cross themselves: their number, and the first face.
+    crossing: (u64, usize),
 }
 
 impl<'a> Cutter<'a> {
@@ -212,6 +228,7 @@ impl<'a> Cutter<'a> {
             triangles,
             triangle_materials,
             dropped: Dropped::default(),
+            crossing: (0, 0),
         }
     }
 
@@ -231,7 +248,7 @@ impl<'a> Cutter<'a> {
             if corners.iter().any(|&corner| corner as usize >= self.positions.len()) {
                 return Err(source.wrong(format!("face {}: an index is out of range", face + 1)));
             }
-            self.cut(corners);
+            self.cut(corners, face);
             if self.triangles.len() > self.most_triangles {
                 let most = self.most_triangles;
                 return Err(source.wrong(format!("more than {most} triangles; split it into several meshes")));
@@ -264,7 +281,7 @@ impl<'a> Cutter<'a> {
     }
 
     /// Adds a face's triangles, or counts the reason why it has none.
-    fn cut(&mut self, corners: &[u32]) {
+    fn cut(&mut self, corners: &[u32], face: usize) {
         let before = self.triangles.len();
         if corners.iter().any(|&corner| !self.positions[corner as usize].is_finite()) {
             self.dropped.non_finite += 1;
@@ -272,7 +289,7 @@ impl<'a> Cutter<'a> {
         }
         match *corners {
             [a, b, c] => self.keep([a, b, c]),
-            _ => self.cut_polygon(corners),
+            _ => self.cut_polygon(corners, face),
         }
         if self.triangles.len() == before {
             self.dropped.degenerate += 1;
@@ -280,7 +297,7 @@ impl<'a> Cutter<'a> {
     }
 
     /// Cuts a polygon. It may touch itself at one place (a quad at a pole): repeated corners are dropped.
-    fn cut_polygon(&mut self, corners: &[u32]) {
+    fn cut_polygon(&mut self, corners: &[u32], face: usize) {
         let place = |corner: u32| self.positions[corner as usize];
         let mut distinct = corners.to_vec();
         distinct.dedup_by(|a, b| place(*a) == place(*b));
@@ -289,7 +306,12 @@ impl<'a> Cutter<'a> {
         }
         if distinct.len() >= 3 {
             let points: Vec<Vec3> = distinct.iter().map(|&corner| place(corner)).collect();
-            triangulate(&points, |triangle| self.keep(triangle.map(|index| distinct[index])));
+            let before = self.triangles.len();
+            let is_simple = triangulate(&points, |triangle| self.keep(triangle.map(|index| distinct[index])));
+            if !is_simple && self.triangles.len() > before {
+                self.crossing.1 = if self.crossing.0 == 0 { face } else { self.crossing.1 };
+                self.crossing.0 += 1;
+            }
         }
     }
 
@@ -432,6 +454,24 @@ mod tests {
             let error = Cutter::new(&SQUARE, &[], 1).cut_all(&source, &faces(list)).expect_err("two");
             assert_eq!(error.to_string(), "a.off: more than 1 triangles; split it into several meshes");
         }
+    }
+
+    #[test]
+    fn faces_that_cross_themselves_are_counted() {
+        let positions = exact(&[Vec3::ZERO, Vec3::X * 3.0, Vec3::Y, Vec3::new(3.0, 2.0, 0.0)]);
+        let warnings = |list: &[&[u32]]| {
+            let parsed = Parsed { positions: positions.clone(), faces: faces(list), ..Parsed::default() };
+            assembled(parsed).expect("has area").warnings
+        };
+        assert!(warnings(&[&[0, 1, 3, 2]]).is_empty());
+        assert_eq!(
+            warnings(&[&[0, 1, 2], &[0, 1, 2, 3]]),
+            ["face 2 crosses itself: its triangles may overlap"]
+        );
+        assert_eq!(
+            warnings(&[&[0, 1, 2, 3], &[0, 1, 3, 2], &[2, 3, 0, 1]]),
+            ["face 1 and 1 more cross themselves: their triangles may overlap"]
+        );
     }
 
     #[test]

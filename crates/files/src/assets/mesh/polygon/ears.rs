@@ -1,0 +1,217 @@
+//! Ear clipping (Meisters, *Polygons Have Ears*, American Mathematical Monthly 1975) for polygons that may touch themselves: holes
+//! joined to the outline by an edge in both directions, corners visited twice, corners on other edges.
+
+use std::collections::VecDeque;
+
+use super::tree::{Tree, turn};
+use crate::math::DVec2;
+
+/// Visits of corners and nodes of the tree that a polygon may take, per corner and at least. Simple polygons take about 50 per
+/// corner; beyond the limit ears are no longer tested, as for polygons that wind around the same corners many times.
+const VISITS_PER_CORNER: u64 = 200;
+const LEAST_VISITS: u64 = 1_000_000;
+
+/// No corner, or one that has been clipped.
+const NONE: u32 = u32::MAX;
+
+/// Cuts a counterclockwise polygon into triangles. Returns whether all of it could be cut along diagonals; a polygon that crosses
+/// itself cannot.
+pub(super) fn clip(points: &[DVec2], emit: impl FnMut([usize; 3])) -> bool {
+    Clipper::new(points, emit).run()
+}
+
+/// Whether a polygon could be cut along diagonals, and the number of visits that this took.
+#[cfg(test)]
+pub(super) fn counted(points: &[DVec2]) -> (bool, u64) {
+    let mut clipper = Clipper::new(points, |_| {});
+    (clipper.run(), clipper.visits)
+}
+
+struct Clipper<'a, F> {
+    points: &'a [DVec2],
+    emit: F,
+    next: Vec<u32>,
+    previous: Vec<u32>,
+    remaining: usize,
+    tree: Tree,
+    /// Corners to test, with their stamps; entries with an old stamp are skipped.
+    queue: VecDeque<(u32, u32)>,
+    stamps: Vec<u32>,
+    /// Corners that a corner keeps from being ears, with their stamps, as a list in `waiting`.
+    first_waiting: Vec<u32>,
+    waiting: Vec<(u32, u32, u32)>,
+    visits: u64,
+    most_visits: u64,
+}
+
+impl<'a, F: FnMut([usize; 3])> Clipper<'a, F> {
+    fn new(points: &'a [DVec2], emit: F) -> Self {
+        let count = points.len() as u32;
+        Self {
+            points,
+            emit,
+            next: (1..count).chain([0]).collect(),
+            previous: [count - 1].into_iter().chain(0..count - 1).collect(),
+            remaining: points.len(),
+            tree: Tree::new(points),
+            queue: (0..count).map(|corner| (corner, 0)).collect(),
+            stamps: vec![0; points.len()],
+            first_waiting: vec![NONE; points.len()],
+            waiting: Vec::new(),
+            visits: 0,
+            most_visits: VISITS_PER_CORNER * u64::from(count) + LEAST_VISITS,
+        }
+    }
+
+    fn run(&mut self) -> bool {
+        let mut is_simple = true;
+        while self.remaining > 2 {
+            self.clip_queued();
+            if self.remaining <= 2 || self.clip_first(|own, corner| own.blocker(corner, true).is_none()) {
+                continue;
+            }
+            is_simple = false;
+            // Clip any convex corner; if there are none, the rest has no area of the polygon's orientation.
+            if !self.clip_first(|_, _| true) {
+                break;
+            }
+        }
+        is_simple && self.visits <= self.most_visits
+    }
+
+    /// Clips ears until no queued corner is one.
+    fn clip_queued(&mut self) {
+        while let Some((corner, stamp)) = self.queue.pop_front() {
+            if self.stamps[corner as usize] != stamp || self.remaining <= 2 {
+                continue;
+            }
+            if self.is_spike(corner) {
+                self.clip(corner);
+            } else if self.is_convex(corner) {
+                match self.blocker(corner, false) {
+                    None => self.clip(corner),
+                    Some(blocker) => self.wait(corner, stamp, blocker),
+                }
+            }
+        }
+    }
+
+    /// Clips the first convex corner that `is_ear` accepts.
+    fn clip_first(&mut self, is_ear: impl Fn(&mut Self, u32) -> bool) -> bool {
+        let Some(start) = self.next.iter().position(|next| *next != NONE) else { return false };
+        let mut corner = start as u32;
+        for _ in 0..self.remaining {
+            if self.is_convex(corner) && is_ear(self, corner) {
+                self.clip(corner);
+                return true;
+            }
+            corner = self.next[corner as usize];
+        }
+        false
+    }
+
+    fn point(&self, corner: u32) -> DVec2 {
+        self.points[corner as usize]
+    }
+
+    fn around(&self, corner: u32) -> [u32; 3] {
+        [self.previous[corner as usize], corner, self.next[corner as usize]]
+    }
+
+    fn is_convex(&self, corner: u32) -> bool {
+        let [a, b, c] = self.around(corner).map(|corner| self.point(corner));
+        turn(a, b, c) > 0.0
+    }
+
+    /// Whether the outline turns back at a corner.
+    fn is_spike(&self, corner: u32) -> bool {
+        let [a, b, c] = self.around(corner).map(|corner| self.point(corner));
+        turn(a, b, c) == 0.0 && (a - b).dot(c - b) >= 0.0
+    }
+
+    /// Emits the triangle of a corner, if it has an area, and removes the corner.
+    fn clip(&mut self, corner: u32) {
+        let [a, b, c] = self.around(corner);
+        if self.is_convex(b) {
+            (self.emit)([a, b, c].map(|corner| corner as usize));
+        }
+        self.next[a as usize] = c;
+        self.previous[c as usize] = a;
+        self.next[b as usize] = NONE;
+        self.stamps[b as usize] += 1;
+        self.remaining -= 1;
+        self.tree.remove(b);
+        for changed in [b, a, c] {
+            self.wake(changed);
+        }
+        for neighbor in [a, c] {
+            self.enqueue(neighbor);
+        }
+    }
+
+    /// Queues a corner behind the others, which alternates clipped corners and keeps triangles from becoming slivers.
+    fn enqueue(&mut self, corner: u32) {
+        let stamp = &mut self.stamps[corner as usize];
+        *stamp += 1;
+        self.queue.push_back((corner, *stamp));
+    }
+
+    fn wait(&mut self, corner: u32, stamp: u32, blocker: u32) {
+        let first = &mut self.first_waiting[blocker as usize];
+        self.waiting.push((corner, stamp, *first));
+        *first = (self.waiting.len() - 1) as u32;
+    }
+
+    /// Queues the corners that waited for this one.
+    fn wake(&mut self, blocker: u32) {
+        let mut place = std::mem::replace(&mut self.first_waiting[blocker as usize], NONE);
+        while place != NONE {
+            let (corner, stamp, next) = self.waiting[place as usize];
+            if self.stamps[corner as usize] == stamp {
+                self.enqueue(corner);
+            }
+            place = next;
+        }
+    }
+
+    /// A corner that keeps a convex corner from being an ear: the outline enters the triangle there. Unless `may_touch`, a corner on the
+    /// diagonal also does, as the triangles on its two sides would not share their vertices.
+    fn blocker(&mut self, corner: u32, may_touch: bool) -> Option<u32> {
+        if self.visits > self.most_visits {
+            return None;
+        }
+        let around = self.around(corner);
+        let triangle = around.map(|corner| self.point(corner));
+        let mut visits = self.visits;
+        let found = self.tree.find(triangle, &mut visits, |other| {
+            self.next[other as usize] != NONE
+                && !around.contains(&other)
+                && self.is_entered(triangle, other, may_touch)
+        });
+        self.visits = visits;
+        found
+    }
+
+    /// Whether the outline enters the interior of a triangle at this corner, or the corner is on the diagonal.
+    fn is_entered(&self, triangle: [DVec2; 3], corner: u32, may_touch: bool) -> bool {
+        let [a, _, c] = triangle;
+        let point = self.point(corner);
+        let turns = turns(triangle, point);
+        if turns.iter().any(|turn| *turn < 0.0) {
+            return false;
+        }
+        if !may_touch && turns[2] == 0.0 && point != a && point != c {
+            return true;
+        }
+        // Beside the sides on which the corner is, its neighbors are on the inner side.
+        [self.previous[corner as usize], self.next[corner as usize]].into_iter().any(|neighbor| {
+            let sides = self::turns(triangle, self.point(neighbor));
+            (0..3).all(|side| turns[side] > 0.0 || sides[side] > 0.0)
+        })
+    }
+}
+
+/// The turn to a point from each side of a triangle.
+fn turns([a, b, c]: [DVec2; 3], point: DVec2) -> [f64; 3] {
+    [turn(a, b, point), turn(b, c, point), turn(c, a, point)]
+}

@@ -1,0 +1,43 @@
+//! Polygons → triangles. Convex ones become fans; ears are clipped from the others.
+
+mod ears;
+mod tree;
+
+use crate::math::{DVec2, DVec3, Vec3};
+
+/// Cuts a polygon of at least 3 finite points into triangles of indices into it, with the same orientation. Returns whether the
+/// triangles cover it exactly once; a polygon that crosses itself is cut as well as possible.
+pub(super) fn triangulate(points: &[Vec3], mut emit: impl FnMut([usize; 3])) -> bool {
+    let points: Vec<DVec3> = points.iter().map(|point| point.as_dvec3()).collect();
+    let normal = newell_normal(&points);
+    let turns =
+        |a: usize, b: usize, c: usize| (points[b] - points[a]).cross(points[c] - points[a]).dot(normal);
+    let count = points.len();
+    if count == 4 && turns(0, 1, 2).min(turns(0, 2, 3)) <= 0.0 && turns(0, 1, 3).min(turns(1, 2, 3)) > 0.0 {
+        emit([0, 1, 3]);
+        emit([1, 2, 3]);
+        true
+    } else if count <= 4 || normal == DVec3::ZERO || (1..count - 1).all(|i| turns(0, i, i + 1) > 0.0) {
+        (1..count - 1).for_each(|i| emit([0, i, i + 1]));
+        normal != DVec3::ZERO && (1..count - 1).all(|i| turns(0, i, i + 1) >= 0.0)
+    } else {
+        ears::clip(&projected(&points, normal), emit)
+    }
+}
+
+/// The points without the coordinate along which the normal is longest, in counterclockwise order. This rounds nothing.
+fn projected(points: &[DVec3], normal: DVec3) -> Vec<DVec2> {
+    let axis = normal.abs().max_position();
+    let (first, second) = ((axis + 1) % 3, (axis + 2) % 3);
+    let (x, y) = if normal[axis] > 0.0 { (first, second) } else { (second, first) };
+    points.iter().map(|point| DVec2::new(point[x], point[y])).collect()
+}
+
+/// The sum of the fan's normals, which is the same for every origin (Newell's method).
+fn newell_normal(points: &[DVec3]) -> DVec3 {
+    let origin = points[0];
+    points.windows(2).map(|pair| (pair[0] - origin).cross(pair[1] - origin)).sum()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,320 @@
+use super::*;
+
+type Points = Vec<(f32, f32)>;
+
+/// Cuts a polygon in a plane of every tilt, checks the triangles against the outline, and returns those in the plane y = 7.
+fn cut(points: &[(f32, f32)]) -> Vec<[usize; 3]> {
+    let upright: Vec<Vec3> = points.iter().map(|&(x, y)| Vec3::new(x, 7.0, -y)).collect();
+    let triangles = covering(&upright, points);
+    let tilted: Vec<Vec3> = points.iter().map(|&(x, y)| Vec3::new(x, y, x + 0.5 * y)).collect();
+    covering(&tilted, points);
+    triangles
+}
+
+/// The triangles, which together have the area of the polygon and none of which is turned around.
+fn covering(space: &[Vec3], points: &[(f32, f32)]) -> Vec<[usize; 3]> {
+    let mut triangles = Vec::new();
+    assert!(triangulate(space, |triangle| triangles.push(triangle)), "{} corners", points.len());
+    let whole = area(points, &(0..points.len()).collect::<Vec<_>>());
+    let areas: Vec<f64> = triangles.iter().map(|triangle| area(points, triangle)).collect();
+    assert!(areas.iter().all(|area| area * whole >= 0.0), "a triangle is turned around");
+    let sum: f64 = areas.iter().sum();
+    assert!((sum - whole).abs() <= 1e-9 * whole.abs(), "{sum} of {whole}");
+    triangles
+}
+
+/// Twice the signed area inside the outline over these corners (the shoelace formula).
+fn area(points: &[(f32, f32)], corners: &[usize]) -> f64 {
+    let at = |place: usize| {
+        let (x, y) = points[corners[place % corners.len()]];
+        DVec2::new(f64::from(x), f64::from(y))
+    };
+    (0..corners.len()).map(|place| at(place).perp_dot(at(place + 1))).sum()
+}
+
+/// Number of triangles with a point in their interiors.
+fn layers(points: &[(f32, f32)], triangles: &[[usize; 3]], x: f64, y: f64) -> usize {
+    let at = |corner: usize| DVec2::new(f64::from(points[corner].0), f64::from(points[corner].1));
+    let holds = |triangle: &&[usize; 3]| {
+        let [a, b, c] = triangle.map(at);
+        let p = DVec2::new(x, y);
+        let turns = [tree::turn(a, b, p), tree::turn(b, c, p), tree::turn(c, a, p)];
+        turns.iter().all(|turn| *turn > 0.0) || turns.iter().all(|turn| *turn < 0.0)
+    };
+    triangles.iter().filter(holds).count()
+}
+
+fn reversed(points: &[(f32, f32)]) -> Points {
+    points.iter().rev().copied().collect()
+}
+
+/// Numbers from 0 to 1 (a linear congruential generator).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        (self.next() * count as f64) as usize
+    }
+}
+
+#[test]
+fn a_dart_is_cut_along_its_inner_diagonal() {
+    let dart = [(0.0, 0.0), (4.0, 0.0), (1.0, 1.0), (0.0, 4.0)];
+    assert_eq!(cut(&dart), [[0, 1, 2], [0, 2, 3]]);
+    let turned = [(4.0, 0.0), (1.0, 1.0), (0.0, 4.0), (0.0, 0.0)];
+    assert_eq!(cut(&turned), [[0, 1, 3], [1, 2, 3]]);
+}
+
+/// A comb whose teeth point up.
+fn comb(teeth: usize) -> Points {
+    let tooth = |tooth: usize| {
+        let x = (teeth - tooth) as f32;
+        [(x, 0.25), (x - 0.25, 4.0), (x - 0.5, 0.25)]
+    };
+    let back = [(0.0, 0.0), (teeth as f32, 0.0)];
+    back.into_iter().chain((0..teeth).flat_map(tooth)).chain([(0.0, 0.25)]).collect()
+}
+
+#[test]
+fn combs_of_any_size_are_covered_once() {
+    for teeth in [3, 300, 350, 10_000] {
+        let points = comb(teeth);
+        assert_eq!(cut(&points).len(), points.len() - 2);
+        let backwards = reversed(&points);
+        let triangles = cut(&backwards);
+        assert_eq!(layers(&backwards, &triangles, 0.25, 3.0), 0, "between two teeth");
+        assert_eq!(layers(&backwards, &triangles, 0.74, 2.0), 1, "in a tooth");
+    }
+}
+
+#[test]
+fn work_per_corner_hardly_grows() {
+    // Gears, spirals and coasts: outlines whose corners block each other.
+    let visits = |points: &[(f32, f32)]| {
+        let plane: Vec<DVec2> = points.iter().map(|&(x, y)| DVec2::new(x.into(), y.into())).collect();
+        let (is_simple, visits) = ears::counted(&plane);
+        assert!(is_simple, "{} corners", points.len());
+        visits / points.len() as u64
+    };
+    for shape in [gear, spiral, coast, comb] {
+        let few = visits(&shape(500));
+        let many = visits(&shape(16_000));
+        assert!(many < 4 * few + 100, "{few} visits per corner became {many}");
+    }
+}
+
+/// A star-shaped outline, in counterclockwise order.
+fn around(corners: usize, radius: impl Fn(usize) -> f64) -> Points {
+    let corner = |index: usize| {
+        let (sin, cos) = (std::f64::consts::TAU * index as f64 / corners as f64).sin_cos();
+        ((radius(index) * cos) as f32, (radius(index) * sin) as f32)
+    };
+    (0..corners).map(corner).collect()
+}
+
+fn gear(teeth: usize) -> Points {
+    around(4 * teeth, |index| if index / 2 % 2 == 0 { 10.0 } else { 9.0 })
+}
+
+fn coast(corners: usize) -> Points {
+    let mut random = Random(5);
+    let radii: Vec<f64> = (0..corners).map(|_| 5.0 + random.next()).collect();
+    around(corners, |index| radii[index])
+}
+
+/// A band that winds inwards twenty times.
+fn spiral(steps: usize) -> Points {
+    let side = |offset: f64| {
+        move |step: usize| {
+            let t = step as f64 / steps as f64;
+            let (sin, cos) = (std::f64::consts::TAU * 20.0 * t).sin_cos();
+            let radius = 30.0 - 25.0 * t - offset;
+            ((radius * cos) as f32, (radius * sin) as f32)
+        }
+    };
+    (0..steps).map(side(0.0)).chain((0..steps).rev().map(side(0.5))).collect()
+}
+
+#[test]
+fn smooth_outlines_do_not_become_fans() {
+    let triangles = cut(&coast(1000));
+    let mut uses = vec![0; 1000];
+    triangles.as_flattened().iter().for_each(|corner| uses[*corner] += 1);
+    assert!(uses.iter().all(|uses| *uses < 100), "{uses:?}");
+}
+
+/// A square with square holes in rows and columns, each joined by an edge in both directions to the outline or to a hole before it.
+fn sieve(side: usize) -> Points {
+    let size = 3.0 * side as f32 + 1.0;
+    let mut outline = vec![(0.0, 0.0), (size, 0.0), (size, size), (0.0, size)];
+    for hole in 0..side * side {
+        let (x, y) = (3.0 * (hole % side) as f32 + 1.0, 3.0 * (hole / side) as f32 + 1.0);
+        let corners = [(x, y), (x, y + 2.0), (x + 2.0, y + 2.0), (x + 2.0, y)];
+        // The outline's corner, or one of the hole below or on the left.
+        let from = match (hole % side, hole / side) {
+            (0, 0) => (0.0, 0.0),
+            (0, _) => (x, y - 1.0),
+            _ => (x - 1.0, y),
+        };
+        let place = outline.iter().position(|corner| *corner == from).expect("visited before");
+        let bridge = corners.into_iter().chain([corners[0], from]);
+        outline.splice(place + 1..place + 1, bridge);
+    }
+    outline
+}
+
+#[test]
+fn holes_joined_by_an_edge_in_both_directions_stay_open() {
+    let frame = [
+        (0.0, 0.0),
+        (3.0, 0.0),
+        (3.0, 3.0),
+        (0.0, 3.0),
+        (0.0, 0.0),
+        (1.0, 1.0),
+        (1.0, 2.0),
+        (2.0, 2.0),
+        (2.0, 1.0),
+        (1.0, 1.0),
+    ];
+    for turn in 0..frame.len() {
+        let mut points = frame.to_vec();
+        points.rotate_left(turn);
+        for points in [reversed(&points), points] {
+            let triangles = cut(&points);
+            assert_eq!(layers(&points, &triangles, 1.4, 1.6), 0);
+            for (x, y) in [(0.5, 1.7), (1.7, 0.5), (2.5, 1.7), (1.7, 2.5), (0.3, 0.2), (0.2, 0.3)] {
+                assert_eq!(layers(&points, &triangles, x, y), 1, "({x}, {y})");
+            }
+        }
+    }
+    let sieve = sieve(12);
+    let triangles = cut(&sieve);
+    for hole in 0..144 {
+        let (x, y) = (3.0 * (hole % 12) as f64 + 1.9, 3.0 * (hole / 12) as f64 + 1.8);
+        assert_eq!(layers(&sieve, &triangles, x, y), 0);
+        assert_eq!(layers(&sieve, &triangles, x - 1.3718, y + 0.1234), 1);
+    }
+}
+
+#[test]
+fn outlines_may_touch_themselves() {
+    // Two squares at a corner, a corner on an edge from inside and from outside, a path there and back, and corners in a row.
+    let touching: [&[(f32, f32)]; 6] = [
+        &[(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0), (1.0, 1.0), (0.0, 1.0)],
+        &[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (3.0, 4.0), (2.0, 0.0), (1.0, 4.0), (0.0, 4.0)],
+        &[(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (6.0, 3.0), (4.0, 1.5), (6.0, 1.0), (6.0, 4.0), (0.0, 4.0)],
+        &[(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (2.0, 4.0), (2.0, 6.0), (2.0, 4.0), (0.0, 4.0)],
+        &[
+            (0.0, 0.0),
+            (1.0, 0.0),
+            (2.0, 0.0),
+            (3.0, 0.0),
+            (3.0, 1.0),
+            (3.0, 3.0),
+            (2.0, 3.0),
+            (0.0, 3.0),
+            (0.0, 1.0),
+        ],
+        &[
+            (0.0, 0.0),
+            (4.0, 0.0),
+            (4.0, 4.0),
+            (0.0, 4.0),
+            (0.0, 2.0),
+            (2.0, 2.0),
+            (2.0, 3.0),
+            (2.0, 2.0),
+            (0.0, 2.0),
+        ],
+    ];
+    for (case, points) in touching.into_iter().enumerate() {
+        for turn in 0..points.len() {
+            let mut points = points.to_vec();
+            points.rotate_left(turn);
+            for points in [reversed(&points), points] {
+                let triangles = cut(&points);
+                assert!(triangles.len() <= points.len() - 2, "{case}");
+            }
+        }
+    }
+}
+
+#[test]
+fn corners_in_a_row_stay_corners() {
+    let row = |from: (f32, f32), to: (f32, f32)| {
+        (0..20).map(move |step| {
+            let t = step as f32 / 20.0;
+            (from.0 + (to.0 - from.0) * t, from.1 + (to.1 - from.1) * t)
+        })
+    };
+    let corners = [(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0)];
+    let square: Points = (0..4).flat_map(|side| row(corners[side], corners[(side + 1) % 4])).collect();
+    let triangles = cut(&square);
+    assert_eq!(triangles.len(), 78);
+    assert!(triangles.iter().all(|triangle| area(&square, triangle) > 0.0));
+}
+
+#[test]
+fn random_outlines_are_covered_once() {
+    let mut random = Random(3);
+    for case in 0..2000 {
+        // A polyomino's outline touches itself where two cells meet at a corner.
+        let points = if case % 2 == 0 { polyomino(&mut random, 4 + case % 40) } else { coast(5 + case % 60) };
+        cut(&points);
+    }
+}
+
+/// The outline of a simply connected polyomino, by its cells' boundary edges with the cells on their left.
+fn polyomino(random: &mut Random, size: usize) -> Points {
+    let mut cells = vec![(0_i32, 0_i32)];
+    let has = |cells: &[(i32, i32)], x, y| cells.contains(&(x, y));
+    while cells.len() < size {
+        let (x, y) = cells[random.below(cells.len())];
+        let (dx, dy) = [(1, 0), (-1, 0), (0, 1), (0, -1)][random.below(4)];
+        let (x, y) = (x + dx, y + dy);
+        // A cell with one neighbor closes no hole by edges.
+        let neighbors =
+            [(1, 0), (-1, 0), (0, 1), (0, -1)].iter().filter(|(dx, dy)| has(&cells, x + dx, y + dy));
+        if !has(&cells, x, y) && neighbors.count() == 1 {
+            cells.push((x, y));
+        }
+    }
+    // Walk along the boundary, turning left into the same cell wherever cells meet at a corner.
+    let start = *cells.iter().min().expect("a cell");
+    let ((mut x, mut y), (mut dx, mut dy)) = (start, (1, 0));
+    let mut outline = Vec::new();
+    loop {
+        outline.push((x as f32, y as f32));
+        (x, y) = (x + dx, y + dy);
+        let left_ahead = (x + (dx - dy - 1) / 2, y + (dy + dx - 1) / 2);
+        let right_ahead = (x + (dx + dy - 1) / 2, y + (dy - dx - 1) / 2);
+        if !has(&cells, left_ahead.0, left_ahead.1) {
+            (dx, dy) = (-dy, dx);
+        } else if has(&cells, right_ahead.0, right_ahead.1) {
+            (dx, dy) = (dy, -dx);
+        }
+        if (x, y) == start && (dx, dy) == (1, 0) {
+            return outline;
+        }
+    }
+}
+
+#[test]
+fn a_polygon_that_crosses_itself_is_reported() {
+    let star: Vec<Vec3> = (0..7)
+        .map(|i| std::f32::consts::TAU * 3.0 * i as f32 / 7.0)
+        .map(|angle| Vec3::new(angle.cos(), 7.0, angle.sin()))
+        .collect();
+    let bow = [Vec3::ZERO, Vec3::new(4.0, 4.0, 0.0), Vec3::X * 4.0, Vec3::Y * 3.0];
+    for points in [&star[..], &bow] {
+        let mut count = 0;
+        assert!(!triangulate(points, |_| count += 1));
+        assert!((1..points.len()).contains(&count));
+    }
+}
