@@ -56,9 +56,23 @@ impl AssetError {
     }
 }
 
+/// BLAKE3 hash of a file's bytes, computed from the same bytes that are decoded.
+pub type FileHash = [u8; 32];
+
+/// A file that another file names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Companion {
+    /// The file.
+    pub path: PathBuf,
+    /// Hash of the bytes that were decoded. `None` if the file could not be read.
+    pub hash: Option<FileHash>,
+}
+
 /// A mesh file's content.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadedMesh {
+    /// Hash of the file.
+    pub hash: FileHash,
     /// The triangles that can be used.
     pub mesh: TriangleMesh,
     /// The file's own materials, which [`TriangleMesh::materials`] refers to.
@@ -71,7 +85,7 @@ pub struct LoadedMesh {
     pub material_warnings: Vec<String>,
     /// Files that belong to the mesh file, read or missing: material libraries, or the buffers of a glTF file. If one of them
     /// changes, so does this value.
-    pub companions: Vec<PathBuf>,
+    pub companions: Vec<Companion>,
     /// Pictures that the material libraries or the glTF file name, looked up or not.
     pub pictures: Vec<PathBuf>,
 }

@@ -18,7 +18,7 @@
 
 use std::path::Path;
 
-use super::{AssetError, OrbiterCamera, read};
+use super::{AssetError, FileHash, OrbiterCamera, read};
 use crate::control::{CancelToken, unwatched};
 use crate::math::limits::{LARGEST, SHORTEST, is_too_short};
 
@@ -28,16 +28,16 @@ const LIMIT: u64 = 1 << 20;
 /// The angle of gKit's viewer, for files from before the `f` line.
 const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 
-/// Reads an orbiter file. `c` and `s` are required; without them, `p` and `r` are 0 and `f` is 45 degrees at
+/// Reads an orbiter file; returns its hash too. `c` and `s` are required; without them, `p` and `r` are 0 and `f` is 45 degrees at
 /// 1024 × 640.
 ///
 /// # Errors
 /// [`AssetError::Unreadable`], or [`AssetError::Malformed`] with the line: an unknown letter, a wrong count of numbers,
 /// a number that is not finite or out of range.
-pub fn load(path: &Path) -> Result<OrbiterCamera, AssetError> {
+pub fn load(path: &Path) -> Result<(OrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
     let bytes = read::text(path, LIMIT, read::Watch { progress: &unwatched, token: &token })?;
-    parse(path, &String::from_utf8_lossy(&bytes))
+    Ok((parse(path, &String::from_utf8_lossy(&bytes))?, read::hash(&bytes)))
 }
 
 fn parse(path: &Path, text: &str) -> Result<OrbiterCamera, AssetError> {

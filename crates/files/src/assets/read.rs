@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::Path;
 
-use super::AssetError;
+use super::{AssetError, FileHash};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::system::file::{self, Kind};
 pub(crate) use crate::system::in_words;
@@ -25,6 +25,11 @@ impl Watch<'_> {
         (self.progress)(done as u64, total as u64);
         self.token.check()
     }
+}
+
+/// Hash of a file that was read as a whole.
+pub(crate) fn hash(bytes: &[u8]) -> FileHash {
+    *blake3::hash(bytes).as_bytes()
 }
 
 /// Opens a regular file of at most `limit` bytes and returns its length too. Pipes, devices and folders are refused
@@ -102,6 +107,17 @@ fn bytes_if(
         return Err(AssetError::malformed(path, Some(1), "this is a binary file of another kind"));
     }
     file.rewind().map_err(unreadable)?;
+    rest(path, file, (length, limit), watch)
+}
+
+/// Reads the rest of an open file, whose length is expected to be `length`. Progress counts as for [`bytes`].
+pub(crate) fn rest(
+    path: &Path,
+    file: File,
+    (length, limit): (u64, u64),
+    watch: Watch<'_>,
+) -> Result<Vec<u8>, AssetError> {
+    let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
     let mut file = file.take(limit);
     let length = length as usize;
     let mut bytes = Vec::new();

@@ -1,7 +1,6 @@
 //! The identity of a picture: names and values of all that it depends on, the same on every machine and in every folder. Keys of
 //! stages hold paths and time stamps; here files count by what is in them.
 
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use super::assembly::Eye;
@@ -135,20 +134,6 @@ fn content(file: &FileRead) -> String {
     match file.content {
         Content::Missing => "missing".to_owned(),
         Content::Unusable(_) => "not readable".to_owned(),
-        Content::Hash(hash) => {
-            let known = || hash.iter().map(|byte| format!("{byte:02x}")).collect();
-            if file.content.is_by_stamp(&file.path) {
-                whole_hash(&file.path).unwrap_or_else(known)
-            } else {
-                known()
-            }
-        }
+        Content::Hash(hash) => hash.iter().map(|byte| format!("{byte:02x}")).collect(),
     }
-}
-
-/// Hash of all bytes of a file.
-fn whole_hash(path: &Path) -> Option<String> {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(File::open(path).ok()?).ok()?;
-    Some(hasher.finalize().to_hex().to_string())
 }

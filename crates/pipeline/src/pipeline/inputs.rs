@@ -71,7 +71,7 @@ impl Inputs {
             };
             let kind = if is_gltf(&file.value) { "buffer" } else { "material file" };
             for companion in &kept.mesh.companions {
-                add(companion, format!("a {kind} of {name}"));
+                add(&companion.path, format!("a {kind} of {name}"));
             }
             for picture in &kept.mesh.pictures {
                 add(picture, format!("a picture that {name} or its materials name"));

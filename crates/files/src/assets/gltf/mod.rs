@@ -24,9 +24,9 @@ pub use self::description::{
     Slot, TextureRef, TextureWrap,
 };
 use self::json::{Root, Uri};
-use super::AssetError;
 use super::image::{self, ImageEncoding, ImageLimits, ImageWithin};
 use super::read::{self, Watch};
+use super::{AssetError, Companion, FileHash};
 use crate::control::{CancelToken, Progress, unwatched};
 
 /// Most bytes of a file, and of all buffers together.
@@ -107,7 +107,8 @@ pub struct Container {
     root: Root,
     buffers: Vec<Vec<u8>>,
     /// Files that hold its buffers, read.
-    companions: Vec<PathBuf>,
+    companions: Vec<Companion>,
+    hash: FileHash,
     /// For each part the first one with the same mesh, which is built for all of them.
     built_as: Vec<usize>,
 }
@@ -129,7 +130,7 @@ impl Container {
     pub fn open(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<Self, AssetError> {
         let watch = Watch { progress, token };
         let bytes = read::not_blank(path, FILE_LIMIT, watch)?;
-        let length = bytes.len();
+        let (length, hash) = (bytes.len(), read::hash(&bytes));
         let wrong = |wrong: Wrong| AssetError::malformed(path, None, wrong.0);
         let (json, binary) =
             if bytes.starts_with(b"glTF") { chunks(&bytes).map_err(wrong)? } else { (0..length, None) };
@@ -174,7 +175,8 @@ impl Container {
             bytes
         });
         let (buffers, companions) = buffers(path, &mut root, binary, watch)?;
-        let mut container = Self { path: path.to_owned(), root, buffers, companions, built_as: Vec::new() };
+        let mut container =
+            Self { path: path.to_owned(), hash, root, buffers, companions, built_as: Vec::new() };
         container.built_as = container.shared_parts().map_err(wrong)?;
         watch.tick(2 * length, 2 * length)?;
         Ok(container)
@@ -186,8 +188,13 @@ impl Container {
     }
 
     /// Files that hold its buffers.
-    pub fn companions(&self) -> &[PathBuf] {
+    pub fn companions(&self) -> &[Companion] {
         &self.companions
+    }
+
+    /// Hash of the file itself.
+    pub fn hash(&self) -> FileHash {
+        self.hash
     }
 
     /// Files that its images name, shown or not.
@@ -474,7 +481,7 @@ fn buffers(
     root: &mut Root,
     mut binary: Option<Vec<u8>>,
     watch: Watch<'_>,
-) -> Result<(Vec<Vec<u8>>, Vec<PathBuf>), AssetError> {
+) -> Result<(Vec<Vec<u8>>, Vec<Companion>), AssetError> {
     let (mut all, mut files, mut total) = (Vec::new(), Vec::new(), 0);
     for (number, buffer) in root.buffers.iter_mut().enumerate() {
         let wrong =
@@ -494,7 +501,7 @@ fn buffers(
                     }
                     other => other,
                 })?;
-                files.push(file);
+                files.push(Companion { path: file, hash: Some(read::hash(&bytes)) });
                 bytes
             }
             None if number == 0 => {

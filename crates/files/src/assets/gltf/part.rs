@@ -70,6 +70,7 @@ impl Container {
             }
             other => other,
         })?;
+        loaded.hash = self.hash;
         (loaded.companions, loaded.pictures) = (self.companions.clone(), self.pictures());
         Ok(loaded)
     }

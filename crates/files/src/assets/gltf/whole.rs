@@ -26,7 +26,7 @@ impl Container {
         };
         let origin = origin_near((least + greatest) * 0.5, (greatest - least).max_element() * 0.5);
         let (companions, pictures) = (self.companions.clone(), self.pictures());
-        let mut whole = LoadedMesh { companions, pictures, ..LoadedMesh::default() };
+        let mut whole = LoadedMesh { hash: self.hash, companions, pictures, ..LoadedMesh::default() };
         whole.mesh.origin = origin;
         whole.material_warnings = self.material_warnings(&scene);
         whole.warnings = scene.notes;

@@ -10,6 +10,21 @@ use crate::control::CancelToken;
 /// Most bytes of a header with the line of the size; the same limit as for PLY.
 const HEADER_BYTES: u64 = 1 << 20;
 
+/// [`check_header`] of bytes in memory.
+pub(super) fn check_bytes(bytes: &[u8]) -> Result<(), String> {
+    let most = HEADER_BYTES as usize;
+    let start = &bytes[..bytes.len().min(most)];
+    let ends = |blank: usize| start[blank + 2..].contains(&b'\n');
+    if bytes.len() >= most && !memchr::memmem::find(start, b"\n\n").is_some_and(ends) {
+        return Err(too_long());
+    }
+    Ok(())
+}
+
+fn too_long() -> String {
+    format!("its header does not end within {} MiB", HEADER_BYTES >> 20)
+}
+
 /// Checks that the header ends within its limit: at an empty line, followed by the line of the size. A file that ends before is
 /// left to the decoder.
 pub(super) fn check_header(file: &File, token: &CancelToken) -> Result<(), String> {
@@ -33,5 +48,5 @@ pub(super) fn check_header(file: &File, token: &CancelToken) -> Result<(), Strin
         }
         at += got as u64;
     }
-    Err(format!("its header does not end within {} MiB", HEADER_BYTES >> 20))
+    Err(too_long())
 }

@@ -18,7 +18,7 @@ use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, 
 
 use super::contain::contain;
 use super::read::{self, Watch};
-use super::{AssetError, read::in_words};
+use super::{AssetError, FileHash, read::in_words};
 use crate::control::{CancelToken, Cancelled, Progress, unwatched};
 use crate::materials::mipmaps::Halving;
 use crate::materials::texels::Texels;
@@ -30,6 +30,8 @@ use png::PngDecoder;
 
 /// Most bytes of an image file.
 const FILE_LIMIT: u64 = 4 << 30;
+/// Bytes from which on the header of a file is checked before the rest is read.
+const CHECKED_FIRST: u64 = 16 << 20;
 
 /// Encoding of the numbers of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -103,7 +105,22 @@ pub fn load(
     progress: Progress<'_>,
     token: &CancelToken,
 ) -> Result<Texels, AssetError> {
-    load_source(Source::open(path, limits, token)?, encoding, Watch { progress, token })
+    load_hashed(path, encoding, limits, progress, token).map(|(texels, _)| texels)
+}
+
+/// [`load`], with the hash of the bytes that were decoded.
+///
+/// # Errors
+/// As for [`load`].
+pub fn load_hashed(
+    path: &Path,
+    encoding: ImageEncoding,
+    limits: ImageLimits,
+    progress: Progress<'_>,
+    token: &CancelToken,
+) -> Result<(Texels, FileHash), AssetError> {
+    let (source, hash) = Source::whole(path, limits, token)?;
+    Ok((load_source(source, encoding, Watch { progress, token })?, hash))
 }
 
 fn load_source(file: Source, encoding: ImageEncoding, watch: Watch<'_>) -> Result<Texels, AssetError> {
@@ -182,9 +199,10 @@ pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelle
     })
 }
 
-/// The bytes of an image: a file, or bytes of another one.
+/// The bytes of an image: an open file, a whole file in memory, or bytes of another one.
 enum Bytes {
     File(File),
+    Whole(Cursor<Vec<u8>>),
     Within(Cursor<Arc<[u8]>>),
 }
 
@@ -192,6 +210,7 @@ impl Read for Bytes {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self {
             Self::File(file) => file.read(buffer),
+            Self::Whole(bytes) => bytes.read(buffer),
             Self::Within(bytes) => bytes.read(buffer),
         }
     }
@@ -201,6 +220,7 @@ impl Seek for Bytes {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         match self {
             Self::File(file) => file.seek(to),
+            Self::Whole(bytes) => bytes.seek(to),
             Self::Within(bytes) => bytes.seek(to),
         }
     }
@@ -222,6 +242,23 @@ impl Source {
             return Err(AssetError::malformed(path, None, "the file is empty"));
         }
         Ok(Self { path: path.to_owned(), file: Bytes::File(file), length, limits, token: token.clone() })
+    }
+
+    /// Reads a file into memory and hashes it: the hash is of the bytes that are decoded, even if the file is replaced or rewritten
+    /// meanwhile.
+    fn whole(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<(Self, FileHash), AssetError> {
+        let (file, length) = read::open(path, FILE_LIMIT)?;
+        if length > CHECKED_FIRST {
+            // Do not fill the memory with a file that is not going to be decoded.
+            size(path, limits, token)?;
+        }
+        let bytes = read::rest(path, file, (length, FILE_LIMIT), Watch { progress: &unwatched, token })?;
+        let (hash, length) = (read::hash(&bytes), bytes.len() as u64);
+        if length == 0 {
+            return Err(AssetError::malformed(path, None, "the file is empty"));
+        }
+        let file = Bytes::Whole(Cursor::new(bytes));
+        Ok((Self { path: path.to_owned(), file, length, limits, token: token.clone() }, hash))
     }
 
     fn within(image: ImageWithin<'_>, limits: ImageLimits, token: &CancelToken) -> Result<Self, AssetError> {
@@ -260,8 +297,14 @@ impl Source {
 
     /// A decoder of an image within the limits, and the bytes that its texels will take.
     fn decoder(self, report: Reporter) -> Result<(Box<dyn ImageDecoder>, u64), String> {
+        let mut in_memory = 0;
         let (header, within) = match &self.file {
             Bytes::File(file) => (Some(file.try_clone().map_err(|error| in_words(&error))?), None),
+            Bytes::Whole(bytes) => {
+                check_start_and_end(bytes.get_ref())?;
+                in_memory = self.length;
+                (None, None)
+            }
             Bytes::Within(bytes) => (None, Some(Arc::clone(bytes.get_ref()))),
         };
         let reader = BufReader::new(Counting::new(self.file, self.length, report));
@@ -273,9 +316,10 @@ impl Source {
         }
         let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
         if is_jpeg {
-            match within {
-                Some(bytes) => jpeg::check_bytes(&bytes)?,
-                None => jpeg::check_whole(&self.path, self.limits.memory_bytes, &self.token)?,
+            match (within, &header) {
+                (Some(bytes), _) => jpeg::check_bytes(&bytes)?,
+                (None, Some(_)) => jpeg::check_whole(&self.path, self.limits.memory_bytes, &self.token)?,
+                (None, None) => {}
             }
         }
         if reader.format() == Some(ImageFormat::Hdr)
@@ -286,7 +330,7 @@ impl Source {
         let growth = most_growth(reader.format());
         let decoder = choose(reader, self.limits.memory_bytes).map_err(|error| reason(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
-        let texel_bytes = check_size(&*decoder, (self.length, held_bytes), self.limits, growth)?;
+        let texel_bytes = check_size(&*decoder, [self.length, held_bytes, in_memory], self.limits, growth)?;
         if is_jpeg {
             let (width, height) = decoder.dimensions();
             jpeg::check_plausible(width, height, self.length)?;
@@ -313,6 +357,15 @@ fn choose<R: BufRead + Seek + 'static>(
     }
 }
 
+/// Checks of a whole file that the decoders lack.
+fn check_start_and_end(bytes: &[u8]) -> Result<(), String> {
+    match ::image::guess_format(bytes) {
+        Ok(ImageFormat::Jpeg) => jpeg::check_bytes(bytes),
+        Ok(ImageFormat::Hdr) => hdr::check_bytes(bytes),
+        Ok(_) | Err(_) => Ok(()),
+    }
+}
+
 /// Bytes of memory that an image may take however short its file is.
 const SMALL_BYTES: u64 = 256 << 20;
 /// Bytes of memory that a byte of a file may become, by how the format packs: the image as it is decoded, and its texels.
@@ -330,10 +383,10 @@ fn most_growth(format: Option<ImageFormat>) -> u64 {
 }
 
 /// Refuses an image before memory of its size is allocated; returns the bytes of the texels. Bytes of the file that the
-/// decoder holds count too.
+/// decoder holds count too; those in memory beside it make way for the texels.
 fn check_size(
     decoder: &dyn ImageDecoder,
-    (length, held_bytes): (u64, u64),
+    [length, held_bytes, in_memory]: [u64; 3],
     limits: ImageLimits,
     most_growth: u64,
 ) -> Result<u64, String> {
@@ -349,7 +402,7 @@ fn check_size(
     let sample_bytes = u64::from(color.bytes_per_pixel() / color.channel_count());
     let texel_bytes = if sample_bytes == 1 { 3 } else { 12 };
     let texels = u64::from(width) * u64::from(height) * texel_bytes;
-    let needed = decoder.total_bytes().saturating_add(texels).saturating_add(held_bytes);
+    let needed = decoder.total_bytes().saturating_add(texels.max(in_memory)).saturating_add(held_bytes);
     if needed > limits.memory_bytes {
         let (needed, most) = (needed.div_ceil(1 << 20), limits.memory_bytes >> 20);
         return Err(format!(

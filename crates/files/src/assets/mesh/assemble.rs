@@ -8,7 +8,7 @@ use super::Source;
 use super::normals::fill_missing_normals;
 use super::places::shared;
 use super::polygon::triangulate;
-use crate::assets::{AssetError, Dropped, FileMaterial, LoadedMesh};
+use crate::assets::{AssetError, Companion, Dropped, FileHash, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::{NormalGroup, TriangleMesh};
 use crate::math::origin::origin_near;
@@ -84,7 +84,7 @@ pub(in crate::assets) struct Parsed {
     pub(in crate::assets) materials: Vec<FileMaterial>,
     pub(in crate::assets) warnings: Vec<String>,
     pub(in crate::assets) material_warnings: Vec<String>,
-    pub(in crate::assets) companions: Vec<PathBuf>,
+    pub(in crate::assets) companions: Vec<Companion>,
     pub(in crate::assets) pictures: Vec<PathBuf>,
 }
 
@@ -167,7 +167,8 @@ pub(in crate::assets) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result
         *uv = Vec2::ZERO;
     }
     complete_normals(&mut mesh, source.watch.token)?;
-    Ok(LoadedMesh { mesh, materials, dropped, warnings, material_warnings, companions, pictures })
+    let hash = FileHash::default();
+    Ok(LoadedMesh { hash, mesh, materials, dropped, warnings, material_warnings, companions, pictures })
 }
 
 /// Positions from an origin near those that faces use. Numbers that no `f32` can hold become infinite.

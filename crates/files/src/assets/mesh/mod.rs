@@ -51,7 +51,7 @@ pub fn load(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<
     if source.bytes.is_empty() {
         return Err(source.wrong("the file is empty"));
     }
-    let loaded = parse(&source)?;
+    let loaded = LoadedMesh { hash: read::hash(&bytes), ..parse(&source)? };
     watch.tick(2 * bytes.len(), 2 * bytes.len())?;
     Ok(loaded)
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::text::{with_line_feeds, without_mark};
 use crate::assets::read::{self, Watch};
-use crate::assets::{AssetError, FileMaterial, PhysicalMaterial};
+use crate::assets::{AssetError, FileHash, FileMaterial, PhysicalMaterial};
 use crate::math::{DVec3, Vec3};
 
 /// Most bytes of a material file.
@@ -16,6 +16,8 @@ pub(super) struct Library {
     pub(super) materials: Vec<tobj::Material>,
     /// Warnings of statements that were left out.
     pub(super) warnings: Vec<String>,
+    /// Hash of the file.
+    pub(super) hash: FileHash,
 }
 
 /// Reads an MTL file.
@@ -25,6 +27,7 @@ pub(super) struct Library {
 pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Library, AssetError> {
     let quiet = Watch { progress: &crate::control::unwatched, ..watch };
     let bytes = read::text(path, FILE_LIMIT, quiet)?;
+    let hash = read::hash(&bytes);
     let mut text = String::with_capacity(bytes.len());
     let mut warnings = Vec::new();
     let bytes = with_line_feeds(without_mark(&bytes));
@@ -42,7 +45,7 @@ pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Library, AssetError>
     }
     let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes())
         .map_err(|error| AssetError::malformed(path, None, error.to_string()))?;
-    Ok(Library { materials, warnings })
+    Ok(Library { materials, warnings, hash })
 }
 
 /// Statements of colours.

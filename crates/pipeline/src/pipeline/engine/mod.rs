@@ -127,6 +127,9 @@ pub(super) struct Engine {
     claim: RefCell<Claim>,
 }
 
+/// Most times that the files of a scene are read for one request, if they change meanwhile.
+const MOST_READS: usize = 16;
+
 /// Everything that is ready to be rendered.
 #[derive(Clone)]
 struct Ready {
@@ -257,13 +260,11 @@ impl Engine {
     ) -> Result<Report, Stop> {
         let watch = Stopwatch::start(meanwhile.token);
         let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: false };
-        let snapshot = Snapshot::of(Arc::clone(&self.contents));
-        let reading = (&snapshot, meanwhile.token);
         // Nobody comes back to the pictures before in a turntable.
         if request.overrides.turn.is_some() {
             self.films = FilmCache::default();
         }
-        let mut ready = self.prepare(request, &mut table, reading, findings)?;
+        let mut ready = self.prepare_of_one_version(request, &mut table, meanwhile.token, findings)?;
         let photons = self.light(request, &ready, &mut table, sink, meanwhile)?;
         let share = self.share(&ready.plan, photons);
         // A share of blocks has fewer samples than the picture.
@@ -346,6 +347,28 @@ impl Engine {
         Ok(photons_key)
     }
 
+    /// [`Self::prepare`], again if a file changes while it is read: no image mixes two versions of a file.
+    fn prepare_of_one_version(
+        &mut self,
+        request: &Request,
+        table: &mut StageTable<'_>,
+        token: &CancelToken,
+        findings: &mut Findings,
+    ) -> Result<Ready, Stop> {
+        for _ in 0..MOST_READS {
+            let snapshot = Snapshot::of(Arc::clone(&self.contents));
+            let ready = self.prepare(request, table, (&snapshot, token), findings);
+            if token.is_cancelled() || snapshot.changed().is_none() {
+                return ready;
+            }
+            findings.start_again();
+            table.stages.clear();
+        }
+        Err(Stop::work(
+            "files of the scene change while they are read; render again when nothing writes them",
+        ))
+    }
+
     /// All stages before photons and light.
     fn prepare(
         &mut self,
@@ -392,6 +415,9 @@ impl Engine {
         let reading = Reading { sink: table.sink, token, contents, pool: &pool, containers: &containers };
         let lookups = plan.settings.lookups();
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
+        if let Some(path) = contents.changed() {
+            return Err(Stop::work(format!("{} changed while it was read", path.display())));
+        }
         Foretold::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).check(&plan)?;
         self.inputs = inputs(&parsed, &meshes, findings);
         self.look_for_conflicts(request, &plan, findings, table.sink)?;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::frame::{framed, tidied};
 use super::materials::{Materials, TextureFile};
@@ -11,11 +11,11 @@ use super::{
     Eye, FOV, Lighting, ModelText, ROUGH, SIZE, Show, UNSEEN, Unique, camera, file_name, ground, light,
     render,
 };
-use crate::assets::AssetError;
 use crate::assets::gltf::{
     Alpha, Container, ImageBytes, ModelCamera, ModelInstance, ModelLight, ModelLightKind, ModelMaterial,
     ModelScene, Slot,
 };
+use crate::assets::{AssetError, Companion};
 use crate::control::{CancelToken, unwatched};
 use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
@@ -87,7 +87,7 @@ pub(super) fn text(
             images.into_iter().try_for_each(|image| container.check_image_header(image, token))?;
         }
     }
-    Ok(ModelText { text: toml.finish(), companions, notes, assets })
+    Ok(ModelText { text: toml.finish(), hash: container.hash(), companions, notes, assets })
 }
 
 struct Writer<'a> {
@@ -103,7 +103,7 @@ struct Writer<'a> {
     images: BTreeSet<usize>,
     image_names: Vec<String>,
     /// Other files that the text was made of.
-    companions: Vec<PathBuf>,
+    companions: Vec<Companion>,
 }
 
 impl Writer<'_> {
@@ -277,7 +277,7 @@ impl super::materials::Files for Writer<'_> {
             // A file without an ending is known by its content, as an image inside is. One that is missing is waited for.
             (Naming::Inside, bytes) => {
                 if let Ok(ImageBytes::File(file)) = bytes {
-                    self.companions.push(file);
+                    self.companions.push(Companion { path: file, hash: None });
                 }
                 TextureFile { file: file_name(self.path), image: Some(image) }
             }

@@ -9,15 +9,15 @@ mod plain;
 mod toml;
 
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use self::frame::{Eye, FOV, KEY, SKY, ground_reflectance, key_direction};
 use self::gltf::{Asset, Naming};
 use self::toml::{Toml, exact_vector, number, rounded, vector};
 use super::settings::{Overrides, Side, UpAxis};
 use super::stages::containers::Containers;
-use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
+use crate::assets::{AssetError, Companion, FileHash};
 use crate::control::CancelToken;
 use crate::math::DVec3;
 use crate::scene::diagnostic::Diagnostic;
@@ -82,8 +82,10 @@ impl Show {
 pub(in crate::pipeline) struct ModelText {
     /// The text of the scene.
     pub(in crate::pipeline) text: String,
+    /// Hash of the model's file.
+    pub(in crate::pipeline) hash: FileHash,
     /// Other files that it was made of.
-    pub(in crate::pipeline) companions: Vec<PathBuf>,
+    pub(in crate::pipeline) companions: Vec<Companion>,
     /// Approximations, a line each.
     pub(in crate::pipeline) notes: Vec<String>,
     /// Files that the text names beside itself and that are not there yet.

@@ -150,9 +150,9 @@ pub(super) fn text(
     // The scene gives the mesh another material where the file's own are missing, and would say nothing of that.
     let mut notes = if needs_material { loaded.material_warnings.clone() } else { Vec::new() };
     notes.extend(is_unseen(&loaded).then(|| UNSEEN.to_owned()));
-    let (companions, assets) = (loaded.companions.clone(), Vec::new());
+    let (hash, companions, assets) = (loaded.hash, loaded.companions.clone(), Vec::new());
     containers.keep(path, loaded);
-    Ok(ModelText { text: toml.finish(), companions, notes, assets })
+    Ok(ModelText { text: toml.finish(), hash, companions, notes, assets })
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::assets::gltf::{Container, ImageBytes, is_gltf};
 use crate::assets::mesh::load;
-use crate::assets::{AssetError, LoadedMesh};
+use crate::assets::{AssetError, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Progress, unwatched};
 
 /// The slot of a file, which is filled by whoever needs it first.
@@ -67,17 +67,18 @@ impl Containers {
         self.ahead.lock().unwrap_or_else(PoisonError::into_inner).insert(canonical(path), mesh);
     }
 
-    /// The bytes of an image of a glTF file, or the file that holds them.
+    /// The bytes of an image of a glTF file, or the file that holds them, and the hash of the glTF file.
     pub(in crate::pipeline) fn image(
         &self,
         (path, number): (&Path, u32),
         token: &CancelToken,
-    ) -> Result<ImageInput, AssetError> {
+    ) -> Result<(ImageInput, FileHash), AssetError> {
         let container = self.open(path, &unwatched, token)?;
-        Ok(match container.image(number as usize)? {
+        let input = match container.image(number as usize)? {
             ImageBytes::Inside(bytes) => ImageInput::Bytes(bytes.into()),
             ImageBytes::File(path) => ImageInput::File(path),
-        })
+        };
+        Ok((input, container.hash()))
     }
 }
 

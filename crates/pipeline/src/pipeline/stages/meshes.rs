@@ -3,15 +3,14 @@
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
-use std::time::SystemTime;
 
 use rayon::prelude::*;
 
 use super::super::cache::Pool;
-use super::super::watch::content::{Content, FileRead, may_have_changed};
+use super::super::watch::content::{Content, FileRead};
 use super::containers::canonical;
 use super::{Asset, Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
-use crate::assets::{AssetError, Dropped, LoadedMesh};
+use crate::assets::{AssetError, Companion, Dropped, LoadedMesh};
 use crate::control::{CancelToken, Cancelled, Progress};
 use crate::scene::description::{MeshFile, Scene, UvSet};
 use crate::scene::fingerprint::{Fingerprint, Key};
@@ -198,19 +197,19 @@ fn one(
         return Ok(Asset { files, result: Ok((mesh, true)) });
     }
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    let begin = SystemTime::now();
     let read = || reading.sink.asset(&name, |progress| load(path, progress, reading.token));
     let mut loaded = read();
     if let Ok(mesh) = &loaded
-        && mesh.companions.iter().any(|file| is_news(file, begin, reading))
+        && has_appeared(&mesh.companions, reading)?
     {
-        // Not hashed before it was read, and perhaps changed in between: now hashed, and read once more.
-        contents_of(mesh.companions.iter(), reading)?;
         loaded = read();
     }
     let result = match loaded {
         Ok(mesh) => {
-            let companions = contents_of(mesh.companions.iter(), reading)?;
+            let content = reading.contents.decoded(path, mesh.hash);
+            files[0].content = content;
+            let read = |companion| reading.contents.of_companion(companion, reading.token);
+            let companions = mesh.companions.iter().map(read).collect::<Result<Vec<_>, _>>()?;
             files.extend(companions.iter().cloned());
             let mut key = Fingerprint::new("mesh");
             key.key(&file_key(file, content));
@@ -224,26 +223,25 @@ fn one(
     Ok(Asset { files, result })
 }
 
-/// Whether this file may not be what was read from it since `begin`.
-fn is_news(path: &Path, begin: SystemTime, reading: &Reading<'_>) -> bool {
-    reading.contents.known(path).is_none() && may_have_changed(path, begin)
+/// Whether a file that could not be read can be read now, and this request did not know of it before.
+fn has_appeared(companions: &[Companion], reading: &Reading<'_>) -> Result<bool, Cancelled> {
+    for companion in companions.iter().filter(|companion| companion.hash.is_none()) {
+        let is_new = reading.contents.known(&companion.path).is_none();
+        let content = reading.contents.read(&companion.path, reading.token)?;
+        if is_new && matches!(content, Content::Hash(_)) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// These files as they are now.
 fn companions(files: &[FileRead], reading: &Reading<'_>) -> Result<Vec<FileRead>, Cancelled> {
-    contents_of(files.iter().map(|file| &file.path), reading)
-}
-
-fn contents_of<'a>(
-    paths: impl Iterator<Item = &'a PathBuf>,
-    reading: &Reading<'_>,
-) -> Result<Vec<FileRead>, Cancelled> {
-    paths
-        .map(|path| {
-            let content = reading.contents.read(path, reading.token)?;
-            Ok(FileRead { path: path.clone(), content })
-        })
-        .collect()
+    let now = |file: &FileRead| {
+        let content = reading.contents.read(&file.path, reading.token)?;
+        Ok(FileRead { path: file.path.clone(), content })
+    };
+    files.iter().map(now).collect()
 }
 
 fn file_key(file: &MeshFile, content: Content) -> Key {
@@ -482,8 +480,13 @@ mod tests {
         let snapshot = desk.snapshot();
         snapshot.read(&desk.folder.path().join("a.obj"), &CancelToken::new()).expect("not cancelled");
         desk.write("a.obj", &format!("{OBJ}f 1 3 2\n"));
-        let (_, files) = desk.read(&snapshot);
-        assert_eq!(files[0].content, old, "whoever watches the file finds that it holds something else");
+        let (mesh, files) = desk.read(&snapshot);
+        assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (1, old), "kept from before");
+        assert_eq!(snapshot.changed(), None);
+        desk.cache = Pool::default();
+        let (mesh, files) = desk.read(&snapshot);
+        assert_eq!((mesh.mesh.mesh.triangles.len(), files[0].content), (2, desk.hash("a.obj")), "decoded");
+        assert_eq!(snapshot.changed(), Some(desk.folder.path().join("a.obj")), "the request starts again");
         let (mesh, files) = desk.read(&desk.snapshot());
         assert_eq!(mesh.mesh.mesh.triangles.len(), 2);
         assert_eq!(files[0].content, desk.hash("a.obj"));
@@ -503,18 +506,41 @@ mod tests {
             pool: &desk.pool,
             containers: &Containers::default(),
         };
-        let loads = std::sync::atomic::AtomicUsize::new(0);
         let load_and_change = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
             let mesh = crate::assets::mesh::load(path, progress, token);
-            if loads.fetch_add(1, std::sync::atomic::Ordering::SeqCst) == 0 {
-                desk.write("a.mtl", "newmtl m\nKd 0 1 0\n");
-            }
+            desk.write("a.mtl", "newmtl m\nKd 0 1 0\n");
             mesh
         };
+        let old = desk.hash("a.mtl");
         let asset = one(&file, desk.hash("a.obj"), None, &reading, load_and_change).expect("not cancelled");
         let mesh = asset.result.expect("a mesh").0;
+        assert_eq!((asset.files[1].content, mesh.mesh.materials[0].diffuse.x), (old, 1.0));
+    }
+
+    #[test]
+    fn a_material_file_that_appears_after_it_was_missed_is_read() {
+        let desk = Desk::new();
+        std::fs::remove_file(desk.folder.path().join("a.mtl")).expect("removed");
+        let path = desk.folder.path().join("a.obj");
+        let file = MeshFile { value: path, span: 0..0, part: None };
+        let snapshot = desk.snapshot();
+        let token = CancelToken::new();
+        let reading = Reading {
+            sink: &desk.sink,
+            token: &token,
+            contents: &snapshot,
+            pool: &desk.pool,
+            containers: &Containers::default(),
+        };
+        let load_and_appear = |path: &Path, progress: Progress<'_>, token: &CancelToken| {
+            let mesh = crate::assets::mesh::load(path, progress, token);
+            desk.write("a.mtl", "newmtl m\nKd 0 1 0\n");
+            mesh
+        };
+        let asset = one(&file, desk.hash("a.obj"), None, &reading, load_and_appear).expect("not cancelled");
+        let mesh = asset.result.expect("a mesh").0;
         assert_eq!(asset.files[1].content, desk.hash("a.mtl"));
-        assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0, "the mesh has what the file is said to hold");
+        assert_eq!(mesh.mesh.materials[0].diffuse.y, 1.0);
     }
 
     #[test]

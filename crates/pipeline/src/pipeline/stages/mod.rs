@@ -114,10 +114,22 @@ impl Default for Findings {
 }
 
 impl Findings {
+    /// Forgets everything but when the request began.
+    pub(super) fn start_again(&mut self) {
+        *self = Self { begun: self.begun, ..Self::default() };
+    }
+
     pub(super) fn read(&mut self, file: FileRead) {
         if self.known.insert(file.clone()) {
             self.files.push(file);
         }
+    }
+
+    /// Puts the content that was decoded in place of one that was seen before.
+    pub(super) fn read_instead(&mut self, file: FileRead) {
+        self.known.retain(|known| known.path != file.path);
+        self.files.retain(|known| known.path != file.path);
+        self.read(file);
     }
 
     /// A scene may be broken because it names a file that is not there: what the errors underline is watched as

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::cache::Memo;
-use super::super::model::{self, Show};
+use super::super::model::{self, ModelText, Show};
 use super::super::protocol::Failure;
 use super::super::watch::content::{Content, FileRead, Snapshot};
 use super::containers::Containers;
@@ -18,7 +18,7 @@ use crate::control::{CancelToken, Cancelled, unwatched};
 use crate::scene;
 use crate::scene::description::Camera;
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::fingerprint::Fingerprint;
+use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::is_model;
 
 /// A scene that was understood.
@@ -52,7 +52,7 @@ fn model_scene(
     (contents, containers): (&Snapshot, &Containers),
     findings: &mut Findings,
     token: &CancelToken,
-) -> Result<(scene::Loaded, Vec<PathBuf>, Vec<Diagnostic>), Stop> {
+) -> Result<(scene::Loaded, ModelText), Stop> {
     let made = model::text(path, show, containers, token).map_err(|error| match error {
         AssetError::Cancelled(_) => Stop::Cancelled,
         AssetError::OutOfMemory { .. } => Stop::work(error),
@@ -68,13 +68,12 @@ fn model_scene(
             broken(&path, format!("{line}{reason}"))
         }
     })?;
-    let notes = made.notes.into_iter().map(|note| of_file(path, Severity::Warning, note)).collect();
-    let loaded = scene::load_made(made.text.into(), path, sets);
+    let loaded = scene::load_made(made.text.as_str().into(), path, sets);
     let loaded = loaded.map_err(|errors| {
         let shown = |one: Diagnostic| if one.path == path { model::in_its_scene(one) } else { one };
         Stop::Failed(Failure::Scene(errors.into_iter().map(shown).collect()))
     })?;
-    Ok((loaded, made.companions, notes))
+    Ok((loaded, made))
 }
 
 fn broken(path: &Path, message: String) -> Stop {
@@ -97,18 +96,11 @@ pub(in crate::pipeline) fn parse(
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<Staged<Arc<Parsed>>, Stop> {
-    let Origin { path, sets, show } = origin;
+    let Origin { path, show, .. } = origin;
     let content = contents.read(path, token)?;
-    findings.read(FileRead { path: path.to_owned(), content });
     let is_model = is_model(path);
-    let mut key = Fingerprint::new("parse");
-    content.add_to(key.path(path));
-    sets.iter().for_each(|set| {
-        key.text(set);
-    });
-    if is_model {
-        show.add_to(&mut key);
-    } else if show.from.is_some() || show.up.is_some() {
+    if !is_model && (show.from.is_some() || show.up.is_some()) {
+        findings.read(FileRead { path: path.to_owned(), content });
         let message = match show.from {
             Some(_) => "--from is for models: a scene has its own camera",
             None => "--up is for models: in a scene y is up",
@@ -119,26 +111,23 @@ pub(in crate::pipeline) fn parse(
             message.to_owned(),
         )])));
     }
-    let key = key.finish();
+    let key = |content| key(origin, content, is_model);
     // A model is made of more than one file: each of them must be as it was.
     let is_same = |parsed: &&Arc<Parsed>| {
         let now =
             |file: &FileRead| contents.read(&file.path, token).is_ok_and(|content| content == file.content);
         parsed.companions.iter().all(now)
     };
-    let known = memo.get(key).filter(is_same).cloned();
-    let (loaded, companions, notes) = match &known {
-        Some(parsed) => (parsed.loaded.clone(), parsed.companions.clone(), parsed.notes.clone()),
-        None if is_model => {
-            let (loaded, companions, notes) = model_scene(origin, (contents, containers), findings, token)?;
-            let read = |path: PathBuf| Ok(FileRead { content: contents.read(&path, token)?, path });
-            (Arc::new(loaded), companions.into_iter().map(read).collect::<Result<_, Cancelled>>()?, notes)
-        }
+    let known = memo.get(key(content)).filter(is_same).cloned();
+    let (loaded, content, companions, notes) = match &known {
+        Some(parsed) => (parsed.loaded.clone(), content, parsed.companions.clone(), parsed.notes.clone()),
         None => {
-            let loaded = scene::load(path, sets).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?;
-            (Arc::new(loaded), Vec::new(), Vec::new())
+            // Until it was understood; then its content is that of the bytes that were.
+            findings.read(FileRead { path: path.to_owned(), content });
+            read(origin, (contents, containers), findings, token)?
         }
     };
+    findings.read_instead(FileRead { path: path.to_owned(), content });
     companions.iter().for_each(|file| findings.read(file.clone()));
     let (orbiter, orbiter_content) = orbiter(&loaded, known.as_deref(), contents, findings, token)?;
     findings.warnings.extend(notes.iter().chain(&loaded.warnings).cloned());
@@ -149,9 +138,45 @@ pub(in crate::pipeline) fn parse(
     let parsed = Arc::new(Parsed { loaded, orbiter, named, companions, notes, orbiter_content });
     // A camera that could not be read is tried again by the next request.
     if parsed.orbiter.is_some() == orbiter_content.is_some() {
-        memo.set(key, parsed.clone());
+        memo.set(key(content), parsed.clone());
     }
     Ok(Staged::done(parsed, ""))
+}
+
+/// A scene with the content of its file, the other files that it was made of, and approximations.
+type Read = (Arc<scene::Loaded>, Content, Vec<FileRead>, Vec<Diagnostic>);
+
+fn read(
+    origin: Origin<'_>,
+    (contents, containers): (&Snapshot, &Containers),
+    findings: &mut Findings,
+    token: &CancelToken,
+) -> Result<Read, Stop> {
+    let Origin { path, sets, .. } = origin;
+    if !is_model(path) {
+        let loaded = scene::load(path, sets).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?;
+        let content = contents.decoded(path, *blake3::hash(loaded.source.text().as_bytes()).as_bytes());
+        return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
+    }
+    let (loaded, made) = model_scene(origin, (contents, containers), findings, token)?;
+    let content = contents.decoded(path, made.hash);
+    let companions = made.companions.iter().map(|companion| contents.of_companion(companion, token));
+    let companions = companions.collect::<Result<_, Cancelled>>()?;
+    let notes = made.notes.into_iter().map(|note| of_file(path, Severity::Warning, note)).collect();
+    Ok((Arc::new(loaded), content, companions, notes))
+}
+
+/// Key of a scene whose file has this content.
+fn key(Origin { path, sets, show }: Origin<'_>, content: Content, is_model: bool) -> Key {
+    let mut key = Fingerprint::new("parse");
+    content.add_to(key.path(path));
+    sets.iter().for_each(|set| {
+        key.text(set);
+    });
+    if is_model {
+        show.add_to(&mut key);
+    }
+    key.finish()
 }
 
 /// Files of the scene without the call's changes, with the files and pictures that only its unread meshes name.
@@ -161,7 +186,7 @@ fn named(loaded: &scene::Loaded) -> Vec<PathBuf> {
     // What cannot be read names nothing that could be known.
     for path in loaded.named.iter().filter(|path| has_material_files(path) && !is_read(path)) {
         if let Ok(mesh) = load_mesh(path, &unwatched, &CancelToken::new()) {
-            named.extend(mesh.companions.into_iter().chain(mesh.pictures));
+            named.extend(mesh.companions.into_iter().map(|one| one.path).chain(mesh.pictures));
         }
     }
     let textures: BTreeSet<_> = loaded.scene.textures.iter().map(|texture| &texture.file.value).collect();
@@ -187,13 +212,18 @@ fn orbiter(
 ) -> Result<Orbiter, Stop> {
     let Camera::Orbiter { file, .. } = &loaded.scene.camera else { return Ok((None, None)) };
     let content = contents.read(&file.value, token)?;
-    findings.read(FileRead { path: file.value.clone(), content });
     if let Some(parsed) = known.filter(|parsed| parsed.orbiter_content == Some(content)) {
+        findings.read(FileRead { path: file.value.clone(), content });
         return Ok((parsed.orbiter, Some(content)));
     }
     match load_orbiter(&file.value) {
-        Ok(camera) => Ok((Some(camera), Some(content))),
+        Ok((camera, hash)) => {
+            let content = contents.decoded(&file.value, hash);
+            findings.read(FileRead { path: file.value.clone(), content });
+            Ok((Some(camera), Some(content)))
+        }
         Err(error) => {
+            findings.read(FileRead { path: file.value.clone(), content });
             findings.asset_error(loaded, file.span.clone(), &error);
             Ok((None, Some(content)))
         }

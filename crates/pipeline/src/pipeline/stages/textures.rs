@@ -14,7 +14,7 @@ use super::meshes::Meshes;
 use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::AssetError;
 use crate::assets::image::{
-    ImageEncoding, ImageLimits, ImageWithin, load, load_within, mipmaps, size, size_within,
+    ImageEncoding, ImageLimits, ImageWithin, load_hashed, load_within, mipmaps, size, size_within,
 };
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
@@ -44,6 +44,8 @@ fn name(source: &TextureSource) -> Name {
 pub(in crate::pipeline) struct TextureCache {
     texels: Pool<Name, Texels>,
     mipmaps: Pool<Name, Mipmaps>,
+    /// For images of glTF files that are in files of their own: these files.
+    linked: HashMap<Name, PathBuf>,
 }
 
 impl TextureCache {
@@ -64,6 +66,8 @@ impl TextureCache {
     pub(in crate::pipeline) fn drop_before(&mut self, request: u64) {
         self.texels.drop_before(request);
         self.mipmaps.drop_before(request);
+        let texels = &self.texels;
+        self.linked.retain(|name, _| texels.latest(name).is_some());
     }
 
     /// The texels of a file that were read last.
@@ -123,6 +127,8 @@ pub(in crate::pipeline) fn needed(
 struct Wanted<'a> {
     name: Name,
     content: Content,
+    /// The file of its own that an image of a glTF file has.
+    linked: Option<FileRead>,
     kept: Kept,
     asked_by: Vec<&'a NeededTexture>,
 }
@@ -158,10 +164,15 @@ pub(in crate::pipeline) fn textures(
     let images = images(needed, cache, reading)?;
     let assets = load_all(&images, MOST_BYTES, reading);
     let mut counts = Counts::default();
-    for (image, asset) in images.into_iter().zip(assets) {
+    for (mut image, (contents, asset)) in images.into_iter().zip(assets) {
+        (image.content, image.linked) = contents;
         let key = image.key();
         for one in &image.asked_by {
             findings.read(FileRead { path: one.source.path.clone(), content: image.content });
+        }
+        if let Some(file) = &image.linked {
+            findings.read(file.clone());
+            cache.linked.insert(image.name.clone(), file.path.clone());
         }
         match asset {
             Ok((loaded_image, was_kept)) => {
@@ -320,6 +331,9 @@ impl Wanted<'_> {
         let mut key = Fingerprint::new("texture");
         key.path(path).index(encoding.index()).index(image.map_or(0, |image| image as usize + 1));
         self.content.add_to(&mut key);
+        if let Some(FileRead { path, content }) = &self.linked {
+            content.add_to(key.path(path));
+        }
         key.finish()
     }
 }
@@ -340,7 +354,12 @@ fn images<'a>(
             continue;
         }
         let content = reading.contents.read(&one.source.path, reading.token)?;
-        images.push(Wanted { name, content, kept: Kept::default(), asked_by: vec![one] });
+        let linked = cache.linked.get(&name).map(|path| {
+            let content = reading.contents.read(path, reading.token)?;
+            Ok(FileRead { path: path.clone(), content })
+        });
+        let (linked, kept) = (linked.transpose()?, Kept::default());
+        images.push(Wanted { name, content, linked, kept, asked_by: vec![one] });
     }
     for image in &mut images {
         let key = image.key();
@@ -358,7 +377,7 @@ fn load_all(
     images: &[Wanted<'_>],
     most_bytes: u64,
     reading: &Reading<'_>,
-) -> Vec<Result<(Image, bool), AssetError>> {
+) -> Vec<(Contents, Result<(Image, bool), AssetError>)> {
     let size = |image: &Wanted<'_>| {
         let (width, height, bytes) = match &image.kept.texels {
             Some(texels) => (texels.width, texels.height, texels.memory_bytes() as u64),
@@ -369,9 +388,13 @@ fn load_all(
     };
     let sizes: Vec<u64> = reading.pool.install(|| images.par_iter().map(size).collect());
     let over = over_budget(&sizes, most_bytes);
-    let load = |(image, over): (&Wanted<'_>, Option<String>)| match over {
-        Some(reason) => Err(AssetError::Malformed { path: image.path().to_owned(), line: None, reason }),
-        None => load_one(image, reading),
+    let load = |(image, over): (&Wanted<'_>, Option<String>)| {
+        let mut contents = (image.content, image.linked.clone());
+        let result = match over {
+            Some(reason) => Err(AssetError::Malformed { path: image.path().to_owned(), line: None, reason }),
+            None => load_one(image, &mut contents, reading),
+        };
+        (contents, result)
     };
     reading.pool.install(|| images.par_iter().zip(over).map(load).collect())
 }
@@ -396,24 +419,21 @@ fn over_budget(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
     sizes.iter().map(check).collect()
 }
 
-/// An image with its levels, and whether all of that was kept from before.
-fn load_one(image: &Wanted<'_>, reading: &Reading<'_>) -> Result<(Image, bool), AssetError> {
+/// Content of the file of an image, and the file of its own that an image of a glTF file has.
+type Contents = (Content, Option<FileRead>);
+
+/// An image with its levels, and whether all of that was kept from before. `contents` become those that were decoded.
+fn load_one(
+    image: &Wanted<'_>,
+    contents: &mut Contents,
+    reading: &Reading<'_>,
+) -> Result<(Image, bool), AssetError> {
     let mut was_kept = true;
     let texels = match &image.kept.texels {
         Some(texels) => texels.clone(),
         None => {
             was_kept = false;
-            let (one, limits) = (image.asked_by[0], ImageLimits::default());
-            let encoding = one.source.encoding;
-            let input = input(&one.source, reading)?;
-            let load = |progress: Progress<'_>| match input {
-                ImageInput::File(path) => load(&path, encoding, limits, progress, reading.token),
-                ImageInput::Bytes(bytes) => {
-                    let within = ImageWithin { path: image.path(), bytes };
-                    load_within(within, encoding, limits, progress, reading.token)
-                }
-            };
-            Arc::new(reading.sink.asset(&one.name, load)?)
+            Arc::new(decode(image, contents, reading)?)
         }
     };
     let mipmaps = match &image.kept.mipmaps {
@@ -426,11 +446,46 @@ fn load_one(image: &Wanted<'_>, reading: &Reading<'_>) -> Result<(Image, bool), 
     Ok((Image { texels, mipmaps }, was_kept))
 }
 
+/// The texels of an image. `contents` become those that were decoded.
+fn decode(image: &Wanted<'_>, contents: &mut Contents, reading: &Reading<'_>) -> Result<Texels, AssetError> {
+    let (one, limits) = (image.asked_by[0], ImageLimits::default());
+    let (encoding, token) = (one.source.encoding, reading.token);
+    contents.1 = None;
+    let file = match one.source.image {
+        None => image.path().to_owned(),
+        Some(number) => {
+            let (input, hash) = reading.containers.image((image.path(), number), token)?;
+            contents.0 = reading.contents.decoded(image.path(), hash);
+            match input {
+                ImageInput::Bytes(bytes) => {
+                    let within = ImageWithin { path: image.path(), bytes };
+                    let load =
+                        |progress: Progress<'_>| load_within(within, encoding, limits, progress, token);
+                    return reading.sink.asset(&one.name, load);
+                }
+                ImageInput::File(path) => {
+                    let content = reading.contents.read(&path, token)?;
+                    contents.1 = Some(FileRead { path: path.clone(), content });
+                    path
+                }
+            }
+        }
+    };
+    let load = |progress: Progress<'_>| load_hashed(&file, encoding, limits, progress, token);
+    let (texels, hash) = reading.sink.asset(&one.name, load)?;
+    let content = reading.contents.decoded(&file, hash);
+    match &mut contents.1 {
+        Some(linked) => linked.content = content,
+        None => contents.0 = content,
+    }
+    Ok(texels)
+}
+
 /// Where an image is read from.
 fn input(source: &TextureSource, reading: &Reading<'_>) -> Result<ImageInput, AssetError> {
     match source.image {
         None => Ok(ImageInput::File(source.path.clone())),
-        Some(image) => reading.containers.image((&source.path, image), reading.token),
+        Some(image) => reading.containers.image((&source.path, image), reading.token).map(|(input, _)| input),
     }
 }
 

@@ -1,13 +1,14 @@
 //! Contents of files, cheap to ask for again: a hash that is computed anew only if the file may have changed.
 
 use std::collections::HashMap;
-use std::fs::{self, Metadata};
+use std::fs::Metadata;
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
+use crate::assets::{Companion, FileHash};
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::fingerprint::Fingerprint;
 use crate::system::file::{self, Kind};
@@ -17,7 +18,7 @@ use crate::system::file::{self, Kind};
 pub struct FileRead {
     /// Its name.
     pub path: PathBuf,
-    /// Its content just before it was read.
+    /// Hash of the bytes that were decoded; for other files, the content at about that time.
     pub content: Content,
 }
 
@@ -46,11 +47,6 @@ pub enum Obstacle {
 }
 
 impl Content {
-    /// Whether a file is too long to be hashed, so that its time stamps stand for its content.
-    pub(in crate::pipeline) fn is_by_stamp(self, path: &Path) -> bool {
-        self != Self::Missing && fs::metadata(path).is_ok_and(|metadata| metadata.len() > MOST_HASHED)
-    }
-
     /// Add it to what a stage read.
     pub(in crate::pipeline) fn add_to(self, key: &mut Fingerprint) {
         match self {
@@ -63,9 +59,9 @@ impl Content {
 
 /// Younger changes than this are not told apart by every file system's time stamps.
 const STAMP_RESOLUTION: Duration = Duration::from_secs(2);
-/// Most bytes that are hashed. For longer files the stamp counts instead of the content, so that nobody reads through a sparse
-/// file of terabytes.
-const MOST_HASHED: u64 = 256 << 20;
+/// Most bytes that are hashed: those of the longest file that is decoded. For longer files the stamp counts instead of the content, so
+/// that nobody reads through a sparse file of terabytes.
+const MOST_HASHED: u64 = 4 << 30;
 /// Bytes between two looks at the token.
 const CHUNK: usize = 1 << 20;
 
@@ -76,19 +72,23 @@ pub struct Contents {
     /// Files that were read through.
     #[cfg(test)]
     pub(in crate::pipeline) hashed: Mutex<Vec<PathBuf>>,
+    /// Files to be replaced, each with its new bytes, as soon as they have been hashed.
+    #[cfg(test)]
+    pub(in crate::pipeline) replacements: Mutex<HashMap<PathBuf, Vec<u8>>>,
 }
 
-/// Contents of files as one request sees them: each file is looked at once, so that everything made of it goes by the same
-/// content. The watcher finds files that change later.
+/// Contents of files as one request sees them. Everything that a request makes of a file should have the same content: a request that
+/// notices a change in between starts again. The watcher finds files that change later.
 #[derive(Debug)]
 pub(in crate::pipeline) struct Snapshot {
     contents: Arc<Contents>,
     seen: Mutex<HashMap<PathBuf, Content>>,
+    changed: Mutex<Option<PathBuf>>,
 }
 
 impl Snapshot {
     pub(in crate::pipeline) fn of(contents: Arc<Contents>) -> Self {
-        Self { contents, seen: Mutex::default() }
+        Self { contents, seen: Mutex::default(), changed: Mutex::default() }
     }
 
     /// Content of the file when this request first looked at it.
@@ -103,6 +103,36 @@ impl Snapshot {
         Ok(*self.seen().entry(path.to_owned()).or_insert(content))
     }
 
+    /// Content of a file whose decoded bytes have this hash. Notes a change if this request has seen another content.
+    pub(in crate::pipeline) fn decoded(&self, path: &Path, hash: FileHash) -> Content {
+        let content = Content::Hash(hash);
+        if *self.seen().entry(path.to_owned()).or_insert(content) != content {
+            *self.changed.lock().unwrap_or_else(PoisonError::into_inner) = Some(path.to_owned());
+        }
+        content
+    }
+
+    /// A file that another file names, with the content that was decoded.
+    ///
+    /// # Errors
+    /// [`Cancelled`].
+    pub(in crate::pipeline) fn of_companion(
+        &self,
+        Companion { path, hash }: &Companion,
+        token: &CancelToken,
+    ) -> Result<FileRead, Cancelled> {
+        let content = match hash {
+            Some(hash) => self.decoded(path, *hash),
+            None => self.read(path, token)?,
+        };
+        Ok(FileRead { path: path.clone(), content })
+    }
+
+    /// A file that changed while this request read its files.
+    pub(in crate::pipeline) fn changed(&self) -> Option<PathBuf> {
+        self.changed.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
     /// Content that this snapshot has seen already.
     pub(in crate::pipeline) fn known(&self, path: &Path) -> Option<Content> {
         self.seen().get(path).copied()
@@ -111,11 +141,6 @@ impl Snapshot {
     fn seen(&self) -> MutexGuard<'_, HashMap<PathBuf, Content>> {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// Whether a file may have changed since then.
-pub(in crate::pipeline) fn may_have_changed(path: &Path, since: SystemTime) -> bool {
-    fs::metadata(path).is_ok_and(|metadata| !Stamp::of(&metadata).is_settled(since))
 }
 
 /// Properties that change with every change of a file, given some time between changes.
@@ -190,7 +215,12 @@ impl Contents {
     fn hash(&self, path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
         #[cfg(test)]
         self.hashed.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_owned());
-        hash(path, token)
+        let content = hash(path, token);
+        #[cfg(test)]
+        if let Some(bytes) = self.replacements.lock().unwrap_or_else(PoisonError::into_inner).remove(path) {
+            std::fs::write(path, bytes).expect("replaced");
+        }
+        content
     }
 
     fn known(&self) -> MutexGuard<'_, HashMap<PathBuf, (Stamp, Content)>> {
@@ -227,7 +257,7 @@ fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs::File;
+    use std::fs::{self, File};
 
     #[test]
     fn content_counts_and_not_the_time_stamp() {

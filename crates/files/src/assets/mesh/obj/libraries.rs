@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::mtl::{self, Library, cut_at_comments};
 use super::super::{AssetError, Source};
-use crate::assets::FileMaterial;
+use crate::assets::{Companion, FileMaterial};
 
 /// The material files that an OBJ names, in the order in which they occur.
 pub(super) struct Libraries<'a> {
@@ -25,7 +25,7 @@ pub(super) struct Found {
     pub(super) warnings: Vec<String>,
     pub(super) missing: bool,
     /// Files that were read or looked for.
-    pub(super) files: Vec<PathBuf>,
+    pub(super) files: Vec<Companion>,
     /// Pictures that they name.
     pub(super) pictures: Vec<PathBuf>,
 }
@@ -68,9 +68,11 @@ impl Libraries<'_> {
     }
 
     fn load_file(&self, path: &Path) -> Result<Vec<tobj::Material>, tobj::LoadError> {
-        self.found.borrow_mut().files.push(path.to_owned());
-        match mtl::load(path, self.source.watch) {
-            Ok(Library { materials, warnings }) => {
+        let library = mtl::load(path, self.source.watch);
+        let hash = library.as_ref().ok().map(|library| library.hash);
+        self.found.borrow_mut().files.push(Companion { path: path.to_owned(), hash });
+        match library {
+            Ok(Library { materials, warnings, hash: _ }) => {
                 let folder = path.parent().unwrap_or(Path::new(""));
                 let known = materials.iter().map(|found| (found.name.clone(), mtl::material(found, folder)));
                 let mut found = self.found.borrow_mut();
