@@ -13,6 +13,8 @@ use super::sent::Input;
 use crate::tui::event::KeyPress;
 
 const ESCAPE: u8 = 0x1b;
+/// Bytes after an escape character with which a terminal begins a sequence: CSI, OSC, SS3, DCS, SOS, PM, APC, and the end of a string.
+const INTRODUCERS: &[u8] = b"[]OPX^_\\";
 /// After this much silence an escape character was the key.
 const LONE_ESCAPE: Duration = Duration::from_millis(50);
 /// A sequence goes on within this time. Lines that lose packets are this slow.
@@ -45,10 +47,11 @@ enum Held {
     Nothing,
     /// An escape character alone.
     Escape,
-    /// A sequence that began then and has so many bytes.
+    /// A sequence that began then and has so many bytes. `introducer`: the byte after the escape character.
     Sequence {
         begin: Instant,
         bytes: usize,
+        introducer: u8,
     },
     /// Perhaps the rest of a sequence whose escape character was taken for the key; else these keys.
     Doubtful(Vec<u8>),
@@ -97,6 +100,11 @@ impl Decoder {
                 }
                 Held::Doubtful(bytes) => self.replay(&bytes),
                 Held::Paste(_) => self.meaning.found.push(Input::Paste),
+                // Nothing followed: two keys.
+                Held::Sequence { bytes: 2, introducer, .. } => {
+                    self.press_escape();
+                    self.replay(&[introducer]);
+                }
                 Held::Nothing | Held::Sequence { .. } => {}
             }
         }
@@ -107,7 +115,15 @@ impl Decoder {
             Held::Nothing => self.begin(byte, now),
             Held::Escape => self.follow_escape(byte, now),
             Held::Sequence { .. } if byte == ESCAPE => self.begin(byte, now),
-            Held::Sequence { begin, bytes } => self.go_on(byte, (begin, bytes + 1), now),
+            Held::Sequence { bytes: 2, introducer, .. } if is_key_behind(introducer, byte) => {
+                self.give_up();
+                self.press_escape();
+                self.replay(&[introducer]);
+                self.begin(byte, now);
+            }
+            Held::Sequence { begin, bytes, introducer } => {
+                self.go_on(byte, (begin, bytes + 1, introducer), now);
+            }
             Held::Doubtful(bytes) => self.follow_doubt(bytes, byte, now),
             Held::Paste(mut paste) => {
                 if paste.takes_last(byte, now) {
@@ -141,18 +157,18 @@ impl Decoder {
                 self.press_escape();
                 self.held = Held::Escape;
             }
-            // No sequence goes on like this.
-            0..0x20 | 0x7f.. => {
+            // No terminal sends a sequence that goes on like this.
+            byte if !INTRODUCERS.contains(&byte) => {
                 self.give_up();
                 self.press_escape();
                 self.begin(byte, now);
             }
-            _ => self.go_on(byte, (now, 2), now),
+            _ => self.go_on(byte, (now, 2, byte), now),
         }
     }
 
-    /// The next byte of a sequence that began then and has so many bytes with this one.
-    fn go_on(&mut self, byte: u8, (begin, bytes): (Instant, usize), now: Instant) {
+    /// The next byte of a sequence that began then, has so many bytes with this one, and has this introducer.
+    fn go_on(&mut self, byte: u8, (begin, bytes, introducer): (Instant, usize, u8), now: Instant) {
         self.meaning.has_ended = false;
         self.parser.advance(&mut self.meaning, &[byte]);
         if std::mem::take(&mut self.meaning.is_paste) {
@@ -160,14 +176,14 @@ impl Decoder {
         } else if bytes >= MOST_BYTES {
             self.give_up();
         } else if !self.meaning.has_ended {
-            self.held = Held::Sequence { begin, bytes };
+            self.held = Held::Sequence { begin, bytes, introducer };
         }
     }
 
     fn follow_doubt(&mut self, mut bytes: Vec<u8>, byte: u8, now: Instant) {
         let before = self.meaning.found.len();
         if (0x20..0x7f).contains(&byte) {
-            self.go_on(byte, (now, bytes.len()), now);
+            self.go_on(byte, (now, bytes.len(), b'['), now);
         }
         let is_known = self.meaning.found.len() > before || matches!(self.held, Held::Paste(_));
         if is_known {
@@ -197,6 +213,17 @@ impl Decoder {
 
     fn press_escape(&mut self) {
         self.meaning.found.push(Input::Key(KeyPress::special(KeyCode::Esc)));
+    }
+}
+
+/// Whether a byte right behind these two is a key, as are they: it does not continue any sequence that a terminal sends.
+fn is_key_behind(introducer: u8, byte: u8) -> bool {
+    match introducer {
+        // rxvt has `a` to `d` for shifted arrows; `n` and `t` end reports.
+        b'[' => matches!(byte, b'e'..=b'm' | b'o'..=b's' | b'u'..=b'~'),
+        b']' => !byte.is_ascii_digit() && byte != ESCAPE,
+        b'P' => byte.is_ascii_lowercase(),
+        _ => false,
     }
 }
 

@@ -115,9 +115,7 @@ impl Perform for Meaning {
                 self.next = Next::SingleShift;
                 return;
             }
-            // The end of a string.
-            b'\\' => {}
-            _ if intermediates.is_empty() => self.key(KeyCode::Char(char::from(byte)), KeyModifiers::ALT),
+            // The end of a string, or an unknown one.
             _ => {}
         }
         self.has_ended = true;

@@ -69,7 +69,6 @@ fn keys_are_what_xterm_sends_for_them() {
         (b"\x1a", Input::Key(KeyPress::ctrl('z'))),
         (b"\0", Input::Key(KeyPress::ctrl(' '))),
         (b"\x1c", Input::Key(KeyPress::ctrl('4'))),
-        (b"\x1bx", with(With::ALT, KeyCode::Char('x'))),
         (b"\x1b[A", special(KeyCode::Up)),
         (b"\x1bOB", special(KeyCode::Down)),
         (b"\x1b[1;5C", with(With::CONTROL, KeyCode::Right)),
@@ -161,6 +160,33 @@ fn an_escape_character_is_the_key_when_nothing_follows() {
     assert_eq!(read(b"\x1b\x1b[A"), [ESC, special(KeyCode::Up)]);
     assert_eq!(read(b"\x1b\x03q"), [ESC, Input::Key(KeyPress::ctrl('c')), plain('q')]);
     assert_eq!(read("\x1béq".as_bytes()), [ESC, plain('é'), plain('q')]);
+}
+
+/// No key has alt: a character right behind an escape character is a key of its own.
+#[test]
+fn escape_and_a_quick_key_are_two_keys() {
+    for key in (b' '..0x7f).filter(|byte| !b"[]OPX^_\\".contains(byte)) {
+        let key = char::from(key);
+        let bytes = [b"\x1b".as_slice(), key.to_string().as_bytes(), b"q"].concat();
+        assert_eq!(read(&bytes), [ESC, plain(key), plain('q')], "{key}");
+        let mut bench = Bench::new();
+        assert_eq!(bench.read(b"\x1b"), []);
+        bench.wait(20);
+        assert_eq!(bench.read(&bytes[1..2]), [ESC, plain(key)], "{key}");
+    }
+    assert_eq!(read(b"\x1b\x1bs"), [ESC, ESC, plain('s')]);
+    assert_eq!(read(b"\x1b]s"), [ESC, plain(']'), plain('s')]);
+    assert_eq!(read(b"\x1b]]"), [ESC, plain(']'), plain(']')]);
+    assert_eq!(read(b"\x1b[s"), [ESC, plain('['), plain('s')]);
+    assert_eq!(read(b"\x1bPp"), [ESC, plain('P'), plain('p')]);
+    assert_eq!(read(b"\x1b[As\x1bs"), [special(KeyCode::Up), plain('s'), ESC, plain('s')]);
+    // The beginning of a sequence that does not go on.
+    for key in ['[', ']', 'P', 'O', 'X', '_'] {
+        let mut bench = Bench::new();
+        assert_eq!(bench.read(format!("\x1b{key}").as_bytes()), []);
+        assert_eq!(bench.wait(1000), [ESC, plain(key)]);
+        assert_eq!(bench.read(b"q"), [plain('q')]);
+    }
 }
 
 #[test]
@@ -285,7 +311,7 @@ fn answers_do_not_keep_a_paste_open() {
 
 #[test]
 fn a_sequence_without_an_end_is_given_up() {
-    for begun in [&b"\x1b]0;t"[..], b"\x1bP", b"\x1b[", b"\x1b[1;", b"\x1bO", b"\x1bX", b"\x1b(", b"\x1b[M"] {
+    for begun in [&b"\x1b]0;t"[..], b"\x1bP1", b"\x1b[1;", b"\x1bXx", b"\x1b[M"] {
         let mut bench = Bench::new();
         assert_eq!(bench.read(begun), []);
         assert_eq!(bench.wait(1000), []);

@@ -43,7 +43,7 @@ pub(super) fn update(state: &mut State, action: Overlay) -> Option<Vec<Effect>> 
 /// Effect of a key while a name is typed. `None` if none is.
 pub(super) fn typed(state: &mut State, key: KeyPress) -> Option<Vec<Effect>> {
     let mut name = state.overlays.views.as_ref().filter(|_| !state.overlays.help.open)?.name.clone()?;
-    let is_held = key.modifiers.intersects(KeyModifiers::CONTROL | KeyModifiers::ALT);
+    let is_held = key.modifiers.contains(KeyModifiers::CONTROL);
     match key.code {
         KeyCode::Char(letter) if !is_held => name.extend(letter.to_lowercase()),
         KeyCode::Backspace => drop(name.pop()),
