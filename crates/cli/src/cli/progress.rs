@@ -8,7 +8,8 @@ pub(super) use self::bars::style;
 pub(super) use self::json::line as json_line;
 use super::args::Progress;
 use super::console::Console;
-use crate::pipeline::protocol::Event;
+use crate::pipeline::protocol::{Event, RenderProgress};
+use crate::pipeline::words::samples_so_far;
 pub(super) use crate::pipeline::words::seconds;
 
 /// Says how work goes on.
@@ -38,6 +39,14 @@ pub(super) fn reporter(progress: Progress, time: Option<f64>, console: &Console)
         Progress::Json => Box::new(json::Json),
         Progress::None => Box::new(Silent),
     }
+}
+
+/// Samples so far, with the total only if that is certain.
+fn samples(progress: &RenderProgress) -> String {
+    if progress.is_total_fixed {
+        return format!("{} of {} samples", samples_so_far(progress), progress.total_samples);
+    }
+    format!("about {:.0} samples per pixel so far", progress.mean_samples.floor())
 }
 
 struct Silent;

@@ -364,10 +364,14 @@ pub struct RenderProgress {
     pub earlier_seconds: f64,
     /// Expected seconds until the end. `None` until the rate is known.
     pub eta_seconds: Option<f64>,
-    /// Samples per pixel so far, on average.
+    /// Samples per pixel so far, on average, rounded down.
     pub samples: u32,
+    /// The exact average.
+    pub mean_samples: f64,
     /// Samples per pixel that there will be, on average, as far as that is known.
     pub total_samples: u32,
+    /// Whether every pixel gets `total_samples`: neither noise nor time ends the render.
+    pub is_total_fixed: bool,
     /// Noise so far. `None` before half a second and 16 samples.
     pub noise: Option<NoiseProgress>,
 }

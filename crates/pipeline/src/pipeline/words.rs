@@ -1,5 +1,43 @@
 //! Amounts in words, the same in every front end.
 
+use super::protocol::RenderProgress;
+
+/// Time until the end of a render, as far as it is worth showing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Eta {
+    /// In this many seconds.
+    Seconds(f64),
+    /// After more than a day.
+    OverADay,
+}
+
+impl Eta {
+    /// `None` while an estimate is mostly noise: before 1 % of the render is done, and in its first half second.
+    pub fn of(progress: &RenderProgress) -> Option<Self> {
+        const DAY: f64 = 24.0 * 3600.0;
+        let is_early = progress.fraction < 0.01 || progress.elapsed_seconds < 0.5;
+        let seconds = progress.eta_seconds.filter(|seconds| !is_early && *seconds >= 0.0)?;
+        Some(if seconds > DAY { Self::OverADay } else { Self::Seconds(seconds) })
+    }
+
+    /// The time in words, for a line that is not redrawn often.
+    pub fn words(self) -> String {
+        match self {
+            Self::Seconds(time) => seconds(time),
+            Self::OverADay => "over a day".to_owned(),
+        }
+    }
+}
+
+/// Average samples per pixel so far, rounded down. Has tenths where a whole number would contradict the percentage beside it.
+pub fn samples_so_far(progress: &RenderProgress) -> String {
+    /// From this total on, a sample is less than a percent.
+    const FINE: u32 = 100;
+    let tenths = (progress.mean_samples * 10.0).floor();
+    let has_tenths = progress.total_samples < FINE && tenths % 10.0 != 0.0;
+    if has_tenths { format!("{:.1}", tenths / 10.0) } else { format!("{:.0}", progress.mean_samples.floor()) }
+}
+
 /// A time in a few characters.
 pub fn seconds(seconds: f64) -> String {
     match seconds {
@@ -24,6 +62,51 @@ fn clock(seconds: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn progress(fraction: f64, elapsed_seconds: f64, eta_seconds: Option<f64>) -> RenderProgress {
+        RenderProgress {
+            fraction,
+            elapsed_seconds,
+            earlier_seconds: 0.0,
+            eta_seconds,
+            samples: 0,
+            mean_samples: 0.0,
+            total_samples: 64,
+            is_total_fixed: true,
+            noise: None,
+        }
+    }
+
+    #[test]
+    fn an_eta_is_neither_early_nor_absurd() {
+        let eta = |fraction, elapsed, eta| Eta::of(&progress(fraction, elapsed, Some(eta))).map(Eta::words);
+        assert_eq!(eta(0.009, 60.0, 6e3), None);
+        assert_eq!(eta(0.4, 0.49, 0.7), None);
+        assert_eq!(eta(0.01, 0.5, 49.5).as_deref(), Some("49.5 s"));
+        assert_eq!(eta(0.01, 600.0, 86_400.0).as_deref(), Some("24 h 00 min"));
+        assert_eq!(eta(0.01, 1e3, 86_401.0).as_deref(), Some("over a day"));
+        assert_eq!(eta(0.5, 1e3, f64::INFINITY).as_deref(), Some("over a day"));
+        assert_eq!(eta(0.5, 1e3, f64::NAN), None);
+        assert_eq!(Eta::of(&progress(0.5, 1e3, None)), None);
+    }
+
+    #[test]
+    fn samples_agree_with_the_percentage() {
+        for (mean, total, words) in [
+            (1.72, 4, "1.7"),
+            (0.97, 1, "0.9"),
+            (1.0, 1, "1"),
+            (2.0, 4, "2"),
+            (2.04, 4, "2"),
+            (0.0, 64, "0"),
+            (63.99, 64, "63.9"),
+            (43.9, 100, "43"),
+        ] {
+            let progress =
+                RenderProgress { mean_samples: mean, total_samples: total, ..progress(0.5, 1.0, None) };
+            assert_eq!(samples_so_far(&progress), words);
+        }
+    }
 
     #[test]
     fn times_in_words() {

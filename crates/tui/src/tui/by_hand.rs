@@ -126,7 +126,9 @@ fn pretend(
             earlier_seconds: 0.0,
             eta_seconds: Some(f64::from(20 - step) * 0.1),
             samples: step * 3,
+            mean_samples: f64::from(step * 3),
             total_samples: 60,
+            is_total_fixed: true,
             noise: None,
         };
         say(Event::Progress { generation, progress });

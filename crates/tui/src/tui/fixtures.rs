@@ -205,7 +205,9 @@ pub(super) fn progress(fraction: f64, eta_seconds: Option<f64>) -> RenderProgres
         earlier_seconds: 0.0,
         eta_seconds,
         samples,
+        mean_samples: f64::from(samples),
         total_samples: 64,
+        is_total_fixed: true,
         noise: None,
     }
 }

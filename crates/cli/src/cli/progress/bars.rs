@@ -4,8 +4,9 @@ use std::collections::HashMap;
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
-use super::{Reporter, seconds};
+use super::{Reporter, samples, seconds};
 use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, Stage, StageReport, Status};
+use crate::pipeline::words::Eta;
 use crate::scene::sanitize::visible;
 
 /// Columns that the bar keeps at least.
@@ -92,9 +93,9 @@ impl Reporter for Bars {
 fn words(progress: &RenderProgress, time: Option<f64>, columns: usize) -> String {
     let done = match time {
         Some(limit) => format!("{} of {}", seconds(progress.elapsed_seconds.min(limit)), seconds(limit)),
-        None => format!("{} of {} samples", progress.samples, progress.total_samples),
+        None => samples(progress),
     };
-    let left = progress.eta_seconds.map(|eta| format!("{} left", seconds(eta)));
+    let left = Eta::of(progress).map(|eta| format!("{} left", eta.words()));
     let whole = match (&left, time) {
         (Some(left), None) => format!("{done}, {left}"),
         (_, _) => done.clone(),
@@ -120,7 +121,9 @@ mod tests {
             earlier_seconds: 0.0,
             eta_seconds: Some(7.5),
             samples: 1000,
+            mean_samples: 1000.5,
             total_samples: 4096,
+            is_total_fixed: true,
             noise: None,
         }
     }

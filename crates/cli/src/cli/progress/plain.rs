@@ -3,8 +3,9 @@
 use std::time::{Duration, Instant};
 
 use super::super::console::Console;
-use super::{Reporter, seconds};
+use super::{Reporter, samples, seconds};
 use crate::pipeline::protocol::{Event, RenderProgress, StageReport, Status};
+use crate::pipeline::words::Eta;
 
 /// Longest silence of a render.
 const INTERVAL: Duration = Duration::from_secs(5);
@@ -63,9 +64,8 @@ impl Reporter for Plain {
 }
 
 fn line(progress: &RenderProgress) -> String {
-    let eta = progress.eta_seconds.map_or(String::new(), |eta| format!(", {} left", seconds(eta)));
-    let (samples, total) = (progress.samples, progress.total_samples);
-    format!("{:<8} {:3.0}% ({samples} of {total} samples{eta})", "render", progress.fraction * 100.0)
+    let eta = Eta::of(progress).map_or(String::new(), |eta| format!(", {} left", eta.words()));
+    format!("{:<8} {:3.0}% ({}{eta})", "render", (progress.fraction * 100.0).floor(), samples(progress))
 }
 
 /// `parse    done    0.40 ms`
@@ -93,7 +93,9 @@ mod tests {
             earlier_seconds: 0.0,
             eta_seconds: None,
             samples,
+            mean_samples: f64::from(samples),
             total_samples: 100,
+            is_total_fixed: true,
             noise: None,
         };
         let mut said = Vec::new();
@@ -119,10 +121,16 @@ mod tests {
             earlier_seconds: 0.0,
             eta_seconds: Some(1.5),
             samples: 25,
+            mean_samples: 25.62,
             total_samples: 64,
+            is_total_fixed: true,
             noise: None,
         };
-        assert_eq!(line(&progress), "render    40% (25 of 64 samples, 1.50 s left)");
+        assert_eq!(line(&progress), "render    40% (25.6 of 64 samples, 1.50 s left)");
+        let by_noise = RenderProgress { is_total_fixed: false, ..progress };
+        assert_eq!(line(&by_noise), "render    40% (about 25 samples per pixel so far, 1.50 s left)");
+        let early = RenderProgress { elapsed_seconds: 0.1, ..progress };
+        assert_eq!(line(&early), "render    40% (25.6 of 64 samples)");
         assert!(!line(&RenderProgress { eta_seconds: None, ..progress }).contains("left"));
     }
 }

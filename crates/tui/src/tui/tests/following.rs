@@ -264,6 +264,7 @@ impl Watch {
             let progress = progress(done, Some((1.0 - done) * SECONDS));
             let progress = protocol::RenderProgress {
                 samples: (done * SAMPLES) as u32,
+                mean_samples: done * SAMPLES,
                 total_samples: SAMPLES as u32,
                 ..progress
             };

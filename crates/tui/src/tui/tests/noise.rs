@@ -28,7 +28,7 @@ fn the_noise_is_told_as_it_falls() {
 }
 
 #[test]
-fn the_total_of_samples_is_a_guess_while_noise_decides_it() {
+fn samples_have_no_total_while_noise_decides_it() {
     let mut desk = Desk::new();
     desk.worker(protocol::Event::Started { generation: 1 });
     let settings = Box::new(crate::pipeline::settings::Effective { error: 0.02, ..settings() });
@@ -39,8 +39,11 @@ fn the_total_of_samples_is_a_guess_while_noise_decides_it() {
         exposure: 0.0,
         own: own(),
     });
-    desk.worker(protocol::Event::Progress { generation: 1, progress: progress(0.5, None) });
-    assert!(desk.text().contains("32 of about 64 samples"), "{}", desk.text());
+    desk.worker(protocol::Event::Progress {
+        generation: 1,
+        progress: RenderProgress { is_total_fixed: false, ..progress(0.5, None) },
+    });
+    assert!(desk.text().contains("about 32 samples per pixel"), "{}", desk.text());
 }
 
 /// The end of a render with `error`, or with a budget of time: whether it was complete, and the samples that it had.

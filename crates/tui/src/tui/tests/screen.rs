@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use ratatui::style::Color;
 
 use super::{BLUE, RED, cells_of};
-use crate::pipeline::protocol::{self, Failure, Stage, StageReport, Status};
+use crate::pipeline::protocol::{self, Failure, RenderProgress, Stage, StageReport, Status};
 use crate::pipeline::settings::{Overrides, View};
 use crate::scene::diagnostic::Severity;
 use crate::tui::Changed;
@@ -154,6 +154,22 @@ fn a_bar_goes_with_its_stage_and_moves_nothing() {
     desk.worker(done(1, Vec::new(), false));
     assert!(!desk.text().contains("knot.obj"), "{}", desk.text());
     assert_eq!(desk.state.next_tick(), None);
+}
+
+#[test]
+fn no_eta_is_shown_early_and_none_is_absurd() {
+    let mut desk = Desk::new();
+    let mut eta = |progress: RenderProgress| {
+        desk.worker(protocol::Event::Progress { generation: 1, progress });
+        desk.text().lines().next().and_then(|row| Some(row.split_once("ETA ")?.1.trim().to_owned()))
+    };
+    assert_eq!(eta(progress(0.004, Some(16_686_900.0))).as_deref(), Some("…"));
+    assert_eq!(
+        eta(RenderProgress { elapsed_seconds: 0.3, ..progress(0.4, Some(2e9)) }).as_deref(),
+        Some("…")
+    );
+    assert_eq!(eta(progress(0.02, Some(16_686_900.0))).as_deref(), Some("over a day"));
+    assert_eq!(eta(progress(0.02, Some(7200.0))).as_deref(), Some("2 h 00 min"));
 }
 
 #[test]

@@ -11,6 +11,7 @@ use super::text::{Tone, columns, counted, number, percent, put, put_right, rest,
 use crate::choice::Choice;
 use crate::pipeline::protocol::{RenderProgress, Status};
 use crate::pipeline::settings::View;
+use crate::pipeline::words::Eta;
 use crate::scene::diagnostic::Severity;
 use crate::scene::sanitize::visible;
 use crate::tui::action::Action;
@@ -206,12 +207,12 @@ fn last_run(state: &State) -> u64 {
 /// Time until the end, unless the render is paused.
 fn eta(state: &State, progress: &RenderProgress) -> String {
     /// Less than that rounds to no time at all.
-    const LEAST: Duration = Duration::from_millis(50);
-    let eta = progress.eta_seconds.and_then(|eta| Duration::try_from_secs_f64(eta).ok());
-    let eta = match eta {
+    const LEAST: f64 = 0.05;
+    let eta = match Eta::of(progress) {
         None => "…".to_owned(),
-        Some(eta) if eta < LEAST => "under 1 s".to_owned(),
-        Some(eta) => running(eta),
+        Some(Eta::OverADay) => Eta::OverADay.words(),
+        Some(Eta::Seconds(eta)) if eta < LEAST => "under 1 s".to_owned(),
+        Some(Eta::Seconds(eta)) => running(Duration::try_from_secs_f64(eta).unwrap_or_default()),
     };
     if state.work.paused { String::new() } else { format!("  ETA {eta}") }
 }

@@ -179,7 +179,8 @@ pub(super) fn about(seconds: f64) -> String {
         x if x < 1.0 => "under 1 s".to_owned(),
         x if x < 99.5 => format!("about {x:.0} s"),
         x if x < 99.5 * 60.0 => format!("about {:.0} min", x / 60.0),
-        x => format!("about {:.0} h", x / 3600.0),
+        x if x <= 24.0 * 3600.0 => format!("about {:.0} h", x / 3600.0),
+        _ => "over a day".to_owned(),
     }
 }
 
@@ -310,7 +311,7 @@ mod tests {
             "about 2 min",
             "about 13 min",
             "about 2 h",
-            "about 25 h",
+            "over a day",
         ];
         assert_eq!(times, words);
     }

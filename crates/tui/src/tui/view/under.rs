@@ -12,6 +12,7 @@ use super::text::{
     Tone, about, bytes, columns, duration, gauge, percent, put, put_right, rest, running, share,
 };
 use crate::pipeline::protocol::{NoiseProgress, RenderProgress};
+use crate::pipeline::words::samples_so_far;
 use crate::scene::sanitize::visible;
 use crate::tui::event::Written;
 use crate::tui::preview_kind::PreviewKind;
@@ -82,11 +83,12 @@ fn bar_words(state: &State, layout: &Layout) -> (f64, String) {
     let time = state.work.rendering_for(state.now).map_or(String::new(), running);
     match (&state.work.progress, state.work.assets.last()) {
         (Some(progress), _) => {
-            let RenderProgress { samples, total_samples, .. } = progress;
-            // Where noise decides, the total is a guess.
-            let is_guess = state.request.effective.as_ref().is_some_and(|it| it.error > 0.0);
-            let of = if is_guess { " of about " } else { "/" };
-            let samples = format!("{samples}{of}{total_samples} samples");
+            let samples = if progress.is_total_fixed {
+                format!("{}/{} samples", samples_so_far(progress), progress.total_samples)
+            } else {
+                // The total is a guess.
+                format!("about {:.0} samples per pixel", progress.mean_samples.floor())
+            };
             (progress.fraction, format!("{samples} · {time}"))
         }
         (None, Some(asset)) if layout.panel.is_empty() => {

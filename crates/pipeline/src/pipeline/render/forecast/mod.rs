@@ -135,7 +135,9 @@ impl Forecast {
             earlier_seconds: moment.state.render_seconds,
             eta_seconds: if moment.is_last { Some(0.0) } else { eta_seconds },
             samples: (moment.units / pixels) as u32,
+            mean_samples: moment.units as f64 / pixels as f64,
             total_samples: self.total_units.div_ceil(pixels) as u32,
+            is_total_fixed: !(moment.plan.settings.render.error > 0.0) && moment.plan.time_seconds.is_none(),
             noise: self.noise.at(work, self.pace.rate(), left),
         }
     }
