@@ -13,7 +13,7 @@ use crate::pipeline::start;
 use crate::pipeline::watch::{Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
-use crate::scene::{NO_SUCH_FILE, NO_SUCH_MODEL, text_now};
+use crate::scene::{is_absence, text_now};
 use crate::system::threads::not_started;
 use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 
@@ -123,11 +123,6 @@ fn absent(scene: &Path) -> Option<Diagnostic> {
         return None;
     }
     text_now(scene).err().map(|problem| *problem).filter(is_absence)
-}
-
-/// Whether a problem is that the scene or the model is not there.
-fn is_absence(problem: &Diagnostic) -> bool {
-    [NO_SUCH_FILE, NO_SUCH_MODEL].contains(&problem.message.as_str())
 }
 
 /// Outcomes of writing pictures.

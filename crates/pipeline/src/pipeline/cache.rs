@@ -25,7 +25,6 @@ impl<T> Memo<T> {
     }
 
     /// The last value, whatever it was made of.
-    #[cfg(test)]
     pub(super) fn latest(&self) -> Option<&T> {
         self.last.as_ref().map(|(_, value)| value)
     }

@@ -29,15 +29,21 @@ use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
 pub use facing::MeshBounds;
 pub use key_path::{key_parts, shortened_key, split_key};
+pub use read::same_text_beside;
 pub use source::{Source, quoted};
 
 /// Scene files over this size, in bytes, are refused.
 pub const MAX_FILE_BYTES: u64 = 128 << 20;
 
 /// The message where a scene file is not there.
-pub const NO_SUCH_FILE: &str = "there is no such scene file";
+const NO_SUCH_FILE: &str = "there is no such scene file";
 /// Message about a file that is not there and is named like a model.
-pub const NO_SUCH_MODEL: &str = "there is no such file";
+const NO_SUCH_MODEL: &str = "there is no such file";
+
+/// Whether a diagnostic says that a scene or model does not exist.
+pub fn is_absence(diagnostic: &Diagnostic) -> bool {
+    [NO_SUCH_FILE, NO_SUCH_MODEL].contains(&diagnostic.message.as_str())
+}
 
 /// Scene files of more parts are refused, as each takes many times its bytes in memory: brackets, `=`, `,` and lines. A
 /// million spheres have half as many.

@@ -251,6 +251,22 @@ pub(super) fn neighbour(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Op
     Some(folder.join(near))
 }
 
+/// Another file in the folder of a missing scene file that has this text: the scene was renamed.
+pub fn same_text_beside(path: &Path, text: &str) -> Option<PathBuf> {
+    let folder = path.parent()?;
+    let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let length = u64::try_from(text.len()).ok()?;
+    let has_text = |file: &PathBuf| {
+        matches!(file::kind(file), Ok((Kind::Regular, metadata)) if metadata.len() == length)
+            && bytes(file).is_ok_and(|bytes| bytes == text.as_bytes())
+    };
+    let names =
+        std::fs::read_dir(listed).ok()?.take(MOST_FILES).filter_map(|entry| Some(entry.ok()?.file_name()));
+    let named = |name| folder.join::<std::ffi::OsString>(name);
+    // The order of a folder is that of its system.
+    names.map(named).filter(|file| file != path && has_text(file)).min()
+}
+
 /// Whether a file may be meant by another name: of the same kind, or of the same name but for the kind. A link to
 /// nowhere is not meant by its own name.
 fn is_alike(found: &Path, meant: &Path) -> bool {
@@ -275,6 +291,23 @@ mod tests {
 
     fn message(path: &Path) -> Diagnostic {
         *text(path).expect_err("a diagnostic")
+    }
+
+    #[test]
+    fn a_renamed_scene_is_found_by_its_text() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = |name: &str| folder.path().join(name);
+        let write = |name: &str, text: &str| std::fs::write(file(name), text).expect("written");
+        let found = || same_text_beside(&file("first.toml"), "a = 1\n");
+        assert_eq!(found(), None);
+        write("other.toml", "a = 2\n");
+        write("longer.toml", "a = 1\n\n");
+        std::fs::create_dir(file("folder.toml")).expect("a folder");
+        assert_eq!(found(), None);
+        write("third", "a = 1\n");
+        assert_eq!(found(), Some(file("third")));
+        write("second.toml", "a = 1\n");
+        assert_eq!(found(), Some(file("second.toml")), "the first by name");
     }
 
     #[test]

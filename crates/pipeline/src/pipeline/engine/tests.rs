@@ -34,8 +34,12 @@ impl Desk {
 
     /// Sends a request for the current scene; returns its events.
     fn send(&mut self) -> Vec<Event> {
+        fs::write(self.folder.path().join("scene.toml"), &self.text).expect("written");
+        self.send_unsaved()
+    }
+
+    fn send_unsaved(&mut self) -> Vec<Event> {
         let scene = self.folder.path().join("scene.toml");
-        fs::write(&scene, &self.text).expect("written");
         let (events, received) = mpsc::channel();
         let sink = Sink { generation: 1, events, previews: PreviewSlot::default(), within: None };
         let request = Request {
@@ -142,4 +146,23 @@ fn of_several_pictures_those_that_were_not_saved_stay_as_they_are() {
     desk.request();
     assert!(Arc::ptr_eq(&texels(&desk, "skin.ppm"), &skin));
     assert!(!Arc::ptr_eq(&texels(&desk, "bark.ppm"), &bark));
+}
+
+#[test]
+fn a_renamed_scene_is_named_in_the_error() {
+    let mut desk = Desk::new(SCENE);
+    desk.request();
+    let renamed = desk.folder.path().join("third.toml");
+    fs::rename(desk.folder.path().join("scene.toml"), &renamed).expect("renamed");
+    let help = |events: Vec<Event>| match events.last() {
+        Some(Event::Failed { failure: Failure::Scene(errors), .. }) => {
+            errors[0].help.clone().unwrap_or_default()
+        }
+        other => panic!("{other:?}"),
+    };
+    let found = help(desk.send_unsaved());
+    assert!(found.contains("third.toml has the same text"), "{found}");
+    fs::write(&renamed, "another text").expect("written");
+    let other = help(desk.send_unsaved());
+    assert!(!other.contains("same text"), "{other}");
 }

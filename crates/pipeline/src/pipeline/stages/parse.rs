@@ -20,6 +20,7 @@ use crate::scene::description::Camera;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::is_model;
+use crate::scene::sanitize::visible;
 
 /// A scene that was understood.
 #[derive(Debug)]
@@ -124,7 +125,7 @@ pub(in crate::pipeline) fn parse(
         None => {
             // Until it was understood; then its content is that of the bytes that were.
             findings.read(FileRead { path: path.to_owned(), content });
-            read(origin, (contents, containers), findings, token)?
+            read(origin, (contents, containers), memo.latest(), findings, token)?
         }
     };
     findings.read_instead(FileRead { path: path.to_owned(), content });
@@ -149,12 +150,14 @@ type Read = (Arc<scene::Loaded>, Content, Vec<FileRead>, Vec<Diagnostic>);
 fn read(
     origin: Origin<'_>,
     (contents, containers): (&Snapshot, &Containers),
+    last: Option<&Arc<Parsed>>,
     findings: &mut Findings,
     token: &CancelToken,
 ) -> Result<Read, Stop> {
     let Origin { path, sets, .. } = origin;
     if !is_model(path) {
-        let loaded = scene::load(path, sets).map_err(|errors| Stop::Failed(Failure::Scene(errors)))?;
+        let loaded = scene::load(path, sets)
+            .map_err(|errors| Stop::Failed(Failure::Scene(with_new_name(errors, path, last))))?;
         let content = contents.decoded(path, *blake3::hash(loaded.source.text().as_bytes()).as_bytes());
         return Ok((Arc::new(loaded), content, Vec::new(), Vec::new()));
     }
@@ -177,6 +180,20 @@ fn key(Origin { path, sets, show }: Origin<'_>, content: Content, is_model: bool
         show.add_to(&mut key);
     }
     key.finish()
+}
+
+/// Adds to the error about a missing scene the name of a file that has the text of the last good one.
+fn with_new_name(mut errors: Vec<Diagnostic>, path: &Path, last: Option<&Arc<Parsed>>) -> Vec<Diagnostic> {
+    let last = last.filter(|last| last.loaded.path == path);
+    if let [error] = &mut errors[..]
+        && scene::is_absence(error)
+        && let Some(last) = last
+        && let Some(file) = scene::same_text_beside(path, &last.loaded.source.shared_text())
+    {
+        let name = visible(&file.to_string_lossy()).into_owned();
+        error.help = Some(format!("{name} has the same text; to watch it, run `glimt {name}`"));
+    }
+    errors
 }
 
 /// Files of the scene without the call's changes, with the files and pictures that only its unread meshes name.

@@ -288,6 +288,21 @@ fn renders_are_counted_and_requests_that_change_nothing_are_not() {
 }
 
 #[test]
+fn a_file_that_is_gone_is_missing_and_not_broken() {
+    let mut desk = Desk::with(state(120, 30));
+    desk.finish(RED);
+    let absent = *crate::scene::text_now("no-such-folder/cornell.toml".as_ref()).expect_err("an error");
+    desk.event(Event::Changed(Changed { noticed: desk.now }));
+    desk.fail(vec![absent]);
+    desk.event(Event::Settled);
+    let text = desk.text();
+    assert!(text.starts_with(" ✗ missing "), "{text}");
+    assert!(!text.contains("broken") && text.contains("stays until the file is back"), "{text}");
+    desk.fail(vec![diagnostic(Severity::Error, "unknown key")]);
+    assert!(desk.text().starts_with(" ✗ broken "), "{}", desk.text());
+}
+
+#[test]
 fn a_broken_file_keeps_the_picture_and_shows_the_place() {
     let mut desk = Desk::new();
     desk.finish(RED);

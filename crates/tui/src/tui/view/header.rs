@@ -13,6 +13,7 @@ use crate::pipeline::protocol::{RenderProgress, Status};
 use crate::pipeline::settings::View;
 use crate::pipeline::words::Eta;
 use crate::scene::diagnostic::Severity;
+use crate::scene::is_absence;
 use crate::scene::sanitize::visible;
 use crate::tui::action::Action;
 use crate::tui::history::ago;
@@ -78,9 +79,16 @@ fn work(state: &State) -> (&'static str, &'static str, Tone) {
         Activity::Done if state.saving.unwritten.is_some() => ("!", "unwritten", Tone::Error),
         Activity::Done => ("✓", "done", Tone::Good),
         Activity::Waiting => ("…", "waiting", Tone::Warning),
+        Activity::Broken if is_missing(state) => ("✗", "missing", Tone::Error),
         Activity::Broken => ("✗", "broken", Tone::Error),
         Activity::Cancelled => ("■", "stopped", Tone::Warning),
     }
+}
+
+/// Whether the scene file does not exist.
+pub(super) fn is_missing(state: &State) -> bool {
+    let problems = state.overlays.problems.as_ref();
+    problems.is_some_and(|problems| problems.diagnostics.iter().any(is_absence))
 }
 
 /// The word for the work, whatever picture is looked at.
@@ -191,6 +199,7 @@ fn figures(state: &State) -> Vec<String> {
             vec![format!("{time} · run {}", state.work.renders), time]
         }
         (Activity::Waiting, _, _) => vec!["for the file to be whole".to_owned()],
+        (Activity::Broken, _, _) if is_missing(state) => vec!["waiting for the file".to_owned()],
         (Activity::Broken, _, _) => vec![errors(state)],
         (Activity::Done | Activity::Cancelled, _, _) => Vec::new(),
     }

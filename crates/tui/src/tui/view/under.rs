@@ -4,7 +4,7 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::drawn::Drawn;
-use super::header::at_work;
+use super::header::{at_work, is_missing};
 use super::layout::Layout;
 use super::message;
 use super::stages;
@@ -56,7 +56,8 @@ fn content(state: &State) -> Content {
             Content::Words(format!("the last good scene goes on: {} %", percent(progress.fraction)))
         }
         Activity::Broken if state.picture.shown.is_some() => {
-            Content::Words("the last good picture stays until the errors are fixed".to_owned())
+            let until = if is_missing(state) { "the file is back" } else { "the errors are fixed" };
+            Content::Words(format!("the last good picture stays until {until}"))
         }
         Activity::Broken => Content::Nothing,
     }
