@@ -11,4 +11,4 @@ pub mod origin;
 pub mod random;
 pub mod transform;
 
-pub use glam::{DMat3, DVec2, DVec3, UVec2, Vec2, Vec3, Vec4};
+pub use glam::{DMat3, DVec2, DVec3, DVec4, UVec2, Vec2, Vec3, Vec4};

@@ -10,7 +10,8 @@ mod read;
 use std::path::{Path, PathBuf};
 
 use crate::geometry::mesh::TriangleMesh;
-use crate::math::Vec3;
+use crate::materials::PixelNumber;
+use crate::math::{DVec2, Vec2, Vec3};
 
 /// Reasons for which a file could not be used.
 #[derive(Debug, thiserror::Error)]
@@ -131,15 +132,15 @@ pub struct FileMaterial {
     /// Opacity in [0, 1], `d` or else 1 − `Tr`.
     pub opacity: f32,
     /// Texture of the opacity, `map_d`, in its place.
-    pub opacity_texture: Option<PathBuf>,
-    /// Diffuse texture, `map_Kd`, relative to the MTL's folder.
-    pub diffuse_texture: Option<PathBuf>,
+    pub opacity_texture: Option<FileTexture>,
+    /// Diffuse texture, `map_Kd`.
+    pub diffuse_texture: Option<FileTexture>,
     /// Specular texture, `map_Ks`.
-    pub specular_texture: Option<PathBuf>,
+    pub specular_texture: Option<FileTexture>,
     /// Emission texture, `map_Ke`.
-    pub emission_texture: Option<PathBuf>,
+    pub emission_texture: Option<FileTexture>,
     /// Normal map, `norm` or `map_Bump`.
-    pub normal_texture: Option<PathBuf>,
+    pub normal_texture: Option<FileTexture>,
     /// Factor on its slopes, ≥ 0: the option `-bm`, or 1.
     pub normal_strength: f32,
     /// What the extension for physically based rendering says. `None` without any of its statements.
@@ -147,9 +148,52 @@ pub struct FileMaterial {
 }
 
 impl FileMaterial {
-    /// Whether it has a highlight. Without an exponent above 0 it would be spread over the hemisphere at full strength.
+    /// Whether it has a highlight. Without an exponent above 0 it would be spread over the hemisphere at full strength; the models 0 and 1
+    /// have none.
     pub fn has_highlight(&self) -> bool {
-        self.shininess > 0.0
+        self.shininess > 0.0 && !matches!(self.illumination_model, Some(0 | 1))
+    }
+
+    /// Whether its mirror is a coat over a stronger diffuse color.
+    pub fn is_coated(&self) -> bool {
+        self.diffuse_texture.is_some() || self.diffuse.max_element() > self.specular.max_element()
+    }
+}
+
+/// A texture of a mesh file's material, with the options of its map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FileTexture {
+    /// The image, relative to the MTL's folder.
+    pub path: PathBuf,
+    /// Factor on the coordinates, `-s`.
+    pub repeat: Vec2,
+    /// Translation of the repeated coordinates, `-o`.
+    pub offset: DVec2,
+    /// Whether the border continues, `-clamp on`.
+    pub is_clamped: bool,
+    /// Summand and factor of the values, `-mm`.
+    pub range: (f32, f32),
+    /// The number of a pixel, if it is asked for: `-imfchan`.
+    pub number: Option<PixelNumber>,
+}
+
+impl FileTexture {
+    /// A texture without options.
+    pub fn new(path: PathBuf) -> Self {
+        Self {
+            path,
+            repeat: Vec2::ONE,
+            offset: DVec2::ZERO,
+            is_clamped: false,
+            range: (0.0, 1.0),
+            number: None,
+        }
+    }
+
+    /// Whether another texture shows the same image at the same coordinates.
+    pub fn is_same_image(&self, other: &Self) -> bool {
+        let at = |texture: &Self| (texture.repeat, texture.offset, texture.is_clamped);
+        self.path == other.path && at(self) == at(other)
     }
 }
 
@@ -165,9 +209,9 @@ pub struct PhysicalMaterial {
     /// Roughness of the clear coat, `Pcr`.
     pub clearcoat_roughness: f32,
     /// Texture of the roughness, `map_Pr`.
-    pub roughness_texture: Option<PathBuf>,
+    pub roughness_texture: Option<FileTexture>,
     /// Texture of the metal's weight, `map_Pm`.
-    pub metallic_texture: Option<PathBuf>,
+    pub metallic_texture: Option<FileTexture>,
 }
 
 /// A gKit orbiter camera: the scene's centre seen from outside.

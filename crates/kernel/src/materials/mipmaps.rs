@@ -1,7 +1,10 @@
 //! The levels of a texture, each with half as many columns and rows as the one before (Williams, *Pyramidal Parametrics*, 1983).
 
+use std::iter::Sum;
+use std::ops::Mul;
+
 use super::texels::{TexelData, Texels};
-use crate::math::Vec3;
+use crate::math::{Vec3, Vec4};
 
 /// All levels of an image but the image itself, in linear light; the last has one texel.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,12 +42,13 @@ impl Mipmaps {
         self.levels.iter().map(Texels::memory_bytes).sum()
     }
 
-    /// Bytes of the levels of an image of so many columns and rows.
-    pub fn memory_bytes_of(width: u32, height: u32) -> u64 {
+    /// Bytes of the levels of an image of so many columns and rows, weighted or not.
+    pub fn memory_bytes_of(width: u32, height: u32, is_weighted: bool) -> u64 {
+        let texel_bytes = if is_weighted { size_of::<Vec4>() } else { size_of::<Vec3>() };
         let (mut width, mut height, mut bytes) = (u64::from(width), u64::from(height), 0);
         while width * height > 1 {
             (width, height) = ((width / 2).max(1), (height / 2).max(1));
-            bytes += width * height * size_of::<Vec3>() as u64;
+            bytes += width * height * texel_bytes as u64;
         }
         bytes
     }
@@ -68,20 +72,39 @@ impl<'a> Halving<'a> {
         self.height
     }
 
+    /// The smaller image without its rows.
+    pub fn start(&self) -> TexelData {
+        let count = self.width as usize * self.height as usize;
+        if self.of.is_weighted() {
+            TexelData::FloatAlpha(Vec::with_capacity(count))
+        } else {
+            TexelData::Float(Vec::with_capacity(count))
+        }
+    }
+
     /// Appends a row of the smaller image: every texel is the mean over the area of the larger one that it covers, so that the
     /// mean of the whole stays, even if a side is odd.
-    pub fn row(&self, y: u32, to: &mut Vec<Vec3>) {
+    pub fn row(&self, y: u32, to: &mut TexelData) {
         let rows = Covered::new(y, self.height, self.of.height);
         for x in 0..self.width {
             let columns = Covered::new(x, self.width, self.of.width);
-            let row = |y: u32| columns.mean(|x| self.of.get(x, y));
-            to.push(rows.mean(row));
+            match to {
+                TexelData::FloatAlpha(texels) => {
+                    let texel = |x: u32, y: u32| self.of.weighted(y as usize * self.of.width as usize + x as usize);
+                    texels.push(rows.mean(|y| columns.mean(|x| texel(x, y))));
+                }
+                TexelData::Float(texels) => texels.push(rows.mean(|y| columns.mean(|x| self.of.get(x, y)))),
+                TexelData::Srgb8(_)
+                | TexelData::Linear8(_)
+                | TexelData::SrgbAlpha8(_)
+                | TexelData::LinearAlpha8(_) => {}
+            }
         }
     }
 
     /// The smaller image of these rows.
-    pub fn texels(&self, rows: Vec<Vec3>) -> Texels {
-        Texels { width: self.width, height: self.height, data: TexelData::Float(rows), unusable: 0 }
+    pub fn texels(&self, rows: TexelData) -> Texels {
+        Texels { width: self.width, height: self.height, data: rows, unusable: 0 }
     }
 }
 
@@ -104,7 +127,7 @@ impl Covered {
         Self { first: first as u32, weights: [weight(0), weight(1), weight(2)] }
     }
 
-    fn mean(&self, of: impl Fn(u32) -> Vec3) -> Vec3 {
+    fn mean<T: Mul<f32, Output = T> + Sum>(&self, of: impl Fn(u32) -> T) -> T {
         let covered = self.weights.iter().zip(self.first..).filter(|(weight, _)| **weight > 0.0);
         covered.map(|(weight, place)| of(place) * *weight).sum()
     }
@@ -115,7 +138,8 @@ mod tests {
     use super::*;
 
     fn halved(of: &Texels) -> Result<Texels, ()> {
-        let (halving, mut rows) = (Halving::new(of), Vec::new());
+        let halving = Halving::new(of);
+        let mut rows = halving.start();
         (0..halving.rows()).for_each(|y| halving.row(y, &mut rows));
         Ok(halving.texels(rows))
     }
@@ -131,7 +155,7 @@ mod tests {
         for (width, height) in [(1, 1), (2, 2), (64, 32), (5, 3), (7, 1), (13, 64), (100, 37)] {
             let image = image(width, height);
             let mipmaps = Mipmaps::of(&image, halved).expect("nothing ends it");
-            assert_eq!(mipmaps.memory_bytes() as u64, Mipmaps::memory_bytes_of(width, height));
+            assert_eq!(mipmaps.memory_bytes() as u64, Mipmaps::memory_bytes_of(width, height, false));
             for number in 1..=mipmaps.count() {
                 let level = mipmaps.level(number).expect("a level");
                 assert_eq!(

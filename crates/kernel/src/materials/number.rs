@@ -29,6 +29,12 @@ pub enum PixelNumber {
     Channel(Channel),
     /// Its alpha, or its luminance in an image without alpha.
     Opacity,
+    /// The same for an image that is not the surface's color: its luminance counts also if alpha is 1 everywhere and the image is gray,
+    /// or of any color.
+    Mask {
+        /// Whether colors do not matter.
+        of_any_color: bool,
+    },
 }
 
 /// A number, or a texture of numbers.

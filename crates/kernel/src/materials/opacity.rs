@@ -8,7 +8,7 @@ use super::number::Number;
 pub struct Opacity {
     /// The chance, clamped to [0, 1].
     pub value: Number,
-    /// Chance from which the surface is there, below which it is not; 0 for none.
+    /// Chance from which the surface is there, below which it is not; 0 for none. Mip levels of a texture are those of its coverage.
     pub cutoff: f32,
 }
 
@@ -16,7 +16,13 @@ impl Opacity {
     /// The chance at texture coordinates, in [0, 1]; adds to `lookups`.
     #[inline]
     pub fn at(&self, at: &TexturePoint, lookups: &mut u64) -> f32 {
-        self.cut(self.value.at(at, lookups))
+        match &self.value {
+            Number::Texture(texture) if self.cutoff > 0.0 && texture.mipmaps.is_some() => {
+                *lookups += 1;
+                texture.coverage(at, self.cutoff)
+            }
+            value => self.cut(value.at(at, lookups)),
+        }
     }
 
     /// The chance, if it is the same everywhere.

@@ -2,7 +2,7 @@
 
 use crate::math::color::{LINEAR_OF_SRGB8, srgb8_to_linear};
 use crate::math::lanes::{LANES, Lanes3, set_lane};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, DVec4, Vec3, Vec4};
 
 /// An image in memory, rows from top to bottom, RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +26,12 @@ pub enum TexelData {
     Linear8(Vec<[u8; 3]>),
     /// Linear floats: 16-bit and float files.
     Float(Vec<Vec3>),
+    /// sRGB bytes and alpha, which weights them between texels.
+    SrgbAlpha8(Vec<[u8; 4]>),
+    /// Linear bytes and alpha.
+    LinearAlpha8(Vec<[u8; 4]>),
+    /// Linear floats, multiplied by alpha, and alpha.
+    FloatAlpha(Vec<Vec4>),
 }
 
 impl Texels {
@@ -42,7 +48,55 @@ impl Texels {
             TexelData::Srgb8(bytes) => srgb8_to_linear(bytes[place]),
             TexelData::Linear8(bytes) => of_linear(bytes[place]),
             TexelData::Float(floats) => floats[place],
+            TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => {
+                self.without_weight(place)
+            }
         }
+    }
+
+    /// Whether alpha weights the texels.
+    #[inline(always)]
+    pub fn is_weighted(&self) -> bool {
+        match &self.data {
+            TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => false,
+            TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => true,
+        }
+    }
+
+    /// Linear color at an index of weighted data.
+    #[cold]
+    fn without_weight(&self, place: usize) -> Vec3 {
+        match &self.data {
+            TexelData::SrgbAlpha8(bytes) => {
+                let [red, green, blue, _] = bytes[place];
+                srgb8_to_linear([red, green, blue])
+            }
+            TexelData::LinearAlpha8(bytes) => {
+                let [red, green, blue, _] = bytes[place];
+                of_linear([red, green, blue])
+            }
+            TexelData::FloatAlpha(floats) => unweighted(floats[place]),
+            TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => self.at(place),
+        }
+    }
+
+    /// Linear color at an index of the data, multiplied by its weight, and the weight.
+    pub fn weighted(&self, place: usize) -> Vec4 {
+        let weight = match &self.data {
+            TexelData::Srgb8(_) | TexelData::Linear8(_) | TexelData::Float(_) => 1.0,
+            TexelData::SrgbAlpha8(bytes) | TexelData::LinearAlpha8(bytes) => {
+                f32::from(bytes[place][3]) / 255.0
+            }
+            TexelData::FloatAlpha(floats) => return floats[place],
+        };
+        (self.at(place) * weight).extend(weight)
+    }
+
+    /// Texels of 1 where this one is at least `least`, and 0 elsewhere.
+    pub fn cut(&self, least: f32) -> Self {
+        let texel = |place: usize| [if self.at(place).x >= least { u8::MAX } else { 0 }; 3];
+        let data = TexelData::Linear8((0..self.len()).map(texel).collect());
+        Self { data, unusable: 0, ..*self }
     }
 
     /// Linear values at some indices of the data.
@@ -82,20 +136,33 @@ impl Texels {
                     put(i, floats[places[i]]);
                 }
             }
+            TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => {
+                for i in 0..N {
+                    put(i, self.without_weight(places[i]));
+                }
+            }
         }
     }
 
     /// Linear values of all texels.
     pub fn into_linear(self) -> Vec<Vec3> {
+        if self.is_weighted() {
+            return (0..self.len()).map(|place| self.at(place)).collect();
+        }
         match self.data {
             TexelData::Srgb8(bytes) => bytes.into_iter().map(srgb8_to_linear).collect(),
             TexelData::Linear8(bytes) => bytes.into_iter().map(of_linear).collect(),
             TexelData::Float(floats) => floats,
+            TexelData::SrgbAlpha8(_) | TexelData::LinearAlpha8(_) | TexelData::FloatAlpha(_) => Vec::new(),
         }
     }
 
-    /// Mean of all texels.
+    /// Mean of all texels, by their weights.
     pub fn mean(&self) -> Vec3 {
+        if self.is_weighted() {
+            let sum: DVec4 = (0..self.len()).map(|place| self.weighted(place).as_dvec4()).sum();
+            return unweighted((sum / self.len() as f64).as_vec4());
+        }
         let rows = (0..self.height).flat_map(|y| (0..self.width).map(move |x| (x, y)));
         let sum: DVec3 = rows.map(|(x, y)| self.get(x, y).as_dvec3()).sum();
         (sum / self.len() as f64).as_vec3()
@@ -106,6 +173,10 @@ impl Texels {
         match &self.data {
             TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => bytes.iter().all(|texel| *texel == [0; 3]),
             TexelData::Float(floats) => floats.iter().all(|texel| *texel == Vec3::ZERO),
+            TexelData::SrgbAlpha8(bytes) | TexelData::LinearAlpha8(bytes) => {
+                bytes.iter().all(|[r, g, b, _]| [*r, *g, *b] == [0; 3])
+            }
+            TexelData::FloatAlpha(floats) => floats.iter().all(|texel| texel.truncate() == Vec3::ZERO),
         }
     }
 
@@ -116,6 +187,12 @@ impl Texels {
                 bytes.iter().all(|[r, g, b]| r == g && g == b)
             }
             TexelData::Float(floats) => floats.iter().all(|texel| texel.x == texel.y && texel.y == texel.z),
+            TexelData::SrgbAlpha8(bytes) | TexelData::LinearAlpha8(bytes) => {
+                bytes.iter().all(|[r, g, b, _]| r == g && g == b)
+            }
+            TexelData::FloatAlpha(floats) => {
+                floats.iter().all(|texel| texel.x == texel.y && texel.y == texel.z)
+            }
         }
     }
 
@@ -126,6 +203,10 @@ impl Texels {
                 bytes.iter().all(|texel| *texel == [255; 3])
             }
             TexelData::Float(floats) => floats.iter().all(|texel| *texel == Vec3::ONE),
+            TexelData::SrgbAlpha8(bytes) | TexelData::LinearAlpha8(bytes) => {
+                bytes.iter().all(|[r, g, b, _]| [*r, *g, *b] == [255; 3])
+            }
+            TexelData::FloatAlpha(floats) => floats.iter().all(|texel| *texel == Vec4::splat(texel.w)),
         }
     }
 
@@ -144,8 +225,15 @@ impl Texels {
         match &self.data {
             TexelData::Srgb8(bytes) | TexelData::Linear8(bytes) => size_of_val(bytes.as_slice()),
             TexelData::Float(floats) => size_of_val(floats.as_slice()),
+            TexelData::SrgbAlpha8(bytes) | TexelData::LinearAlpha8(bytes) => size_of_val(bytes.as_slice()),
+            TexelData::FloatAlpha(floats) => size_of_val(floats.as_slice()),
         }
     }
+}
+
+/// A color without the weight that it is multiplied by; black without weight.
+pub fn unweighted(weighted: Vec4) -> Vec3 {
+    if weighted.w > 0.0 { weighted.truncate() / weighted.w } else { Vec3::ZERO }
 }
 
 #[inline(always)]

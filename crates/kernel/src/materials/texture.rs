@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use super::footprint::{SecondPoint, TexturePoint, UvSet};
 use super::mipmaps::Mipmaps;
-use super::texels::Texels;
+use super::texels::{Texels, unweighted};
 use crate::choice;
 use crate::math::elementary::{exp2, log2};
 use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
 use crate::math::transform::sin_cos_degrees;
-use crate::math::{DVec2, Vec2, Vec3};
+use crate::math::{DVec2, Vec2, Vec3, Vec4};
 
 choice! {
     /// Texture interpolation.
@@ -50,8 +50,35 @@ pub struct Texture {
     pub repeat: Vec2,
     /// Motion of the repeated coordinates. `None` if those of the first set stay.
     pub moved: Option<Box<Moved>>,
-    /// Factor on what is looked up. `None` for 1; heights and their slopes have none.
-    pub factor: Option<Vec3>,
+    /// Change of what is looked up. `None` if it stays; heights and their slopes do.
+    pub factor: Option<Factor>,
+}
+
+/// A factor on looked-up values, and a summand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Factor {
+    /// The factor.
+    pub gain: Vec3,
+    /// The summand.
+    pub base: Vec3,
+}
+
+impl Factor {
+    /// A factor without a summand. `None` if it is 1.
+    pub fn new(gain: Vec3) -> Option<Self> {
+        Self::with_base(gain, Vec3::ZERO)
+    }
+
+    /// `None` if it changes nothing.
+    pub fn with_base(gain: Vec3, base: Vec3) -> Option<Self> {
+        (gain != Vec3::ONE || base != Vec3::ZERO).then_some(Self { gain, base })
+    }
+
+    /// A value with the change.
+    #[inline]
+    fn of(&self, value: Vec3) -> Vec3 {
+        value * self.gain + self.base
+    }
 }
 
 /// Choice and motion of texture coordinates: of a set, a rotation, then a translation.
@@ -155,7 +182,7 @@ impl Texture {
     pub fn lookup(&self, at: &TexturePoint) -> Vec3 {
         let tiles = self.tiles(at);
         let value = self.in_tiles(tiles, || self.level(at));
-        self.factor.map_or(value, |factor| value * factor)
+        self.factor.map_or(value, |factor| factor.of(value))
     }
 
     /// The value at coordinates of the tiles, at this level if the filter has levels.
@@ -245,8 +272,9 @@ impl Texture {
             Some(moved) => self.moved_row(moved, uv),
         };
         if let Some(factor) = self.factor {
-            for (lanes, factor) in row.iter_mut().zip(factor.to_array()) {
-                lanes.iter_mut().for_each(|lane| *lane *= factor);
+            let (gain, base) = (factor.gain.to_array(), factor.base.to_array());
+            for (channel, lanes) in row.iter_mut().enumerate() {
+                lanes.iter_mut().for_each(|lane| *lane = *lane * gain[channel] + base[channel]);
             }
         }
         row
@@ -284,6 +312,10 @@ impl Texture {
             texels.fill_row(&places(&columns, &rows, extent), &mut colors);
             return colors;
         }
+        if texels.is_weighted() {
+            self.weighted_row(&folded, &mut colors);
+            return colors;
+        }
         let right = self.wrap.index_row(&first[0], 1, extent[0]);
         let upper = self.wrap.index_row(&first[1], 1, extent[1]);
         let mut corners = [[[0.0; LANES]; 3]; 4];
@@ -304,7 +336,7 @@ impl Texture {
     pub fn mean(&self) -> Vec3 {
         let last = self.mipmaps.as_ref().and_then(|mipmaps| mipmaps.level(mipmaps.count()));
         let mean = last.map_or_else(|| self.texels.mean(), |last| last.get(0, 0));
-        self.factor.map_or(mean, |factor| mean * factor)
+        self.factor.map_or(mean, |factor| factor.of(mean))
     }
 
     /// The level at which the footprint is one texel, from 0 on; with a fraction between two levels.
@@ -329,19 +361,76 @@ impl Texture {
 
     /// Interpolates between the two levels at `level`.
     fn trilinear(&self, level: f32, folded: [f32; 2]) -> Vec3 {
-        let mipmaps = self.mipmaps.as_ref().filter(|_| level > 0.0);
-        let Some(mipmaps) = mipmaps else { return self.bilinear(&self.texels, folded) };
+        let Some((near, far, part)) = self.levels(level) else { return self.bilinear(&self.texels, folded) };
+        if self.texels.is_weighted() {
+            let [near, far] = [near, far].map(|texels| self.weighted(texels, folded));
+            return unweighted(near.lerp(far, part));
+        }
+        self.bilinear(near, folded).lerp(self.bilinear(far, folded), part)
+    }
+
+    /// The two images next to a level, and the part of the second. `None` if the image itself is all that counts.
+    #[inline(always)]
+    fn levels(&self, level: f32) -> Option<(&Texels, &Texels, f32)> {
+        let mipmaps = self.mipmaps.as_ref().filter(|_| level > 0.0)?;
         let level = level.min(mipmaps.count() as f32);
         let number = level as usize;
         let of = |number: usize| match number {
             0 => &*self.texels,
             number => mipmaps.level(number).unwrap_or(&self.texels),
         };
-        let near = self.bilinear(of(number), folded);
-        near.lerp(self.bilinear(of(number + 1), folded), level - number as f32)
+        Some((of(number), of(number + 1), level - number as f32))
     }
 
-    fn bilinear(&self, texels: &Texels, [u, v]: [f32; 2]) -> Vec3 {
+    /// The part of the footprint in which the value is at least `cutoff`: 0 or 1 in the image itself; the mip levels are those of
+    /// [`Texels::cut`].
+    pub fn coverage(&self, at: &TexturePoint, cutoff: f32) -> f32 {
+        let tiles = self.tiles(at);
+        let folded = [self.wrap.fold(finite(tiles.x)) as f32, self.wrap.fold(finite(tiles.y)) as f32];
+        let cut = |value: f32| f32::from(u8::from(value >= cutoff));
+        let Some((near, far, part)) = self.levels(self.level(at)) else {
+            return cut(self.bilinear(&self.texels, folded).x);
+        };
+        let of = |texels: &Texels| {
+            let value = self.bilinear(texels, folded).x;
+            if std::ptr::eq(texels, &*self.texels) { cut(value) } else { value }
+        };
+        let near = of(near);
+        near + (of(far) - near) * part
+    }
+
+    /// Bilinear look-ups of weighted texels, side by side.
+    #[cold]
+    #[inline(never)]
+    fn weighted_row(&self, folded: &[Lanes; 2], colors: &mut Lanes3) {
+        for i in 0..LANES {
+            let color = self.bilinear(&self.texels, [folded[0][i], folded[1][i]]);
+            set_lane(colors, i, color);
+        }
+    }
+
+    /// Bilinear mean of texels multiplied by their weights, and of the weights.
+    #[cold]
+    #[inline(never)]
+    fn weighted(&self, texels: &Texels, folded: [f32; 2]) -> Vec4 {
+        let (places, [fx, fy]) = self.corners(texels, folded);
+        let corners = places.map(|place| texels.weighted(place));
+        corners[0].lerp(corners[1], fx).lerp(corners[2].lerp(corners[3], fx), fy)
+    }
+
+    fn bilinear(&self, texels: &Texels, folded: [f32; 2]) -> Vec3 {
+        if texels.is_weighted() {
+            return unweighted(self.weighted(texels, folded));
+        }
+        let (places, [fx, fy]) = self.corners(texels, folded);
+        let corners = texels.at_each(&places);
+        let (lower, upper) = (corners[0].lerp(corners[1], fx), corners[2].lerp(corners[3], fx));
+        lower.lerp(upper, fy)
+    }
+
+    /// Indices of the four nearest texels, and the place between them.
+    #[inline(always)]
+    fn corners(&self, texels: &Texels, [u, v]: [f32; 2]) -> ([usize; 4], [f32; 2]) {
         let (size, extent) = (size(texels), extent(texels));
         let (x, y) = (u * size.x - 0.5, v * size.y - 0.5);
         let first = [floor(x), floor(y)];
@@ -349,10 +438,7 @@ impl Texture {
         let [left, right] = self.wrap.neighbours(first[0], extent[0]);
         let [bottom, top] = self.wrap.neighbours(first[1], extent[1]);
         let place = |column, row| place(column, row, extent);
-        let places = [place(left, bottom), place(right, bottom), place(left, top), place(right, top)];
-        let corners = texels.at_each(&places);
-        let (lower, upper) = (corners[0].lerp(corners[1], fx), corners[2].lerp(corners[3], fx));
-        lower.lerp(upper, fy)
+        ([place(left, bottom), place(right, bottom), place(left, top), place(right, top)], [fx, fy])
     }
 }
 
@@ -475,6 +561,7 @@ fn finite(x: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::materials::footprint::Footprint;
+    use crate::materials::mipmaps::Halving;
     use crate::materials::texels::TexelData;
 
     /// A texture of [[0, 1], [2, 3]], bottom row first.
@@ -554,7 +641,7 @@ mod tests {
     fn a_factor_multiplies_values_and_their_mean_but_no_slopes() {
         let plain = numbered(TextureFilter::Bilinear, Wrap::Repeat);
         let factor = Vec3::new(0.5, 2.0, 3.0);
-        let texture = Texture { factor: Some(factor), ..plain.clone() };
+        let texture = Texture { factor: Factor::new(factor), ..plain.clone() };
         let at = TexturePoint::sharp(DVec2::new(0.3, 0.6));
         assert_eq!(texture.lookup(&at), plain.lookup(&at) * factor);
         assert_eq!((texture.mean(), texture.slopes(&at)), (plain.mean() * factor, plain.slopes(&at)));
@@ -641,5 +728,79 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The mip levels of an image.
+    fn levels(image: &Texels) -> Option<Arc<Mipmaps>> {
+        let halved = |level: &Texels| -> Result<Texels, ()> {
+            let halving = Halving::new(level);
+            let mut rows = halving.start();
+            (0..halving.rows()).for_each(|y| halving.row(y, &mut rows));
+            Ok(halving.texels(rows))
+        };
+        Mipmaps::of(image, halved).ok().map(Arc::new)
+    }
+
+    /// A clamped texture of a row of texels.
+    fn row(width: u32, data: TexelData, filter: TextureFilter) -> Texture {
+        let texels = Arc::new(Texels { width, height: 1, data, unusable: 0 });
+        let (mipmaps, wrap, repeat) = (levels(&texels), Wrap::Clamp, Vec2::ONE);
+        Texture { texels, mipmaps, filter, wrap, repeat, moved: None, factor: None }
+    }
+
+    #[test]
+    fn invisible_texels_lend_no_color() {
+        for data in [
+            TexelData::SrgbAlpha8(vec![[255, 255, 255, 0], [0, 255, 0, 255]]),
+            TexelData::LinearAlpha8(vec![[255, 0, 0, 0], [0, 255, 0, 51]]),
+            TexelData::FloatAlpha(vec![Vec4::ZERO, Vec4::new(0.0, 0.5, 0.0, 0.5)]),
+        ] {
+            for filter in [TextureFilter::Bilinear, TextureFilter::Mipmap] {
+                let texture = row(2, data.clone(), filter);
+                for u in [0.3, 0.5, 0.7, 0.9] {
+                    let color = texture.lookup(&TexturePoint::sharp(DVec2::new(u, 0.5)));
+                    assert!((color - Vec3::Y).length() < 1e-6, "{data:?} {filter:?} {u}: {color}");
+                }
+                for level in [0.5, 1.0] {
+                    let color = texture.trilinear(level, [0.2, 0.5]);
+                    assert!((color - Vec3::Y).length() < 1e-6, "{data:?} {level}: {color}");
+                }
+                assert!((texture.mean() - Vec3::Y).length() < 1e-6);
+            }
+            let texture = Texture { mipmaps: None, ..row(2, data, TextureFilter::Bilinear) };
+            let uv = [std::array::from_fn(|i| i as f64 / 15.0), [0.5; LANES]];
+            let lanes = texture.lookup_row(&uv);
+            for i in 0..LANES {
+                let alone = texture.lookup(&TexturePoint::sharp(DVec2::new(uv[0][i], 0.5)));
+                assert_eq!(lane(&lanes, i), alone, "{i}");
+            }
+        }
+        // Alpha weights, whatever it is.
+        let half = TexelData::LinearAlpha8(vec![[255, 0, 0, 51], [0, 255, 0, 204]]);
+        let color = row(2, half, TextureFilter::Bilinear).lookup(&TexturePoint::sharp(DVec2::new(0.5, 0.5)));
+        assert!((color - Vec3::new(0.2, 0.8, 0.0)).length() < 1e-6, "{color}");
+    }
+
+    #[test]
+    fn a_cutoff_keeps_its_coverage_at_a_distance() {
+        // Of ten texels, four are visible, their alpha just above the cutoff.
+        let alphas = [140, 140, 120, 0, 0, 140, 120, 0, 140, 0].map(|alpha| [alpha; 3]);
+        let mut texture = row(10, TexelData::Linear8(alphas.to_vec()), TextureFilter::Mipmap);
+        texture.mipmaps = levels(&texture.texels.cut(0.5));
+        let at = |u: f64, width: f32| {
+            let footprint = Footprint::of_cone(width, Vec3::Z, Vec3::Z, [Vec3::X, Vec3::Y]);
+            TexturePoint { footprint, ..TexturePoint::sharp(DVec2::new(u, 0.5)) }
+        };
+        for u in [0.1, 0.3, 0.9] {
+            let coverage = texture.coverage(&at(u, 1e3), 0.5);
+            assert!((coverage - 0.4).abs() < 1e-6, "{coverage}");
+        }
+        // Nearby, it is 0 or 1.
+        for (u, expected) in [(0.05, 1.0), (0.25, 0.0), (0.35, 0.0), (0.55, 1.0)] {
+            assert_eq!(texture.coverage(&at(u, 0.0), 0.5), expected, "{u}");
+        }
+        // Between an image and its first level, it changes without a step.
+        let near = [1.0 + 1e-4, 1.0].map(|texels| texture.coverage(&at(0.05, texels * 0.1), 0.5));
+        assert!((near[0] - near[1]).abs() < 1e-2, "{near:?}");
     }
 }

@@ -41,7 +41,7 @@ pub fn lights(
     let objects = (0_u32..).zip(geometry.objects()).zip(&scene.objects);
     let shining = scene.materials.iter().map(|material| {
         let emission = lit(emission(scene, images, material));
-        Shining::new(emission, opacity(scene, images, &material.opacity))
+        Shining::new(emission, opacity(scene, images, material))
     });
     let shining: Vec<Shining> = shining.collect();
     let environment = scene.environment.as_ref().and_then(|environment| around(environment, sky));

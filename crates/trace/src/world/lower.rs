@@ -1,27 +1,29 @@
 //! From the description's materials and those of mesh files to materials that are ready for look-ups.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::textures::{FILE_NUMBER, FILE_OPACITY, TextureSource, declared_source, file_source};
+use super::textures::{
+    Cutoff, FILE_NUMBER, TextureSource, coverage, file_color_use, file_opacity_use, file_source, material_source,
+};
 use super::{Image, Images};
-use crate::assets::{FileMaterial, PhysicalMaterial};
+use crate::assets::{FileMaterial, FileTexture, PhysicalMaterial};
 use crate::materials::texels::{TexelData, Texels};
-use crate::materials::texture::{Color, Moved, Texture, TextureFilter, Wrap};
+use crate::materials::texture::{Color, Factor, Moved, Texture, TextureFilter, Wrap};
 use crate::materials::{
     Bsdf, Bump, Coated, Emission, EmissionCoat, Glass, Material, Metal, MetalFresnel, Mirror, NormalMap,
-    Number, Opacity, Pane, Phong, Plastic, Principled, PrincipledInputs, Relief, Rough,
+    Number, Opacity, Pane, Phong, Plastic, Principled, PrincipledInputs, Relief, Rough, UvSet,
 };
-use crate::math::{DVec3, Vec2, Vec3};
+use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    self, ColorSource, FresnelSource, MaterialKind, NumberSource, OpacitySource, PixelNumber, Scene,
+    self, ColorSource, FresnelSource, MaterialKind, NumberSource, PixelNumber, Scene, TextureRole,
     TextureUse,
 };
 
 /// A material of the scene file.
 pub fn material(scene: &Scene, images: &Images, material: &description::Material) -> Material {
-    let color = |source: &ColorSource| declared_color(scene, images, source);
-    let number = |source: &NumberSource| declared_number(scene, images, source, PixelNumber::Luminance);
+    let of = Declared { scene, images, material };
+    let color = |source: &ColorSource| of.color(source);
+    let number = |source: &NumberSource| of.number(source, TextureRole::Roughness);
     let bsdf = match &material.kind {
         MaterialKind::Phong { diffuse, specular, shininess, ambient } => Bsdf::Rough(Rough::Phong(Phong {
             diffuse: color(diffuse),
@@ -64,24 +66,36 @@ pub fn material(scene: &Scene, images: &Images, material: &description::Material
     };
     let emission = emission(scene, images, material);
     let normal_map = material.normal_map.map(|map| NormalMap {
-        texture: declared_texture(scene, images, map.texture, TextureUse::Normal),
+        texture: of.texture(map.texture, TextureRole::NormalMap),
         strength: map.strength,
     });
     let bump = material.bump.map(|bump| Bump {
-        texture: declared_texture(scene, images, bump.texture, TextureUse::Number(bump.number())),
+        texture: of.texture(bump.texture, TextureRole::Bump(bump.number())),
         scale: bump.scale,
     });
     let relief = Relief::new(normal_map, bump);
-    Material { bsdf, emission, relief, opacity: opacity(scene, images, &material.opacity) }
+    Material { bsdf, emission, relief, opacity: opacity(scene, images, material) }
 }
 
 /// Opacity of a material of the scene file. `None` if the material is there everywhere.
-pub fn opacity(scene: &Scene, images: &Images, source: &OpacitySource) -> Option<Opacity> {
+pub fn opacity(scene: &Scene, images: &Images, material: &description::Material) -> Option<Opacity> {
+    let source = &material.opacity;
     if source.is_full() {
         return None;
     }
-    let value = declared_number(scene, images, &source.value, PixelNumber::Opacity);
-    Some(Opacity { value, cutoff: source.cutoff })
+    let (value, cutoff) = match source.texture() {
+        None => (Number::Constant(source.value.constant()?), source.cutoff),
+        Some((index, number)) => {
+            let of = Declared { scene, images, material };
+            let texture = of.texture(index, TextureRole::Opacity(number));
+            // The mip levels of a coverage have the factor in the cutoff.
+            let coverage = coverage(scene, index, source.cutoff);
+            let factor = texture.factor.filter(|_| coverage.is_none());
+            let texture = Arc::new(Texture { factor, ..(*texture).clone() });
+            (Number::Texture(texture), coverage.map_or(source.cutoff, Cutoff::value))
+        }
+    };
+    Some(Opacity { value, cutoff })
 }
 
 /// A metal: a mirror if it is smooth.
@@ -110,21 +124,21 @@ fn fresnel_of(source: &FresnelSource, color: impl Fn(&ColorSource) -> Color) -> 
 
 /// Emission of a material of the scene file.
 pub fn emission(scene: &Scene, images: &Images, material: &description::Material) -> Emission {
-    let emission = &material.emission;
+    let (emission, of) = (&material.emission, Declared { scene, images, material });
     let coat = material.emission_coat().and_then(|numbers| {
-        let [weight, roughness] =
-            numbers.map(|number| declared_number(scene, images, &number, PixelNumber::Luminance));
+        let [weight, roughness] = numbers.map(|number| of.number(&number, TextureRole::EmissionCoat));
         EmissionCoat::new(weight, roughness).map(Arc::new)
     });
-    let texture = emission.texture.map(|index| declared_texture(scene, images, index, TextureUse::Color));
+    let texture = emission.texture.map(|index| of.texture(index, TextureRole::Emission));
     Emission { scale: emission.scale, texture, sides: emission.sides, coat }
 }
 
 /// Kind of a material of a mesh file. Models 4, 6, 7 and 9 of the MTL format are glass, unless a texture masks them; what the extension for physically based
-/// rendering describes is principled; else models 3, 5 and 8 with a highlight are mirrors.
+/// rendering describes is principled; else models 3, 5 and 8 with a highlight are mirrors, or coats over a stronger diffuse color.
 enum FileKind<'a> {
     Phong,
     Principled(&'a PhysicalMaterial),
+    Coated,
     Mirror,
     Glass,
 }
@@ -133,7 +147,9 @@ fn kind(own: &FileMaterial) -> FileKind<'_> {
     match (own.illumination_model, &own.physical) {
         (Some(4 | 6 | 7 | 9), _) if own.opacity_texture.is_none() => FileKind::Glass,
         (_, Some(physical)) => FileKind::Principled(physical),
-        (Some(3 | 5 | 8), None) if own.specular.max_element() > 0.0 => FileKind::Mirror,
+        (Some(3 | 5 | 8), None) if own.specular.max_element() > 0.0 => {
+            if own.is_coated() { FileKind::Coated } else { FileKind::Mirror }
+        }
         (_, None) => FileKind::Phong,
     }
 }
@@ -142,7 +158,7 @@ fn kind(own: &FileMaterial) -> FileKind<'_> {
 pub fn file_emits(own: &FileMaterial) -> bool {
     match kind(own) {
         FileKind::Phong | FileKind::Principled(_) => own.emission != Vec3::ZERO,
-        FileKind::Mirror | FileKind::Glass => false,
+        FileKind::Mirror | FileKind::Coated | FileKind::Glass => false,
     }
 }
 
@@ -150,7 +166,7 @@ pub fn file_emits(own: &FileMaterial) -> bool {
 pub fn file_is_glass(own: &FileMaterial) -> bool {
     match kind(own) {
         FileKind::Glass => true,
-        FileKind::Phong | FileKind::Principled(_) | FileKind::Mirror => false,
+        FileKind::Phong | FileKind::Principled(_) | FileKind::Coated | FileKind::Mirror => false,
     }
 }
 
@@ -167,7 +183,7 @@ pub fn file_emission(images: &Images, own: &FileMaterial) -> Emission {
     match &own.emission_texture {
         None => Emission::constant(own.emission),
         // A material whose map cannot be read does not shine all over.
-        Some(path) => match file_texture(images, &file_source(path, TextureUse::Color)) {
+        Some(texture) => match file_texture(images, texture, file_color_use(own, texture)) {
             None => Emission::NONE,
             texture => Emission { texture, ..Emission::constant(own.emission) },
         },
@@ -180,7 +196,7 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
         return None;
     }
     let texture = own.opacity_texture.as_ref();
-    let value = match texture.and_then(|path| file_texture(images, &file_source(path, FILE_OPACITY))) {
+    let value = match texture.and_then(|texture| file_texture(images, texture, file_opacity_use(own, texture))) {
         Some(texture) => Number::Texture(texture),
         None if own.opacity < 1.0 => Number::Constant(own.opacity),
         None => return None,
@@ -192,6 +208,7 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
 pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
     let bsdf = match (kind(own), file_glass(own)) {
         (FileKind::Mirror, _) => Bsdf::Mirror(Mirror::Even(Color::Constant(own.specular.min(Vec3::ONE)))),
+        (FileKind::Coated, _) => file_coated(images, own),
         (FileKind::Glass, Some((ior, tint))) => {
             let roughness = own.physical.as_ref().map_or(0.0, |physical| physical.roughness);
             Bsdf::Glass(Glass::new(ior, tint).with_roughness(Number::Constant(roughness)))
@@ -206,8 +223,8 @@ pub fn file_material(images: &Images, own: &FileMaterial) -> Material {
 
 /// A rough material of a mesh file, with its emission and its normal map.
 fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
-    let normals = own.normal_texture.as_ref().and_then(|path| {
-        let texture = file_texture(images, &file_source(path, TextureUse::Normal))?;
+    let normals = own.normal_texture.as_ref().and_then(|texture| {
+        let texture = file_texture(images, texture, TextureUse::Normal)?;
         Some(NormalMap { texture, strength: own.normal_strength })
     });
     // Grey ones are heights, of a length that the file does not tell.
@@ -220,19 +237,30 @@ fn file_surface(images: &Images, own: &FileMaterial, rough: Rough) -> Material {
     }
 }
 
-fn file_color(images: &Images, path: &Option<PathBuf>, constant: Vec3) -> Color {
-    let texture = path.as_ref().and_then(|path| file_texture(images, &file_source(path, TextureUse::Color)));
+fn file_color(images: &Images, own: &FileMaterial, texture: Option<&FileTexture>, constant: Vec3) -> Color {
+    let texture = texture.and_then(|texture| file_texture(images, texture, file_color_use(own, texture)));
     texture.map_or(Color::Constant(constant), Color::Texture)
+}
+
+/// A mirror over a diffuse color: a coat that reflects `Ks` of light along its normal.
+fn file_coated(images: &Images, own: &FileMaterial) -> Bsdf {
+    // An index of refraction for more than this would be beyond 10.
+    const MOST: f32 = 0.66;
+    let specular = own.specular.min(Vec3::ONE);
+    let root = specular.max_element().min(MOST).sqrt();
+    let diffuse = file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE));
+    let tint = Color::Constant(specular / specular.max_element());
+    plastic(diffuse, tint, Number::Constant(0.0), (1.0 + root) / (1.0 - root))
 }
 
 fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
     let strength = own.specular * (2.0 / (own.shininess + 2.0));
     let specular = match own.has_highlight() {
-        true => file_color(images, &own.specular_texture, strength),
+        true => file_color(images, own, own.specular_texture.as_ref(), strength),
         false => Color::Constant(Vec3::ZERO),
     };
     Rough::Phong(Phong {
-        diffuse: file_color(images, &own.diffuse_texture, own.diffuse),
+        diffuse: file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse),
         specular,
         shininess: own.shininess,
         ambient: None,
@@ -241,12 +269,12 @@ fn file_phong(images: &Images, own: &FileMaterial) -> Rough {
 
 /// A principled material of a mesh file. An index of refraction of 1 or less says nothing.
 fn file_principled(images: &Images, own: &FileMaterial, physical: &PhysicalMaterial) -> Rough {
-    let number = |path: &Option<PathBuf>, constant: f32| {
-        let texture = path.as_ref().and_then(|path| file_texture(images, &file_source(path, FILE_NUMBER)));
+    let number = |texture: &Option<FileTexture>, constant: f32| {
+        let texture = texture.as_ref().and_then(|texture| file_texture(images, texture, FILE_NUMBER));
         texture.map_or(Number::Constant(constant), Number::Texture)
     };
     Rough::Principled(Box::new(Principled::new(PrincipledInputs {
-        color: file_color(images, &own.diffuse_texture, own.diffuse.min(Vec3::ONE)),
+        color: file_color(images, own, own.diffuse_texture.as_ref(), own.diffuse.min(Vec3::ONE)),
         metallic: number(&physical.metallic_texture, physical.metallic),
         roughness: number(&physical.roughness_texture, physical.roughness),
         ior: if own.ior > 1.0 { own.ior.min(10.0) } else { 1.5 },
@@ -269,47 +297,69 @@ pub fn fallback_material() -> Material {
     Material { bsdf: Bsdf::Rough(Rough::Phong(phong)), emission: Emission::NONE, relief: None, opacity: None }
 }
 
-fn declared_color(scene: &Scene, images: &Images, source: &ColorSource) -> Color {
-    match source {
-        ColorSource::Constant(color) => Color::Constant(*color),
-        ColorSource::Texture(index) => {
-            Color::Texture(declared_texture(scene, images, *index, TextureUse::Color))
-        }
-    }
+/// A material of the scene file that looks up images.
+#[derive(Clone, Copy)]
+struct Declared<'a> {
+    scene: &'a Scene,
+    images: &'a Images,
+    material: &'a description::Material,
 }
 
-/// A number of the scene file; `usual` is that of a pixel without a channel.
-fn declared_number(scene: &Scene, images: &Images, source: &NumberSource, usual: PixelNumber) -> Number {
-    match source {
-        NumberSource::Constant(number) => Number::Constant(*number),
-        NumberSource::Texture { texture, channel } => {
-            let used = TextureUse::Number(channel.map_or(usual, PixelNumber::Channel));
-            Number::Texture(declared_texture(scene, images, *texture, used))
+impl Declared<'_> {
+    fn color(self, source: &ColorSource) -> Color {
+        match source {
+            ColorSource::Constant(color) => Color::Constant(*color),
+            // All roles of colors use textures alike.
+            ColorSource::Texture(index) => Color::Texture(self.texture(*index, TextureRole::Facets)),
         }
     }
-}
 
-fn declared_texture(scene: &Scene, images: &Images, index: usize, used: TextureUse) -> Arc<Texture> {
-    let declared = &scene.textures[index];
-    let &description::Texture { filter, wrap, repeat, rotate, offset, uv, factor, .. } = declared;
-    let Image { texels, mipmaps } = image(images, &declared_source(scene, index, used));
-    let mipmaps = match filter {
-        TextureFilter::Nearest | TextureFilter::Bilinear => None,
-        TextureFilter::Mipmap => mipmaps,
-    };
-    let moved = Moved::new(uv, rotate, offset.as_dvec2()).map(Box::new);
-    let factor = match used {
-        TextureUse::Color | TextureUse::Number(_) => Some(factor).filter(|factor| *factor != Vec3::ONE),
-        TextureUse::Normal => None,
-    };
-    Arc::new(Texture { texels, mipmaps, filter, wrap, repeat, moved, factor })
+    /// A number; without a channel, a texture's luminance.
+    fn number(self, source: &NumberSource, role: fn(PixelNumber) -> TextureRole) -> Number {
+        match (source.constant(), source.texture(PixelNumber::Luminance)) {
+            (Some(number), _) => Number::Constant(number),
+            (None, Some((texture, number))) => Number::Texture(self.texture(texture, role(number))),
+            (None, None) => Number::Constant(1.0),
+        }
+    }
+
+    fn texture(self, index: usize, role: TextureRole) -> Arc<Texture> {
+        let Self { scene, images, material } = self;
+        let declared = &scene.textures[index];
+        let &description::Texture { filter, wrap, repeat, rotate, offset, uv, factor, .. } = declared;
+        let Image { texels, mipmaps } = image(images, &material_source(scene, material, (index, role)));
+        let mipmaps = match filter {
+            TextureFilter::Nearest | TextureFilter::Bilinear => None,
+            TextureFilter::Mipmap => mipmaps,
+        };
+        let moved = Moved::new(uv, rotate, offset.as_dvec2()).map(Box::new);
+        let factor = match role.texture_use() {
+            TextureUse::Color | TextureUse::CutOut | TextureUse::Number(_) => Factor::new(factor),
+            TextureUse::Normal => None,
+        };
+        Arc::new(Texture { texels, mipmaps, filter, wrap, repeat, moved, factor })
+    }
 }
 
 /// A texture of a mesh file. `None` if it was not loaded: it is never looked up, or could not be read.
-fn file_texture(images: &Images, source: &TextureSource) -> Option<Arc<Texture>> {
-    let (filter, wrap, repeat) = (TextureFilter::Bilinear, Wrap::Repeat, Vec2::ONE);
-    let texels = images.get(source)?.texels.clone();
-    Some(Arc::new(Texture { texels, mipmaps: None, filter, wrap, repeat, moved: None, factor: None }))
+fn file_texture(images: &Images, texture: &FileTexture, used: TextureUse) -> Option<Arc<Texture>> {
+    let texels = images.get(&file_source(texture, used))?.texels.clone();
+    let (base, gain) = texture.range;
+    let factor = match used {
+        TextureUse::Color | TextureUse::CutOut | TextureUse::Number(_) => {
+            Factor::with_base(Vec3::splat(gain), Vec3::splat(base))
+        }
+        TextureUse::Normal => None,
+    };
+    Some(Arc::new(Texture {
+        texels,
+        mipmaps: None,
+        filter: TextureFilter::Bilinear,
+        wrap: if texture.is_clamped { Wrap::Clamp } else { Wrap::Repeat },
+        repeat: texture.repeat,
+        moved: Moved::new(UvSet::First, 0.0, texture.offset).map(Box::new),
+        factor,
+    }))
 }
 
 /// The loaded image. A material that no object has may name textures that were not loaded: they are never looked up.

@@ -47,7 +47,7 @@ pub use origin::origin;
 pub use plain::PlainMaterial;
 pub use straight::{MOST_STRAIGHT, Weakened};
 pub use textures::{
-    Lookups, NeededTexture, TextureSource, declared_source, environment_source, textures_needed,
+    Cutoff, Lookups, NeededTexture, TextureSource, environment_source, material_source, textures_needed,
 };
 
 use crate::assets::OrbiterCamera;

@@ -5,10 +5,12 @@ use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::assets::image::ImageEncoding;
-use crate::assets::{FileMaterial, LoadedMesh};
+use crate::assets::image::{ColorCurve, ImageEncoding};
+use crate::assets::{FileMaterial, FileTexture, LoadedMesh};
 use crate::math::Vec3;
-use crate::scene::description::{Encoding, PixelNumber, Scene, TextureFilter, TextureRole, TextureUse};
+use crate::scene::description::{
+    Channel, Encoding, Material, PixelNumber, Scene, TextureFilter, TextureRole, TextureUse,
+};
 
 /// An image file, and the encoding of its numbers.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -19,6 +21,24 @@ pub struct TextureSource {
     pub image: Option<u32>,
     /// Encoding of its numbers.
     pub encoding: ImageEncoding,
+    /// Cutoff of the opacity, if the mip levels are of its coverage.
+    pub coverage: Option<Cutoff>,
+}
+
+/// A cutoff of opacity, by its bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Cutoff(u32);
+
+impl Cutoff {
+    /// A cutoff of the opacity, as one of the numbers of an image with this factor.
+    pub fn new(cutoff: f32, factor: f32) -> Self {
+        Self(if factor > 0.0 { cutoff / factor } else { f32::INFINITY }.to_bits())
+    }
+
+    /// The number from which the surface exists.
+    pub fn value(self) -> f32 {
+        f32::from_bits(self.0)
+    }
 }
 
 /// An image file that is needed.
@@ -126,7 +146,7 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
         let (textures, is_delta) = (material.textures().into_iter(), material.kind.has_delta());
         for (texture, role) in textures.filter(|(_, role)| lookups.has(*role, is_delta)) {
             add(NeededTexture {
-                source: declared_source(scene, texture, role.texture_use()),
+                source: material_source(scene, material, (texture, role)),
                 name: scene.textures[texture].name.clone(),
                 declared: Some(texture),
                 mesh_file: None,
@@ -139,10 +159,11 @@ pub fn textures_needed(scene: &Scene, meshes: &[Arc<LoadedMesh>], lookups: Looku
     }
     for (file, mesh) in meshes.iter().enumerate().filter(|(file, _)| own_materials[*file]) {
         let of_material = |own| file_textures(own, lookups).map(move |texture| (own, texture));
-        for (own, (path, used)) in mesh.materials.iter().flat_map(of_material) {
+        for (own, (texture, used)) in mesh.materials.iter().flat_map(of_material) {
+            let path = &texture.path;
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
             add(NeededTexture {
-                source: file_source(path, used),
+                source: file_source(texture, used),
                 name,
                 declared: None,
                 mesh_file: Some(file),
@@ -178,7 +199,7 @@ fn environment_file(scene: &Scene) -> Option<&Path> {
 }
 
 fn environment_map(file: &Path) -> TextureSource {
-    TextureSource { path: file.to_owned(), image: None, encoding: ImageEncoding::Color }
+    TextureSource { path: file.to_owned(), image: None, encoding: ImageEncoding::Color, coverage: None }
 }
 
 /// Whether each material of the scene belongs to an object, and whether each mesh file's own materials belong to an
@@ -196,6 +217,75 @@ fn in_use(scene: &Scene) -> (Vec<bool>, Vec<bool>) {
     (materials, files)
 }
 
+/// Source of a texture of a material of the scene file in this role.
+pub fn material_source(
+    scene: &Scene,
+    material: &Material,
+    (texture, role): (usize, TextureRole),
+) -> TextureSource {
+    let source = declared_source(scene, texture, texture_use(scene, material, (texture, role)));
+    match role {
+        TextureRole::Opacity(_) => {
+            TextureSource { coverage: coverage(scene, texture, material.opacity.cutoff), ..source }
+        }
+        TextureRole::Diffuse
+        | TextureRole::Specular
+        | TextureRole::Ambient
+        | TextureRole::Facets
+        | TextureRole::Roughness(_)
+        | TextureRole::Emission
+        | TextureRole::EmissionCoat(_)
+        | TextureRole::NormalMap
+        | TextureRole::Bump(_) => source,
+    }
+}
+
+/// The cutoff of an opacity texture, if its mip levels are of its coverage.
+pub fn coverage(scene: &Scene, texture: usize, cutoff: f32) -> Option<Cutoff> {
+    let is_covered = cutoff > 0.0 && has_mipmaps(scene, texture);
+    is_covered.then(|| Cutoff::new(cutoff, scene.textures[texture].factor.x))
+}
+
+/// Use of a texture of a material of the scene file.
+pub fn texture_use(
+    scene: &Scene,
+    material: &Material,
+    (texture, role): (usize, TextureRole),
+) -> TextureUse {
+    match role.texture_use() {
+        TextureUse::Color | TextureUse::CutOut => {
+            let is_alpha = |number| match number {
+                PixelNumber::Opacity | PixelNumber::Channel(Channel::Alpha) => true,
+                PixelNumber::Luminance | PixelNumber::Channel(_) | PixelNumber::Mask { .. } => false,
+            };
+            let opacity = material.opacity.texture().filter(|(_, number)| is_alpha(*number));
+            let is_cut_out = opacity.is_some_and(|(opacity, _)| is_same_image(scene, opacity, texture));
+            if is_cut_out { TextureUse::CutOut } else { TextureUse::Color }
+        }
+        TextureUse::Number(PixelNumber::Opacity) if !is_color(scene, material, texture) => {
+            TextureUse::Number(PixelNumber::Mask { of_any_color: false })
+        }
+        used @ (TextureUse::Number(_) | TextureUse::Normal) => used,
+    }
+}
+
+/// Whether the image of a texture is also that of a color of the material.
+fn is_color(scene: &Scene, material: &Material, texture: usize) -> bool {
+    let image = |texture: usize| (&scene.textures[texture].file.value, scene.textures[texture].image);
+    material.textures().into_iter().any(|(other, role)| {
+        role.texture_use() == TextureUse::Color && image(other) == image(texture)
+    })
+}
+
+/// Whether two textures show the same image at the same coordinates.
+fn is_same_image(scene: &Scene, a: usize, b: usize) -> bool {
+    let [a, b] = [a, b].map(|texture| &scene.textures[texture]);
+    let at = |texture: &crate::scene::description::Texture| {
+        (texture.image, texture.wrap, texture.repeat, texture.rotate, texture.offset, texture.uv)
+    };
+    a.file.value == b.file.value && at(a) == at(b)
+}
+
 /// Source of a texture of the scene file for this use.
 pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> TextureSource {
     let texture = &scene.textures[texture];
@@ -205,50 +295,78 @@ pub fn declared_source(scene: &Scene, texture: usize, used: TextureUse) -> Textu
             ImageEncoding::Linear
         }
         (Encoding::Auto, TextureUse::Color) => ImageEncoding::Color,
+        (Encoding::Auto, TextureUse::CutOut) => ImageEncoding::CutOut(ColorCurve::Auto),
+        (Encoding::Srgb, TextureUse::CutOut) => ImageEncoding::CutOut(ColorCurve::Srgb),
+        (Encoding::Linear, TextureUse::CutOut) => ImageEncoding::CutOut(ColorCurve::Linear),
         (Encoding::Srgb, TextureUse::Number(of)) => ImageEncoding::Number { of, is_srgb: true },
         (Encoding::Auto | Encoding::Linear, TextureUse::Number(of)) => {
             ImageEncoding::Number { of, is_srgb: false }
         }
     };
-    TextureSource { path: texture.file.value.clone(), image: texture.image, encoding }
+    TextureSource { path: texture.file.value.clone(), image: texture.image, encoding, coverage: None }
 }
 
 /// Source of a texture of a mesh file for this use.
-pub fn file_source(path: &Path, used: TextureUse) -> TextureSource {
+pub fn file_source(texture: &FileTexture, used: TextureUse) -> TextureSource {
     let encoding = match used {
         TextureUse::Color => ImageEncoding::Color,
+        TextureUse::CutOut => ImageEncoding::CutOut(ColorCurve::Auto),
         TextureUse::Normal => ImageEncoding::Linear,
-        TextureUse::Number(of) => ImageEncoding::Number { of, is_srgb: false },
+        TextureUse::Number(of) => {
+            ImageEncoding::Number { of: texture.number.unwrap_or(of), is_srgb: false }
+        }
     };
-    TextureSource { path: path.to_owned(), image: None, encoding }
+    TextureSource { path: texture.path.clone(), image: None, encoding, coverage: None }
 }
 
 /// Use of textures of mesh files as numbers.
 pub const FILE_NUMBER: TextureUse = TextureUse::Number(PixelNumber::Luminance);
-/// Use of textures of mesh files as opacity.
-pub const FILE_OPACITY: TextureUse = TextureUse::Number(PixelNumber::Opacity);
 
-fn file_textures(material: &FileMaterial, lookups: Lookups) -> impl Iterator<Item = (&Path, TextureUse)> {
+/// Use of a color texture of a mesh file's material.
+pub fn file_color_use(own: &FileMaterial, texture: &FileTexture) -> TextureUse {
+    let is_alpha = |opacity: &&FileTexture| match opacity.number {
+        None | Some(PixelNumber::Opacity | PixelNumber::Channel(Channel::Alpha)) => true,
+        Some(PixelNumber::Luminance | PixelNumber::Channel(_) | PixelNumber::Mask { .. }) => false,
+    };
+    let opacity = own.opacity_texture.as_ref().filter(is_alpha);
+    let is_cut_out = opacity.is_some_and(|opacity| opacity.is_same_image(texture));
+    if is_cut_out { TextureUse::CutOut } else { TextureUse::Color }
+}
+
+/// Use of the texture of a mesh file's opacity.
+pub fn file_opacity_use(own: &FileMaterial, opacity: &FileTexture) -> TextureUse {
+    let colors = [&own.diffuse_texture, &own.specular_texture, &own.emission_texture];
+    let is_color = colors.into_iter().flatten().any(|color| color.path == opacity.path);
+    let number = if is_color { PixelNumber::Opacity } else { PixelNumber::Mask { of_any_color: true } };
+    TextureUse::Number(number)
+}
+
+fn file_textures(own: &FileMaterial, lookups: Lookups) -> impl Iterator<Item = (&FileTexture, TextureUse)> {
     let shared = [
-        (&material.diffuse_texture, TextureRole::Ambient),
-        (&material.emission_texture, TextureRole::Emission),
-        (&material.normal_texture, TextureRole::NormalMap),
-        (&material.opacity_texture, TextureRole::Opacity(PixelNumber::Opacity)),
+        (&own.diffuse_texture, TextureRole::Ambient),
+        (&own.emission_texture, TextureRole::Emission),
+        (&own.normal_texture, TextureRole::NormalMap),
+        (&own.opacity_texture, TextureRole::Opacity(PixelNumber::Opacity)),
     ];
-    let own = match &material.physical {
+    let of_kind = match &own.physical {
         None => vec![
-            (&material.diffuse_texture, TextureRole::Diffuse),
-            (
-                if material.has_highlight() { &material.specular_texture } else { &None },
-                TextureRole::Specular,
-            ),
+            (&own.diffuse_texture, TextureRole::Diffuse),
+            (if own.has_highlight() { &own.specular_texture } else { &None }, TextureRole::Specular),
         ],
         Some(physical) => vec![
-            (&material.diffuse_texture, TextureRole::Facets),
+            (&own.diffuse_texture, TextureRole::Facets),
             (&physical.roughness_texture, TextureRole::Roughness(PixelNumber::Luminance)),
             (&physical.metallic_texture, TextureRole::Roughness(PixelNumber::Luminance)),
         ],
     };
-    let looked_up = own.into_iter().chain(shared).filter(move |(_, role)| lookups.has(*role, false));
-    looked_up.filter_map(|(path, role)| Some((path.as_deref()?, role.texture_use())))
+    let looked_up = of_kind.into_iter().chain(shared).filter(move |(_, role)| lookups.has(*role, false));
+    looked_up.filter_map(|(texture, role)| {
+        let texture = texture.as_ref()?;
+        let used = match role.texture_use() {
+            TextureUse::Color | TextureUse::CutOut => file_color_use(own, texture),
+            TextureUse::Number(PixelNumber::Opacity) => file_opacity_use(own, texture),
+            used @ (TextureUse::Number(_) | TextureUse::Normal) => used,
+        };
+        Some((texture, used))
+    })
 }

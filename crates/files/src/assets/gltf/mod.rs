@@ -296,11 +296,12 @@ impl Container {
     /// # Errors
     /// [`AssetError::Malformed`] with the index of the image; [`AssetError::Cancelled`].
     pub fn check_image_header(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
-        let limits = ImageLimits::default();
+        let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let size = match self.image(number)? {
-            ImageBytes::File(file) => image::size(&file, limits, token),
+            ImageBytes::File(file) => image::size(&file, encoding, limits, token),
             ImageBytes::Inside(bytes) => {
-                image::size_within(ImageWithin { path: &self.path, bytes: bytes.into() }, limits, token)
+                let image = ImageWithin { path: &self.path, bytes: bytes.into() };
+                image::size_within(image, encoding, limits, token)
             }
         };
         size.map(drop).map_err(|error| self.about_image(number, error))

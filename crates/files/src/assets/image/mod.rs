@@ -4,9 +4,14 @@ mod apart;
 mod convert;
 mod counting;
 mod exr;
+mod facts;
 mod hdr;
+mod icc;
 mod jpeg;
 mod png;
+mod primaries;
+mod space;
+mod tga;
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read, Seek, SeekFrom};
@@ -14,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use ::image::error::LimitErrorKind;
-use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
+use ::image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
 use super::contain::contain;
 use super::read::{self, Watch};
@@ -26,7 +31,10 @@ use crate::materials::{Mipmaps, PixelNumber};
 use apart::Reporter;
 use counting::Counting;
 use exr::ExrDecoder;
+use facts::{Alpha, Facts, Ignored};
+use hdr::HdrDecoder;
 use png::PngDecoder;
+use space::ColorSpace;
 
 /// Most bytes of an image file.
 const FILE_LIMIT: u64 = 4 << 30;
@@ -36,7 +44,7 @@ const CHECKED_FIRST: u64 = 16 << 20;
 /// Encoding of the numbers of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ImageEncoding {
-    /// Whole numbers are sRGB, floats are linear.
+    /// As the file says; else whole numbers are sRGB, floats are linear.
     Color,
     /// Always sRGB.
     Srgb,
@@ -51,6 +59,30 @@ pub enum ImageEncoding {
         /// Whether colours are sRGB.
         is_srgb: bool,
     },
+    /// Colors of a surface whose opacity is the alpha of the same image: not multiplied by alpha, but weighted by it between texels.
+    CutOut(ColorCurve),
+}
+
+/// Encoding of colors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ColorCurve {
+    /// [`ImageEncoding::Color`].
+    Auto,
+    /// [`ImageEncoding::Srgb`].
+    Srgb,
+    /// [`ImageEncoding::Linear`].
+    Linear,
+}
+
+impl ColorCurve {
+    /// The encoding of an image without alpha.
+    pub fn encoding(self) -> ImageEncoding {
+        match self {
+            Self::Auto => ImageEncoding::Color,
+            Self::Srgb => ImageEncoding::Srgb,
+            Self::Linear => ImageEncoding::Linear,
+        }
+    }
 }
 
 impl ImageEncoding {
@@ -66,12 +98,37 @@ impl ImageEncoding {
                     PixelNumber::Luminance => 0,
                     PixelNumber::Opacity => 1,
                     PixelNumber::Channel(channel) => 2 + channel as usize,
+                    PixelNumber::Mask { of_any_color } => 6 + usize::from(of_any_color),
                 };
                 4 + 2 * of + usize::from(is_srgb)
             }
+            Self::CutOut(curve) => 20 + curve as usize,
+        }
+    }
+
+    /// The color space of a file's samples.
+    fn space(self, facts: &Facts) -> ColorSpace {
+        if self.is_declared() { facts.space.clone() } else { ColorSpace::default() }
+    }
+
+    /// Whether the file declares its color space, and not the scene.
+    fn is_declared(self) -> bool {
+        match self {
+            Self::Color | Self::Raw | Self::CutOut(ColorCurve::Auto) => true,
+            Self::Srgb | Self::Linear | Self::Number { .. } | Self::CutOut(_) => false,
         }
     }
 }
+
+/// Texels of an image file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadedImage {
+    /// The texels.
+    pub texels: Texels,
+    /// Warnings about parts of the file that are ignored, with its name.
+    pub warnings: Vec<String>,
+}
+
 
 /// Limits on the size of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,8 +161,8 @@ pub fn load(
     limits: ImageLimits,
     progress: Progress<'_>,
     token: &CancelToken,
-) -> Result<Texels, AssetError> {
-    load_hashed(path, encoding, limits, progress, token).map(|(texels, _)| texels)
+) -> Result<LoadedImage, AssetError> {
+    load_hashed(path, encoding, limits, progress, token).map(|(image, _)| image)
 }
 
 /// [`load`], with the hash of the bytes that were decoded.
@@ -118,33 +175,55 @@ pub fn load_hashed(
     limits: ImageLimits,
     progress: Progress<'_>,
     token: &CancelToken,
-) -> Result<(Texels, FileHash), AssetError> {
-    let (source, hash) = Source::whole(path, limits, token)?;
+) -> Result<(LoadedImage, FileHash), AssetError> {
+    let (source, hash) = Source::whole(path, encoding, limits, token)?;
     Ok((load_source(source, encoding, Watch { progress, token })?, hash))
 }
 
-fn load_source(file: Source, encoding: ImageEncoding, watch: Watch<'_>) -> Result<Texels, AssetError> {
-    let length = file.length as usize;
+fn load_source(
+    file: Source,
+    encoding: ImageEncoding,
+    watch: Watch<'_>,
+) -> Result<LoadedImage, AssetError> {
+    let (path, length) = (file.path.clone(), file.length as usize);
     watch.tick(0, length)?;
-    let texels =
-        file.read_apart(watch, move |file, report| Ok(convert::texels(file.decode(report)?, encoding)))?;
+    let (texels, ignored) = file.read_apart(watch, move |file, report| {
+        let (image, mut facts) = file.decode(encoding, report)?;
+        if let Some(words) = convert::constant_alpha(&image, encoding, &facts) {
+            facts.warn(words);
+        }
+        Ok((convert::texels(image, encoding, &facts), facts.ignored))
+    })?;
     watch.tick(length, length)?;
-    Ok(texels)
+    let warning = |Ignored { line, words }| {
+        let line = line.map_or(String::new(), |line| format!(":{line}"));
+        format!("{}{line}: {words}", path.display())
+    };
+    Ok(LoadedImage { texels, warnings: ignored.into_iter().map(warning).collect() })
 }
 
 /// Columns and rows of an image, and the bytes that its texels will take, according to its header.
 ///
 /// # Errors
 /// As for [`load`], as far as the start of the file shows them.
-pub fn size(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<(u32, u32, u64), AssetError> {
-    size_of_source(Source::open(path, limits, token)?, Watch { progress: &unwatched, token })
+pub fn size(
+    path: &Path,
+    encoding: ImageEncoding,
+    limits: ImageLimits,
+    token: &CancelToken,
+) -> Result<(u32, u32, u64), AssetError> {
+    size_of_source(Source::open(path, limits, token)?, encoding, Watch { progress: &unwatched, token })
 }
 
-fn size_of_source(file: Source, watch: Watch<'_>) -> Result<(u32, u32, u64), AssetError> {
-    file.read_apart(watch, |file, report| {
-        let (decoder, bytes) = file.decoder(report)?;
+fn size_of_source(
+    file: Source,
+    encoding: ImageEncoding,
+    watch: Watch<'_>,
+) -> Result<(u32, u32, u64), AssetError> {
+    file.read_apart(watch, move |file, report| {
+        let Opened { decoder, texel_bytes, .. } = file.opened(encoding, report)?;
         let (width, height) = decoder.dimensions();
-        Ok((width, height, bytes))
+        Ok((width, height, texel_bytes))
     })
 }
 
@@ -167,7 +246,7 @@ pub fn load_within(
     limits: ImageLimits,
     progress: Progress<'_>,
     token: &CancelToken,
-) -> Result<Texels, AssetError> {
+) -> Result<LoadedImage, AssetError> {
     load_source(Source::within(image, limits, token)?, encoding, Watch { progress, token })
 }
 
@@ -177,10 +256,11 @@ pub fn load_within(
 /// As for [`size`].
 pub fn size_within(
     image: ImageWithin<'_>,
+    encoding: ImageEncoding,
     limits: ImageLimits,
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
-    size_of_source(Source::within(image, limits, token)?, Watch { progress: &unwatched, token })
+    size_of_source(Source::within(image, limits, token)?, encoding, Watch { progress: &unwatched, token })
 }
 
 /// The mip levels of an image.
@@ -190,13 +270,21 @@ pub fn size_within(
 pub fn mipmaps(texels: &Texels, token: &CancelToken) -> Result<Mipmaps, Cancelled> {
     Mipmaps::of(texels, |level| {
         let halving = Halving::new(level);
-        let mut rows = Vec::with_capacity(level.len() / 4);
+        let mut rows = halving.start();
         for y in 0..halving.rows() {
             token.check()?;
             halving.row(y, &mut rows);
         }
         Ok(halving.texels(rows))
     })
+}
+
+/// The mip levels of the part of an image that is at least as large as a cutoff: numbers from 0 to 1.
+///
+/// # Errors
+/// [`Cancelled`].
+pub fn coverage(texels: &Texels, cutoff: f32, token: &CancelToken) -> Result<Mipmaps, Cancelled> {
+    mipmaps(&texels.cut(cutoff), token)
 }
 
 /// The bytes of an image: an open file, a whole file in memory, or bytes of another one.
@@ -246,11 +334,16 @@ impl Source {
 
     /// Reads a file into memory and hashes it: the hash is of the bytes that are decoded, even if the file is replaced or rewritten
     /// meanwhile.
-    fn whole(path: &Path, limits: ImageLimits, token: &CancelToken) -> Result<(Self, FileHash), AssetError> {
+    fn whole(
+        path: &Path,
+        encoding: ImageEncoding,
+        limits: ImageLimits,
+        token: &CancelToken,
+    ) -> Result<(Self, FileHash), AssetError> {
         let (file, length) = read::open(path, FILE_LIMIT)?;
         if length > CHECKED_FIRST {
             // Do not fill the memory with a file that is not going to be decoded.
-            size(path, limits, token)?;
+            size(path, encoding, limits, token)?;
         }
         let bytes = read::rest(path, file, (length, FILE_LIMIT), Watch { progress: &unwatched, token })?;
         let (hash, length) = (read::hash(&bytes), bytes.len() as u64);
@@ -284,85 +377,130 @@ impl Source {
             .map_err(|reason| AssetError::malformed(&path, None, reason))
     }
 
-    fn decode(self, report: Reporter) -> Result<DynamicImage, String> {
-        let (mut decoder, _) = self.decoder(report)?;
+    fn decode(self, encoding: ImageEncoding, report: Reporter) -> Result<(DynamicImage, Facts), String> {
+        let Opened { mut decoder, facts, .. } = self.opened(encoding, report)?;
         let (width, height) = decoder.dimensions();
         let orientation = decoder.orientation().map_err(|error| reason(&error))?;
         let image = DynamicImage::from_decoder(decoder);
         let mut image =
             image.map_err(|error| format!("it claims {width} × {height} pixels: {}", reason(&error)))?;
         image.apply_orientation(orientation);
-        Ok(image)
+        Ok((image, facts))
     }
 
-    /// A decoder of an image within the limits, and the bytes that its texels will take.
-    fn decoder(self, report: Reporter) -> Result<(Box<dyn ImageDecoder>, u64), String> {
-        let mut in_memory = 0;
-        let (header, within) = match &self.file {
-            Bytes::File(file) => (Some(file.try_clone().map_err(|error| in_words(&error))?), None),
+    /// A decoder of an image within the limits.
+    fn opened(self, encoding: ImageEncoding, report: Reporter) -> Result<Opened, String> {
+        let start = |bytes: &[u8]| ::image::guess_format(bytes).ok();
+        let (mut in_memory, mut is_checked) = (0, true);
+        match &self.file {
+            Bytes::File(_) => is_checked = false,
             Bytes::Whole(bytes) => {
-                check_start_and_end(bytes.get_ref())?;
                 in_memory = self.length;
-                (None, None)
+                if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) {
+                    jpeg::check_bytes(bytes.get_ref())?;
+                }
             }
-            Bytes::Within(bytes) => (None, Some(Arc::clone(bytes.get_ref()))),
-        };
-        let reader = BufReader::new(Counting::new(self.file, self.length, report));
-        let mut reader = ImageReader::new(reader).with_guessed_format().map_err(|error| in_words(&error))?;
+            Bytes::Within(bytes) if start(bytes.get_ref()) == Some(ImageFormat::Jpeg) => {
+                jpeg::check_bytes(bytes.get_ref())?;
+            }
+            Bytes::Within(_) => {}
+        }
+        let mut bytes = BufReader::new(Counting::new(self.file, self.length, report));
+        let is_hdr = bytes.fill_buf().map_err(|error| in_words(&error))?.starts_with(hdr::MAGIC);
+        let mut reader = ImageReader::new(bytes).with_guessed_format().map_err(|error| in_words(&error))?;
+        if is_hdr {
+            reader.set_format(ImageFormat::Hdr);
+        }
         if reader.format().is_none() {
-            // Only TGA has no first bytes to recognise it by.
+            // Only TGA has no first bytes to recognize it by.
             let format = ImageFormat::from_path(&self.path).ok().filter(|format| *format == ImageFormat::Tga);
             reader.set_format(format.ok_or_else(unknown_format)?);
         }
         let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
-        if is_jpeg {
-            match (within, &header) {
-                (Some(bytes), _) => jpeg::check_bytes(&bytes)?,
-                (None, Some(_)) => jpeg::check_whole(&self.path, self.limits.memory_bytes, &self.token)?,
-                (None, None) => {}
-            }
-        }
-        if reader.format() == Some(ImageFormat::Hdr)
-            && let Some(header) = &header
-        {
-            hdr::check_header(header, &self.token)?;
+        if is_jpeg && !is_checked {
+            jpeg::check_whole(&self.path, self.limits.memory_bytes, &self.token)?;
         }
         let growth = most_growth(reader.format());
-        let decoder = choose(reader, self.limits.memory_bytes).map_err(|error| reason(&error))?;
+        let (decoder, facts) =
+            choose(reader, encoding, self.limits.memory_bytes).map_err(|error| reason(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
-        let texel_bytes = check_size(&*decoder, [self.length, held_bytes, in_memory], self.limits, growth)?;
+        let texel = texel_bytes(decoder.color_type(), encoding, &facts);
+        let texel_bytes = check_size(&*decoder, texel, [self.length, held_bytes, in_memory], self.limits, growth)?;
         if is_jpeg {
             let (width, height) = decoder.dimensions();
             jpeg::check_plausible(width, height, self.length)?;
         }
-        Ok((decoder, texel_bytes))
+        Ok(Opened { decoder, facts, texel_bytes })
     }
+}
+
+/// A decoder of an image, with what it does not apply.
+struct Opened {
+    decoder: Box<dyn ImageDecoder>,
+    facts: Facts,
+    /// Bytes that the texels will take.
+    texel_bytes: u64,
 }
 
 /// The decoder of the format that was found.
 fn choose<R: BufRead + Seek + 'static>(
     mut reader: ImageReader<R>,
+    encoding: ImageEncoding,
     memory_bytes: u64,
-) -> Result<Box<dyn ImageDecoder>, ImageError> {
+) -> Result<(Box<dyn ImageDecoder>, Facts), ImageError> {
     match reader.format() {
-        Some(ImageFormat::Png) => Ok(Box::new(PngDecoder::new(reader.into_inner(), memory_bytes)?)),
-        Some(ImageFormat::OpenExr) => Ok(Box::new(ExrDecoder::new(reader.into_inner(), memory_bytes)?)),
-        _ => {
+        Some(ImageFormat::Png) => {
+            let decoder = PngDecoder::new(reader.into_inner(), memory_bytes)?;
+            let facts = decoder.facts();
+            Ok((Box::new(decoder), facts))
+        }
+        Some(ImageFormat::OpenExr) => {
+            let decoder = ExrDecoder::new(reader.into_inner(), memory_bytes)?;
+            let facts = decoder.facts();
+            Ok((Box::new(decoder), facts))
+        }
+        Some(ImageFormat::Hdr) => {
+            let mut decoder = HdrDecoder::new(reader.into_inner())?;
+            let facts = decoder.facts();
+            Ok((Box::new(decoder), facts))
+        }
+        format => {
+            let alpha = match format {
+                Some(ImageFormat::Tga) => {
+                    let mut file = reader.into_inner();
+                    let alpha = tga::alpha(&mut file).map_err(ImageError::IoError)?;
+                    reader = ImageReader::with_format(file, ImageFormat::Tga);
+                    alpha
+                }
+                Some(ImageFormat::Bmp) => Alpha::Unsure,
+                _ => Alpha::Straight,
+            };
             // Width and height are checked elsewhere, with better messages.
             let mut limits = Limits::default();
             limits.max_alloc = Some(memory_bytes);
             reader.limits(limits);
-            Ok(Box::new(reader.into_decoder()?))
+            let mut decoder = reader.into_decoder()?;
+            let mut facts = Facts { alpha, ..Facts::default() };
+            if encoding.is_declared()
+                && let Some(profile) = decoder.icc_profile()?
+            {
+                facts.add_profile(Some(&profile), !decoder.color_type().has_color());
+            }
+            Ok((Box::new(decoder), facts))
         }
     }
 }
 
-/// Checks of a whole file that the decoders lack.
-fn check_start_and_end(bytes: &[u8]) -> Result<(), String> {
-    match ::image::guess_format(bytes) {
-        Ok(ImageFormat::Jpeg) => jpeg::check_bytes(bytes),
-        Ok(ImageFormat::Hdr) => hdr::check_bytes(bytes),
-        Ok(_) | Err(_) => Ok(()),
+/// Bytes of a texel, as [`convert::texels`] makes it.
+fn texel_bytes(color: ColorType, encoding: ImageEncoding, facts: &Facts) -> u64 {
+    let sample_bytes = color.bytes_per_pixel() / color.channel_count();
+    let is_packed = sample_bytes == 1 && encoding.space(facts).is_usual();
+    match encoding {
+        ImageEncoding::CutOut(_) if color.has_alpha() => {
+            if is_packed && facts.alpha != Alpha::Premultiplied { 4 } else { 16 }
+        }
+        _ if is_packed => 3,
+        _ => 12,
     }
 }
 
@@ -386,6 +524,7 @@ fn most_growth(format: Option<ImageFormat>) -> u64 {
 /// decoder holds count too; those in memory beside it make way for the texels.
 fn check_size(
     decoder: &dyn ImageDecoder,
+    texel_bytes: u64,
     [length, held_bytes, in_memory]: [u64; 3],
     limits: ImageLimits,
     most_growth: u64,
@@ -398,9 +537,6 @@ fn check_size(
     if width.max(height) > limits.side {
         return Err(format!("{size}, more than {} a side", limits.side));
     }
-    let color = decoder.color_type();
-    let sample_bytes = u64::from(color.bytes_per_pixel() / color.channel_count());
-    let texel_bytes = if sample_bytes == 1 { 3 } else { 12 };
     let texels = u64::from(width) * u64::from(height) * texel_bytes;
     let needed = decoder.total_bytes().saturating_add(texels.max(in_memory)).saturating_add(held_bytes);
     if needed > limits.memory_bytes {

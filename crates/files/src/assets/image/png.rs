@@ -1,19 +1,32 @@
 //! PNG by `png`: `image` would unpack chunks beside the picture too.
 
-use std::io::{BufRead, Seek};
+use std::io::{self, BufRead, Read, Seek, SeekFrom};
 
 use ::image::error::{DecodingError, ImageFormatHint, LimitError, LimitErrorKind};
 use ::image::{ColorType, ImageDecoder, ImageError, ImageFormat, ImageResult};
 
-/// Decoder of the first picture, without colour profile and texts.
+use super::facts::Facts;
+use super::primaries::Primaries;
+use super::space::{ColorSpace, Curve};
+use crate::math::DMat3;
+
+/// Most bytes of a color profile, packed and unpacked.
+const PROFILE_BYTES: u32 = 16 << 20;
+
+/// Decoder of the first frame, without texts.
 pub(super) struct PngDecoder<R: BufRead + Seek> {
     reader: png::Reader<R>,
     color_type: ColorType,
+    profile: Option<Profile>,
 }
+
+/// A color profile, or `None` if it cannot be unpacked.
+type Profile = Option<Vec<u8>>;
 
 impl<R: BufRead + Seek> PngDecoder<R> {
     /// A decoder that takes at most so many bytes of memory besides the pixels.
-    pub(super) fn new(file: R, memory_bytes: u64) -> ImageResult<Self> {
+    pub(super) fn new(mut file: R, memory_bytes: u64) -> ImageResult<Self> {
+        let profile = profile(&mut file).map_err(ImageError::IoError)?;
         let limits = png::Limits { bytes: usize::try_from(memory_bytes).unwrap_or(usize::MAX) };
         let mut decoder = png::Decoder::new_with_limits(file, limits);
         decoder.set_ignore_text_chunk(true);
@@ -33,7 +46,45 @@ impl<R: BufRead + Seek> PngDecoder<R> {
             png::ColorType::Rgb if is_wide => ColorType::Rgb16,
             png::ColorType::Rgb | png::ColorType::Indexed => ColorType::Rgb8,
         };
-        Ok(Self { reader, color_type })
+        Ok(Self { reader, color_type, profile })
+    }
+
+    /// The facts that the samples do not contain. Of several statements about colors, the first of `cICP`, `sRGB`, `iCCP`, and `gAMA`
+    /// with `cHRM` counts.
+    pub(super) fn facts(&self) -> Facts {
+        let (info, mut facts) = (self.reader.info(), Facts::default());
+        if let Some(frames) = info.animation_control().map(|control| control.num_frames).filter(|n| *n > 1) {
+            facts.warn(format!("it has {frames} frames; only the first is used"));
+        }
+        let is_gray = !self.color_type.has_color();
+        if let Some(points) = info.coding_independent_code_points {
+            match space_of_points(points) {
+                Some(space) => facts.space = space,
+                None => facts.warn("its cICP chunk has a code that is not read; its colors count as sRGB"),
+            }
+        } else if info.srgb.is_some() {
+        } else if let Some(profile) = &self.profile {
+            facts.add_profile(profile.as_deref(), is_gray);
+        } else {
+            facts.space = self.space_of_numbers(&mut facts, is_gray);
+        }
+        facts
+    }
+
+    /// The space of the chunks `gAMA` and `cHRM`.
+    fn space_of_numbers(&self, facts: &mut Facts, is_gray: bool) -> ColorSpace {
+        let info = self.reader.info();
+        let curve = info.gama_chunk.map_or(Curve::Srgb, |gamma| curve(gamma.into_scaled()));
+        let number = |number: png::ScaledFloat| f64::from(number.into_scaled()) / 100_000.0;
+        let matrix = info.chrm_chunk.filter(|_| !is_gray).map_or(Some(DMat3::IDENTITY), |chunk| {
+            let [red, green, blue, white] =
+                [chunk.red, chunk.green, chunk.blue, chunk.white].map(|(x, y)| [number(x), number(y)]);
+            Primaries { red, green, blue, white }.to_rec_709()
+        });
+        if matrix.is_none() {
+            facts.warn("its cHRM chunk spans no colors and is ignored");
+        }
+        ColorSpace::new(Some([curve.clone(), curve.clone(), curve]), matrix.unwrap_or(DMat3::IDENTITY))
     }
 }
 
@@ -63,6 +114,78 @@ impl<R: BufRead + Seek> ImageDecoder for PngDecoder<R> {
     fn read_image_boxed(self: Box<Self>, samples: &mut [u8]) -> ImageResult<()> {
         (*self).read_image(samples)
     }
+}
+
+/// The curve of a `gAMA` chunk in units of 1/100000. 1/2.2 is the usual statement of sRGB (PNG, 11.3.2.5).
+fn curve(gamma: u32) -> Curve {
+    const SRGB: u32 = 45_455;
+    const TOLERANCE: u32 = 500;
+    match gamma {
+        0 => Curve::Srgb,
+        _ if gamma.abs_diff(SRGB) <= TOLERANCE => Curve::Srgb,
+        _ => Curve::Power(100_000.0 / f64::from(gamma)),
+    }
+}
+
+/// The space of code points of video signals (ITU-T H.273, tables 2 and 3). `None` for rare ones and for PQ and HLG.
+fn space_of_points(points: png::CodingIndependentCodePoints) -> Option<ColorSpace> {
+    let primaries = match points.color_primaries {
+        1 => Primaries::REC_709,
+        9 => Primaries::REC_2020,
+        12 => Primaries::DISPLAY_P3,
+        _ => return None,
+    };
+    let curve = match points.transfer_function {
+        1 | 6 | 14 | 15 => Curve::REC_709,
+        4 => Curve::Power(2.2),
+        5 => Curve::Power(2.8),
+        8 => Curve::LINEAR,
+        13 => Curve::Srgb,
+        _ => return None,
+    };
+    let is_plain = points.matrix_coefficients == 0 && points.is_video_full_range_image;
+    let curves = [curve.clone(), curve.clone(), curve];
+    is_plain.then(|| Some(ColorSpace::new(Some(curves), primaries.to_rec_709()?)))?
+}
+
+/// The color profile of a file, which is then at its start again.
+fn profile(file: &mut (impl Read + Seek)) -> io::Result<Option<Profile>> {
+    let profile = find_profile(file);
+    file.seek(SeekFrom::Start(0))?;
+    match profile {
+        // The decoder reports the end of the file.
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Ok(None),
+        profile => profile,
+    }
+}
+
+fn find_profile(file: &mut (impl Read + Seek)) -> io::Result<Option<Profile>> {
+    const SIGNATURE: u64 = 8;
+    const CHECKSUM: i64 = 4;
+    file.seek(SeekFrom::Start(SIGNATURE))?;
+    loop {
+        let mut header = [[0; 4]; 2];
+        file.read_exact(header.as_flattened_mut())?;
+        let [length, kind] = header;
+        let length = u32::from_be_bytes(length);
+        match &kind {
+            b"IDAT" | b"IEND" => return Ok(None),
+            b"iCCP" if length > PROFILE_BYTES => return Ok(Some(None)),
+            b"iCCP" => {
+                let mut chunk = vec![0; length as usize];
+                file.read_exact(&mut chunk)?;
+                return Ok(Some(unpacked(&chunk)));
+            }
+            _ => file.seek(SeekFrom::Current(i64::from(length) + CHECKSUM))?,
+        };
+    }
+}
+
+/// Unpacks a profile, which follows its name and a method, which is 0.
+fn unpacked(chunk: &[u8]) -> Option<Vec<u8>> {
+    let name = memchr::memchr(0, chunk)?;
+    let packed = chunk[name + 1..].strip_prefix(&[0])?;
+    fdeflate::decompress_to_vec_bounded(packed, PROFILE_BYTES as usize).ok()
 }
 
 fn image_error(error: png::DecodingError) -> ImageError {

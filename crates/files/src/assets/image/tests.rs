@@ -9,11 +9,15 @@ use crate::materials::texels::TexelData;
 use crate::math::Vec3;
 use crate::math::color::srgb_to_linear;
 
+mod colors;
+mod cutout;
 mod exr;
+mod hdr;
 mod png;
+mod tga;
 
 fn load_with(path: &Path, encoding: ImageEncoding) -> Result<Texels, AssetError> {
-    load(path, encoding, ImageLimits::default(), &unwatched, &CancelToken::new())
+    Ok(load(path, encoding, ImageLimits::default(), &unwatched, &CancelToken::new())?.texels)
 }
 
 fn load_bytes(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Result<Texels, AssetError> {
@@ -21,6 +25,16 @@ fn load_bytes(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Result<Texel
     let path = folder.path().join(name);
     fs::write(&path, bytes).expect("written");
     load_with(&path, encoding)
+}
+
+/// Warnings about a file, without its folder.
+fn warned(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(name);
+    fs::write(&path, bytes).expect("written");
+    let loaded = load(&path, encoding, ImageLimits::default(), &unwatched, &CancelToken::new()).expect("read");
+    let folder = format!("{}/", folder.path().display());
+    loaded.warnings.iter().map(|warning| warning.replace(&folder, "")).collect()
 }
 
 fn says(name: &str, bytes: &[u8]) -> String {

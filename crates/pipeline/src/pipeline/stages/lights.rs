@@ -9,7 +9,7 @@ use super::textures::Textures;
 use crate::control::{CancelToken, Cancelled};
 use crate::lights::infinite::SkyMap;
 use crate::lights::{Lights, Receivers};
-use crate::scene::description::{PixelNumber, Scene, TextureUse};
+use crate::scene::description::{Scene, TextureRole};
 use crate::scene::fingerprint::{Key, Referents};
 use crate::world::{self, Geometry, TextureSource};
 
@@ -57,14 +57,19 @@ fn picked(by_whom: &str, lights: &Lights) -> String {
 /// The images that lamps by materials of the scene file have on them.
 fn patterns(scene: &Scene) -> impl Iterator<Item = TextureSource> {
     let shining = scene.materials.iter().filter(|material| material.emits());
-    let textures = shining.flat_map(|material| {
-        let emission = material.emission.texture.map(|texture| (texture, TextureUse::Color));
-        let coat = material.emission_coat().into_iter().flatten();
-        let coat = coat.filter_map(|number| number.texture(PixelNumber::Luminance));
-        let numbers = material.opacity.texture().into_iter().chain(coat);
-        emission.into_iter().chain(numbers.map(|(texture, number)| (texture, TextureUse::Number(number))))
-    });
-    textures.map(|(texture, used)| world::declared_source(scene, texture, used))
+    shining.flat_map(move |material| {
+        let textures = material.textures().into_iter().filter(|(_, role)| match role {
+            TextureRole::Emission | TextureRole::EmissionCoat(_) | TextureRole::Opacity(_) => true,
+            TextureRole::Diffuse
+            | TextureRole::Specular
+            | TextureRole::Ambient
+            | TextureRole::Facets
+            | TextureRole::Roughness(_)
+            | TextureRole::NormalMap
+            | TextureRole::Bump(_) => false,
+        });
+        textures.map(|texture| world::material_source(scene, material, texture))
+    })
 }
 
 fn sky(textures: &Textures, memo: &mut SkyMemo) -> Option<Arc<SkyMap>> {

@@ -14,7 +14,8 @@ use super::meshes::Meshes;
 use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::AssetError;
 use crate::assets::image::{
-    ImageEncoding, ImageLimits, ImageWithin, load_hashed, load_within, mipmaps, size, size_within,
+    ColorCurve, ImageEncoding, ImageLimits, ImageWithin, LoadedImage, coverage, load_hashed, load_within, mipmaps,
+    size, size_within,
 };
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
@@ -25,24 +26,31 @@ use crate::scene::diagnostic::Severity;
 use crate::scene::fingerprint::{Fingerprint, Key};
 use crate::scene::{Loaded, is_model};
 use crate::world::{
-    Image, Images, Lookups, NeededTexture, TextureSource, environment_source, textures_needed,
+    Cutoff, Image, Images, Lookups, NeededTexture, TextureSource, environment_source, textures_needed,
 };
 
 /// Most bytes that the texels of a scene's images may take together.
 const MOST_BYTES: u64 = 2 << 30;
 
 /// A file and the reading of its numbers, however the scene spells it.
-type Name = (PathBuf, Option<u32>, ImageEncoding);
+type Name = (PathBuf, Option<u32>, ImageEncoding, Option<Cutoff>);
 
 fn name(source: &TextureSource) -> Name {
-    (canonical(&source.path), source.image, source.encoding)
+    (canonical(&source.path), source.image, source.encoding, source.coverage)
+}
+
+/// Decoded texels, and warnings about parts of the file that were ignored.
+#[derive(Clone, Debug)]
+struct Decoded {
+    texels: Arc<Texels>,
+    warnings: Vec<String>,
 }
 
 /// The cache of textures: one entry for each file and reading of its numbers, and one for its mipmap levels if a material uses
 /// them.
 #[derive(Debug, Default)]
 pub(in crate::pipeline) struct TextureCache {
-    texels: Pool<Name, Texels>,
+    texels: Pool<Name, Decoded>,
     mipmaps: Pool<Name, Mipmaps>,
     /// For images of glTF files that are in files of their own: these files.
     linked: HashMap<Name, PathBuf>,
@@ -73,7 +81,8 @@ impl TextureCache {
     /// The texels of a file that were read last.
     #[cfg(test)]
     pub(in crate::pipeline) fn latest(&self, path: &Path) -> Option<&Arc<Texels>> {
-        self.texels.latest(&(canonical(path), None, ImageEncoding::Color))
+        let name = (canonical(path), None, ImageEncoding::Color, None);
+        self.texels.latest(&name).map(|decoded| &decoded.texels)
     }
 }
 
@@ -136,7 +145,7 @@ struct Wanted<'a> {
 /// Cached parts of an image.
 #[derive(Debug, Default)]
 struct Kept {
-    texels: Option<Arc<Texels>>,
+    texels: Option<Arc<Decoded>>,
     mipmaps: Option<Arc<Mipmaps>>,
 }
 
@@ -175,8 +184,9 @@ pub(in crate::pipeline) fn textures(
             cache.linked.insert(image.name.clone(), file.path.clone());
         }
         match asset {
-            Ok((loaded_image, was_kept)) => {
-                let Image { texels, mipmaps } = &loaded_image;
+            Ok((decoded, mipmaps, was_kept)) => {
+                let texels = &decoded.texels;
+                let loaded_image = Image { texels: texels.clone(), mipmaps: mipmaps.clone() };
                 counts.kept += usize::from(was_kept);
                 counts.loaded += usize::from(!was_kept);
                 textures.texels_loaded += if image.kept.texels.is_some() { 0 } else { texels.len() as u64 };
@@ -196,11 +206,15 @@ pub(in crate::pipeline) fn textures(
                 warn_of_unusable(loaded, &image, texels, findings);
                 warn_of_heights(loaded, &image, texels, findings);
                 warn_of_full_alpha(loaded, &image, texels, findings);
-                if let Some(mipmaps) = mipmaps {
+                for warning in &decoded.warnings {
+                    findings.warn(loaded, place(loaded, image.asked_by[0]), warning.clone());
+                }
+                if let Some(mipmaps) = &mipmaps {
                     let bytes = mipmaps.memory_bytes();
                     cache.mipmaps.insert(image.name.clone(), key, (mipmaps.clone(), bytes));
                 }
-                cache.texels.insert(image.name, key, (texels.clone(), texels.memory_bytes()));
+                let bytes = texels.memory_bytes();
+                cache.texels.insert(image.name, key, (decoded, bytes));
             }
             Err(AssetError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error @ AssetError::OutOfMemory { .. }) => return Err(Stop::work(error)),
@@ -264,10 +278,12 @@ fn show_without(
     }
     let texel = match one.source.encoding {
         ImageEncoding::Linear => Vec3::new(0.5, 0.5, 1.0),
-        ImageEncoding::Color if is_light => Vec3::ZERO,
-        ImageEncoding::Color | ImageEncoding::Srgb | ImageEncoding::Raw | ImageEncoding::Number { .. } => {
-            Vec3::ONE
-        }
+        ImageEncoding::Color | ImageEncoding::CutOut(ColorCurve::Auto) if is_light => Vec3::ZERO,
+        ImageEncoding::Color
+        | ImageEncoding::Srgb
+        | ImageEncoding::Raw
+        | ImageEncoding::CutOut(_)
+        | ImageEncoding::Number { .. } => Vec3::ONE,
     };
     let texels = Texels { width: 1, height: 1, data: TexelData::Float(vec![texel]), unusable: 0 };
     images.insert(one.source.clone(), Image { texels: Arc::new(texels), mipmaps: None });
@@ -327,9 +343,12 @@ impl Wanted<'_> {
     }
 
     fn key(&self) -> Key {
-        let (path, image, encoding) = &self.name;
+        let (path, image, encoding, coverage) = &self.name;
         let mut key = Fingerprint::new("texture");
         key.path(path).index(encoding.index()).index(image.map_or(0, |image| image as usize + 1));
+        if let Some(cutoff) = coverage {
+            key.f32(cutoff.value());
+        }
         self.content.add_to(&mut key);
         if let Some(FileRead { path, content }) = &self.linked {
             content.add_to(key.path(path));
@@ -377,14 +396,15 @@ fn load_all(
     images: &[Wanted<'_>],
     most_bytes: u64,
     reading: &Reading<'_>,
-) -> Vec<(Contents, Result<(Image, bool), AssetError>)> {
+) -> Vec<(Contents, Result<Found, AssetError>)> {
     let size = |image: &Wanted<'_>| {
-        let (width, height, bytes) = match &image.kept.texels {
-            Some(texels) => (texels.width, texels.height, texels.memory_bytes() as u64),
+        let (width, height, bytes) = match image.kept.texels.as_deref() {
+            Some(Decoded { texels, .. }) => (texels.width, texels.height, texels.memory_bytes() as u64),
             // One that cannot be read says so when it is loaded.
             None => size_of(&image.asked_by[0].source, reading).unwrap_or_default(),
         };
-        bytes + if image.has_mipmaps() { Mipmaps::memory_bytes_of(width, height) } else { 0 }
+        let is_weighted = matches!(image.asked_by[0].source.encoding, ImageEncoding::CutOut(_));
+        bytes + if image.has_mipmaps() { Mipmaps::memory_bytes_of(width, height, is_weighted) } else { 0 }
     };
     let sizes: Vec<u64> = reading.pool.install(|| images.par_iter().map(size).collect());
     let over = over_budget(&sizes, most_bytes);
@@ -422,32 +442,44 @@ fn over_budget(sizes: &[u64], most_bytes: u64) -> Vec<Option<String>> {
 /// Content of the file of an image, and the file of its own that an image of a glTF file has.
 type Contents = (Content, Option<FileRead>);
 
-/// An image with its levels, and whether all of that was kept from before. `contents` become those that were decoded.
+/// An image, its levels, and whether all of that was kept from before.
+type Found = (Arc<Decoded>, Option<Arc<Mipmaps>>, bool);
+
+/// An image with its levels. `contents` become those that were decoded.
 fn load_one(
     image: &Wanted<'_>,
     contents: &mut Contents,
     reading: &Reading<'_>,
-) -> Result<(Image, bool), AssetError> {
+) -> Result<Found, AssetError> {
     let mut was_kept = true;
-    let texels = match &image.kept.texels {
-        Some(texels) => texels.clone(),
+    let decoded = match &image.kept.texels {
+        Some(decoded) => decoded.clone(),
         None => {
             was_kept = false;
-            Arc::new(decode(image, contents, reading)?)
+            let LoadedImage { texels, warnings } = decode(image, contents, reading)?;
+            Arc::new(Decoded { texels: Arc::new(texels), warnings })
         }
     };
     let mipmaps = match &image.kept.mipmaps {
         None if image.has_mipmaps() => {
             was_kept = false;
-            Some(Arc::new(mipmaps(&texels, reading.token)?))
+            let made = match image.asked_by[0].source.coverage {
+                None => mipmaps(&decoded.texels, reading.token)?,
+                Some(cutoff) => coverage(&decoded.texels, cutoff.value(), reading.token)?,
+            };
+            Some(Arc::new(made))
         }
         kept => kept.clone(),
     };
-    Ok((Image { texels, mipmaps }, was_kept))
+    Ok((decoded, mipmaps, was_kept))
 }
 
 /// The texels of an image. `contents` become those that were decoded.
-fn decode(image: &Wanted<'_>, contents: &mut Contents, reading: &Reading<'_>) -> Result<Texels, AssetError> {
+fn decode(
+    image: &Wanted<'_>,
+    contents: &mut Contents,
+    reading: &Reading<'_>,
+) -> Result<LoadedImage, AssetError> {
     let (one, limits) = (image.asked_by[0], ImageLimits::default());
     let (encoding, token) = (one.source.encoding, reading.token);
     contents.1 = None;
@@ -491,11 +523,11 @@ fn input(source: &TextureSource, reading: &Reading<'_>) -> Result<ImageInput, As
 
 /// Columns, rows and bytes of an image.
 fn size_of(source: &TextureSource, reading: &Reading<'_>) -> Result<(u32, u32, u64), AssetError> {
-    let limits = ImageLimits::default();
+    let (limits, encoding) = (ImageLimits::default(), source.encoding);
     match input(source, reading)? {
-        ImageInput::File(path) => size(&path, limits, reading.token),
+        ImageInput::File(path) => size(&path, encoding, limits, reading.token),
         ImageInput::Bytes(bytes) => {
-            size_within(ImageWithin { path: &source.path, bytes }, limits, reading.token)
+            size_within(ImageWithin { path: &source.path, bytes }, encoding, limits, reading.token)
         }
     }
 }
@@ -513,7 +545,8 @@ pub(in crate::pipeline) fn add_declared(loaded: &Loaded, wanted: &mut Vec<Needed
             Encoding::Srgb => ImageEncoding::Srgb,
             Encoding::Linear => ImageEncoding::Linear,
         };
-        let source = TextureSource { path: texture.file.value.clone(), image: texture.image, encoding };
+        let (path, image) = (texture.file.value.clone(), texture.image);
+        let source = TextureSource { path, image, encoding, coverage: None };
         wanted.push(NeededTexture {
             source,
             name: texture.name.clone(),

@@ -73,6 +73,14 @@ pub enum NumberSource {
 }
 
 impl NumberSource {
+    /// The number, if it is the same everywhere.
+    pub fn constant(&self) -> Option<f32> {
+        match *self {
+            Self::Constant(number) => Some(number),
+            Self::Texture { .. } => None,
+        }
+    }
+
     /// The texture and its number of each pixel, if it is one; without a channel, the number is `usual`.
     pub fn texture(&self, usual: PixelNumber) -> Option<(usize, PixelNumber)> {
         match *self {
@@ -279,6 +287,8 @@ impl Bump {
 pub enum TextureUse {
     /// Colours.
     Color,
+    /// Colors of a surface whose opacity is the alpha of the same image.
+    CutOut,
     /// Normals.
     Normal,
     /// Numbers.

@@ -61,7 +61,7 @@ pub(super) fn check_encodings(context: &Context<'_>, textures: &Textures, materi
     let (mut colors, mut numbers) = (vec![false; list.len()], vec![false; list.len()]);
     for (texture, role) in materials.iter().flat_map(Material::textures) {
         match role.texture_use() {
-            TextureUse::Color => colors[texture] = true,
+            TextureUse::Color | TextureUse::CutOut => colors[texture] = true,
             TextureUse::Normal | TextureUse::Number(PixelNumber::Channel(Channel::Alpha)) => {}
             TextureUse::Number(_) => numbers[texture] = true,
         }

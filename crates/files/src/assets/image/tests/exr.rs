@@ -2,6 +2,7 @@
 
 use std::io::Cursor;
 
+use ::exr::meta::attribute::Chromaticities;
 use ::exr::prelude::*;
 
 use super::*;
@@ -142,8 +143,12 @@ fn the_display_window_is_the_picture() {
 fn what_cannot_be_read_is_said() {
     let said = says("a.exr", &one(vec![("U", floats(RAMP)), ("V", floats(RAMP))]));
     assert!(said.ends_with("its channels are U, V; wanted are R, G and B, or Y for grey"), "{said}");
-    let chroma = says("a.exr", &one(vec![("Y", floats(RAMP)), ("RY", floats(RAMP)), ("BY", floats(RAMP))]));
-    assert!(chroma.contains("its channels are BY, RY, Y; wanted are R, G and B"), "{chroma}");
+    let chroma = says("a.exr", &one(vec![("Y", floats(RAMP)), ("RY", floats(RAMP))]));
+    assert!(chroma.contains("its channels are RY, Y; wanted are R, G and B"), "{chroma}");
+    for names in [["X", "Y", "Z"], ["N.X", "N.Y", "N.Z"], ["Y", "X", "depth"]] {
+        let said = says("a.exr", &one(names.map(|name| (name, floats(RAMP))).to_vec()));
+        assert!(said.contains("wanted are R, G and B"), "{said}");
+    }
     let whole = one(vec![("Y", floats(RAMP))]);
     for length in 0..whole.len() {
         let _ = load_bytes("a.exr", &whole[..length], ImageEncoding::Color);
@@ -155,4 +160,122 @@ fn what_cannot_be_read_is_said() {
     sampled[at] = 2;
     let said = says("a.exr", &sampled);
     assert!(said.contains("subsampling"), "{said}");
+}
+
+fn parts(channels: &[(&str, [f32; 4])]) -> Vec<u8> {
+    let part = |(name, values): &(&str, [f32; 4])| {
+        layer(&format!("part {name}"), Encoding::FAST_LOSSLESS, vec![(*name, floats(*values))])
+    };
+    encoded(channels.iter().map(part).collect())
+}
+
+#[test]
+fn colors_may_have_a_part_for_each_channel() {
+    let expected: Vec<_> = RAMP.iter().map(|&red| Vec3::new(red, 9.0, 1.0)).collect();
+    let (nines, ones) = ([9.0; 4], [1.0; 4]);
+    assert_eq!(texels(&parts(&[("R", RAMP), ("G", nines), ("B", ones)])), expected);
+    assert_eq!(texels(&parts(&[("Z", OTHER), ("B", ones), ("A", OTHER), ("G", nines), ("R", RAMP)])), expected);
+    assert_eq!(texels(&parts(&[("l.R", RAMP), ("l.G", nines), ("l.B", ones), ("l.A", ones)])), expected);
+    assert_eq!(texels(&parts(&[("Y", RAMP), ("Z", OTHER)])), grey(RAMP));
+    for vector in [&["X", "Y", "Z"][..], &["R", "G"], &["u.Y", "u.X"]] {
+        let channels: Vec<_> = vector.iter().map(|name| (*name, RAMP)).collect();
+        let said = says("a.exr", &parts(&channels));
+        assert!(said.contains("wanted are R, G and B"), "{vector:?}: {said}");
+    }
+}
+
+#[test]
+fn chromaticities_are_converted() {
+    let file = |attribute: Option<Chromaticities>| {
+        let mut file = Cursor::new(Vec::new());
+        let mut attributes = ImageAttributes::new(IntegerBounds::from_dimensions(SIZE));
+        attributes.chromaticities = attribute;
+        let content = vec![("R", floats([1.0; 4])), ("G", floats([0.5; 4])), ("B", floats([0.25; 4]))];
+        let image = Image { attributes, layer_data: layer("main", Encoding::UNCOMPRESSED, content) };
+        image.write().to_buffered(&mut file).expect("written");
+        file.into_inner()
+    };
+    let rec_2020 = Chromaticities {
+        red: Vec2(0.708, 0.292),
+        green: Vec2(0.17, 0.797),
+        blue: Vec2(0.131, 0.046),
+        white: Vec2(0.3127, 0.329),
+    };
+    let plain = Vec3::new(1.0, 0.5, 0.25);
+    assert_eq!(texels(&file(None))[0], plain);
+    let converted = texels(&file(Some(rec_2020)))[0];
+    assert!((converted - Vec3::new(1.3484, 0.4397, 0.2114)).length() < 1e-3, "{converted}");
+    let linear = load_bytes("a.exr", &file(Some(rec_2020)), ImageEncoding::Linear).expect("an EXR");
+    assert_eq!(linear.get(0, 0), plain);
+    // Our own files say Rec. 709.
+    let own = Chromaticities {
+        red: Vec2(0.64, 0.33),
+        green: Vec2(0.30, 0.60),
+        blue: Vec2(0.15, 0.06),
+        white: Vec2(0.3127, 0.329),
+    };
+    assert_eq!(texels(&file(Some(own)))[0], plain);
+    let broken = file(Some(Chromaticities { green: own.red, ..own }));
+    assert_eq!(texels(&broken)[0], plain);
+    assert_eq!(
+        warned("a.exr", &broken, ImageEncoding::Color),
+        ["a.exr: its chromaticities span no colors and are ignored"]
+    );
+}
+
+/// A scan-line file without compression of 4 × 2 pixels, whose chroma has a sample in every second column and row.
+fn subsampled(window: [i32; 4]) -> Vec<u8> {
+    let text = |words: &str| [words.as_bytes(), &[0]].concat();
+    let ints = |values: &[i32]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
+    let attribute = |name: &str, kind: &str, data: Vec<u8>| {
+        [text(name), text(kind), ints(&[data.len() as i32]), data].concat()
+    };
+    let channel = |name: &str, step: i32| [text(name), ints(&[2]), vec![0; 4], ints(&[step, step])].concat();
+    let channels = [channel("BY", 2), channel("RY", 2), channel("Y", 1), vec![0]].concat();
+    let header = [
+        vec![0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0],
+        attribute("channels", "chlist", channels),
+        attribute("compression", "compression", vec![0]),
+        attribute("dataWindow", "box2i", ints(&[0, 0, 3, 1])),
+        attribute("displayWindow", "box2i", ints(&window)),
+        attribute("lineOrder", "lineOrder", vec![0]),
+        attribute("pixelAspectRatio", "float", 1.0_f32.to_le_bytes().to_vec()),
+        attribute("screenWindowCenter", "v2f", vec![0; 8]),
+        attribute("screenWindowWidth", "float", 1.0_f32.to_le_bytes().to_vec()),
+        vec![0],
+    ]
+    .concat();
+    let floats = |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
+    // Rows of BY, RY and Y, then of Y only.
+    let rows = [floats(&[0.0, 1.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0]), floats(&[2.0; 4])];
+    let start = header.len() + 16;
+    let offsets = [start, start + 8 + rows[0].len()].map(|offset| (offset as u64).to_le_bytes()).concat();
+    let [first, second] = &rows;
+    let chunks = [ints(&[0, first.len() as i32]), first.clone(), ints(&[1, second.len() as i32]), second.clone()];
+    [header, offsets, chunks.concat()].concat()
+}
+
+#[test]
+fn luminance_and_chroma_make_a_color() {
+    let found = texels(&subsampled([0, 0, 3, 1]));
+    let color = |y: f32, ry: f32, by: f32| {
+        let (red, blue) = ((ry + 1.0) * y, (by + 1.0) * y);
+        Vec3::new(red, (y - red * 0.21264 - blue * 0.07219) / 0.71517, blue)
+    };
+    let row = |y: f32| [(0.0, 0.0), (0.25, 0.5), (0.5, 1.0), (0.5, 1.0)].map(|(ry, by)| color(y, ry, by));
+    let expected = [row(1.0), row(2.0)].concat();
+    for (found, expected) in found.iter().zip(&expected) {
+        assert!((*found - *expected).length() < 1e-4, "{found} {expected}");
+    }
+    assert_eq!(found[0], Vec3::ONE);
+    // A display window that begins between the samples, and beyond them.
+    let moved = texels(&subsampled([1, -1, 4, 0]));
+    assert_eq!((moved[..4].to_vec(), moved[7]), (vec![Vec3::ZERO; 4], Vec3::ZERO));
+    assert!((moved[4] - expected[1]).length() < 1e-4);
+    let full = one(vec![("Y", floats([1.0; 4])), ("RY", floats([0.5; 4])), ("BY", floats([1.0; 4]))]);
+    assert!((texels(&full)[3] - color(1.0, 0.5, 1.0)).length() < 1e-4);
+    let whole = subsampled([0, 0, 3, 1]);
+    for length in 0..whole.len() {
+        let _ = load_bytes("a.exr", &whole[..length], ImageEncoding::Color);
+    }
 }

@@ -1,5 +1,5 @@
 //! OBJ (Wavefront, *Object Files*, 1995): polygons with an index of their own for each part of a corner, which become vertices
-//! with one index. `tobj` reads the material libraries.
+//! with one index.
 
 mod build;
 mod libraries;
@@ -7,15 +7,12 @@ mod statements;
 mod vertex;
 mod words;
 
-use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
-use std::path::Path;
 
 use super::assemble::{Parsed, assemble};
 use super::text::with_line_feeds;
 use super::{AssetError, LoadedMesh, Source};
 use crate::assets::FileMaterial;
-use crate::assets::contain::contain;
 use build::{Run, build};
 use libraries::{Found, Libraries};
 use statements::{Change, Corner, NONE, Smoothing, Statements, face_start};
@@ -60,38 +57,25 @@ impl Materials {
             Change::Material(_) | Change::Library(_) | Change::Object | Change::Smoothing(_) => None,
         };
         let names: BTreeSet<String> = changes.iter().filter_map(|(_, change)| name_of(change)).collect();
-        let libraries =
-            Libraries { source, used: &names, found: RefCell::default(), failed: RefCell::default() };
+        let mut libraries = Libraries { source, used: &names, found: Found::default() };
         let mut known = HashMap::new();
-        let mut loaded = Vec::new();
         let mut used = Vec::new();
         for (_, change) in changes {
             match change {
-                Change::Library(name) => {
-                    let result = contain(|| libraries.load(Path::new(name)));
-                    source.watch.token.check()?;
-                    if let Some(error) = libraries.failed.take() {
-                        return Err(error);
-                    }
-                    let result = result.map_err(|panic| source.wrong(panic))?;
-                    let (materials, places) = result.map_err(|error| source.wrong(error.to_string()))?;
-                    known.extend(places.into_iter().map(|(name, place)| (name, place + loaded.len())));
-                    loaded.extend(materials);
-                }
+                Change::Library(name) => known.extend(libraries.load(name)?),
                 Change::Material(name) => used.push((name, known.get(name).copied())),
                 Change::Object | Change::Smoothing(_) => {}
             }
         }
         let place = |(name, found): (&String, Option<usize>)| found.or_else(|| known.get(name).copied());
         let used = used.into_iter().map(|used| place(used).map_or(NONE, |place| place as u32)).collect();
-        let mut found = libraries.found.into_inner();
+        let mut found = libraries.found;
         let mut warnings = std::mem::take(&mut found.warnings);
         if !found.missing {
             let unknown = names.difference(&found.resolved);
             warnings.extend(unknown.map(|name| format!("no material is named {name:?}")));
         }
-        let material = |material: &tobj::Material| found.materials.get(&material.name).cloned();
-        let all = loaded.iter().filter_map(material).collect();
+        let all = std::mem::take(&mut found.materials);
         Ok(Self { all, used, warnings, found })
     }
 }

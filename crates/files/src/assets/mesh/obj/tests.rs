@@ -417,3 +417,36 @@ fn a_colour_that_is_no_number_has_its_line() {
     let said = says("v 0 0 0 1 1 1\nv 1 0 0 nan nan nan\nv 0 1 0 1 1 1\nf 1 2 3\n");
     assert_eq!(said, ":2: the colors of a vertex are finite numbers");
 }
+
+#[test]
+fn libraries_may_follow_their_use() {
+    let mtl: &[u8] = b"newmtl red\nKd 1 0 0\n";
+    let other: &[u8] = b"newmtl blue\nKd 0 0 1\n";
+    for text in [
+        format!("{SQUARE}usemtl red\nmtllib a.mtl\nf 1 2 3\n"),
+        format!("{SQUARE}usemtl red\nf 1 2 3\nmtllib a.mtl"),
+        format!("mtllib b.mtl\n{SQUARE}usemtl red\n\tmtllib\ta.mtl # late\nf 1 2 3\n"),
+        format!("{SQUARE}usemtl red\nf 1 2 3\nusemtl blue\nf 1 3 4\nmtllib b.mtl\nmtllib a.mtl\n"),
+        format!("{SQUARE}usemtl red\nf 1 2 3\nmtllib b.mtl a.mtl\n"),
+    ] {
+        let files = [("a.obj", text.as_bytes()), ("a.mtl", mtl), ("b.mtl", other)];
+        let loaded = read_with(&files).expect(&text);
+        assert_eq!(loaded.material_warnings, Vec::<String>::new(), "{text}");
+        assert_eq!(loaded.materials[loaded.mesh.materials[0] as usize].diffuse, Vec3::X, "{text}");
+    }
+    // Of two materials with one name, the one before counts.
+    let text = format!("mtllib a.mtl\n{SQUARE}usemtl red\nf 1 2 3\nmtllib c.mtl\nusemtl red\nf 1 3 4\n");
+    let files = [("a.obj", text.as_bytes()), ("a.mtl", mtl), ("c.mtl", b"newmtl red\nKd 0 1 0\n")];
+    let loaded = read_with(&files).expect("whole");
+    let colors = loaded.mesh.materials.iter().map(|index| loaded.materials[*index as usize].diffuse);
+    assert_eq!(colors.collect::<Vec<_>>(), [Vec3::X, Vec3::Y]);
+}
+
+#[test]
+fn names_of_materials_may_be_latin_1() {
+    let text = [b"mtllib a.mtl\n", SQUARE.as_bytes(), b"o caf\xe9\nusemtl gr\xfcn\nf 1 2 3\n"].concat();
+    for mtl in [b"newmtl gr\xfcn\nKd 1 0 0\n".as_slice(), "newmtl gr\u{fc}n\nKd 1 0 0\n".as_bytes()] {
+        let loaded = read_with(&[("a.obj", &text), ("a.mtl", mtl)]).expect("whole");
+        assert_eq!((loaded.materials[0].diffuse, loaded.material_warnings.len()), (Vec3::X, 0));
+    }
+}

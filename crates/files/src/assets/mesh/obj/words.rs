@@ -2,6 +2,8 @@
 
 use fast_float2::parse;
 
+use super::super::text::decoded;
+
 /// A position in the text of an OBJ.
 pub(super) struct Words<'a> {
     bytes: &'a [u8],
@@ -57,10 +59,10 @@ impl<'a> Words<'a> {
             let line = self.line();
             let text = line.trim_ascii_end();
             let Some(text) = text.strip_suffix(b"\\").filter(|_| self.at < self.bytes.len()) else {
-                name.push_str(&String::from_utf8_lossy(text));
+                name.push_str(&decoded(text));
                 return name.trim().to_owned();
             };
-            name.push_str(&String::from_utf8_lossy(text));
+            name.push_str(&decoded(text));
             name.push(' ');
             self.at += 1;
         }

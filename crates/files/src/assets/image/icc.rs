@@ -1,0 +1,125 @@
+//! Color profiles of a matrix and curves, or of one gray curve (ICC.1:2022). Profiles of tables are not read.
+
+use super::primaries::from_colorants;
+use super::space::{ColorSpace, Curve};
+use crate::math::{DMat3, DVec3};
+
+/// Most values of a curve's table.
+const MOST_VALUES: usize = 1 << 16;
+
+/// The color space of a profile for an image of this kind, or the reason why it is ignored.
+pub(super) fn space(profile: &[u8], is_gray: bool) -> Result<ColorSpace, String> {
+    let profile = Profile::of(profile).ok_or("it is broken")?;
+    match (profile.field(16), profile.field(20)) {
+        (Some(b"RGB "), Some(b"XYZ ")) if !is_gray => profile.rgb(),
+        (Some(b"GRAY"), Some(b"XYZ " | b"Lab ")) if is_gray => {
+            let curve = profile.curve(b"kTRC").ok_or("it has no gray curve that can be read")?;
+            Ok(ColorSpace::new(Some([curve.clone(), curve.clone(), curve]), DMat3::IDENTITY))
+        }
+        (Some(b"RGB "), Some(b"Lab ")) if !is_gray => Err("it has tables instead of a matrix".to_owned()),
+        (Some(space), _) => {
+            let space = String::from_utf8_lossy(space).trim().to_owned();
+            Err(format!("it is for {space:?}, not for {}", if is_gray { "gray" } else { "RGB" }))
+        }
+        (None, _) => Err("it is broken".to_owned()),
+    }
+}
+
+struct Profile<'a>(&'a [u8]);
+
+impl<'a> Profile<'a> {
+    fn of(bytes: &'a [u8]) -> Option<Self> {
+        let profile = Self(bytes);
+        (profile.field(36)? == b"acsp").then_some(profile)
+    }
+
+    fn field(&self, at: usize) -> Option<&'a [u8; 4]> {
+        self.0.get(at..)?.first_chunk()
+    }
+
+    fn word(&self, at: usize) -> Option<usize> {
+        self.field(at).map(|bytes| u32::from_be_bytes(*bytes) as usize)
+    }
+
+    /// The data of a tag.
+    fn tag(&self, name: &[u8; 4]) -> Option<&'a [u8]> {
+        const TABLE: usize = 128;
+        let count = self.word(TABLE)?.min(self.0.len() / 12);
+        let entry = (0..count).map(|i| TABLE + 4 + 12 * i).find(|&entry| self.field(entry) == Some(name))?;
+        let start = self.word(entry + 4)?;
+        self.0.get(start..start.checked_add(self.word(entry + 8)?)?)
+    }
+
+    fn rgb(&self) -> Result<ColorSpace, String> {
+        let [red, green, blue] = [b"rXYZ", b"gXYZ", b"bXYZ"].map(|name| self.xyz(name));
+        let (Some(red), Some(green), Some(blue)) = (red, green, blue) else {
+            return Err("it has tables instead of a matrix".to_owned());
+        };
+        let curves = [b"rTRC", b"gTRC", b"bTRC"].map(|name| self.curve(name));
+        let [Some(r), Some(g), Some(b)] = curves else {
+            return Err("it has no curves that can be read".to_owned());
+        };
+        let colorants = DMat3::from_cols(red, green, blue);
+        if colorants.determinant().abs() < 1e-6 {
+            return Err("its primaries span no colors".to_owned());
+        }
+        let matrix = from_colorants(colorants).ok_or("its primaries span no colors")?;
+        Ok(ColorSpace::new(Some([r, g, b]), matrix))
+    }
+
+    fn xyz(&self, name: &[u8; 4]) -> Option<DVec3> {
+        let data = Self(self.tag(name)?);
+        (data.field(0)? == b"XYZ ").then_some(())?;
+        let [x, y, z] = [8, 12, 16].map(|at| data.fixed(at));
+        Some(DVec3::new(x?, y?, z?))
+    }
+
+    /// A number of the type s15Fixed16.
+    fn fixed(&self, at: usize) -> Option<f64> {
+        self.field(at).map(|bytes| f64::from(i32::from_be_bytes(*bytes)) / 65536.0)
+    }
+
+    fn curve(&self, name: &[u8; 4]) -> Option<Curve> {
+        let data = Self(self.tag(name)?);
+        match data.field(0)? {
+            b"curv" => data.sampled(),
+            b"para" => data.parametric(),
+            _ => None,
+        }
+    }
+
+    fn sampled(&self) -> Option<Curve> {
+        const START: usize = 12;
+        let count = self.word(8)?;
+        let values = self.0.get(START..START + 2 * count.min(MOST_VALUES))?;
+        let values: Vec<u16> = values.as_chunks().0.iter().map(|word| u16::from_be_bytes(*word)).collect();
+        match *values.as_slice() {
+            [] => Some(Curve::LINEAR),
+            [gamma] => Some(Curve::Power(f64::from(gamma) / 256.0)),
+            _ => Some(Curve::Table(values)),
+        }
+    }
+
+    fn parametric(&self) -> Option<Curve> {
+        let kind = u16::from_be_bytes(*self.0.get(8..)?.first_chunk()?);
+        let number = |index: usize| self.fixed(12 + 4 * index);
+        let g = number(0)?;
+        let (mut a, mut b, mut c, mut d, mut e, mut f) = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        if kind >= 1 {
+            (a, b) = (number(1)?, number(2)?);
+            d = -b / a;
+        }
+        match kind {
+            0 | 1 => {}
+            2 => {
+                e = number(3)?;
+                f = e;
+            }
+            3 => (c, d) = (number(3)?, number(4)?),
+            4 => (c, d, e, f) = (number(3)?, number(4)?, number(5)?, number(6)?),
+            _ => return None,
+        }
+        [g, a, b, c, d, e, f].iter().all(|number| number.is_finite()).then_some(())?;
+        Some(Curve::Parametric { g, a, b, c, d, e, f })
+    }
+}

@@ -1,0 +1,151 @@
+//! The meaning of a file's red, green and blue: curves from samples to linear light, and primaries.
+
+use super::primaries::is_identity;
+use crate::math::color::srgb_to_linear;
+use crate::math::elementary::power_f64;
+use crate::math::{DMat3, DVec3};
+
+/// A curve from samples in [0, 1] to linear light.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Curve {
+    Srgb,
+    /// The sample to this power.
+    Power(f64),
+    /// (a·x + b)^g + e from d on, below c·x + f (ICC.1, 10.18).
+    Parametric { g: f64, a: f64, b: f64, c: f64, d: f64, e: f64, f: f64 },
+    /// Values at equal distances, from 0 to 65535.
+    Table(Vec<u16>),
+}
+
+impl Curve {
+    pub(super) const LINEAR: Self = Self::Power(1.0);
+    /// The camera curve of ITU-R BT.709, inverted.
+    pub(super) const REC_709: Self = Self::Parametric {
+        g: 1.0 / 0.45,
+        a: 1.0 / 1.099,
+        b: 0.099 / 1.099,
+        c: 1.0 / 4.5,
+        d: 0.081,
+        e: 0.0,
+        f: 0.0,
+    };
+
+    /// Linear light of a sample in [0, 1].
+    pub(super) fn decode(&self, x: f64) -> f64 {
+        match self {
+            Self::Srgb => f64::from(srgb_to_linear(x as f32)),
+            Self::Power(exponent) => power(x, *exponent),
+            Self::Parametric { g, a, b, c, d, e, f } => {
+                if x >= *d {
+                    power(a * x + b, *g) + e
+                } else {
+                    c * x + f
+                }
+            }
+            Self::Table(values) => interpolated(values, x),
+        }
+    }
+
+    /// Whether no byte differs from sRGB by more than its rounding in a profile.
+    fn is_srgb(&self) -> bool {
+        const TOLERANCE: f64 = 1.5e-3;
+        *self == Self::Srgb
+            || (0..=u8::MAX).map(|byte| f64::from(byte) / 255.0).all(|x| {
+                let difference = self.decode(x) - f64::from(srgb_to_linear(x as f32));
+                difference.abs() <= TOLERANCE
+            })
+    }
+}
+
+/// xʸ, or 0 for x ≤ 0.
+fn power(x: f64, exponent: f64) -> f64 {
+    match x {
+        _ if x < f64::MIN_POSITIVE => 0.0,
+        _ if exponent == 1.0 => x,
+        _ => power_f64(x, exponent),
+    }
+}
+
+fn interpolated(values: &[u16], x: f64) -> f64 {
+    let at = x.clamp(0.0, 1.0) * values.len().saturating_sub(1) as f64;
+    let first = at as usize;
+    let value = |index: usize| values.get(index).or(values.last()).map_or(0.0, |word| f64::from(*word));
+    let [low, high] = [value(first), value(first + 1)];
+    (low + (high - low) * (at - first as f64)) / f64::from(u16::MAX)
+}
+
+/// A color space, as far as it differs from the usual one: sRGB for whole numbers, linear Rec. 709 for floats.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct ColorSpace {
+    curves: Option<[Curve; 3]>,
+    matrix: Option<DMat3>,
+}
+
+impl ColorSpace {
+    /// A space of curves, if they are not the usual ones, and a matrix to linear Rec. 709.
+    pub(super) fn new(curves: Option<[Curve; 3]>, matrix: DMat3) -> Self {
+        Self {
+            curves: curves.filter(|curves| !curves.iter().all(Curve::is_srgb)),
+            matrix: (!is_identity(&matrix)).then_some(matrix),
+        }
+    }
+
+    /// A space of other primaries.
+    pub(super) fn of_matrix(matrix: DMat3) -> Self {
+        Self::new(None, matrix)
+    }
+
+    pub(super) fn is_usual(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Linear light of whole numbers from 0 to `most`, for red, green and blue.
+    pub(super) fn tables(&self, most: u16) -> [Vec<f32>; 3] {
+        const SRGB: [Curve; 3] = [Curve::Srgb, Curve::Srgb, Curve::Srgb];
+        let curves = self.curves.as_ref().unwrap_or(&SRGB);
+        let table = |curve: &Curve| {
+            let samples = (0..=most).map(|sample| f64::from(sample) / f64::from(most));
+            samples.map(|x| curve.decode(x) as f32).collect()
+        };
+        [table(&curves[0]), table(&curves[1]), table(&curves[2])]
+    }
+
+    /// Linear Rec. 709 of linear light in this space.
+    pub(super) fn converted(&self, linear: [f32; 3]) -> [f32; 3] {
+        let Some(matrix) = &self.matrix else { return linear };
+        (*matrix * DVec3::from_array(linear.map(f64::from))).as_vec3().to_array()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_of_known_value() {
+        let parametric = Curve::Parametric {
+            g: 2.4,
+            a: 1.0 / 1.055,
+            b: 0.055 / 1.055,
+            c: 1.0 / 12.92,
+            d: 0.04045,
+            e: 0.0,
+            f: 0.0,
+        };
+        assert!(parametric.is_srgb() && Curve::Srgb.is_srgb());
+        assert!(!Curve::Power(2.2).is_srgb() && !Curve::LINEAR.is_srgb() && !Curve::REC_709.is_srgb());
+        assert!((Curve::Power(2.0).decode(0.5) - 0.25).abs() < 1e-9);
+        assert_eq!([Curve::LINEAR.decode(0.3), Curve::Power(2.2).decode(0.0)], [0.3, 0.0]);
+        let table = Curve::Table(vec![0, 65535, 0]);
+        assert_eq!([0.0, 0.25, 0.5, 1.0].map(|x| table.decode(x)), [0.0, 0.5, 1.0, 0.0]);
+        assert!((Curve::REC_709.decode(0.5) - ((0.5_f64 + 0.099) / 1.099).powf(1.0 / 0.45)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_usual_space_is_recognized() {
+        let srgb = || Some([Curve::Srgb, Curve::Srgb, Curve::Srgb]);
+        assert!(ColorSpace::new(srgb(), DMat3::IDENTITY).is_usual());
+        assert!(!ColorSpace::new(srgb(), DMat3::from_diagonal(DVec3::new(1.0, 0.9, 1.0))).is_usual());
+        assert!(!ColorSpace::new(Some([Curve::Srgb, Curve::LINEAR, Curve::Srgb]), DMat3::IDENTITY).is_usual());
+    }
+}

@@ -1,0 +1,280 @@
+//! Maps of an MTL: a file behind options.
+
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+
+use crate::assets::FileTexture;
+use crate::materials::{Channel, PixelNumber};
+use crate::math::{DVec2, Vec2};
+
+/// What a map is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Diffuse,
+    Specular,
+    Emission,
+    Opacity,
+    /// `norm`, `map_Kn`.
+    Normal,
+    /// `bump`, `map_Bump`: normals or heights.
+    Bump,
+    Roughness,
+    Metallic,
+    Ambient,
+    /// Not read.
+    Other(&'static str),
+}
+
+impl Kind {
+    /// The kind by its keyword, in any case.
+    pub(super) fn of(keyword: &str) -> Option<Self> {
+        const OTHERS: [&str; 13] = [
+            "map_Ns", "disp", "map_Disp", "decal", "refl", "map_Refl", "map_Tr", "map_Tf", "map_Ps", "map_Pc",
+            "map_Pcr", "map_aniso", "map_aat",
+        ];
+        Some(match keyword.to_ascii_lowercase().as_str() {
+            "map_kd" => Self::Diffuse,
+            "map_ks" => Self::Specular,
+            "map_ke" => Self::Emission,
+            "map_d" | "map_opacity" => Self::Opacity,
+            "norm" | "map_norm" | "map_kn" => Self::Normal,
+            "bump" | "map_bump" => Self::Bump,
+            "map_pr" => Self::Roughness,
+            "map_pm" => Self::Metallic,
+            "map_ka" => Self::Ambient,
+            other => Self::Other(OTHERS.into_iter().find(|name| name.eq_ignore_ascii_case(other))?),
+        })
+    }
+
+    /// Whether its values are colors.
+    fn is_color(self) -> bool {
+        match self {
+            Self::Diffuse | Self::Specular | Self::Emission | Self::Ambient => true,
+            Self::Opacity
+            | Self::Normal
+            | Self::Bump
+            | Self::Roughness
+            | Self::Metallic
+            | Self::Other(_) => false,
+        }
+    }
+
+    fn is_normal(self) -> bool {
+        match self {
+            Self::Normal | Self::Bump => true,
+            Self::Diffuse
+            | Self::Specular
+            | Self::Emission
+            | Self::Opacity
+            | Self::Roughness
+            | Self::Metallic
+            | Self::Ambient
+            | Self::Other(_) => false,
+        }
+    }
+}
+
+/// A map as the file has it.
+#[derive(Clone, Debug)]
+pub(super) struct Map {
+    pub(super) line: usize,
+    repeat: [f64; 2],
+    offset: [f64; 2],
+    range: [f64; 2],
+    is_clamped: bool,
+    /// The number of a pixel, if a channel is named.
+    number: Option<PixelNumber>,
+    /// Factor on bumps.
+    pub(super) strength: f64,
+    /// Options without effect.
+    ignored: Vec<String>,
+    /// The text behind the options.
+    name: String,
+}
+
+impl Map {
+    /// Parses the text behind the keyword. `None` if it has no file.
+    pub(super) fn parse(text: &str) -> Option<Self> {
+        let mut map = Self {
+            line: 0,
+            repeat: [1.0; 2],
+            offset: [0.0; 2],
+            range: [0.0, 1.0],
+            is_clamped: false,
+            number: None,
+            strength: 1.0,
+            ignored: Vec::new(),
+            name: String::new(),
+        };
+        let mut rest = Words(text.trim());
+        while let Some(option) = rest.option() {
+            map.add(&option, &mut rest);
+        }
+        // Some exporters quote names that have spaces.
+        let name = rest.0;
+        map.name = name.strip_prefix('"').and_then(|name| name.strip_suffix('"')).unwrap_or(name).to_owned();
+        (!map.name.is_empty()).then_some(map)
+    }
+
+    /// Reads the arguments of an option.
+    fn add(&mut self, option: &str, rest: &mut Words<'_>) {
+        match option {
+            "-s" => {
+                let [u, v, _] = rest.numbers([1.0; 3]);
+                self.repeat = [u, v];
+            }
+            "-o" => {
+                let [u, v, _] = rest.numbers([0.0; 3]);
+                self.offset = [u, v];
+            }
+            "-t" => {
+                if rest.numbers([0.0; 3]) != [0.0; 3] {
+                    self.ignored.push("-t".to_owned());
+                }
+            }
+            "-mm" => self.range = rest.numbers([0.0, 1.0]),
+            "-bm" => {
+                let [strength] = rest.numbers([1.0]);
+                if strength < 0.0 {
+                    self.ignored.push(format!("-bm {strength}"));
+                } else {
+                    self.strength = strength;
+                }
+            }
+            "-clamp" => self.is_clamped = rest.switch().unwrap_or(false),
+            "-imfchan" => self.add_channel(rest),
+            "-boost" | "-texres" => {
+                if rest.numbers([0.0]) != [0.0] {
+                    self.ignored.push(option.to_owned());
+                }
+            }
+            "-blendu" | "-blendv" => {
+                if rest.switch() == Some(false) {
+                    self.ignored.push(format!("{option} off"));
+                }
+            }
+            "-cc" => {
+                if rest.switch() == Some(true) {
+                    self.ignored.push("-cc on".to_owned());
+                }
+            }
+            _ => {
+                rest.word();
+                self.ignored.push(option.to_owned());
+            }
+        }
+    }
+
+    fn add_channel(&mut self, rest: &mut Words<'_>) {
+        let Some(letter) = rest.word() else { return };
+        let channel = |channel| Some(PixelNumber::Channel(channel));
+        self.number = match letter.to_ascii_lowercase().as_str() {
+            "r" => channel(Channel::Red),
+            "g" => channel(Channel::Green),
+            "b" => channel(Channel::Blue),
+            "m" => channel(Channel::Alpha),
+            "l" => Some(PixelNumber::Luminance),
+            _ => {
+                self.ignored.push(format!("-imfchan {letter}"));
+                None
+            }
+        };
+    }
+
+    /// Options without effect on a map of this kind.
+    pub(super) fn ignored(&self, kind: Kind) -> impl Iterator<Item = String> {
+        let channel = (self.number.is_some() && (kind.is_color() || kind.is_normal())).then(|| "-imfchan".to_owned());
+        let range = (self.range != [0.0, 1.0] && kind.is_normal()).then(|| "-mm".to_owned());
+        let strength = (self.strength != 1.0 && !kind.is_normal()).then(|| "-bm".to_owned());
+        self.ignored.iter().cloned().chain(channel).chain(range).chain(strength)
+    }
+
+    /// Spellings of the file, relative to the MTL's folder: whole, then without what may be a comment.
+    pub(super) fn files(&self) -> impl Iterator<Item = PathBuf> {
+        cut_at_comments(&self.name).flat_map(|name| spellings(&name.replace('\\', "/")))
+    }
+
+    /// The texture, whose file exists if one of the spellings does.
+    pub(super) fn texture(&self, folder: &Path) -> Option<FileTexture> {
+        let [u, v] = self.repeat;
+        let [base, gain] = self.range.map(|number| number as f32);
+        Some(FileTexture {
+            repeat: Vec2::new(u as f32, v as f32),
+            offset: DVec2::from_array(self.offset),
+            is_clamped: self.is_clamped,
+            range: (base, gain),
+            number: self.number,
+            ..FileTexture::new(found(folder, self.files())?)
+        })
+    }
+}
+
+/// Words of a statement, of which the last ones are the file.
+struct Words<'a>(&'a str);
+
+impl<'a> Words<'a> {
+    /// The option that comes next, in lower case. Another word is the start of the file's name, even with a dash.
+    fn option(&mut self) -> Option<String> {
+        const OPTIONS: [&str; 13] = [
+            "-s", "-o", "-t", "-mm", "-bm", "-clamp", "-imfchan", "-boost", "-texres", "-blendu", "-blendv",
+            "-cc", "-type",
+        ];
+        let (word, rest) = self.0.split_once(char::is_whitespace)?;
+        let option = word.to_ascii_lowercase();
+        OPTIONS.contains(&option.as_str()).then(|| {
+            self.0 = rest.trim_start();
+            option
+        })
+    }
+
+    /// The next word, unless it is the last one.
+    fn word(&mut self) -> Option<&'a str> {
+        let (word, rest) = self.0.split_once(char::is_whitespace)?;
+        self.0 = rest.trim_start();
+        Some(word)
+    }
+
+    /// Up to `N` numbers in place of the usual ones.
+    fn numbers<const N: usize>(&mut self, usual: [f64; N]) -> [f64; N] {
+        let mut numbers = usual;
+        for number in &mut numbers {
+            let Some((word, _)) = self.0.split_once(char::is_whitespace) else { break };
+            let Ok(value) = word.parse::<f32>() else { break };
+            if value.is_finite() {
+                *number = f64::from(value);
+            }
+            self.word();
+        }
+        numbers
+    }
+
+    /// `on` or `off`.
+    fn switch(&mut self) -> Option<bool> {
+        let (word, _) = self.0.split_once(char::is_whitespace)?;
+        let value = [("on", true), ("off", false)];
+        let (_, is_on) = value.into_iter().find(|(name, _)| word.eq_ignore_ascii_case(name))?;
+        self.word();
+        Some(is_on)
+    }
+}
+
+/// The text whole, then without its last comment, and so on.
+pub(in crate::assets::mesh) fn cut_at_comments(text: &str) -> impl Iterator<Item = &str> {
+    let is_comment = |(at, _): &(usize, &str)| text[..*at].ends_with([' ', '\t']);
+    let cuts = text.rmatch_indices('#').filter(is_comment).map(|(at, _)| text[..at].trim_end());
+    std::iter::once(text).chain(cuts).filter(|text| !text.is_empty())
+}
+
+/// A name in UTF-8, and in Latin-1 if it has letters beyond ASCII.
+pub(in crate::assets::mesh) fn spellings(name: &str) -> impl Iterator<Item = PathBuf> + use<> {
+    let latin1: Option<Vec<u8>> = name.chars().map(|letter| u8::try_from(u32::from(letter)).ok()).collect();
+    let latin1 = latin1.filter(|_| !name.is_ascii()).map(|bytes| PathBuf::from(OsStr::from_bytes(&bytes)));
+    std::iter::once(PathBuf::from(name)).chain(latin1)
+}
+
+/// The first of these files that exists, or else the first.
+pub(in crate::assets::mesh) fn found(folder: &Path, names: impl Iterator<Item = PathBuf>) -> Option<PathBuf> {
+    let files: Vec<_> = names.map(|name| folder.join(name)).collect();
+    files.iter().find(|file| file.exists()).or(files.first()).cloned()
+}

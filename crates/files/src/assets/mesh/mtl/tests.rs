@@ -1,0 +1,353 @@
+//! Statements of MTL and the materials that they make.
+
+use super::*;
+use crate::assets::{FileMaterial, FileTexture, PhysicalMaterial};
+use crate::control::{CancelToken, unwatched};
+use crate::materials::{Channel, PixelNumber};
+use crate::math::{DVec2, Vec2, Vec3};
+
+fn path(texture: &Option<FileTexture>) -> Option<&Path> {
+    texture.as_ref().map(|texture| texture.path.as_path())
+}
+
+/// The warnings about all materials of a text.
+fn warned(text: &[u8]) -> Vec<String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.mtl");
+    std::fs::write(&path, text).expect("written");
+    let token = CancelToken::new();
+    let Library { materials, ignored, .. } = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole");
+    warnings(Path::new("a.mtl"), ignored, materials.iter())
+}
+
+fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.mtl");
+    std::fs::write(&path, text).expect("written");
+    let token = CancelToken::new();
+    let found = load(&path, Watch { progress: &unwatched, token: &token })?.materials;
+    Ok(found.iter().map(|found| material(found, Path::new("models"))).collect())
+}
+
+#[test]
+fn every_statement_finds_its_field() {
+    let text = "newmtl red brick\nKa 0.1 0.2 0.3\nKd 0.5 0.4 -0.3\nKs 0.2 0.2 0.2\nKe 4 5 6\nNs 25\nNi 1.5\n\
+                illum 7\nmap_Kd -s 2 2 2 -o 0.5 wall one.png\nmap_Ks sub\\shine.png\nmap_Bump -bm 0.5 old.png\n\
+                norm bumps.png\nmap_Ke glow.png\nnewmtl plain\nnewmtl bulb\nmap_Ke glow.png\n";
+    let materials = read(text).expect("whole");
+    assert_eq!(materials.len(), 3);
+    let file = |name: &str| Some(FileTexture::new(PathBuf::from("models").join(name)));
+    let wall = FileTexture {
+        repeat: Vec2::splat(2.0),
+        offset: DVec2::new(0.5, 0.0),
+        ..FileTexture::new(PathBuf::from("models/wall one.png"))
+    };
+    let expected = FileMaterial {
+        name: "red brick".to_owned(),
+        diffuse: Vec3::new(0.5, 0.4, 0.0),
+        specular: Vec3::splat(0.2),
+        shininess: 25.0,
+        emission: Vec3::new(4.0, 5.0, 6.0),
+        ior: 1.5,
+        illumination_model: Some(7),
+        opacity: 1.0,
+        opacity_texture: None,
+        diffuse_texture: Some(wall),
+        specular_texture: file("sub/shine.png"),
+        emission_texture: file("glow.png"),
+        normal_texture: file("bumps.png"),
+        normal_strength: 1.0,
+        physical: None,
+    };
+    assert_eq!(materials[0], expected);
+    assert_eq!((materials[1].diffuse, materials[1].emission), (Vec3::splat(0.6), Vec3::ZERO));
+    assert_eq!(materials[2].emission, Vec3::ONE);
+}
+
+#[test]
+fn colours_are_read_as_the_format_has_them() {
+    let diffuse = |statement: &str| read(&format!("newmtl a\n{statement}\n")).expect("whole")[0].diffuse;
+    assert_eq!(diffuse("Kd 0.25 # grey"), Vec3::splat(0.25));
+    // The white of D65 and the primary red of Rec. 709.
+    assert!((diffuse("Kd xyz 0.95046 1 1.08906") - Vec3::ONE).length() < 1e-3);
+    assert!((diffuse("Kd xyz 0.41239 0.21264 0.01933") - Vec3::X).length() < 1e-3);
+    assert_eq!(diffuse("Kd spectral brass.rfl 0.5"), Vec3::splat(0.6));
+    assert_eq!(read("newmtl a\nd -halo 0.5\n").expect("whole")[0].opacity, 0.5);
+    let quoted = read("newmtl a\nmap_Kd -s 1 1 1 \"wall one.png\"\n").expect("whole");
+    assert_eq!(path(&quoted[0].diffuse_texture), Some(Path::new("models/wall one.png")));
+    for broken in ["Kd", "Kd 1 2", "Kd xyz 1 2", "Kd xyz x", "Kd x"] {
+        let error = read(&format!("newmtl a\n{broken}\n")).expect_err(broken).to_string();
+        assert!(error.ends_with("a.mtl:2: `Kd` is followed by three finite numbers"), "{error}");
+    }
+}
+
+#[test]
+fn a_bump_multiplier_is_the_strength_of_the_normal_map() {
+    for (statement, strength) in [
+        ("map_Bump -bm 0.5 n.png", 0.5),
+        ("bump -clamp on -bm 2 -s 1 1 1 n.png", 2.0),
+        ("norm -bm 0 n.png", 0.0),
+        ("norm n.png", 1.0),
+        ("norm -bm -3 n.png", 1.0),
+        ("norm -bm nan n.png", 1.0),
+    ] {
+        let found = read(&format!("newmtl a\n{statement}\n")).expect("whole");
+        assert_eq!(found[0].normal_strength, strength, "{statement}");
+        assert_eq!(path(&found[0].normal_texture), Some(Path::new("models/n.png")), "{statement}");
+    }
+}
+
+#[test]
+fn opacity_is_what_is_said_first_of_all_by_d() {
+    for (statements, opacity) in [
+        ("d 0.25 # of glass\n", 0.25),
+        ("Tr 0.25\n", 0.75),
+        ("Tr 1\nd 1\n", 1.0),
+        ("d -1\n", 0.0),
+        ("Tr -0.5\n", 1.0),
+        ("Kd 1 1 1\n", 1.0),
+    ] {
+        let found = read(&format!("newmtl a\n{statements}")).expect("whole");
+        assert_eq!((found[0].opacity, &found[0].opacity_texture), (opacity, &None), "{statements}");
+    }
+    let found = read("newmtl a\nd 1\nmap_d -mm 0 1 mask.png\n").expect("whole");
+    assert_eq!(path(&found[0].opacity_texture), Some(Path::new("models/mask.png")));
+    let error = read("newmtl a\nTr x\n").expect_err("refused").to_string();
+    assert!(error.ends_with("a.mtl:2: `Tr` is followed by a finite number"), "{error}");
+}
+
+#[test]
+fn the_statements_of_the_extension_find_their_fields() {
+    let physical = |text: &str| read(&format!("newmtl a\n{text}")).expect("whole")[0].physical.clone();
+    assert_eq!(physical("Kd 1 0 0\n"), None);
+    let plain = PhysicalMaterial {
+        roughness: 0.5,
+        metallic: 0.0,
+        clearcoat: 0.0,
+        clearcoat_roughness: 0.0,
+        roughness_texture: None,
+        metallic_texture: None,
+    };
+    assert_eq!(physical("Ps 0.25\n"), Some(plain.clone()));
+    assert_eq!(physical("aniso 0.5\n"), Some(plain.clone()));
+    let all = "Pr 0.3 # dull\nPm 1.5\nPc -1\nPcr 0.1\nmap_Pr -s 1 1 1 dull.png\nmap_Pm metal.png\n";
+    let file = |name: &str| Some(FileTexture::new(Path::new("models").join(name)));
+    let expected = PhysicalMaterial {
+        roughness: 0.3,
+        metallic: 1.0,
+        clearcoat: 0.0,
+        clearcoat_roughness: 0.1,
+        roughness_texture: file("dull.png"),
+        metallic_texture: file("metal.png"),
+    };
+    assert_eq!(physical(all), Some(expected));
+    assert_eq!(
+        physical("map_Pm metal.png\n"),
+        Some(PhysicalMaterial { metallic_texture: file("metal.png"), ..plain })
+    );
+    let error = read("newmtl a\nPr rough\n").expect_err("refused").to_string();
+    assert!(error.ends_with("a.mtl:2: `Pr` is followed by a finite number"), "{error}");
+}
+
+#[test]
+fn the_pictures_of_all_maps_are_known() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.mtl");
+    let maps =
+        ["map_Ka", "map_Kd", "map_Ks", "map_Ns", "map_d", "map_Bump", "norm", "map_Ke", "disp", "decal"];
+    let statements = maps.map(|map| format!("{map} {map}.png\n")).concat();
+    std::fs::write(&path, format!("newmtl a\n{statements}refl -type sphere map_Kd.png\n"))
+        .expect("written");
+    let token = CancelToken::new();
+    let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole").materials;
+    let mut expected = maps.map(|map| PathBuf::from(format!("models/{map}.png")));
+    expected.sort();
+    let mut pictures: Vec<_> = found[0].pictures(Path::new("models")).collect();
+    pictures.sort();
+    pictures.dedup();
+    assert_eq!(pictures, expected);
+}
+
+#[test]
+fn options_may_have_fewer_numbers_than_three() {
+    for options in
+        ["-o 0", "-o 0 0", "-s 1 1", "-t 0.5", "-blendu on -o 0 0", "-mm 0", "-clamp on -s 2 -o 1 1"]
+    {
+        let found = read(&format!("newmtl a\nmap_Kd {options} u.png\n")).expect("whole");
+        assert_eq!(path(&found[0].diffuse_texture), Some(Path::new("models/u.png")), "{options}");
+    }
+}
+
+#[test]
+fn a_comment_may_follow_a_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("wall.png"), "").expect("written");
+    std::fs::write(folder.path().join("Map #1.png"), "").expect("written");
+    let file = |name: &str| Some(FileTexture::new(folder.path().join(name)));
+    let text =
+        "newmtl a\nmap_Kd -bm 2 wall.png # of brick\nmap_Ks Map #1.png # as it came\nnorm no #2.png\n";
+    let path = folder.path().join("a.mtl");
+    std::fs::write(&path, text).expect("written");
+    let token = CancelToken::new();
+    let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole").materials;
+    let found = material(&found[0], folder.path());
+    assert_eq!(found.diffuse_texture, file("wall.png"));
+    assert_eq!(found.specular_texture, file("Map #1.png"));
+    assert_eq!(found.normal_texture, file("no #2.png"), "as the file has it, where there is none");
+}
+
+#[test]
+fn errors_name_the_line() {
+    let says = |text: &str| read(text).expect_err("refused").to_string();
+    assert!(says("newmtl a\nKd 0.5 1\n").ends_with("a.mtl:2: `Kd` is followed by three finite numbers"));
+    assert!(says("newmtl a\n\nNs nan\n").ends_with("a.mtl:3: `Ns` is followed by a finite number"));
+    assert!(says("newmtl\n").ends_with("a.mtl:1: `newmtl` is followed by a name"));
+    assert!(
+        says("newmtl a # b\nKd 1 0 # 0\n").ends_with("a.mtl:2: `Kd` is followed by three finite numbers")
+    );
+    assert!(read("newmtl a\nKd 1 0 0# red\nillum 2#x\nNs 3#\n").is_ok());
+    assert!(says("illum x\n").contains("whole number"));
+    assert!(says("map_Kd\n").contains("followed by a file"));
+}
+
+#[test]
+fn keywords_are_read_in_any_case() {
+    let text = "NEWMTL a\nKD 1 0 0\nks .1 .2 .3\nKE 1 1 1\nns 5\nNI 2\nILLUM 7\nD 0.5\nMAP_kd t.png\nMap_d m.png\nBUMP b.png\nPR .25\n";
+    let found = read(text).expect("whole").remove(0);
+    assert_eq!((found.name.as_str(), found.diffuse, found.emission), ("a", Vec3::X, Vec3::ONE));
+    assert_eq!((found.shininess, found.ior, found.illumination_model), (5.0, 2.0, Some(7)));
+    assert_eq!((found.opacity, path(&found.diffuse_texture)), (0.5, Some(Path::new("models/t.png"))));
+    assert_eq!(path(&found.opacity_texture), Some(Path::new("models/m.png")));
+    assert_eq!(path(&found.normal_texture), Some(Path::new("models/b.png")));
+    assert_eq!(found.physical.map(|physical| physical.roughness), Some(0.25));
+}
+
+#[test]
+fn map_options_find_their_fields() {
+    let texture = |statement: &str| {
+        let found = read(&format!("newmtl a\n{statement}\n")).expect(statement).remove(0);
+        found.opacity_texture.expect(statement)
+    };
+    let plain = || FileTexture::new(PathBuf::from("models/t.png"));
+    let channel = |channel| Some(PixelNumber::Channel(channel));
+    for (options, expected) in [
+        ("-s 2 3 4", FileTexture { repeat: Vec2::new(2.0, 3.0), ..plain() }),
+        ("-s 2", FileTexture { repeat: Vec2::new(2.0, 1.0), ..plain() }),
+        ("-S -1 1", FileTexture { repeat: Vec2::new(-1.0, 1.0), ..plain() }),
+        ("-o .25 -0.5 1", FileTexture { offset: DVec2::new(0.25, -0.5), ..plain() }),
+        ("-clamp on", FileTexture { is_clamped: true, ..plain() }),
+        ("-clamp off", plain()),
+        ("-mm 0.25 0.5", FileTexture { range: (0.25, 0.5), ..plain() }),
+        ("-mm 0.25", FileTexture { range: (0.25, 1.0), ..plain() }),
+        ("-imfchan r", FileTexture { number: channel(Channel::Red), ..plain() }),
+        ("-imfchan G", FileTexture { number: channel(Channel::Green), ..plain() }),
+        ("-imfchan b", FileTexture { number: channel(Channel::Blue), ..plain() }),
+        ("-imfchan m", FileTexture { number: channel(Channel::Alpha), ..plain() }),
+        ("-imfchan l", FileTexture { number: Some(PixelNumber::Luminance), ..plain() }),
+        (
+            "-blendu on -s 2 2 1 -clamp on -o 1",
+            FileTexture {
+                repeat: Vec2::splat(2.0),
+                offset: DVec2::new(1.0, 0.0),
+                is_clamped: true,
+                ..plain()
+            },
+        ),
+    ] {
+        assert_eq!(texture(&format!("map_d {options} t.png")), expected, "{options}");
+    }
+    for (name, file) in [
+        ("-dash.png", "-dash.png"),
+        ("-s.png", "-s.png"),
+        ("-s 2 -my wall.png", "-my wall.png"),
+        ("-clamp on a - b.png", "a - b.png"),
+        ("-o 1 2 3 4", "4"),
+        ("-clamp.png", "-clamp.png"),
+        ("-o", "-o"),
+        ("-cc t.png", "t.png"),
+        ("-bm t.png", "t.png"),
+    ] {
+        assert_eq!(texture(&format!("map_d {name}")).path, Path::new("models").join(file), "{name}");
+    }
+}
+
+#[test]
+fn ignored_statements_are_named_with_their_line() {
+    let of = |statements: &str| warned(format!("newmtl a\n{statements}").as_bytes());
+    for (statements, words) in [
+        ("map_Kd -t 1 1 1 t.png\n", "a.mtl:2: the option `-t` is ignored"),
+        ("\nmap_Kd -cc on t.png\n", "a.mtl:3: the option `-cc on` is ignored"),
+        ("map_Kd -blendu off t.png\n", "a.mtl:2: the option `-blendu off` is ignored"),
+        ("map_Kd -boost 2 t.png\n", "a.mtl:2: the option `-boost` is ignored"),
+        ("map_Kd -texres 128 t.png\n", "a.mtl:2: the option `-texres` is ignored"),
+        ("map_Kd -imfchan r t.png\n", "a.mtl:2: the option `-imfchan` is ignored"),
+        ("map_d -imfchan z t.png\n", "a.mtl:2: the option `-imfchan z` is ignored"),
+        ("norm -mm 0 2 t.png\n", "a.mtl:2: the option `-mm` is ignored"),
+        ("norm -bm -3 t.png\n", "a.mtl:2: the option `-bm -3` is ignored"),
+        ("map_Kd -bm 3 t.png\n", "a.mtl:2: the option `-bm` is ignored"),
+        ("map_Ns t.png\n", "a.mtl:2: `map_Ns` is not read"),
+        ("refl -type sphere t.png\n", "a.mtl:2: `refl` is not read"),
+        ("map_Ka t.png\n", "a.mtl:2: `map_Ka` is not read; ambient light uses the diffuse color"),
+        ("Kd spectral brass.rfl\n", "a.mtl:2: the spectrum of `Kd` is not read; the usual color is used"),
+        ("illum 0\n", "a.mtl:2: `illum 0`, a color without shading, is shown as a matte surface"),
+        ("illum 10\n", "a.mtl:2: `illum 10`, shadows on an invisible surface, is shown as a plain surface"),
+        ("illum 99\n", "a.mtl:2: this `illum` is no model of the format; it counts as 2"),
+        ("illum 4\n", "a.mtl:2: glass without an index of refraction `Ni` above 1 is invisible"),
+        ("d .5\nTf 1 0 0\n", "a.mtl:3: `Tf` is ignored; a `material` of the scene may have a `tint`"),
+        ("Kd 255 0 0\n", "a.mtl:2: this material reflects more light than falls on it; keep `Kd` and `Ks` at or below 1"),
+        ("Kd .5 .5 .5\nKs .9 .9 .9\nNs 0.5\nillum 2\n", "a.mtl:2: this material reflects more light than falls on it; keep `Kd` and `Ks` at or below 1"),
+        ("Ks 2 2 2\nillum 3\n", "a.mtl:2: this mirror reflects more light than falls on it; `Ks` counts as 1"),
+        ("Kd .1 .1 .1\nKs .9 .9 .9\nillum 3\n", "a.mtl:2: `Kd` below a stronger mirror `Ks` is ignored"),
+        ("Ps 0.5\n", "a.mtl:2: `Ps` is ignored"),
+        ("Foo 1\n", "a.mtl:2: `Foo` is no known statement and is ignored"),
+    ] {
+        assert_eq!(of(statements), [words], "{statements}");
+    }
+    for quiet in [
+        "Kd 1 1 1\nillum 2\nd 1\nTf 0 1 0\n",
+        "map_Kd -s 2 2 2 -o 1 1 1 -clamp on -mm 0 1 -t 0 0 0 -blendu on t.png\nmap_Ka t.png\n",
+        "Kd 1 1 1\nKs 1 1 1\nNs 10\nillum 1\n",
+        "illum 7\nNi 1.5\nTf 1 1 1\n",
+        "Ks 1 1 1\nillum 3\n",
+        "Kd .8 .1 .1\nKs .2 .2 .2\nillum 3\nsharpness 60\n",
+    ] {
+        assert_eq!(of(quiet), [""; 0], "{quiet}");
+    }
+    // Equal ones of several materials are one line.
+    assert_eq!(
+        warned(b"Kd 1 1 1\nnewmtl a\nmap_Ns t.png\nnewmtl b\nmap_Ns t.png\nnewmtl a\n"),
+        [
+            "a.mtl:1: statements before the first `newmtl` are ignored",
+            "a.mtl:6: the material \"a\" replaces the one of line 2",
+            "a.mtl:3: `map_Ns` is not read (1 more)",
+        ]
+    );
+}
+
+#[test]
+fn the_model_decides_about_highlights_and_mirrors() {
+    let of = |model: u8| read(&format!("newmtl a\nKd .8 0 0\nKs .5 .5 .5\nNs 9\nillum {model}\n")).expect("whole");
+    assert_eq!([0, 1, 2, 10].map(|model| of(model)[0].has_highlight()), [false, false, true, true]);
+    assert!(of(3)[0].is_coated());
+    let black = read("newmtl a\nKs .5 .5 .5\nillum 3\n").expect("whole");
+    assert_eq!((black[0].diffuse, black[0].is_coated()), (Vec3::ZERO, false));
+}
+
+#[test]
+fn latin_1_names_are_found_by_their_bytes() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().expect("a folder");
+    let latin1 = |bytes: &[u8]| folder.path().join(std::ffi::OsStr::from_bytes(bytes));
+    std::fs::write(latin1(b"caf\xe9.png"), "").expect("written");
+    std::fs::write(folder.path().join("\u{e4}.png"), "").expect("written");
+    let mtl = b"newmtl gr\xfcn\nmap_Kd caf\xe9.png\nmap_Ks \xe4.png\nnewmtl b\nmap_Kd caf\xc3\xa9.png\n";
+    let path = folder.path().join("a.mtl");
+    std::fs::write(&path, mtl).expect("written");
+    let token = CancelToken::new();
+    let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole").materials;
+    let [a, b] = [0, 1].map(|index| material(&found[index], folder.path()));
+    assert_eq!(a.name, "gr\u{fc}n");
+    assert_eq!(super::tests::path(&a.diffuse_texture), Some(latin1(b"caf\xe9.png").as_path()));
+    assert_eq!(super::tests::path(&a.specular_texture), Some(folder.path().join("\u{e4}.png").as_path()));
+    assert_eq!(super::tests::path(&b.diffuse_texture), Some(latin1(b"caf\xe9.png").as_path()));
+}
