@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use rayon::prelude::*;
 
-use super::Source;
 use super::normals::fill_missing_normals;
 use super::places::shared;
 use super::polygon::triangulate;
+use super::{Source, corners};
 use crate::assets::{AssetError, Companion, Dropped, FileHash, FileMaterial, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::{NormalGroup, TriangleMesh};
@@ -20,7 +20,7 @@ const BATCH: usize = 1 << 14;
 /// Polygons over vertices: corners of all, one after the other.
 #[derive(Debug, Default)]
 pub(in crate::assets) struct Faces {
-    corners: Vec<u32>,
+    pub(super) corners: Vec<u32>,
     /// Corners of each face; empty as long as all are triangles.
     arities: Vec<u32>,
 }
@@ -78,6 +78,10 @@ pub(in crate::assets) struct Parsed {
     /// In sRGB.
     pub(in crate::assets) colors: Vec<[u8; 3]>,
     pub(in crate::assets) faces: Faces,
+    /// Texture coordinates of each corner of the faces, NaN where it takes those of its vertex; or empty.
+    pub(in crate::assets) corner_uvs: Vec<Vec2>,
+    /// Color of each corner of the faces, or empty.
+    pub(in crate::assets) corner_colors: Vec<[u8; 3]>,
     /// Whether each face has vertices of its own, of which those at one place become one.
     pub(in crate::assets) has_corners_apart: bool,
     pub(in crate::assets) face_materials: Vec<u32>,
@@ -96,6 +100,11 @@ pub(in crate::assets) struct ColorRange {
 }
 
 impl ColorRange {
+    /// The greatest number.
+    pub(in crate::assets) fn greatest(&self) -> f64 {
+        self.greatest
+    }
+
     pub(in crate::assets) fn add(&mut self, parts: [f64; 3]) {
         for part in parts.into_iter().filter(|part| part.is_finite()) {
             self.greatest = self.greatest.max(part);
@@ -115,13 +124,14 @@ impl ColorRange {
     }
 }
 
-/// A vertex colour of parts from 0 to 1 in sRGB, in bytes; what is not a number is 0.
+/// A vertex color with parts from 0 to 1 in sRGB, in bytes; NaN is 0.
 pub(in crate::assets) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
     parts.map(|part| (part.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
 }
 
 /// Assembles a mesh: cuts polygons, drops bad faces, compacts the vertices, completes the normals.
-pub(in crate::assets) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result<LoadedMesh, AssetError> {
+pub(in crate::assets) fn assemble(source: &Source<'_>, mut parsed: Parsed) -> Result<LoadedMesh, AssetError> {
+    corners::split(&mut parsed, source.watch.token)?;
     let Parsed {
         positions,
         normals,
@@ -130,6 +140,8 @@ pub(in crate::assets) fn assemble(source: &Source<'_>, parsed: Parsed) -> Result
         second_uvs,
         colors,
         mut faces,
+        corner_uvs: _,
+        corner_colors: _,
         has_corners_apart,
         face_materials,
         materials,

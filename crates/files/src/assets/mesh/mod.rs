@@ -2,6 +2,7 @@
 //! them that keeps the invariants of [`TriangleMesh`](crate::geometry::mesh::TriangleMesh).
 
 pub(in crate::assets) mod assemble;
+mod corners;
 mod mtl;
 pub(in crate::assets) mod normals;
 mod obj;

@@ -2,7 +2,7 @@
 //! counts behind the header word, no edge count, undeclared columns behind coordinates and faces, comments and blank
 //! lines anywhere.
 
-use super::assemble::{Faces, Parsed, assemble, color_bytes};
+use super::assemble::{ColorRange, Parsed, assemble};
 use super::text::{Cursor, shown};
 use super::{AssetError, LoadedMesh, Source};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -21,12 +21,70 @@ struct Header {
 }
 
 pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
-    Reader { source: *source, cursor: Cursor::new(source.bytes, 0) }.read()
+    let (excess, indices) = Default::default();
+    Reader { source: *source, cursor: Cursor::new(source.bytes, 0), excess, indices }.read()
 }
 
 struct Reader<'a> {
     source: Source<'a>,
     cursor: Cursor<'a>,
+    /// Lines with numbers that the header does not name.
+    excess: Lines,
+    /// Lines whose color is a number in a colormap.
+    indices: Lines,
+}
+
+/// Lines to warn of: their number, and a byte of the first.
+#[derive(Clone, Copy, Default)]
+struct Lines(u64, usize);
+
+impl Lines {
+    fn add(&mut self, at: usize) {
+        self.1 = if self.0 == 0 { at } else { self.1 };
+        self.0 += 1;
+    }
+
+    fn warning(self, source: &Source<'_>, what: &str) -> Option<String> {
+        let Self(count, first) = self;
+        let line = source.line(first);
+        match count {
+            0 => None,
+            1 => Some(format!("line {line} has {what}: ignored")),
+            _ => Some(format!("line {line} and {} more have {what}: ignored", count - 1)),
+        }
+    }
+}
+
+/// Colors of vertices or corners, where they have some.
+#[derive(Default)]
+struct Colors {
+    all: Vec<Option<[f64; 3]>>,
+    range: ColorRange,
+    least_alpha: Option<f64>,
+}
+
+impl Colors {
+    /// Adds the color for `times` vertices or corners.
+    fn push(&mut self, color: &[f64], times: usize) {
+        let color: Option<[f64; 3]> = color.first_chunk().copied().inspect(|color| self.range.add(*color));
+        self.all.extend(std::iter::repeat_n(color, times));
+    }
+
+    fn alpha(&mut self, alpha: f64) {
+        self.least_alpha = Some(self.least_alpha.map_or(alpha, |least| least.min(alpha)));
+    }
+
+    /// All colors in bytes, white where there is none; empty if there are none at all.
+    fn finish(self, warnings: &mut Vec<String>) -> Vec<[u8; 3]> {
+        if self.all.iter().all(Option::is_none) {
+            return Vec::new();
+        }
+        if self.least_alpha.is_some_and(|least| least < self.range.one()) {
+            warnings.push("the alpha of the colors is ignored".to_owned());
+        }
+        let bytes = |color: Option<[f64; 3]>| color.map_or([u8::MAX; 3], |color| self.range.bytes(color));
+        self.all.into_iter().map(bytes).collect()
+    }
 }
 
 impl Reader<'_> {
@@ -38,7 +96,17 @@ impl Reader<'_> {
         self.plausible(vertices, faces)?;
         let mut parsed = Parsed::default();
         self.vertices(header, vertices, &mut parsed)?;
-        self.faces(vertices, faces, &mut parsed.faces)?;
+        let colors = self.faces(vertices, faces, &mut parsed)?;
+        let own_colors = colors.finish(&mut parsed.warnings);
+        if parsed.colors.is_empty() {
+            parsed.corner_colors = own_colors;
+        } else if !own_colors.is_empty() {
+            parsed.warnings.push("the colors of the faces are ignored: the vertices have colors".to_owned());
+        }
+        parsed.warnings.extend(self.excess.warning(&self.source, "more numbers than the header names"));
+        parsed
+            .warnings
+            .extend(self.indices.warning(&self.source, "an index into a colormap that is elsewhere"));
         assemble(&self.source, parsed)
     }
 
@@ -145,7 +213,7 @@ impl Reader<'_> {
 
     fn vertices(&mut self, header: Header, count: u64, parsed: &mut Parsed) -> Result<(), AssetError> {
         parsed.positions.reserve(count as usize);
-        let mut colors = Vec::new();
+        let mut colors = Colors::default();
         for index in 0..count {
             if index % BATCH == 0 {
                 self.source.tick(self.cursor.at())?;
@@ -168,21 +236,27 @@ impl Reader<'_> {
                     };
                     parsed.uvs.push(DVec2::new(u, v).as_vec2());
                 }
-                colors.extend(color.first_chunk().map(|color: &[f64; 3]| DVec3::from_array(*color)));
+                self.color(color, 1, &mut colors);
             } else if header.uvs {
                 parsed.uvs.push(self.last_two()?);
+            } else if self.cursor.skip_in_line() {
+                self.excess.add(self.cursor.at());
             }
             self.cursor.end_line();
         }
-        // A single number is an index into colours that are elsewhere.
-        if colors.len() < parsed.positions.len() {
-            return Ok(());
-        }
-        // Colours are from 0 to 1, or from 0 to 255.
-        let are_bytes = colors.iter().any(|color: &DVec3| color.max_element() > 1.0);
-        let greatest = if are_bytes { 255.0 } else { 1.0 };
-        parsed.colors = colors.into_iter().map(|color| color_bytes((color / greatest).to_array())).collect();
+        parsed.colors = colors.finish(&mut parsed.warnings);
         Ok(())
+    }
+
+    /// Adds the color that ends a line, for `times` vertices or corners.
+    fn color(&mut self, color: &[f64], times: usize, colors: &mut Colors) {
+        colors.push(color, times);
+        match color {
+            [_, _, _, alpha] => colors.alpha(*alpha),
+            [_] => self.indices.add(self.cursor.at()),
+            [] | [_, _, _] => {}
+            [_, _] | [_, _, _, _, _, ..] => self.excess.add(self.cursor.at()),
+        }
     }
 
     fn triple(&mut self, what: &str) -> Result<DVec3, AssetError> {
@@ -217,8 +291,9 @@ impl Reader<'_> {
         Ok(last.as_vec2())
     }
 
-    fn faces(&mut self, vertices: u64, count: u64, faces: &mut Faces) -> Result<(), AssetError> {
-        faces.reserve(count as usize);
+    fn faces(&mut self, vertices: u64, count: u64, parsed: &mut Parsed) -> Result<Colors, AssetError> {
+        parsed.faces.reserve(count as usize);
+        let mut colors = Colors::default();
         for index in 0..count {
             if index % BATCH == 0 {
                 self.source.tick(self.cursor.at())?;
@@ -226,12 +301,12 @@ impl Reader<'_> {
             if !self.cursor.skip_blank() {
                 return self.wrong(format!("the file ends after {index} of {count} faces"));
             }
-            self.face(vertices, faces)?;
+            self.face(vertices, parsed, &mut colors)?;
         }
-        Ok(())
+        Ok(colors)
     }
 
-    fn face(&mut self, vertices: u64, faces: &mut Faces) -> Result<(), AssetError> {
+    fn face(&mut self, vertices: u64, parsed: &mut Parsed, colors: &mut Colors) -> Result<(), AssetError> {
         let arity = usize::try_from(self.number("corners")?).unwrap_or(usize::MAX);
         if arity.saturating_mul(2) > self.cursor.remaining() {
             return self.wrong(format!("a face claims {arity} corners, more than the file can hold"));
@@ -241,7 +316,7 @@ impl Reader<'_> {
                 return self.wrong(format!("a face of {arity} corners ends after {corner}"));
             }
             match self.cursor.integer() {
-                Some(vertex) if (0..vertices as i64).contains(&vertex) => faces.corner(vertex as u32),
+                Some(vertex) if (0..vertices as i64).contains(&vertex) => parsed.faces.corner(vertex as u32),
                 Some(vertex) => {
                     return self
                         .wrong(format!("vertex {vertex} is out of range: there are {vertices}, from 0"));
@@ -249,7 +324,17 @@ impl Reader<'_> {
                 None => return self.unexpected("a vertex"),
             }
         }
-        faces.close(arity);
+        parsed.faces.close(arity);
+        let (mut color, mut count) = ([0.0; 5], 0);
+        while count < color.len() && self.cursor.skip_in_line() {
+            let Some(number) = self.cursor.float() else {
+                self.excess.add(self.cursor.at());
+                break;
+            };
+            color[count] = number;
+            count += 1;
+        }
+        self.color(&color[..count], arity, colors);
         self.cursor.end_line();
         Ok(())
     }
@@ -293,16 +378,15 @@ mod tests {
             // Normals that the header does not declare.
             format!("OFF\n4 2 0\n{}{FACES}", lines(" 0 0 -1")),
             format!("4OFF\n4 2 0\n{}{FACES}", lines(" 1")),
-            // Colours behind the faces, of any length.
-            format!("OFF\n4 2 0\n{}3 0 1 2 0.5\n3  0 2 3 255 0 0 255\n", lines("")),
+            format!("OFF\n4 2 0\n{}3 0 1 2 7\n3  0 2 3 x\n", lines("")),
             format!("OFF\n4 2 0\n{}{}", lines(""), FACES.trim_end()),
             // A polygon instead of two triangles.
             format!("OFF\n4 1 0\n{}4 0 1 2 3\n", lines("")),
             format!("OFF\n4 1 0\n{}4 0 1\n2 3\n", lines("")),
         ] {
             let mut mesh = read(&text).unwrap_or_else(|error| panic!("{error}: {text}")).mesh;
-            assert_eq!(mesh.colors.is_empty(), !text.starts_with("COFF"), "{text}");
             mesh.colors.clear();
+            mesh.normal_groups.clear();
             assert_eq!(mesh, plain, "{text}");
         }
     }
@@ -318,7 +402,57 @@ mod tests {
         };
         assert_eq!(read(["255 0 1 9", "1 1 1", "2 3 4 255"]), [[255, 0, 1], [1, 1, 1], [2, 3, 4]]);
         assert_eq!(read(["1 0 0.2", "0 0 0 1", "1 1 1"]), [[255, 0, 51], [0; 3], [255; 3]]);
-        assert_eq!(read(["3", "1 1 1", "1 1 1"]), [[0; 3]; 0]);
+        assert_eq!(read(["3", "0 1 1", "1 1 1"]), [[255; 3], [0, 255, 255], [255; 3]]);
+        assert_eq!(read(["3", "3", "3"]), [[0; 3]; 0]);
+    }
+
+    /// Colors of the corners of two triangles, whose lines end in these tails, and the warnings.
+    fn of_faces(header: &str, vertex: &str, tails: [&str; 2]) -> (Vec<[u8; 3]>, Vec<String>) {
+        let [a, b] = tails;
+        let text = format!(
+            "{header}\n4 2 0\n0 0 0{vertex}\n1 0 0{vertex}\n1 1 0{vertex}\n0 1 0{vertex}\n3 0 1 2 {a}\n3 0 2 3 {b}\n"
+        );
+        let loaded = super::tests::read(&text).unwrap_or_else(|error| panic!("{error}: {text}"));
+        let mesh = &loaded.mesh;
+        let corners =
+            mesh.triangles.as_flattened().iter().filter_map(|vertex| mesh.colors.get(*vertex as usize));
+        (corners.copied().collect(), loaded.warnings)
+    }
+
+    #[test]
+    fn colors_of_faces_are_read() {
+        let (red, green, white) = ([255, 0, 0], [0, 255, 0], [255; 3]);
+        let off = |tails| of_faces("OFF", "", tails);
+        let both = ([[red; 3], [green; 3]].concat(), vec![]);
+        for tails in [
+            ["255 0 0", "0 255 0"],
+            ["1 0 0", "0 1 0"],
+            ["1.0 0.0 0 1", "0 1 0.0 1"],
+            ["255 0 0 255 # x", "0 255 0 255"],
+        ] {
+            assert_eq!(off(tails), both, "{tails:?}");
+        }
+        assert_eq!(off(["255 0 0", ""]), ([[red; 3], [white; 3]].concat(), vec![]));
+        assert_eq!(off(["", ""]), (vec![], vec![]));
+        let index = "line 7 has an index into a colormap that is elsewhere: ignored";
+        assert_eq!(off(["3", "255 0 0"]), ([[white; 3], [red; 3]].concat(), vec![index.to_owned()]));
+        let faded = vec!["the alpha of the colors is ignored".to_owned()];
+        assert_eq!(off(["1 0 0 0.5", "0 1 0"]), ([[red; 3], [green; 3]].concat(), faded));
+        let more = "line 7 and 1 more have more numbers than the header names: ignored";
+        assert_eq!(off(["1 2", "1 0 0 1 7"]), ([[white; 3], [red; 3]].concat(), vec![more.to_owned()]));
+        let vertices = "the colors of the faces are ignored: the vertices have colors";
+        assert_eq!(
+            of_faces("COFF", " 0 255 0", ["255 0 0", "255 0 0"]),
+            (vec![green; 6], vec![vertices.to_owned()])
+        );
+    }
+
+    #[test]
+    fn numbers_that_the_header_does_not_name_have_their_line() {
+        let more = "line 3 and 3 more have more numbers than the header names: ignored";
+        assert_eq!(of_faces("OFF", " 0 0 1", ["", ""]), (vec![], vec![more.to_owned()]));
+        assert_eq!(of_faces("NOFF", " 0 0 1 7", ["", ""]).1, [more.to_owned()]);
+        assert!(of_faces("NOFF", " 0 0 1", ["", ""]).1.is_empty());
     }
 
     #[test]

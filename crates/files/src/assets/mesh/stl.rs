@@ -138,10 +138,9 @@ impl Text<'_> {
                     None => return self.wrong(start, "\"endloop\" without \"outer loop\""),
                 }
             } else if is("solid") || is("endsolid") {
-                // A name of any words follows.
-                self.cursor.end_line();
+                self.name();
             } else if is("normal") {
-                self.skip(3);
+                self.skip_normal();
             } else if !(is("facet") || is("outer") || is("endfacet")) {
                 return self.wrong(start, format!("expected a keyword of STL, found {}", shown(word)));
             }
@@ -174,11 +173,30 @@ impl Text<'_> {
         }
     }
 
-    /// Skips some words of this line.
-    fn skip(&mut self, count: usize) {
-        for _ in 0..count {
-            if self.cursor.skip_in_line() {
-                self.cursor.word();
+    /// Skips a name of any words, up to the end of the line or to the facet that follows it there.
+    fn name(&mut self) {
+        let bytes = self.source.bytes;
+        let is_blank = |byte: &u8| byte.is_ascii_whitespace();
+        let mut at = self.cursor.at();
+        while bytes.get(at).is_some_and(|byte| *byte != b'\n') {
+            let word = bytes[at..].iter().position(is_blank).map_or(&bytes[at..], |end| &bytes[at..at + end]);
+            if word.eq_ignore_ascii_case(b"facet") {
+                let mut ahead = Cursor::new(bytes, at + word.len());
+                if ahead.skip_blank() && ahead.word().eq_ignore_ascii_case(b"normal") {
+                    break;
+                }
+            }
+            at += word.len().max(1);
+        }
+        self.cursor = Cursor::new(bytes, at);
+    }
+
+    /// Skips a normal, whose words need not be numbers.
+    fn skip_normal(&mut self) {
+        for _ in 0..3 {
+            let mut ahead = self.cursor;
+            if ahead.skip_blank() && !ahead.word().eq_ignore_ascii_case(b"outer") {
+                self.cursor = ahead;
             }
         }
     }
@@ -258,6 +276,24 @@ mod tests {
             assert_eq!(places(&loaded), expected);
             assert_eq!(loaded.mesh.positions.len(), 4, "corners at one place are one vertex");
             assert!(loaded.warnings.is_empty() && loaded.mesh.normals.is_empty());
+        }
+    }
+
+    #[test]
+    fn blanks_may_be_of_any_kind() {
+        let expected = TETRAHEDRON.map(|facet| facet.map(Vec3::from_array));
+        let text = text_of(&TETRAHEDRON).replace("of # any name", "").replace("of any name", "");
+        let words: Vec<&str> = text.split_whitespace().collect();
+        let twice = [words.join(" "), words.join("\t")].join(" ");
+        for blank in [" ", "\t", "\n", "\r\n", "\r", "  \n"] {
+            let loaded =
+                read(words.join(blank).as_bytes()).unwrap_or_else(|error| panic!("{error}: {blank:?}"));
+            assert_eq!(places(&loaded), expected, "{blank:?}");
+        }
+        assert_eq!(places(&read(twice.as_bytes()).expect("two solids in a line")).len(), 8);
+        for name in ["one", "of two words", "a # b", "facet", "endsolid facet"] {
+            let text = words.join(" ").replace("solid", &format!("solid {name}"));
+            assert_eq!(places(&read(text.as_bytes()).expect(name)), expected, "{name:?}");
         }
     }
 

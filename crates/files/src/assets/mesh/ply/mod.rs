@@ -2,14 +2,17 @@
 //! properties and elements.
 
 mod body;
+mod colors;
+mod faces;
 mod header;
 pub mod write;
 
-use super::assemble::{Parsed, assemble, color_bytes};
+use super::assemble::{Parsed, assemble};
 use super::text::Cursor;
 use super::{AssetError, LoadedMesh, Source};
 use crate::math::{DVec2, DVec3};
 use body::{Ascii, Binary, Lines, Numbers};
+use colors::Colors;
 use header::{Element, Encoding, Header, Kind, Scalar};
 
 /// Elements between two polls of the token.
@@ -68,6 +71,14 @@ impl Place<'_> {
         match self.encoding {
             Encoding::Ascii => self.source.wrong_at(at, reason),
             _ => self.source.wrong(reason),
+        }
+    }
+
+    /// A face in words, with its line in a text.
+    fn of_face(&self, at: usize, index: usize) -> String {
+        match self.encoding {
+            Encoding::Ascii => format!("line {}: face {}", self.source.line(at), index + 1),
+            Encoding::LittleEndian | Encoding::BigEndian => format!("face {}", index + 1),
         }
     }
 }
@@ -151,7 +162,10 @@ fn list_length(numbers: &mut impl Numbers, count: Scalar, item: Scalar) -> Resul
     }
 }
 
-/// Slot of a vertex value: position, normal, texture coordinates, colour, second set of coordinates. `None` for other properties.
+/// Slot of the alpha of a vertex.
+const ALPHA: usize = 13;
+
+/// Slot of a vertex value: position, normal, texture coordinates, color, second set of coordinates, alpha. `None` for other properties.
 fn slot(name: &str) -> Option<usize> {
     Some(match name {
         "x" => 0,
@@ -167,6 +181,7 @@ fn slot(name: &str) -> Option<usize> {
         "blue" | "diffuse_blue" | "b" => 10,
         "u1" | "s1" => 11,
         "v1" | "t1" => 12,
+        "alpha" | "diffuse_alpha" | "a" => ALPHA,
         _ => return None,
     })
 }
@@ -189,27 +204,29 @@ fn read_vertices(
     }
     let (has_normals, has_uvs, has_colors) = (has(&[3, 4, 5]), has(&[6, 7]), has(&[8, 9, 10]));
     let has_second_uvs = has(&[11, 12]);
-    // Whole numbers are parts of the greatest.
-    let greatest = |slot: usize| {
-        let kind = layout.iter().find(|(_, to)| *to == Some(slot)).map(|(kind, _)| *kind);
-        if let Some(Kind::One(scalar)) = kind { scalar.greatest() } else { 1.0 }
+    let scalar = |slot: usize| {
+        layout.iter().find_map(|(kind, to)| match *kind {
+            Kind::One(scalar) if *to == Some(slot) => Some(scalar),
+            Kind::One(_) | Kind::List { .. } => None,
+        })
     };
-    let full = [8, 9, 10].map(greatest);
+    let mut colors =
+        has_colors.then(|| Colors::new([8, 9, 10].map(|slot| scalar(slot).unwrap_or(Scalar::U8))));
+    let alpha_scalar = scalar(ALPHA);
     let count = element.count as usize;
     parsed.positions.reserve(count);
     parsed.normals.reserve(if has_normals { count } else { 0 });
     parsed.uvs.reserve(if has_uvs { count } else { 0 });
     parsed.second_uvs.reserve(if has_second_uvs { count } else { 0 });
-    parsed.colors.reserve(if has_colors { count } else { 0 });
     each(place, element, numbers, |numbers| {
-        let mut values = [0.0; 13];
+        let mut values = [0.0; 14];
         for &(kind, slot) in &layout {
             match (kind, slot) {
                 (Kind::One(scalar), Some(slot)) => values[slot] = numbers.float(scalar)?,
                 _ => skip(numbers, kind)?,
             }
         }
-        let [x, y, z, nx, ny, nz, u, v, red, green, blue, second_u, second_v] = values;
+        let [x, y, z, nx, ny, nz, u, v, red, green, blue, second_u, second_v, alpha] = values;
         parsed.positions.push(DVec3::new(x, y, z));
         if has_normals {
             parsed.normals.push(DVec3::new(nx, ny, nz).as_vec3());
@@ -220,11 +237,20 @@ fn read_vertices(
         if has_second_uvs {
             parsed.second_uvs.push(DVec2::new(second_u, second_v).as_vec2());
         }
-        if has_colors {
-            parsed.colors.push(color_bytes([red / full[0], green / full[1], blue / full[2]]));
+        if let Some(colors) = &mut colors {
+            colors.push([red, green, blue]);
+            if let Some(scalar) = alpha_scalar {
+                colors.alpha(alpha, scalar);
+            }
         }
         Ok(())
-    })
+    })?;
+    if let Some(colors) = colors {
+        let (colors, warning) = colors.finish();
+        parsed.colors = colors;
+        parsed.warnings.extend(warning);
+    }
+    Ok(())
 }
 
 fn read_faces(
@@ -237,6 +263,9 @@ fn read_faces(
     let Some(corners) = corners_of(element) else {
         return Err(place.source.wrong("the faces have no list of whole numbers `vertex_indices`"));
     };
+    if faces::has_own(element, corners) {
+        return faces::read(place, element, corners, numbers, vertices, parsed);
+    }
     let faces = &mut parsed.faces;
     faces.reserve(element.count as usize);
     each_list(place, element, corners, numbers, |numbers, item, length| {

@@ -79,9 +79,9 @@ fn binary_of_both_orders_and_all_types() {
     let mesh = read_bytes(&wild(false)).expect("little").mesh;
     assert_eq!(
         mesh.positions,
-        [Vec3::new(0., 0., 0.25), Vec3::new(2.5, 0., 0.25), Vec3::new(0., -300., 0.25)]
+        [Vec3::new(0., 0., 0.25), Vec3::new(0., -300., 0.25), Vec3::new(2.5, 0., 0.25)]
     );
-    assert_eq!(mesh.triangles, [[0, 2, 1]]);
+    assert_eq!(mesh.triangles, [[0, 1, 2]]);
     assert_eq!(mesh.normals, [Vec3::NEG_Z; 3]);
     assert_eq!(mesh.uvs, [Vec2::new(0.75, 1.0); 3]);
     assert_eq!(read_bytes(&wild(true)).expect("big").mesh, mesh);
@@ -270,4 +270,162 @@ fn values_that_the_header_does_not_name_are_left_out_line_by_line() {
     // Several items in a line are fine.
     let joined = read_bytes(&ascii("0 0 0 1 0 0\n1 1 0 0 1 0\n3 0 1 2\n")).expect("whole");
     assert_eq!((joined.mesh, joined.warnings.len()), (plain.mesh, 0));
+}
+
+/// A text with the square's vertices, and faces with these properties and lines.
+fn square(vertex: (&str, [&str; 4]), face: &str, lines: &[&str]) -> String {
+    let (properties, tails) = vertex;
+    let xyz = "property float x\nproperty float y\nproperty float z\n";
+    let vertices: String = SQUARE.lines().zip(tails).map(|(line, tail)| format!("{line} {tail}\n")).collect();
+    format!(
+        "ply\nformat ascii 1.0\nelement vertex 4\n{xyz}{properties}element face {}\n\
+         property list uchar int vertex_indices\n{face}end_header\n{vertices}{}\n",
+        lines.len(),
+        lines.join("\n")
+    )
+}
+
+const PLAIN: (&str, [&str; 4]) = ("", [""; 4]);
+
+/// The value of each corner of the triangles.
+fn of_corners<T: Copy>(loaded: &LoadedMesh, values: &[T]) -> Vec<T> {
+    loaded
+        .mesh
+        .triangles
+        .as_flattened()
+        .iter()
+        .filter_map(|vertex| values.get(*vertex as usize))
+        .copied()
+        .collect()
+}
+
+fn loaded(text: &str) -> LoadedMesh {
+    read_bytes(text.as_bytes()).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+#[test]
+fn texture_coordinates_of_corners_are_read() {
+    let list = "property list uchar float texcoord\n";
+    let uvs = |face: &str, lines: &[&str]| {
+        let loaded = loaded(&square(PLAIN, face, lines));
+        (of_corners(&loaded, &loaded.mesh.uvs), loaded.warnings)
+    };
+    let [a, b, c, d] = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
+    let both = vec![a, b, c, a, c, d];
+    let two = ["3 0 1 2 6 0 0 1 0 1 1", "3 0 2 3 6 0 0 1 1 0 1"];
+    assert_eq!(uvs(list, &two), (both.clone(), vec![]));
+    assert_eq!(uvs(list, &["4 0 1 2 3 8 0 0 1 0 1 1 0 1"]), (both.clone(), vec![]));
+    assert_eq!(uvs(list, &["4 0 1 2 3 12 0 0 9 1 0 9 1 1 9 0 1 9"]), (both.clone(), vec![]));
+    for name in ["texcoords", "uv", "st", "texture_coordinates"] {
+        assert_eq!(uvs(&list.replace("texcoord", name), &two).0, both, "{name}");
+    }
+    let numbered = format!("{list}property int texnumber\n");
+    assert_eq!(
+        uvs(&numbered, &["3 0 1 2 6 0 0 1 0 1 1 2", "3 0 2 3 6 0 0 1 1 0 1 2"]),
+        (both.clone(), vec![])
+    );
+    let several = "the faces have several textures (`texnumber`): all show those of one material";
+    assert_eq!(
+        uvs(&numbered, &["3 0 1 2 6 0 0 1 0 1 1 0", "3 0 2 3 6 0 0 1 1 0 1 1"]),
+        (both.clone(), vec![several.to_owned()])
+    );
+    // Those of a face are for all of its corners.
+    let one = vec![Vec2::new(0.5, 0.25); 6];
+    assert_eq!(uvs(list, &["4 0 1 2 3 2 0.5 0.25"]).0, one);
+    assert_eq!(uvs("property float u\nproperty float v\n", &["4 0 1 2 3 0.5 0.25"]).0, one);
+    assert_eq!(uvs("property double s\nproperty double t\n", &["4 0 1 2 3 0.5 0.25"]).0, one);
+    // An empty list is nothing to warn of; a wrong one is.
+    assert_eq!(uvs(list, &[two[0], "3 0 2 3 0"]), (vec![a, b, c, a, a, a], vec![]));
+    let (found, warnings) = uvs(list, &[two[0], "3 0 2 3 5 1 1 1 1 1"]);
+    assert_eq!(found, [a, b, c, a, a, a]);
+    let does_not_fit = "line 15: face 2: the number of texture coordinates or colors does not fit the corners: ignored there";
+    assert_eq!(warnings, [does_not_fit]);
+    assert!(uvs("", &["3 0 1 2"]).0.is_empty());
+}
+
+#[test]
+fn seams_of_textures_keep_the_normals_of_vertices() {
+    let list = "property list uchar float texcoord\n";
+    let text = square(PLAIN, list, &["3 0 1 2 6 0 0 1 0 1 1", "3 0 2 3 6 0.5 0.5 1 0 0 1"])
+        .replace("1 1 0 \n", "1 1 5 \n");
+    let mesh = loaded(&text).mesh;
+    let normals = crate::assets::mesh::vertex_normals(&mesh, &CancelToken::new()).expect("nobody cancels");
+    assert_eq!(mesh.positions.len(), 6);
+    for (a, b) in [(0, 3), (2, 4)] {
+        let [a, b] = [(0, a), (1, b - 3)].map(|(face, corner)| mesh.triangles[face][corner] as usize);
+        assert!(a != b && normals[a] == normals[b], "{normals:?}");
+    }
+}
+
+#[test]
+fn vertex_colors_of_every_type_and_range() {
+    let colors = |scalar: &str, names: [&str; 3], tail: &str| {
+        let properties: String = names.iter().map(|name| format!("property {scalar} {name}\n")).collect();
+        let loaded = loaded(&square((&properties, [tail; 4]), "", &["3 0 1 2"]));
+        loaded.mesh.colors[0]
+    };
+    let names = ["red", "green", "blue"];
+    for (scalar, tail) in [
+        ("uchar", "200 100 50"),
+        ("int", "200 100 50"),
+        ("uint", "200 100 50"),
+        ("short", "200 100 50"),
+        ("ushort", "200 100 50"),
+        ("float", "200 100 50"),
+        ("double", "200.0 100.2 50.0"),
+        ("float", "0.784314 0.392157 0.196078"),
+        ("ushort", "51400 25700 12850"),
+        ("int", "51400 25700 12850"),
+        ("uint", "3368601800 1684300900 842150450"),
+    ] {
+        assert_eq!(colors(scalar, names, tail), [200, 100, 50], "{scalar} {tail}");
+    }
+    for names in [["r", "g", "b"], ["diffuse_red", "diffuse_green", "diffuse_blue"]] {
+        assert_eq!(colors("uchar", names, "200 100 50"), [200, 100, 50], "{names:?}");
+    }
+}
+
+#[test]
+fn an_alpha_below_one_is_warned_of() {
+    let warnings = |scalar: &str, tail: &str| {
+        let names = ["red", "green", "blue", "alpha"];
+        let properties: String = names.iter().map(|name| format!("property {scalar} {name}\n")).collect();
+        loaded(&square((&properties, [tail; 4]), "", &["3 0 1 2"])).warnings
+    };
+    for (scalar, opaque, faded) in [
+        ("uchar", "9 9 9 255", "9 9 9 254"),
+        ("float", "1 1 1 1", "1 1 1 0.5"),
+        ("float", "9 9 9 255", "9 9 9 9"),
+    ] {
+        assert!(warnings(scalar, opaque).is_empty(), "{scalar} {opaque}");
+        assert_eq!(warnings(scalar, faded), ["the alpha of the colors is ignored"]);
+    }
+}
+
+#[test]
+fn colors_of_faces_and_of_corners_are_read() {
+    let parts =
+        |scalar: &str| ["red", "green", "blue"].map(|name| format!("property {scalar} {name}\n")).concat();
+    let colors = |vertex, face: &str, lines: &[&str]| {
+        let loaded = loaded(&square(vertex, face, lines));
+        (of_corners(&loaded, &loaded.mesh.colors), loaded.warnings)
+    };
+    let (red, green, blue) = ([255, 0, 0], [0, 255, 0], [0, 0, 255]);
+    let both = [[red; 3], [green; 3]].concat();
+    assert_eq!(
+        colors(PLAIN, &parts("uchar"), &["3 0 1 2 255 0 0", "3 0 2 3 0 255 0"]),
+        (both.clone(), vec![])
+    );
+    assert_eq!(colors(PLAIN, &parts("float"), &["3 0 1 2 1 0 0", "3 0 2 3 0 1 0"]).0, both);
+    assert_eq!(colors(PLAIN, &parts("float"), &["3 0 1 2 255 0 0", "3 0 2 3 0 255 0"]).0, both);
+    let list = "property list uchar float color\n";
+    let corners = ["3 0 1 2 9 1 0 0 0 1 0 0 0 1", "3 0 2 3 4 0 1 0 1"];
+    assert_eq!(colors(PLAIN, list, &corners), ([red, green, blue, green, green, green].to_vec(), vec![]));
+    assert_eq!(colors(PLAIN, list, &[corners[0], "3 0 2 3 0"]).0[3..], [[255; 3]; 3]);
+    let vertex = parts("uchar");
+    let (found, warnings) = colors((&vertex, ["0 0 255"; 4]), &parts("uchar"), &["3 0 1 2 255 0 0"]);
+    assert_eq!(
+        (found, warnings),
+        (vec![blue; 3], vec!["the colors of the faces are ignored: the vertices have colors".to_owned()])
+    );
 }

@@ -1,0 +1,66 @@
+//! Corners with values of their own, which vertices do not have.
+
+use std::collections::HashMap;
+
+use super::assemble::Parsed;
+use crate::control::{CancelToken, Cancelled};
+use crate::geometry::mesh::NormalGroup;
+use crate::math::Vec2;
+
+/// Corners between two polls of the token.
+const BATCH: usize = 1 << 14;
+
+/// A vertex with the values of a corner.
+type Key = (u32, [u32; 2], [u8; 3]);
+
+/// Makes a vertex for each combination of a vertex, texture coordinates and a color that corners have. They keep the normal of
+/// the vertex.
+pub(super) fn split(parsed: &mut Parsed, token: &CancelToken) -> Result<(), Cancelled> {
+    let (uvs, colors) = (std::mem::take(&mut parsed.corner_uvs), std::mem::take(&mut parsed.corner_colors));
+    let vertices = parsed.positions.len();
+    let is_in_range = |corner: &u32| (*corner as usize) < vertices;
+    // A corner out of range is an error that is reported with its face.
+    if (uvs.is_empty() && colors.is_empty()) || !parsed.faces.corners.iter().all(is_in_range) {
+        return Ok(());
+    }
+    let mut sources = Vec::new();
+    let (mut new_uvs, mut new_colors) = (Vec::new(), Vec::new());
+    let mut known: HashMap<Key, u32> = HashMap::new();
+    for (place, corner) in parsed.faces.corners.iter_mut().enumerate() {
+        if place % BATCH == 0 {
+            token.check()?;
+        }
+        let vertex = *corner as usize;
+        let of_vertex = || parsed.uvs.get(vertex).copied().unwrap_or(Vec2::ZERO);
+        let uv = uvs.get(place).copied().filter(|uv| !uv.is_nan()).unwrap_or_else(of_vertex);
+        let color = colors.get(place).copied().unwrap_or_default();
+        let next = sources.len() as u32;
+        *corner = *known.entry((*corner, uv.to_array().map(f32::to_bits), color)).or_insert(next);
+        if *corner == next {
+            sources.push(vertex);
+            new_uvs.push(uv);
+            new_colors.push(color);
+        }
+    }
+    take(&mut parsed.positions, &sources);
+    take(&mut parsed.normals, &sources);
+    take(&mut parsed.uvs, &sources);
+    take(&mut parsed.second_uvs, &sources);
+    take(&mut parsed.colors, &sources);
+    if !uvs.is_empty() {
+        parsed.uvs = new_uvs;
+    }
+    if !colors.is_empty() {
+        parsed.colors = new_colors;
+    }
+    let group = |vertex: &usize| NormalGroup { normal: *vertex as u32, group: NormalGroup::BY_ANGLE };
+    parsed.normal_groups = sources.iter().map(group).collect();
+    Ok(())
+}
+
+/// Takes the value of each source; an empty list stays empty.
+fn take<T: Copy>(values: &mut Vec<T>, sources: &[usize]) {
+    if !values.is_empty() {
+        *values = sources.iter().map(|vertex| values[*vertex]).collect();
+    }
+}

@@ -1,0 +1,56 @@
+//! Colors of a PLY file, whose range depends on their type and on their greatest number.
+
+use super::super::assemble::{ColorRange, color_bytes};
+use super::header::Scalar;
+
+/// Colors in the order of the file.
+pub(super) struct Colors {
+    /// Types of red, green and blue.
+    scalars: [Scalar; 3],
+    /// Colors whose parts are bytes.
+    bytes: Vec<[u8; 3]>,
+    /// All other colors.
+    numbers: Vec<[f64; 3]>,
+    range: ColorRange,
+    /// Least alpha and its type.
+    alpha: Option<(f64, Scalar)>,
+}
+
+impl Colors {
+    pub(super) fn new(scalars: [Scalar; 3]) -> Self {
+        let (bytes, numbers) = Default::default();
+        Self { scalars, bytes, numbers, range: ColorRange::default(), alpha: None }
+    }
+
+    pub(super) fn push(&mut self, color: [f64; 3]) {
+        if self.scalars == [Scalar::U8; 3] {
+            self.bytes.push(color.map(|part| part as u8));
+        } else {
+            self.range.add(color);
+            self.numbers.push(color);
+        }
+    }
+
+    pub(super) fn alpha(&mut self, alpha: f64, scalar: Scalar) {
+        let least = self.alpha.map_or(alpha, |(least, _)| least.min(alpha));
+        self.alpha = Some((least, scalar));
+    }
+
+    /// The colors in bytes, and the warning of an alpha.
+    pub(super) fn finish(self) -> (Vec<[u8; 3]>, Option<String>) {
+        let one = |scalar: Scalar| match scalar {
+            Scalar::U8 | Scalar::I8 => scalar.greatest(),
+            Scalar::I16 | Scalar::U16 | Scalar::I32 | Scalar::U32 => {
+                let fits = |limit: &f64| self.range.greatest() <= *limit;
+                [255.0, 65535.0].into_iter().find(fits).unwrap_or(f64::INFINITY).min(scalar.greatest())
+            }
+            Scalar::F32 | Scalar::F64 => self.range.one(),
+        };
+        let is_seen_through = self.alpha.is_some_and(|(least, scalar)| least < one(scalar));
+        let warning = is_seen_through.then(|| "the alpha of the colors is ignored".to_owned());
+        let ones = self.scalars.map(one);
+        let in_bytes = |color: &[f64; 3]| color_bytes(std::array::from_fn(|part| color[part] / ones[part]));
+        let colors = self.numbers.iter().map(in_bytes);
+        (if self.numbers.is_empty() { self.bytes } else { colors.collect() }, warning)
+    }
+}
