@@ -48,6 +48,15 @@ pub fn kind(path: &Path) -> io::Result<(Kind, Metadata)> {
     Ok((Kind::of(path, &metadata), metadata))
 }
 
+/// Most bytes of a pointer of Git LFS (the specification of Git LFS: "pointer files must be less than 1024 bytes").
+pub const LFS_POINTER_LIMIT: u64 = 1024;
+
+/// Whether these bytes are a pointer of Git LFS in place of a file's content.
+pub fn is_lfs_pointer(bytes: &[u8]) -> bool {
+    let starts = ["version https://git-lfs.github.com/spec/", "version https://hawser.github.com/spec/"];
+    (bytes.len() as u64) < LFS_POINTER_LIMIT && starts.iter().any(|start| bytes.starts_with(start.as_bytes()))
+}
+
 /// Reason not to replace this file with another one, if there is any. Read-only files are kept even for root,
 /// who could replace them.
 pub fn why_keep(metadata: &Metadata) -> Option<&'static str> {

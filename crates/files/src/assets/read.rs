@@ -38,10 +38,19 @@ pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
     let refused =
         |kind: Kind| AssetError::unreadable(path, format!("it is {}, not a regular file", kind.words()));
-    let (file, found) = file::open(path).map_err(unreadable)?.map_err(refused)?;
+    let (mut file, found) = file::open(path).map_err(unreadable)?.map_err(refused)?;
     if found.len() > limit {
         let reason = format!("it has {} bytes, more than the {} MiB that are read", found.len(), limit >> 20);
         return Err(AssetError::unreadable(path, reason));
+    }
+    if found.len() < file::LFS_POINTER_LIMIT {
+        let mut bytes = Vec::new();
+        (&mut file).take(file::LFS_POINTER_LIMIT).read_to_end(&mut bytes).map_err(unreadable)?;
+        if file::is_lfs_pointer(&bytes) {
+            let reason = "it is a Git LFS pointer, not the file's content: run `git lfs pull`";
+            return Err(AssetError::unreadable(path, reason));
+        }
+        file.rewind().map_err(unreadable)?;
     }
     Ok((file, found.len()))
 }
@@ -51,12 +60,18 @@ const START: usize = 1 << 12;
 
 /// Reads a text file; a file whose start is binary is refused before the rest is read.
 pub(crate) fn text(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, watch, |start| !start.contains(&0))
+    bytes_if(path, limit, watch, |start| {
+        refuse_utf16(path, start)?;
+        binary_if(path, start.contains(&0))
+    })
 }
 
 /// Reads a file whose first three bytes are not zeros: they are letters in every format that uses this function.
 pub(crate) fn lettered(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, watch, |start| !start[..start.len().min(3)].contains(&0))
+    bytes_if(path, limit, watch, |start| {
+        refuse_utf16(path, start)?;
+        binary_if(path, start[..start.len().min(3)].contains(&0))
+    })
 }
 
 /// Reads the start of a regular file, at most so many bytes.
@@ -67,14 +82,28 @@ pub(crate) fn start(path: &Path, most: u64) -> Result<Vec<u8>, AssetError> {
     read.map(|_| bytes).map_err(|error| AssetError::unreadable(path, in_words(&error)))
 }
 
-/// Reads a file that does not begin with zeros alone.
+/// Reads a file, text or binary, that does not begin with zeros alone.
 pub(crate) fn not_blank(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, watch, |start| start.is_empty() || start.iter().any(|byte| *byte != 0))
+    bytes_if(path, limit, watch, |start| {
+        binary_if(path, !start.is_empty() && start.iter().all(|byte| *byte == 0))
+    })
 }
 
-/// Reads a regular file.
+/// Reads a regular file, whose bytes may be any.
 pub(crate) fn bytes(path: &Path, limit: u64, watch: Watch<'_>) -> Result<Vec<u8>, AssetError> {
-    bytes_if(path, limit, watch, |_| true)
+    bytes_if(path, limit, watch, |_| Ok(()))
+}
+
+fn binary_if(path: &Path, is_binary: bool) -> Result<(), AssetError> {
+    let refused = || AssetError::malformed(path, Some(1), "this is a binary file of another kind");
+    if is_binary { Err(refused()) } else { Ok(()) }
+}
+
+/// Refuses a file that should be text and begins as UTF-16 does. Numbers of 16 bits may look the same: do not call this on files
+/// that may be binary.
+pub(crate) fn refuse_utf16(path: &Path, start: &[u8]) -> Result<(), AssetError> {
+    let refused = || AssetError::malformed(path, Some(1), "this is text in UTF-16; save it as UTF-8");
+    if is_utf16(start) { Err(refused()) } else { Ok(()) }
 }
 
 /// Whether a file begins as text in UTF-16 does: two letters, each beside a byte 0, behind a mark or not.
@@ -93,19 +122,13 @@ fn bytes_if(
     path: &Path,
     limit: u64,
     watch: Watch<'_>,
-    accept: impl Fn(&[u8]) -> bool,
+    accept: impl Fn(&[u8]) -> Result<(), AssetError>,
 ) -> Result<Vec<u8>, AssetError> {
     let (mut file, length) = open(path, limit)?;
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
     let mut start = Vec::new();
     (&mut file).take(START as u64).read_to_end(&mut start).map_err(unreadable)?;
-    if is_utf16(&start) {
-        let reason = "this is text in UTF-16; save it as UTF-8";
-        return Err(AssetError::malformed(path, Some(1), reason));
-    }
-    if !accept(&start) {
-        return Err(AssetError::malformed(path, Some(1), "this is a binary file of another kind"));
-    }
+    accept(&start)?;
     file.rewind().map_err(unreadable)?;
     rest(path, file, (length, limit), watch)
 }
@@ -184,12 +207,44 @@ mod tests {
             let big: Vec<u8> = words().encode_utf16().flat_map(u16::to_be_bytes).collect();
             for bytes in [little, big] {
                 fs::write(&path, bytes).expect("written");
-                for read in [text, lettered, not_blank] {
+                for read in [text, lettered] {
                     let error = read(&path, u64::MAX, watch(&token)).expect_err("refused").to_string();
                     assert!(error.ends_with("wide:1: this is text in UTF-16; save it as UTF-8"), "{error}");
                 }
             }
         }
+    }
+
+    #[test]
+    fn binary_files_may_begin_as_utf16_does() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let token = CancelToken::new();
+        let path = folder.path().join("numbers");
+        for numbers in [[33_u16, 126, 40], [0xfeff, 65, 66]] {
+            let content: Vec<u8> = numbers.into_iter().flat_map(u16::to_le_bytes).collect();
+            fs::write(&path, &content).expect("written");
+            for read in [bytes, not_blank] {
+                assert_eq!(read(&path, 100, watch(&token)).expect("numbers"), content);
+            }
+        }
+    }
+
+    #[test]
+    fn pointers_of_git_lfs_are_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let token = CancelToken::new();
+        let path = folder.path().join("pointer");
+        let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+        fs::write(&path, pointer).expect("written");
+        for read in [text, lettered, not_blank, bytes] {
+            let error = read(&path, 1 << 20, watch(&token)).expect_err("no content").to_string();
+            assert!(
+                error.ends_with("Git LFS pointer, not the file's content: run `git lfs pull`"),
+                "{error}"
+            );
+        }
+        fs::write(&path, format!("{pointer}{}", "x".repeat(1024))).expect("written");
+        assert!(bytes(&path, 1 << 20, watch(&token)).is_ok(), "pointers are short");
     }
 
     #[cfg(unix)]

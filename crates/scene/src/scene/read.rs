@@ -25,6 +25,10 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
         return Err(problem(path, message, Some(help), None));
     }
     let bytes = bytes(path).map_err(|(message, help)| problem(path, message, help, None))?;
+    if file::is_lfs_pointer(&bytes) {
+        let message = "this is a Git LFS pointer, not the file's content".to_owned();
+        return Err(problem(path, message, Some("run `git lfs pull`".to_owned()), None));
+    }
     if let Some(content) = OtherContent::of(&bytes) {
         return Err(content.problem(path));
     }
@@ -414,6 +418,17 @@ mod tests {
         assert!(help.expect("a way out").contains("rename it to model.obj"));
         std::fs::write(&path, b"\x89PNG\r\n\x1a\n").expect("written");
         assert_eq!(message(&path).message, "this is a picture, not the text of a scene");
+    }
+
+    #[test]
+    fn a_pointer_of_git_lfs_is_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.toml");
+        std::fs::write(&path, "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 9\n")
+            .expect("written");
+        let said = message(&path);
+        assert_eq!(said.message, "this is a Git LFS pointer, not the file's content");
+        assert_eq!(said.help.as_deref(), Some("run `git lfs pull`"));
     }
 
     #[test]

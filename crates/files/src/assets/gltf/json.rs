@@ -116,6 +116,20 @@ pub(super) struct NodeExtensions {
     pub(super) light: Option<NodeLight>,
     #[serde(rename = "EXT_mesh_gpu_instancing")]
     pub(super) instancing: Option<IgnoredAny>,
+    #[serde(rename = "KHR_node_visibility")]
+    pub(super) visibility: Option<NodeVisibility>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(default)]
+pub(super) struct NodeVisibility {
+    pub(super) visible: bool,
+}
+
+impl Default for NodeVisibility {
+    fn default() -> Self {
+        Self { visible: true }
+    }
 }
 
 #[derive(Debug, Deserialize)]

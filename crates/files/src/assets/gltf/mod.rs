@@ -130,6 +130,7 @@ impl Container {
     pub fn open(path: &Path, progress: Progress<'_>, token: &CancelToken) -> Result<Self, AssetError> {
         let watch = Watch { progress, token };
         let bytes = read::not_blank(path, FILE_LIMIT, watch)?;
+        read::refuse_utf16(path, &bytes)?;
         let (length, hash) = (bytes.len(), read::hash(&bytes));
         let wrong = |wrong: Wrong| AssetError::malformed(path, None, wrong.0);
         let (json, binary) =
@@ -436,7 +437,7 @@ const MISSING: [(&str, &str); 5] = [
 ];
 
 /// Extensions that are read, or whose loss a note states.
-const KNOWN: [&str; 20] = [
+const KNOWN: [&str; 21] = [
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -454,6 +455,7 @@ const KNOWN: [&str; 20] = [
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_transform",
     // Data about the file, which no picture shows.
     "KHR_xmp",

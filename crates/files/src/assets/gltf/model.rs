@@ -127,8 +127,9 @@ impl Walk<'_> {
         }
         // Place every node. A node may have one parent: more, and circles, are met as a second visit.
         let worlds = self.worlds(&roots)?;
-        for &(node, placed) in &worlds.order {
-            self.node(node, placed, &worlds).map_err(|wrong| wrong.inside(format!("nodes[{node}]")))?;
+        for &(node, placed, is_visible) in &worlds.order {
+            self.node(node, placed, is_visible, &worlds)
+                .map_err(|wrong| wrong.inside(format!("nodes[{node}]")))?;
         }
         Ok(())
     }
@@ -136,35 +137,38 @@ impl Walk<'_> {
     fn worlds(&self, roots: &[usize]) -> Result<Worlds, Wrong> {
         let nodes = &self.container.root.nodes;
         let mut worlds = Worlds { order: Vec::new(), of_node: vec![None; nodes.len()] };
-        let mut waiting: Vec<(usize, Placed)> =
-            roots.iter().rev().map(|node| (*node, Placed::IDENTITY)).collect();
-        while let Some((number, parent)) = waiting.pop() {
+        let mut waiting: Vec<(usize, Placed, bool)> =
+            roots.iter().rev().map(|node| (*node, Placed::IDENTITY, true)).collect();
+        while let Some((number, parent, is_parent_visible)) = waiting.pop() {
             let node = nodes.get(number).ok_or_else(|| Wrong::index("nodes", number, nodes.len()))?;
             if worlds.of_node[number].is_some() {
                 return Err(Wrong::new(format!("nodes[{number}] is its own ancestor, or has two parents")));
             }
             let placed = parent.after(local(node));
             worlds.of_node[number] = Some(placed);
-            worlds.order.push((number, placed));
-            waiting.extend(node.children.iter().rev().map(|child| (*child, placed)));
+            let hides = node.extensions.visibility.as_ref().is_some_and(|visibility| !visibility.visible);
+            let is_visible = is_parent_visible && !hides;
+            worlds.order.push((number, placed, is_visible));
+            waiting.extend(node.children.iter().rev().map(|child| (*child, placed, is_visible)));
         }
         Ok(worlds)
     }
 
-    fn node(&mut self, number: usize, placed: Placed, worlds: &Worlds) -> Result<(), Wrong> {
+    /// Adds what a node shows: a hidden one only its camera.
+    fn node(
+        &mut self,
+        number: usize,
+        placed: Placed,
+        is_visible: bool,
+        worlds: &Worlds,
+    ) -> Result<(), Wrong> {
         let container = self.container;
         let root = &container.root;
         let node = &root.nodes[number];
         let place = format!("nodes[{number}]");
-        if node.mesh.is_some() || node.camera.is_some() || node.extensions.light.is_some() {
+        let shows = node.mesh.is_some() || node.extensions.light.is_some();
+        if node.camera.is_some() || (is_visible && shows) {
             check_reach(node, &placed)?;
-        }
-        if let Some(light) = &node.extensions.light {
-            let lights = &root.extensions.lights.lights;
-            let json =
-                lights.get(light.light).ok_or_else(|| Wrong::index("lights", light.light, lights.len()))?;
-            check_intensity(json, light.light)?;
-            self.light(json, &node.name, placed, &place);
         }
         if let Some(camera) = node.camera {
             let json = root
@@ -172,6 +176,16 @@ impl Walk<'_> {
                 .get(camera)
                 .ok_or_else(|| Wrong::index("cameras", camera, root.cameras.len()))?;
             self.camera(json, &node.name, placed, &place);
+        }
+        if !is_visible {
+            return Ok(());
+        }
+        if let Some(light) = &node.extensions.light {
+            let lights = &root.extensions.lights.lights;
+            let json =
+                lights.get(light.light).ok_or_else(|| Wrong::index("lights", light.light, lights.len()))?;
+            check_intensity(json, light.light)?;
+            self.light(json, &node.name, placed, &place);
         }
         if node.extensions.instancing.is_some() {
             self.notes.add(
@@ -399,8 +413,8 @@ fn check_intensity(json: &Light, number: usize) -> Result<(), Wrong> {
 
 /// Placements of all nodes.
 struct Worlds {
-    /// Nodes in the order of the walk.
-    order: Vec<(usize, Placed)>,
+    /// Nodes in the order of the walk, with their placement and whether they are visible (`KHR_node_visibility`).
+    order: Vec<(usize, Placed, bool)>,
     /// Placement of each node; `None` for those that the scene does not have.
     of_node: Vec<Option<Placed>>,
 }

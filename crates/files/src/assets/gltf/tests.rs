@@ -181,6 +181,43 @@ fn normalised_integers_and_sparse_elements_are_numbers() {
 }
 
 #[test]
+fn hidden_nodes_show_neither_meshes_nor_lights_below_them() {
+    let visible = |visible: bool| json!({"KHR_node_visibility": {"visible": visible}});
+    let mut json = square();
+    json["extensionsRequired"] = json!(["KHR_node_visibility"]);
+    json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "point"}]}});
+    json["cameras"] = json!([{"perspective": {"yfov": 0.5}}]);
+    let mut lit = visible(true);
+    lit["KHR_lights_punctual"] = json!({"light": 0});
+    json["nodes"] = json!([
+        {"name": "shown", "mesh": 0, "children": [1, 4], "extensions": visible(true)},
+        {"name": "hidden", "mesh": 0, "children": [2, 3], "extensions": visible(false)},
+        {"name": "below", "mesh": 0, "camera": 0, "extensions": lit, "children": [5]},
+        {"extensions": {"KHR_lights_punctual": {"light": 0}}},
+        {"name": "last", "mesh": 0, "extensions": {"KHR_node_visibility": {}}},
+        {"name": "far", "mesh": 0, "scale": [1e20, 1, 1]}
+    ]);
+    let scene = scene(&open_json(&json).expect("read")).expect("a scene");
+    let names: Vec<&str> = scene.instances.iter().map(|instance| instance.name.as_str()).collect();
+    assert_eq!(names, ["shown", "last"]);
+    assert_eq!((scene.lights.len(), scene.cameras.len()), (0, 1), "a camera shows nothing of its own");
+}
+
+#[test]
+fn a_buffer_is_no_text() {
+    let desk = Desk::new();
+    // Two numbers of 16 bits that are letters in UTF-16.
+    let mut json = square();
+    json["bufferViews"][0]["byteOffset"] = json!(4);
+    json["bufferViews"][1]["byteOffset"] = json!(52);
+    json["bufferViews"][2]["byteOffset"] = json!(64);
+    json["buffers"][0] = json!({"byteLength": 96, "uri": "a.bin"});
+    desk.write("a.bin", &[&[b'a', 0, b'b', 0], &bytes()[..]].concat());
+    let container = desk.open("a.gltf", json.to_string().as_bytes()).expect("read");
+    assert_eq!(part(&container, 0).expect("a mesh").mesh.positions.len(), 4);
+}
+
+#[test]
 fn nodes_place_parts_and_cameras_and_lights() {
     let mut json = square();
     json["nodes"] = json!([

@@ -6,6 +6,7 @@
 use super::assemble::{Faces, Parsed, assemble};
 use super::text::{Cursor, shown, with_line_feeds};
 use super::{AssetError, LoadedMesh, Source};
+use crate::assets::read;
 use crate::math::DVec3;
 
 /// Bytes before the number of facets of a binary file.
@@ -18,6 +19,9 @@ const FACET: usize = 50;
 const BATCH: usize = 1 << 13;
 
 pub(super) fn parse(source: &Source<'_>) -> Result<LoadedMesh, AssetError> {
+    if !fits_claim(source.bytes) {
+        read::refuse_utf16(source.path, source.bytes)?;
+    }
     let mut parsed = match kind(source.bytes) {
         Kind::Text => {
             let bytes = with_line_feeds(source.bytes);
@@ -38,12 +42,16 @@ enum Kind {
 
 /// The kind of a file. One whose length is that of the facets which it claims is binary, whatever its header says.
 fn kind(bytes: &[u8]) -> Kind {
-    let fits = claimed(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count);
     let word = bytes.trim_ascii_start().get(..5);
     let says_solid = word.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
     // Text has no byte 0; a header is filled with them, or with blanks before facets that have some.
     let is_text = says_solid && memchr::memchr(0, bytes).is_none();
-    if is_text && !fits { Kind::Text } else { Kind::Binary }
+    if is_text && !fits_claim(bytes) { Kind::Text } else { Kind::Binary }
+}
+
+/// Whether the length of a file is that of the facets which it claims as a binary file.
+fn fits_claim(bytes: &[u8]) -> bool {
+    claimed(bytes).is_some_and(|count| bytes.len() as u64 == START as u64 + FACET as u64 * count)
 }
 
 /// The number of facets that a binary file claims. `None` if it ends before.
@@ -268,6 +276,7 @@ mod tests {
             binary_of(b"made by nobody", 4, &TETRAHEDRON),
             binary_of(b"solid that is binary", 4, &TETRAHEDRON),
             binary_of(b"solid without its count", 0, &TETRAHEDRON),
+            binary_of(b"s\0o\0l\0i\0d\0", 4, &TETRAHEDRON),
             text_of(&TETRAHEDRON).into_bytes(),
             text_of(&TETRAHEDRON).to_uppercase().replace('\n', "\r").into_bytes(),
             text_of(&TETRAHEDRON).replace('\n', " ").replacen("# any name", "\n", 1).into_bytes(),
@@ -347,6 +356,8 @@ mod tests {
         assert!(
             says(b"PK\x03\x04 an archive").starts_with("a.stl: an STL file is text that begins with solid")
         );
+        let wide: Vec<u8> = "solid a\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+        assert_eq!(says(&wide), "a.stl:1: this is text in UTF-16; save it as UTF-8");
         assert!(says(b"solid a\nendsolid a\n").contains("no usable face: the file has none"));
         assert!(
             says(b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 x\n")
