@@ -282,7 +282,7 @@ fn a_command_that_is_said_can_be_pasted() {
 fn help_and_version_are_answers() {
     let desk = Desk::new();
     for (line, word) in
-        [("--help", "--samples"), ("--version", env!("CARGO_PKG_VERSION")), ("new --help", "FILE")]
+        [("--help", "--samples"), ("--version", glimt::pipeline::BUILD), ("new --help", "FILE")]
     {
         let output = desk.run(line);
         assert_eq!(output.status.code(), Some(0));

@@ -65,7 +65,7 @@ const STYLES: Styles = Styles::styled()
 
 /// A ray tracer that lives in the terminal: edit a scene, save it, see it.
 #[derive(Clone, Debug, Parser)]
-#[command(name = "glimt", version, after_help = after_help(), after_long_help = after_long_help(), styles = STYLES)]
+#[command(name = "glimt", version = crate::pipeline::BUILD, after_help = after_help(), after_long_help = after_long_help(), styles = STYLES)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, max_term_width = 100)]
 pub struct Args {
     /// A command other than rendering.

@@ -12,7 +12,7 @@ use crate::tui::{self, Answers, ColorDepth, Probe, probe};
 
 /// Prints a line for each finding.
 pub(super) fn run(console: &Console) -> Exit {
-    let mut lines = vec![("glimt", format!("{}, {}-{}", env!("CARGO_PKG_VERSION"), ARCH, OS))];
+    let mut lines = vec![("glimt", format!("{}, {}-{}", crate::pipeline::BUILD, ARCH, OS))];
     lines.extend([("processor", processor()), ("threads", threads())]);
     match probe() {
         Some(probe) => lines.extend(terminal(&probe)),

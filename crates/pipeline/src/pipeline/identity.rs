@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use super::assembly::Eye;
+use super::build::BUILD;
 use super::keys;
 use super::plan::Plan;
 use super::stages::parse::Parsed;
@@ -28,7 +29,7 @@ pub(super) struct Depends<'a> {
 impl Depends<'_> {
     /// Names and values.
     pub(super) fn traits(&self) -> Vec<Trait> {
-        let mut traits = vec![Trait::setting("glimt", env!("CARGO_PKG_VERSION"))];
+        let mut traits = vec![Trait::setting("glimt", BUILD)];
         self.add_settings(&mut traits);
         let scene_path = &self.parsed.loaded.path;
         let others = self.files.iter().filter(|file| file.path != *scene_path);

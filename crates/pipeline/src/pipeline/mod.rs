@@ -7,6 +7,7 @@
 
 mod answers;
 mod assembly;
+mod build;
 mod cache;
 mod cautions;
 mod check;
@@ -37,6 +38,7 @@ mod worker;
 #[cfg(test)]
 mod tests;
 
+pub use build::BUILD;
 pub use check::{Checked, Checker, check};
 pub use model::import::{Imported, import};
 pub use watch::content::{Content, FileRead};

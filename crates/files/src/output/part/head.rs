@@ -215,10 +215,16 @@ pub fn differences(own: &[Trait], other: &[Trait], (here, there): (&str, &str)) 
                 debug_assert!(own.is_some() != other.is_some());
                 format!("{} is used {place} only", name_of(name))
             }
+            (Some(own), Some(other)) if *name == PROGRAM => {
+                format!("glimt {own} rendered it {here} and glimt {other} {there}; use the same build")
+            }
             (own, other) => format!("{name} is {} {here} and {} {there}", shown(own), shown(other)),
         })
         .collect()
 }
+
+/// Name of the trait that is the program's version and build.
+const PROGRAM: &str = "glimt";
 
 /// Name of the trait that stands for all others.
 pub(super) const EVERYTHING: &str = "everything";

@@ -148,6 +148,17 @@ fn other_files_are_told_from_parts() {
     assert!(opened(folder.path()).is_err() && opened(&folder.path().join("none")).is_err());
 }
 
+#[test]
+fn parts_of_two_builds_do_not_fit() {
+    let of = |build: &str| vec![Trait::setting("glimt", build), Trait::setting("width", "4")];
+    let [one, other] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(of);
+    assert_eq!(differences(&one, &one, ("here", "there")), [""; 0]);
+    assert_eq!(
+        differences(&one, &other, ("here", "there")),
+        ["glimt 0.1.0 (build 1) rendered it here and glimt 0.1.0 (build 2) there; use the same build"]
+    );
+}
+
 /// Whole records may not be left out or changed for those of another file either.
 #[test]
 fn records_are_bound_to_their_file() {

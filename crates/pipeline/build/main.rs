@@ -1,0 +1,20 @@
+//! Sets `GLIMT_BUILD`, the identity of the sources that decide what an image looks like.
+
+mod sources;
+
+use std::path::Path;
+
+/// Crates whose sources affect pixels.
+const CRATES: [&str; 6] = ["base", "kernel", "scene", "files", "trace", "pipeline"];
+
+fn main() {
+    let crates = Path::new("..");
+    let mut roots: Vec<_> = CRATES.iter().map(|name| crates.join(name).join("src")).collect();
+    // Versions of dependencies.
+    roots.push(crates.join("../Cargo.lock"));
+    for root in &roots {
+        println!("cargo::rerun-if-changed={}", root.display());
+    }
+    println!("cargo::rerun-if-changed=build");
+    println!("cargo::rustc-env=GLIMT_BUILD={:012x}", sources::identity(&roots) >> 16);
+}
