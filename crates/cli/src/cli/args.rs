@@ -2,6 +2,8 @@
 
 mod bench;
 pub(in crate::cli) mod candidates;
+#[cfg(test)]
+mod help_tests;
 mod parts;
 
 use std::ops::RangeInclusive;
@@ -13,6 +15,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 pub use self::bench::BenchArgs;
 pub use self::parts::{Engine, FarmArgs, MergeArgs};
+use super::console::answer_columns;
 use super::environment;
 use crate::choice;
 use crate::choice::Choice;
@@ -23,7 +26,7 @@ use crate::pipeline::turntable::{self, Turn};
 use crate::scene::description::{Accel, Integrator, KeyRange, Render, Shadows, render_keys};
 use crate::tui::{ColorChoice, PreviewChoice};
 
-/// Calls, with what they do.
+/// Calls, with what they do. No line is wider than a narrow terminal.
 pub(super) const EXAMPLES: &str = "  \
   glimt new ball.toml                     write a scene to start from
   glimt ball.toml                         edit it in an editor and see it here
@@ -31,21 +34,27 @@ pub(super) const EXAMPLES: &str = "  \
   glimt ball.toml --once --samples 16 --time 2 --report report.json
   glimt check ball.toml                   find errors without rendering
   glimt explain materials.metal.roughness what a key means
-  glimt helmet.glb                        a model alone: obj, off, ply, stl, glb, gltf
-  glimt helmet.glb --once --turntable 36 -o helmet.gif    all around it
-  glimt import helmet.glb -o helmet.toml  a scene of it, to edit
-  glimt compare a.exr reference.exr       the error of one picture against another
-  glimt bench ball.toml --plot plot.svg   measure the error of each method against its seconds
-  glimt ball.toml --once -o 1.part --shard 1/2    render the first half, as another machine the second
-  glimt merge a.png 1.part 2.part         join both
+  glimt helmet.glb                        show a model: obj, off, ply, stl, gltf
+  glimt helmet.glb --once --turntable 36 -o helmet.gif
+  glimt import helmet.glb -o helmet.toml  make a scene of it, to edit
+  glimt compare a.exr reference.exr       measure the error of an image
+  glimt bench ball.toml --plot plot.svg   plot the error of each method over time
+  glimt ball.toml --once -o 1.part --shard 1/2    render the first half
+  glimt merge a.png 1.part 2.part         join both halves
 
-The scene that `glimt new` writes has every key, with comments.
+The scene that `glimt new` writes has every key, with comments. \
 A scene that is named like a command is given with its folder: glimt ./check";
 
 /// Exit codes of all commands.
 pub(super) const EXIT_CODES: &str = "\
-0 done; 1 the work failed; 2 the call or the scene is wrong;
+0 done; 1 the work failed; 2 the call or the scene is wrong; \
 130, 143, 129 ended by SIGINT, SIGTERM, SIGHUP.";
+
+/// Columns of help: those of the terminal, or 80. `COLUMNS` overrides them.
+fn help_columns() -> usize {
+    let asked = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
+    asked.filter(|columns| *columns > 0).unwrap_or_else(answer_columns)
+}
 
 /// Text after the options of `--help`.
 fn after_long_help() -> String {
@@ -66,7 +75,7 @@ const STYLES: Styles = Styles::styled()
 /// A ray tracer that lives in the terminal: edit a scene, save it, see it.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "glimt", version = crate::pipeline::BUILD, after_help = after_help(), after_long_help = after_long_help(), styles = STYLES)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, max_term_width = 100)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, term_width = help_columns())]
 pub struct Args {
     /// A command other than rendering.
     #[command(subcommand)]
@@ -211,7 +220,7 @@ Exit codes: 0 explained; 2 there is no such key.";
 const SCHEMA_HELP: &str = "\
 A scene that begins with the line
   #:schema glimt.schema.json
-has the schema beside it in editors with Taplo (VS Code: Even Better TOML; also Helix, Neovim, Zed). `glimt new --schema`
+has the schema beside it in editors with Taplo (VS Code: Even Better TOML; also Helix, Neovim, Zed). `glimt new --schema` \
 writes both. Names of materials, files and geometry are left to `glimt check`.";
 
 choice! {
@@ -243,11 +252,11 @@ impl Draft {
 }
 
 const LSP_HELP: &str = "\
-Mistakes while you type, completion of keys, words and names, what a key means, definitions of names, colours.
+Mistakes while you type, completion of keys, words and names, what a key means, definitions of names, colours. \
 The editor starts it for scenes; docs/editors.md has the lines for Neovim, Helix and others.";
 
 const DOCTOR_HELP: &str = "\
-On a terminal it asks the terminal what it is and does, and waits a second at most for answers. The exit code is 0
+On a terminal it asks the terminal what it is and does, and waits a second at most for answers. The exit code is 0 \
 whatever it finds.";
 
 choice! {
@@ -267,11 +276,11 @@ choice! {
 }
 
 const IMPORT_HELP: &str = "\
-The scene is what `glimt FILE` shows, as a text to edit. Its meshes and images are in a folder beside it that has its
-name. Where the file has something that glimt lacks, a comment names it and what stands for it, and so does a message.
+The scene is what `glimt FILE` shows, as a text to edit. Its meshes and images are in a folder beside it that has its \
+name. Where the file has something that glimt lacks, a comment names it and what stands for it, and so does a message. \
 Lights: 1 cd counts as 1 W/sr, 1 lx as 1 W/m2.
 
-Exit codes: 0 written; 1 it could not be written, or --strict and something has no equal; 2 the file is wrong, or
+Exit codes: 0 written; 1 it could not be written, or --strict and something has no equal; 2 the file is wrong, or \
 there is a file of that name.";
 
 /// A file of another program, and the scene to write.
@@ -310,21 +319,21 @@ pub struct InfoArgs {
 }
 
 const COMPARE_HELP: &str = "\
-On linear values as they are: RMSE, max |a - b|, and relMSE = mean of (a - b)^2/(b^2 + 0.01), also
-without the 0.1 % of the pixels that have the largest errors. On what a display shows, clamped sRGB:
+On linear values as they are: RMSE, max |a - b|, and relMSE = mean of (a - b)^2/(b^2 + 0.01), also \
+without the 0.1 % of the pixels that have the largest errors. On what a display shows, clamped sRGB: \
 PSNR; SSIM (Wang et al. 2004, on Rec. 709 luma); FLIP (Andersson et al. 2020, 67 pixels a degree).
 
-Bias is mean(a - b)/mean(b) of the luminance. EXR files of light that glimt rendered, whole, without photons and
-with two samples a pixel or more, hold the standard error of their mean luminance: z is the bias over the standard
-error that both give it. It asks for two seeds: with one, both pictures may have the same noise. The error is an
+Bias is mean(a - b)/mean(b) of the luminance. EXR files of light that glimt rendered, whole, without photons and \
+with two samples a pixel or more, hold the standard error of their mean luminance: z is the bias over the standard \
+error that both give it. It asks for two seeds: with one, both pictures may have the same noise. The error is an \
 estimate by the samples: mostly 0.8 to 1.5 times the true one, up to 2 times at small details in few samples.
 
-On a terminal the pictures are above the table, the difference as FLIP; where FLIP is below 0.1 everywhere, as
+On a terminal the pictures are above the table, the difference as FLIP; where FLIP is below 0.1 everywhere, as \
 |a - b| with its greatest value in white. --json shows none.
 
 Files of 8 and 16 bits are taken for sRGB, float files for linear; alpha is left out.
 
-Exit codes: 0 measured, and not above --max-relmse; 1 above it, or --diff could not be written;
+Exit codes: 0 measured, and not above --max-relmse; 1 above it, or --diff could not be written; \
 2 the call or a file is wrong: sizes that differ, values that are not finite.";
 
 /// Two pictures and what is made of their difference.

@@ -64,9 +64,7 @@ impl Console {
 
     /// Columns of stdout, if it is a terminal.
     pub(super) fn answer_columns(&self) -> Option<usize> {
-        let is_terminal = io::stdout().is_terminal();
-        let size = if is_terminal { crossterm::terminal::size().ok() } else { None };
-        size.map(|(columns, _)| usize::from(columns)).filter(|columns| *columns > 0)
+        terminal_columns(io::stdout().is_terminal())
     }
 
     /// A text of our own on stdout, as it is.
@@ -109,7 +107,15 @@ impl Console {
 }
 
 fn columns() -> usize {
-    let is_terminal = std::io::stderr().is_terminal();
+    terminal_columns(io::stderr().is_terminal()).unwrap_or(PLAIN_COLUMNS)
+}
+
+/// Columns of running text on stdout: those of the terminal, or 80 where there is none.
+pub(super) fn answer_columns() -> usize {
+    terminal_columns(io::stdout().is_terminal()).unwrap_or(80)
+}
+
+fn terminal_columns(is_terminal: bool) -> Option<usize> {
     let size = if is_terminal { crossterm::terminal::size().ok() } else { None };
-    size.map(|(columns, _)| usize::from(columns)).filter(|columns| *columns > 0).unwrap_or(PLAIN_COLUMNS)
+    size.map(|(columns, _)| usize::from(columns)).filter(|columns| *columns > 0)
 }

@@ -1,6 +1,6 @@
 //! `glimt explain`: the meaning of a key, from the definition.
 
-use super::console::Console;
+use super::console::{Console, answer_columns};
 use super::exit::Exit;
 use crate::scene::keys::key::{Default, KeyInfo, Kind, TableInfo, TypeInfo};
 use crate::scene::keys::{paths, table, tables};
@@ -16,7 +16,7 @@ pub(super) fn run(path: Option<&str>, console: &Console) -> Exit {
     };
     match text {
         Some(text) => {
-            console.text(&fitted(&text, console.answer_columns()));
+            console.text(&fitted(&text, answer_columns()));
             Exit::DONE
         }
         None => console.fail(Exit::WRONG, &unknown(path.unwrap_or_default())),
@@ -24,8 +24,7 @@ pub(super) fn run(path: Option<&str>, console: &Console) -> Exit {
 }
 
 /// The text in lines of at most so many columns; what goes on stands under the column where it begins.
-fn fitted(text: &str, columns: Option<usize>) -> String {
-    let Some(columns) = columns else { return text.to_owned() };
+fn fitted(text: &str, columns: usize) -> String {
     let mut fitted = String::new();
     for line in text.lines() {
         // A name and its description have two spaces or more between them.
@@ -252,11 +251,10 @@ mod tests {
         let text = "[mesh]\n    A mesh from a file.\n\n    matrix    One two three four five six.\n";
         let expected =
             "[mesh]\n    A mesh from a file.\n\n    matrix    One two three four\n              five six.\n";
-        assert_eq!(fitted(text, Some(34)), expected);
-        assert_eq!(fitted(text, None), text);
-        assert_eq!(fitted(text, Some(10)), text, "too narrow to be broken");
+        assert_eq!(fitted(text, 34), expected);
+        assert_eq!(fitted(text, 10), text, "too narrow to be broken");
         for (path, _) in paths() {
-            let text = fitted(&explained(&path).unwrap_or_default(), Some(80));
+            let text = fitted(&explained(&path).unwrap_or_default(), 80);
             let broken: Vec<&str> = text.lines().filter(|line| line.chars().count() > 80).collect();
             assert!(broken.is_empty(), "{broken:?}");
         }

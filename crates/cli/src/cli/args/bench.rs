@@ -10,13 +10,13 @@ use crate::scene::description::{Accel, Integrator, Shadows};
 use crate::tui::ColorChoice;
 
 pub(super) const HELP: &str = "\
-Every picture is measured against two references of independent noise, by mean of (x - r1)(x - r2)/(r² + 0.01):
-their noise is not read as error. What pictures of different seeds have in common is the method's bias; a slope
-that flattens is called so, with the size. References are kept in $XDG_CACHE_HOME/glimt/references, else
+Every picture is measured against two references of independent noise, by mean of (x - r1)(x - r2)/(r² + 0.01): \
+their noise is not read as error. What pictures of different seeds have in common is the method's bias; a slope \
+that flattens is called so, with the size. References are kept in $XDG_CACHE_HOME/glimt/references, else \
 ~/.cache/glimt/references, as long as the scene, its files and the size are the same.
 
-Without --samples or --time, each method goes on to 4 times the samples as long as there is time (--within).
-Without options of methods: path, whitted with photons, and the scene as it is where that is neither. Lists are
+Without --samples or --time, each method goes on to 4 times the samples as long as there is time (--within). \
+Without options of methods: path, whitted with photons, and the scene as it is where that is neither. Lists are \
 multiplied: --integrator path,whitted --photons on,off. Without SCENE, the one that glimt new writes.
 
 Exit codes: 0 measured; 1 the work failed; 2 the call or a scene is wrong; 130, 143, 129 ended by a signal.";

@@ -10,17 +10,17 @@ use crate::tui::ColorChoice;
 pub(super) const MOST: u32 = 1 << 20;
 
 pub(super) const MERGE_HELP: &str = "\
-The picture is the one that a single run would have written: the same linear values in an EXR, the same bytes of
+The picture is the one that a single run would have written: the same linear values in an EXR, the same bytes of \
 pixels in a PNG, whatever the order of the parts and the machines that made them.
 
-Exit codes: 0 done; 1 the picture could not be written; 2 a part is missing, doubled, damaged, of another picture
+Exit codes: 0 done; 1 the picture could not be written; 2 a part is missing, doubled, damaged, of another picture \
 or of another version: it is named, and nothing is written.";
 
 pub(super) const FARM_HELP: &str = "\
 Options behind -- go to every render:
   glimt farm room.toml -o room.exr --shards 8 --engine slurm -- --samples 4096
 
-Nothing is submitted: look at the script, then give it to a shell (slurm, parallel) or to kubectl apply -f -.
+Nothing is submitted: look at the script, then give it to a shell (slurm, parallel) or to kubectl apply -f -. \
 The scene, its files and the output must have the same paths on all machines.";
 
 /// Parts and where their picture goes.

@@ -1,0 +1,50 @@
+//! Tests of the layout of `-h` and `--help`.
+
+use clap::CommandFactory;
+
+use super::Args;
+
+/// The short and the long help of the program and of each command, in this many columns.
+fn helps(columns: usize) -> Vec<(String, String)> {
+    let mut all = Args::command().term_width(columns);
+    all.build();
+    let mut helps = vec![("glimt".to_owned(), all.render_help().to_string())];
+    for command in all.get_subcommands_mut() {
+        let name = command.get_name().to_owned();
+        let texts = [command.render_help(), command.render_long_help()];
+        helps.extend(texts.map(|text| (name.clone(), text.to_string())));
+    }
+    helps
+}
+
+#[test]
+fn help_fits_its_columns() {
+    for columns in [80, 100, 140] {
+        for (name, help) in helps(columns) {
+            // The usage is one line, whatever its length.
+            for line in help.lines().filter(|line| !line.starts_with("Usage:")) {
+                assert!(line.chars().count() <= columns, "{name} at {columns}: {line}");
+            }
+        }
+    }
+}
+
+/// A line of running text ends only where the next word does not fit: it is not broken twice.
+#[test]
+fn help_is_wrapped_once() {
+    for columns in [80, 100, 140] {
+        for (name, help) in helps(columns) {
+            let lines: Vec<&str> = help.lines().collect();
+            for pair in lines.windows(2) {
+                let [line, next] = [pair[0], pair[1]];
+                let is_text = |line: &str| line.starts_with(|c: char| c.is_alphanumeric() || c == '|');
+                if !is_text(line) || !is_text(next) || line.ends_with(':') {
+                    continue;
+                }
+                let word = next.split(' ').next().unwrap_or_default();
+                let is_full = line.chars().count() + 1 + word.chars().count() > columns;
+                assert!(is_full, "{name} at {columns}: {line:?} then {next:?}");
+            }
+        }
+    }
+}
