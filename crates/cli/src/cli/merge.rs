@@ -9,8 +9,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde_json::json;
 
 use super::args::{MergeArgs, Progress};
-use super::console::Console;
+use super::console::{Console, answer_columns};
 use super::exit::Exit;
+use super::merge_block::Block;
 use super::progress::{json_line, style};
 use super::signals::{self, Ended};
 use crate::control::CancelToken;
@@ -19,6 +20,7 @@ use crate::film::tone::develop;
 use crate::output::part::{self, Merged, PartError, PartFile};
 use crate::output::write::{Guard, atomic_until};
 use crate::output::{self, FileIdentity, Finish, Format, Losses, OutputError};
+use crate::scene::sanitize::{shortened, visible};
 use crate::system::threads::not_started;
 use crate::tui::{Named, printed};
 
@@ -139,6 +141,7 @@ impl Merge<'_> {
         let mut parts: Vec<PartFile> = Vec::new();
         let mut waiting: Vec<Awaited> = self.args.parts.iter().cloned().map(Awaited::new).collect();
         let mut said = None;
+        let mut block = Block::default();
         loop {
             let mut rest = Vec::new();
             for mut awaited in waiting {
@@ -152,10 +155,14 @@ impl Merge<'_> {
             let state = (parts.len(), unfinished.iter().map(|path| path.to_path_buf()).collect::<Vec<_>>());
             if said.as_ref() != Some(&state) {
                 let is_new = said.is_none_or(|(count, _)| count != parts.len());
-                self.say_parts(parts.len(), &unfinished);
-                if is_new {
-                    self.show(&parts)?;
+                let words = self.parts_words(parts.len(), &unfinished);
+                if self.has_block() {
+                    self.redraw(&parts, &words, &mut block)?;
+                } else if is_new {
+                    // Parts that do not fit are named as soon as they are there.
+                    part::check(&parts).map_err(|error| self.refuse(&error))?;
                 }
+                self.say_parts(parts.len(), &unfinished, &words);
                 said = Some(state);
             }
             if waiting.is_empty() {
@@ -176,42 +183,62 @@ impl Merge<'_> {
         Ok(())
     }
 
-    /// Reports how many parts are there, and those that are not whole yet.
-    fn say_parts(&self, count: usize, unfinished: &[&Path]) {
-        let all = self.args.parts.len();
+    /// The number of parts that exist, and the names of the unfinished ones.
+    fn parts_words(&self, count: usize, unfinished: &[&Path]) -> String {
         let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
+        let not_whole = match names.as_slice() {
+            [] => String::new(),
+            [name] => format!("; {name} is not whole yet"),
+            names => format!("; {} are not whole yet", names.join(", ")),
+        };
+        format!("{count} of {} parts{not_whole}", self.args.parts.len())
+    }
+
+    /// Reports the parts on stderr, unless the image on the same terminal has these words.
+    fn say_parts(&self, count: usize, unfinished: &[&Path], words: &str) {
         match self.args.progress {
             Progress::None => {}
             Progress::Json => {
-                json_line(&json!({ "event": "parts", "parts": count, "total": all, "unfinished": names }));
+                let names: Vec<_> = unfinished.iter().map(|path| path.to_string_lossy()).collect();
+                let total = self.args.parts.len();
+                json_line(&json!({ "event": "parts", "parts": count, "total": total, "unfinished": names }));
             }
-            Progress::Auto | Progress::Plain => {
-                let not_whole = match names.as_slice() {
-                    [] => String::new(),
-                    [name] => format!("; {name} is not whole yet"),
-                    names => format!("; {} are not whole yet", names.join(", ")),
-                };
-                self.console.say(&format!("{count} of {all} parts{not_whole}"));
-            }
+            Progress::Auto if self.has_block() && self.console.is_terminal => {}
+            Progress::Auto | Progress::Plain => self.console.say(words),
         }
     }
 
-    /// Shows the picture of these parts, on a terminal.
-    fn show(&self, parts: &[PartFile]) -> Result<(), Exit> {
-        let (count, all) = (parts.len(), self.args.parts.len());
-        let is_terminal = std::io::stdout().is_terminal();
-        let finish = parts.first().and_then(|part| part.head.picture.finish());
-        let Some(finish) = finish.filter(|_| is_terminal) else {
-            // Parts that do not fit are named as soon as they are there.
-            return part::check(parts).map(drop).map_err(|error| self.refuse(&error));
+    /// Whether the image is redrawn in place: on a terminal, if no lines of progress come in between.
+    fn has_block(&self) -> bool {
+        let has_lines = match self.args.progress {
+            Progress::Plain | Progress::Json => self.console.is_terminal,
+            Progress::Auto | Progress::None => false,
         };
-        let merged = self.merged(parts, true, "show")?;
-        let lines = self.pool.install(|| {
-            let image = finish.image(&merged.film);
-            let picture = develop(&image, &finish.tone.of_picture(&image));
-            printed(&[Named { name: format!("{count} of {all} parts"), picture }], self.args.color, true)
-        });
-        self.console.text(&format!("{lines}\n"));
+        std::io::stdout().is_terminal() && !has_lines
+    }
+
+    /// Shows the image of these parts in place of the last one, with words above it.
+    fn redraw(&self, parts: &[PartFile], words: &str, block: &mut Block) -> Result<(), Exit> {
+        let words = visible(words);
+        let columns = answer_columns();
+        let finish = parts.first().and_then(|part| part.head.picture.finish());
+        let lines = match finish {
+            None => {
+                part::check(parts).map_err(|error| self.refuse(&error))?;
+                String::new()
+            }
+            Some(finish) => {
+                let merged = self.merged(parts, true, "show")?;
+                self.pool.install(|| {
+                    let image = finish.image(&merged.film);
+                    let picture = develop(&image, &finish.tone.of_picture(&image));
+                    printed(&[Named { name: words.to_string(), picture }], self.args.color, true)
+                })
+            }
+        };
+        // A narrow terminal shows no image.
+        let lines = if lines.is_empty() { format!("{}\n", shortened(&words, columns)) } else { lines };
+        self.console.text(&block.redrawn(&lines, columns));
         Ok(())
     }
 

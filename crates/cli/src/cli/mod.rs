@@ -20,6 +20,7 @@ mod lower;
 mod lsp;
 mod man;
 mod merge;
+mod merge_block;
 mod new;
 mod once;
 mod progress;

@@ -1,0 +1,38 @@
+//! The image of `merge --watch` on a terminal, redrawn in place.
+
+/// Lines at the bottom of the terminal that the next version replaces.
+#[derive(Debug, Default)]
+pub(super) struct Block {
+    rows: usize,
+    /// Columns of the terminal when the lines were printed.
+    columns: usize,
+}
+
+impl Block {
+    /// The bytes that replace the block with these lines. In a terminal of another width, the old lines have been wrapped to an
+    /// unknown number of rows: they stay.
+    pub(super) fn redrawn(&mut self, lines: &str, columns: usize) -> String {
+        let up = if self.rows > 0 && self.columns == columns {
+            format!("\x1b[{}A\r\x1b[J", self.rows)
+        } else {
+            String::new()
+        };
+        (self.rows, self.columns) = (lines.lines().count(), columns);
+        up + lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_replaces_itself() {
+        let mut block = Block::default();
+        assert_eq!(block.redrawn("1 of 3 parts\na\nb\n", 80), "1 of 3 parts\na\nb\n");
+        assert_eq!(block.redrawn("2 of 3 parts\n", 80), "\x1b[3A\r\x1b[J2 of 3 parts\n");
+        assert_eq!(block.redrawn("3 of 3 parts\na\n", 60), "3 of 3 parts\na\n", "another width");
+        assert_eq!(block.redrawn("", 60), "\x1b[2A\r\x1b[J");
+        assert_eq!(block.redrawn("x\n", 60), "x\n", "nothing to replace");
+    }
+}
