@@ -5,12 +5,11 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::console::Console;
+use super::diagnostic_json::diagnostic;
 use super::exit::Exit;
 use crate::output::json::in_a_line;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::{Checked, check};
-use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::report::line_and_column;
 
 pub(super) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Console) -> Exit {
     if is_json {
@@ -45,29 +44,6 @@ fn in_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
         Err(error) => return console.fail(Exit::FAILED, &format!("cannot write JSON: {error}")),
     }
     exit
-}
-
-/// A diagnostic; lines and columns count from 1, columns in characters, and the end is the first one that is not meant.
-fn diagnostic(one: &Diagnostic) -> Value {
-    let severity = match one.severity {
-        Severity::Error => "error",
-        Severity::Warning => "warning",
-    };
-    let at = |offset| one.place.as_ref().map(|place| line_and_column(&place.source, offset));
-    let span = one.place.as_ref().map(|place| place.span.clone());
-    let (start, end) = (span.clone().and_then(|span| at(span.start)), span.and_then(|span| at(span.end)));
-    let label = one.place.as_ref().map(|place| place.label.as_str()).filter(|label| !label.is_empty());
-    json!({
-        "file": one.path.to_string_lossy(),
-        "line": start.map(|(line, _)| line),
-        "column": start.map(|(_, column)| column),
-        "end_line": end.map(|(line, _)| line),
-        "end_column": end.map(|(_, column)| column),
-        "severity": severity,
-        "message": one.message,
-        "label": label,
-        "help": one.help,
-    })
 }
 
 fn summary(scene: &Path, checked: &Checked) -> String {

@@ -8,6 +8,7 @@ mod check;
 mod compare;
 mod completions;
 mod console;
+mod diagnostic_json;
 mod doctor;
 pub mod environment;
 mod exit;

@@ -1,4 +1,4 @@
-//! One JSON object a line. The key `event` says which other keys there are:
+//! One JSON object a line. Its first key, `event`, says which other keys there are:
 //!
 //! | event | keys |
 //! | --- | --- |
@@ -12,19 +12,18 @@
 //! | `failed` | `kind` (`scene`, `work`), `message`, `diagnostics` |
 //! | `cancelled` | |
 //!
-//! A diagnostic has `severity` (`error`, `warning`), `message`, `path`, `line` and `column` (from 1), `help`; a
-//! path, line, column or help that it does not have is null.
+//! A diagnostic has the keys of `check --json` ([`diagnostic_json`](super::super::diagnostic_json)), and `path`.
 
 use std::borrow::Cow;
 use std::io::Write;
 
 use serde_json::{Value, json};
 
+use super::super::diagnostic_json::diagnostic;
 use super::Reporter;
 use crate::output::json::in_a_line;
 use crate::pipeline::protocol::{CheckpointNews, Event, Failure};
-use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::report::line_and_column;
+use crate::scene::diagnostic::Diagnostic;
 
 pub(super) struct Json;
 
@@ -46,9 +45,20 @@ impl Reporter for Json {
 
 /// A line on stderr; nothing can be done where nobody reads it.
 pub(in crate::cli) fn line(value: &Value) {
-    if let Ok(text) = in_a_line(value) {
+    if let Ok(text) = with_event_first(value) {
         let _ = writeln!(std::io::stderr().lock(), "{text}");
     }
+}
+
+/// The object in a line. Its other keys are sorted.
+fn with_event_first(value: &Value) -> serde_json::Result<String> {
+    let mut rest = value.clone();
+    let Some(event) = rest.as_object_mut().and_then(|keys| keys.remove("event")) else {
+        return in_a_line(value);
+    };
+    let (first, rest) = (in_a_line(&json!({ "event": event }))?, in_a_line(&rest)?);
+    let comma = if rest == "{}" { "" } else { "," };
+    Ok(format!("{}{comma}{}", &first[..first.len() - 1], &rest[1..]))
 }
 
 fn value(event: &Event) -> Option<Value> {
@@ -125,20 +135,44 @@ fn failed(failure: &Failure) -> Value {
     }
 }
 
+/// Diagnostics as in `check --json`; `path` is `file`, or null without one.
 fn diagnostics(all: &[Diagnostic]) -> Vec<Value> {
-    all.iter()
-        .map(|one| {
-            let place = one.place.as_ref().map(|place| line_and_column(&place.source, place.span.start));
-            json!({
-                "severity": if one.severity == Severity::Error { "error" } else { "warning" },
-                "message": one.message, "path": path(one),
-                "line": place.map(|(line, _)| line), "column": place.map(|(_, column)| column),
-                "help": one.help,
-            })
-        })
-        .collect()
+    let with_path = |one: &Diagnostic| {
+        let mut value = diagnostic(one);
+        value["path"] = json!(path(one));
+        value
+    };
+    all.iter().map(with_path).collect()
 }
 
 fn path(diagnostic: &Diagnostic) -> Option<Cow<'_, str>> {
     Some(diagnostic.path.to_string_lossy()).filter(|path| !path.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_event_comes_first() {
+        let value = json!({ "a": 1, "event": "stage", "z": [2] });
+        assert_eq!(with_event_first(&value).expect("JSON"), r#"{"event":"stage","a":1,"z":[2]}"#);
+        assert_eq!(
+            with_event_first(&json!({ "event": "cancelled" })).expect("JSON"),
+            r#"{"event":"cancelled"}"#
+        );
+        assert_eq!(with_event_first(&json!({ "a": 1 })).expect("JSON"), r#"{"a":1}"#);
+    }
+
+    #[test]
+    fn a_diagnostic_has_the_keys_of_check_and_its_own() {
+        let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 0, 0]\n[materials.a]\ntype = \"metl\"\n";
+        let outcome = crate::scene::parse(text.into(), std::path::Path::new("a.toml"));
+        let failed = failed(&Failure::Scene(outcome.diagnostics));
+        let one = &failed["diagnostics"][0];
+        assert_eq!(one["path"], one["file"]);
+        for key in ["severity", "message", "line", "column", "end_line", "end_column", "label"] {
+            assert!(!one[key].is_null(), "{key}: {one}");
+        }
+    }
 }
