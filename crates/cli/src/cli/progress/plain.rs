@@ -1,10 +1,11 @@
 //! Lines now and then, for logs.
 
+use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
 use super::super::console::Console;
 use super::{Reporter, samples, seconds};
-use crate::pipeline::protocol::{Event, RenderProgress, StageReport, Status};
+use crate::pipeline::protocol::{AssetProgress, Event, RenderProgress, StageReport, Status};
 use crate::pipeline::words::Eta;
 
 /// Longest silence of a render.
@@ -18,11 +19,18 @@ pub(super) struct Plain {
     said: f64,
     last: Instant,
     last_line: String,
+    /// Names of the assets that were reported as loaded.
+    loaded: HashSet<String>,
 }
 
 impl Plain {
     pub(super) fn new(console: Console) -> Self {
-        Self { console, said: 0.0, last: Instant::now(), last_line: String::new() }
+        Self { console, said: 0.0, last: Instant::now(), last_line: String::new(), loaded: HashSet::new() }
+    }
+
+    /// Whether an asset is loaded, for the first time: a file of several meshes is loaded once for each of them.
+    fn is_newly_loaded(&mut self, progress: &AssetProgress) -> bool {
+        progress.done == progress.total && self.loaded.insert(progress.name.clone())
     }
 
     fn progress(&mut self, progress: &RenderProgress) {
@@ -54,7 +62,7 @@ impl Reporter for Plain {
         {
             self.console.say(&stage_line(stage));
         } else if let Event::Asset { progress, .. } = event
-            && progress.done == progress.total
+            && self.is_newly_loaded(progress)
         {
             self.console.say(&format!("{:<8} {} 100%", "loaded", progress.name));
         } else if let Event::Progress { progress, .. } = event {
@@ -111,6 +119,14 @@ mod tests {
         assert_eq!(plain.due(&progress(0.9, 90)), None);
         plain.last = Instant::now().checked_sub(INTERVAL).expect("the machine runs for longer");
         assert!(plain.due(&progress(0.91, 91)).is_some());
+    }
+
+    #[test]
+    fn a_file_of_several_meshes_is_loaded_once() {
+        let mut plain = Plain::new(Console::new(crate::tui::ColorChoice::None));
+        let asset = |name: &str, done| AssetProgress { name: name.to_owned(), done, total: 10 };
+        let said = [asset("toy.glb", 5), asset("toy.glb", 10), asset("toy.glb", 10), asset("b.png", 10)];
+        assert_eq!(said.map(|progress| plain.is_newly_loaded(&progress)), [false, true, false, true]);
     }
 
     #[test]
