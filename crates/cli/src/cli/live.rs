@@ -13,7 +13,7 @@ use crate::pipeline::start;
 use crate::pipeline::watch::{Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
-use crate::scene::{is_absence, text_now};
+use crate::scene::{SAME_TEXT, is_absence, text_now};
 use crate::system::threads::not_started;
 use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 
@@ -260,14 +260,16 @@ fn tap(events: &Receiver<Event>, watcher: &Watcher, writes: &Writes, forward: im
 /// A scene that is not there may come (back): what watches it needs no other way out.
 fn await_scene(problem: &mut Diagnostic) {
     if is_absence(problem) {
-        let typo = problem.help.take().filter(|help| help.starts_with("did you mean"));
-        let typo = typo.map_or(String::new(), |typo| format!("; {typo}"));
+        // A typo, or a new name.
+        let is_file = |help: &String| help.starts_with("did you mean") || help.contains(SAME_TEXT);
+        let file = problem.help.take().filter(is_file);
+        let file = file.map_or(String::new(), |help| format!("; {help}"));
         problem.help = Some(match missing_folder(&problem.path) {
             Some(folder) => format!(
-                "the folder {} is not there; the scene is rendered as soon as both are{typo}",
+                "the folder {} is not there; the scene is rendered as soon as both are{file}",
                 visible(&folder.to_string_lossy())
             ),
-            None => format!("it is rendered as soon as it is there{typo}"),
+            None => format!("it is rendered as soon as it is there{file}"),
         });
     }
 }
@@ -311,6 +313,10 @@ mod tests {
             problem.help.expect("a way out")
         };
         assert_eq!(said("room.toml"), "it is rendered as soon as it is there");
+        let mut renamed = *crate::scene::text_now(Path::new("none.toml")).expect_err("there is none");
+        renamed.help = Some(format!("third.toml {SAME_TEXT}"));
+        await_scene(&mut renamed);
+        assert!(renamed.help.is_some_and(|help| help.contains("third.toml")));
         let name = "gone/room.toml";
         assert!(
             said(name).ends_with("/gone is not there; the scene is rendered as soon as both are"),

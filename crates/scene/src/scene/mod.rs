@@ -40,6 +40,9 @@ const NO_SUCH_FILE: &str = "there is no such scene file";
 /// Message about a file that is not there and is named like a model.
 const NO_SUCH_MODEL: &str = "there is no such file";
 
+/// Words about another file in the help of an error about a missing scene.
+pub const SAME_TEXT: &str = "has the same text";
+
 /// Whether a diagnostic says that a scene or model does not exist.
 pub fn is_absence(diagnostic: &Diagnostic) -> bool {
     [NO_SUCH_FILE, NO_SUCH_MODEL].contains(&diagnostic.message.as_str())

@@ -154,11 +154,12 @@ fn a_renamed_scene_is_named_in_the_error() {
     desk.request();
     let renamed = desk.folder.path().join("third.toml");
     fs::rename(desk.folder.path().join("scene.toml"), &renamed).expect("renamed");
-    let help = |events: Vec<Event>| match events.last() {
-        Some(Event::Failed { failure: Failure::Scene(errors), .. }) => {
-            errors[0].help.clone().unwrap_or_default()
-        }
-        other => panic!("{other:?}"),
+    let help = |events: Vec<Event>| {
+        let of_scene = |event| match event {
+            Event::Failed { failure: Failure::Scene(errors), .. } => errors.into_iter().next()?.help,
+            _ => None,
+        };
+        events.into_iter().find_map(of_scene).expect("an error with a way out")
     };
     let found = help(desk.send_unsaved());
     assert!(found.contains("third.toml has the same text"), "{found}");

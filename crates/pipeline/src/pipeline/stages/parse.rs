@@ -191,7 +191,7 @@ fn with_new_name(mut errors: Vec<Diagnostic>, path: &Path, last: Option<&Arc<Par
         && let Some(file) = scene::same_text_beside(path, &last.loaded.source.shared_text())
     {
         let name = visible(&file.to_string_lossy()).into_owned();
-        error.help = Some(format!("{name} has the same text; to watch it, run `glimt {name}`"));
+        error.help = Some(format!("{name} {}; run `glimt {name}` to watch it", scene::SAME_TEXT));
     }
     errors
 }
