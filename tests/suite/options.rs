@@ -361,6 +361,36 @@ fn a_word_that_is_no_file_is_taken_for_a_command() {
     desk.expect("paint --once -o a.png", 0);
 }
 
+/// Without a screen that waits for the file to become a scene.
+#[test]
+fn images_parts_and_checkpoints_are_refused_with_their_info() {
+    let desk = Desk::new();
+    desk.write("ball.toml", SCENE);
+    desk.expect("ball.toml --once -o a.png -o b.exr -o c.hdr -o d.jpg -o e.webp -o f.ppm", 0);
+    desk.expect("ball.toml --once -o h.part --shard 1/2", 0);
+    fs::rename(desk.path("a.png"), desk.path("a.toml")).expect("renamed");
+    desk.write("g.gif", "GIF89a");
+    for (file, words) in [
+        ("a.toml", "an image (PNG)"),
+        ("b.exr", "an image (EXR)"),
+        ("c.hdr", "an image (HDR)"),
+        ("d.jpg", "an image (JPEG)"),
+        ("e.webp", "an image (WebP)"),
+        ("f.ppm", "an image (PPM)"),
+        ("g.gif", "an image (GIF)"),
+        ("h.part", "a part of an image or a checkpoint"),
+    ] {
+        for call in [file.to_owned(), format!("{file} --once"), format!("check {file}")] {
+            let stderr = desk.expect(&call, 2);
+            assert!(stderr.contains(&format!("this is {words}, not a scene")), "{call}: {stderr}");
+            let has_info = stderr.contains("scene") && stderr.contains("ball.toml");
+            assert!(has_info || file == "g.gif", "{call}: {stderr}");
+        }
+    }
+    let json = desk.expect("a.toml --once --progress json", 2);
+    assert!(json.lines().all(|line| line.starts_with('{')) && json.contains("an image (PNG)"), "{json}");
+}
+
 /// Checks the way out in the message: the stacks of so many threads take more than the limit.
 #[cfg(target_os = "linux")]
 #[test]

@@ -5,6 +5,9 @@ use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
+/// First bytes of a part of an image and of a checkpoint. Whoever reads another kind of file recognizes them, too.
+pub const PART_MARK: [u8; 12] = *b"\x89GLIMT\r\n\x1a\n\0\0";
+
 /// File type of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {

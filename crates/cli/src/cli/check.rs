@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::console::Console;
 use super::diagnostic_json::diagnostic;
 use super::exit::Exit;
+use super::info::instead_of_scene;
 use crate::output::json::in_a_line;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::{Checked, check};
@@ -14,6 +15,9 @@ use crate::pipeline::{Checked, check};
 pub(super) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Console) -> Exit {
     if is_json {
         return in_json(scene, sets, console);
+    }
+    if let Some(exit) = instead_of_scene(scene, console) {
+        return exit;
     }
     match check(scene, sets) {
         Ok(checked) => {

@@ -9,6 +9,7 @@ use super::console::Console;
 use super::exit::Exit;
 use crate::output::json::file;
 use crate::output::settings::{Made, made};
+use crate::scene::other_content;
 use crate::scene::sanitize::visible;
 
 pub(super) fn run(args: &InfoArgs, console: &Console) -> Exit {
@@ -25,6 +26,16 @@ pub(super) fn run(args: &InfoArgs, console: &Console) -> Exit {
         console.text(&as_text(&args.image, &made));
     }
     if made.is_own() { Exit::DONE } else { Exit::FAILED }
+}
+
+/// Refuses a file in place of a scene that is an image, a part or a checkpoint, and says how it was made. `None` for other files.
+pub(super) fn instead_of_scene(path: &Path, console: &Console) -> Option<Exit> {
+    let problem = other_content(path)?;
+    console.diagnostics(&[*problem]);
+    if let Ok(made) = made(path) {
+        console.say_lines(&as_text(path, &made));
+    }
+    Some(Exit::WRONG)
 }
 
 fn as_json(path: &Path, made: &Made) -> Value {

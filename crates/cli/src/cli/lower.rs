@@ -31,6 +31,13 @@ pub(super) struct Order {
     pub(super) nice: u8,
 }
 
+impl Order {
+    /// Whether errors go into JSON lines.
+    pub(super) fn is_in_json(&self) -> bool {
+        self.is_once && self.progress == Progress::Json
+    }
+}
+
 /// The meaning of the arguments.
 ///
 /// # Errors

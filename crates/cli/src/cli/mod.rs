@@ -75,13 +75,22 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> Exit {
         None => match lower::lower(args.render) {
             Ok(order) => match no_command(&order.scene) {
                 Some(message) => console.fail(Exit::WRONG, &message),
-                None if order.is_once => once::run(&order, &console),
-                None => live::run(order, &console),
+                None => render(order, &console),
             },
             Err(message) => console.fail(Exit::WRONG, &message),
         },
     };
     console.end(exit)
+}
+
+fn render(order: lower::Order, console: &Console) -> Exit {
+    // JSON lines have their own form of the same error.
+    let refused = (!order.is_in_json()).then(|| info::instead_of_scene(&order.scene, console));
+    match refused.flatten() {
+        Some(exit) => exit,
+        None if order.is_once => once::run(&order, console),
+        None => live::run(order, console),
+    }
 }
 
 /// The way to begin, for a call without a word.

@@ -13,6 +13,7 @@ pub mod fingerprint;
 mod key_path;
 pub mod keys;
 pub mod nearest;
+mod other_content;
 pub mod outline;
 mod read;
 pub mod report;
@@ -29,6 +30,7 @@ use description::{Camera, Scene, Viewpoint};
 use diagnostic::{Diagnostic, Severity};
 pub use facing::MeshBounds;
 pub use key_path::{key_parts, shortened_key, split_key};
+pub use other_content::other_content;
 pub use read::same_text_beside;
 pub use source::{Source, quoted};
 

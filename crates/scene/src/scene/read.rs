@@ -8,6 +8,7 @@ use super::diagnostic::{Diagnostic, Place, Severity};
 use super::document::is_mesh;
 use super::keys::endings::MESHES;
 use super::nearest::nearest;
+use super::other_content::{OtherContent, other_content};
 use super::sanitize::visible;
 use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE, NO_SUCH_MODEL};
 use crate::system::file::{self, Kind};
@@ -24,7 +25,10 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
         let help = format!("export it as one of these: .{}", MESHES.join(", ."));
         return Err(problem(path, message, Some(help), None));
     }
-    let bytes = bytes(path).map_err(|(message, help)| problem(path, message, help, None))?;
+    let bytes = bytes(path).map_err(|(message, help)| {
+        // A large image is not a large scene.
+        other_content(path).unwrap_or_else(|| problem(path, message, help, None))
+    })?;
     if file::is_lfs_pointer(&bytes) {
         let message = "this is a Git LFS pointer, not the file's content".to_owned();
         return Err(problem(path, message, Some("run `git lfs pull`".to_owned()), None));
@@ -90,73 +94,12 @@ fn lacks_camera(path: &Path) -> bool {
     start().is_some_and(|bytes| memchr::memmem::find(&bytes, b"[camera]").is_none())
 }
 
-/// Content other than a scene, by the first bytes of a file.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum OtherContent {
-    /// A model, with its format and the usual ending of its files.
-    Model { format: &'static str, ending: &'static str },
-    /// A picture.
-    Picture,
-}
-
-impl OtherContent {
-    /// The content of bytes. `None` for what may be a scene.
-    fn of(bytes: &[u8]) -> Option<Self> {
-        const PICTURES: [&[u8]; 8] = [
-            b"\x89PNG\r\n",
-            b"\xff\xd8\xff",
-            b"\x76\x2f\x31\x01",
-            b"#?RADIANCE",
-            b"RIFF",
-            b"P3\n",
-            b"P6\n",
-            b"GIF8",
-        ];
-        if PICTURES.iter().any(|start| bytes.starts_with(start)) {
-            return Some(Self::Picture);
-        }
-        if bytes.starts_with(b"glTF") {
-            return Some(Self::Model { format: "glTF", ending: "glb" });
-        }
-        // The first line that is no comment.
-        let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
-        let line = lines.find(|line| !line.is_empty() && !line.starts_with(b"#"))?;
-        let mut words = line.split(u8::is_ascii_whitespace);
-        let (word, next) = (words.next()?, words.next());
-        // In TOML a key is followed by an equals sign.
-        if line.contains(&b'=') {
-            return None;
-        }
-        let (format, ending) = match (word, next) {
-            (b"ply", None) => ("PLY", "ply"),
-            (b"OFF" | b"COFF" | b"NOFF" | b"CNOFF" | b"STOFF", _) => ("OFF", "off"),
-            (b"solid", _) => ("STL", "stl"),
-            (b"v" | b"vn" | b"vt" | b"mtllib" | b"usemtl" | b"o" | b"g", Some(_)) => ("OBJ", "obj"),
-            _ => return None,
-        };
-        Some(Self::Model { format, ending })
-    }
-
-    fn problem(self, path: &Path) -> Box<Diagnostic> {
-        // The name without an ending that is for scenes.
-        let name = if may_be_scene(path) { path.file_stem() } else { path.file_name() };
-        let name = name.unwrap_or(path.as_os_str()).to_string_lossy();
-        let (message, help) = match self {
-            Self::Model { format, ending } => (
-                format!("this is a model ({format}), but its name does not end in .{ending}"),
-                format!("models are known by their endings: rename it to {}.{ending}", visible(&name)),
-            ),
-            Self::Picture => (
-                "this is a picture, not the text of a scene".to_owned(),
-                "`glimt info` says how a picture was made; `glimt new FILE` writes a scene to start from"
-                    .to_owned(),
-            ),
-        };
-        problem(path, message, Some(help), None)
-    }
-}
-
-fn problem(path: &Path, message: String, help: Option<String>, place: Option<Place>) -> Box<Diagnostic> {
+pub(super) fn problem(
+    path: &Path,
+    message: String,
+    help: Option<String>,
+    place: Option<Place>,
+) -> Box<Diagnostic> {
     Box::new(Diagnostic { severity: Severity::Error, message, path: path.to_owned(), place, help })
 }
 
@@ -279,7 +222,7 @@ fn is_alike(found: &Path, meant: &Path) -> bool {
 }
 
 /// Whether a file may be a scene by its name.
-fn may_be_scene(found: &Path) -> bool {
+pub(super) fn may_be_scene(found: &Path) -> bool {
     found.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
@@ -380,44 +323,6 @@ mod tests {
         let scene = folder.path().join("scene.obj");
         std::fs::write(&scene, "[camera]\n").expect("written");
         assert!(text(&scene).is_ok());
-    }
-
-    #[test]
-    fn models_and_pictures_without_their_endings_are_known_by_their_start() {
-        let of = |text: &str| OtherContent::of(text.as_bytes());
-        let ending = |text: &str| match of(text) {
-            Some(OtherContent::Model { ending, .. }) => ending,
-            Some(OtherContent::Picture) => "picture",
-            None => "",
-        };
-        for (text, expected) in [
-            ("# by a program\n\nmtllib a.mtl\nv 0 0 0\n", "obj"),
-            ("v 0 0 0\r\n", "obj"),
-            ("ply\r\nformat ascii 1.0\r\n", "ply"),
-            ("OFF\n3 1 0\n", "off"),
-            ("OFF 3 1 0\n", "off"),
-            ("solid \nfacet", "stl"),
-            ("glTF\u{2}\0\0\0", "glb"),
-            ("P6\n1 1\n255\nabc", "picture"),
-            ("#?RADIANCE\n", "picture"),
-            ("# a scene\n[camera]\n", ""),
-            ("v = 3\n", ""),
-            ("solid = true\n", ""),
-            ("g \"x\" = 3", ""),
-            ("v\n", ""),
-            ("", ""),
-            ("[render", ""),
-        ] {
-            assert_eq!(ending(text), expected, "{text:?}");
-        }
-        let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("model");
-        std::fs::write(&path, "v 0 0 0\n").expect("written");
-        let Diagnostic { message: said, help, .. } = message(&path);
-        assert_eq!(said, "this is a model (OBJ), but its name does not end in .obj");
-        assert!(help.expect("a way out").contains("rename it to model.obj"));
-        std::fs::write(&path, b"\x89PNG\r\n\x1a\n").expect("written");
-        assert_eq!(message(&path).message, "this is a picture, not the text of a scene");
     }
 
     #[test]

@@ -26,7 +26,7 @@ pub use read::{PartFile, input_in_place_of, input_of_that_name, is_part};
 pub use save::save;
 
 /// The first bytes of a file. Like those of PNG, they are changed by whatever takes the file for a text.
-const MARK: [u8; 12] = *b"\x89GLIMT\r\n\x1a\n\0\0";
+const MARK: [u8; 12] = crate::system::file::PART_MARK;
 
 /// Version of the format.
 const VERSION: u32 = 1;

@@ -1,0 +1,221 @@
+//! Files in place of a scene that are something else, recognized by their first bytes: models, images, parts and checkpoints.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::diagnostic::Diagnostic;
+use super::read::{may_be_scene, problem};
+use super::sanitize::visible;
+use crate::system::file::{self, PART_MARK};
+
+/// Content other than a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum OtherContent {
+    /// A model, with its format and the usual ending of its files.
+    Model { format: &'static str, ending: &'static str },
+    /// An image of this format.
+    Image(&'static str),
+    /// A part of an image, or a checkpoint.
+    Part,
+}
+
+/// The error about a file that is an image, a part or a checkpoint, whatever its name. `None` for anything else, and for a file that
+/// cannot be read.
+pub fn other_content(path: &Path) -> Option<Box<Diagnostic>> {
+    const START: u64 = 1 << 10;
+    let (opened, _) = file::open(path).ok()?.ok()?;
+    let mut bytes = Vec::new();
+    opened.take(START).read_to_end(&mut bytes).ok()?;
+    match OtherContent::of(&bytes)? {
+        OtherContent::Model { .. } => None,
+        content @ (OtherContent::Image(_) | OtherContent::Part) => Some(content.problem(path)),
+    }
+}
+
+impl OtherContent {
+    /// The content of bytes. `None` for what may be a scene.
+    pub(super) fn of(bytes: &[u8]) -> Option<Self> {
+        if bytes.starts_with(&PART_MARK) {
+            return Some(Self::Part);
+        }
+        image_format(bytes).map(Self::Image).or_else(|| model(bytes))
+    }
+
+    pub(super) fn problem(self, path: &Path) -> Box<Diagnostic> {
+        // The name without an ending that is for scenes.
+        let name = if may_be_scene(path) { path.file_stem() } else { path.file_name() };
+        let name = name.unwrap_or(path.as_os_str()).to_string_lossy();
+        let (message, help) = match self {
+            Self::Model { format, ending } => (
+                format!("this is a model ({format}), but its name does not end in .{ending}"),
+                format!("models are known by their endings: rename it to {}.{ending}", visible(&name)),
+            ),
+            Self::Image(format) => {
+                let has_settings = !matches!(format, "BMP" | "TGA" | "TIFF");
+                let info = if has_settings { "`glimt info` says how an image was made; " } else { "" };
+                let help = format!("{info}`glimt new FILE` writes a scene to start from");
+                (format!("this is an image ({format}), not a scene"), help)
+            }
+            Self::Part => (
+                "this is a part of an image or a checkpoint, not a scene".to_owned(),
+                "`glimt info` says which scene it belongs to; `glimt merge` joins parts".to_owned(),
+            ),
+        };
+        problem(path, message, Some(help), None)
+    }
+}
+
+/// The format of an image.
+fn image_format(bytes: &[u8]) -> Option<&'static str> {
+    const STARTS: [(&[u8], &str); 9] = [
+        (b"\x89PNG\r\n", "PNG"),
+        (b"\xff\xd8\xff", "JPEG"),
+        (b"\x76\x2f\x31\x01", "EXR"),
+        (b"#?RADIANCE", "HDR"),
+        (b"#?RGBE", "HDR"),
+        (b"GIF87a", "GIF"),
+        (b"GIF89a", "GIF"),
+        (b"II*\0", "TIFF"),
+        (b"MM\0*", "TIFF"),
+    ];
+    let known = STARTS.iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, format)| *format);
+    match bytes {
+        _ if known.is_some() => known,
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => Some("WebP"),
+        // A line of TOML has more than a key.
+        [b'P', b'1'..=b'7', b' ' | b'\t' | b'\r' | b'\n', rest @ ..] if !begins_with(rest, b'=') => {
+            Some("PPM")
+        }
+        // The reserved bytes are 0, which no text has.
+        [b'B', b'M', _, _, _, _, 0, 0, 0, 0, ..] => Some("BMP"),
+        _ => is_tga(bytes).then_some("TGA"),
+    }
+}
+
+/// Whether the first byte that is not blank is this one.
+fn begins_with(bytes: &[u8], byte: u8) -> bool {
+    bytes.trim_ascii_start().first() == Some(&byte)
+}
+
+/// Whether bytes are a TGA header, which has no mark: its fields are in range, and one of them is a byte that no text has.
+fn is_tga(bytes: &[u8]) -> bool {
+    let &[_, map, kind, first0, first1, count0, count1, depth, _, _, _, _, w0, w1, h0, h1, bits, ..] = bytes
+    else {
+        return false;
+    };
+    let is_mapped = matches!(kind, 1 | 9);
+    let has_map = map == 1 && matches!(depth, 15 | 16 | 24 | 32);
+    let has_none = map == 0 && [first0, first1, count0, count1, depth] == [0; 5];
+    let is_kind = matches!(kind, 1..=3 | 9..=11) && if is_mapped { has_map } else { has_map || has_none };
+    is_kind && [w0, w1] != [0; 2] && [h0, h1] != [0; 2] && matches!(bits, 8 | 15 | 16 | 24 | 32)
+}
+
+/// A model, by the first line that is not a comment.
+fn model(bytes: &[u8]) -> Option<OtherContent> {
+    if bytes.starts_with(b"glTF") {
+        return Some(OtherContent::Model { format: "glTF", ending: "glb" });
+    }
+    let mut lines = bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii);
+    let line = lines.find(|line| !line.is_empty() && !line.starts_with(b"#"))?;
+    let mut words = line.split(u8::is_ascii_whitespace);
+    let (word, next) = (words.next()?, words.next());
+    // In TOML a key is followed by an equals sign.
+    if line.contains(&b'=') {
+        return None;
+    }
+    let (format, ending) = match (word, next) {
+        (b"ply", None) => ("PLY", "ply"),
+        (b"OFF" | b"COFF" | b"NOFF" | b"CNOFF" | b"STOFF", _) => ("OFF", "off"),
+        (b"solid", _) => ("STL", "stl"),
+        (b"v" | b"vn" | b"vt" | b"mtllib" | b"usemtl" | b"o" | b"g", Some(_)) => ("OBJ", "obj"),
+        _ => return None,
+    };
+    Some(OtherContent::Model { format, ending })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_are_known_by_their_start() {
+        let mut tga = vec![0; 18];
+        (tga[2], tga[12], tga[14], tga[16]) = (2, 4, 4, 24);
+        let images: [(&[u8], &str); 13] = [
+            (b"\x89PNG\r\n\x1a\n", "PNG"),
+            (b"\xff\xd8\xff\xe0", "JPEG"),
+            (b"\x76\x2f\x31\x01\x02", "EXR"),
+            (b"#?RADIANCE\n", "HDR"),
+            (b"#?RGBE\n", "HDR"),
+            (b"GIF89a\0", "GIF"),
+            (b"RIFF\x04\0\0\0WEBPVP8L", "WebP"),
+            (b"P6\n1 1\n255\nabc", "PPM"),
+            (b"P3 1 1 255 1 2 3", "PPM"),
+            (b"P5\t", "PPM"),
+            (b"BM\x46\0\0\0\0\0\0\0\x36", "BMP"),
+            (b"II*\0", "TIFF"),
+            (&tga, "TGA"),
+        ];
+        for (bytes, format) in images {
+            assert_eq!(OtherContent::of(bytes), Some(OtherContent::Image(format)), "{format}");
+        }
+        for scene in
+            ["P6 = 3", "P6\n= 3", "BM = 1", "GIF8 = 1", "RIFF = 1", "# P6\n[camera]", "#? what\n", "", "P6"]
+        {
+            assert_eq!(OtherContent::of(scene.as_bytes()), None, "{scene:?}");
+        }
+    }
+
+    #[test]
+    fn parts_are_known_by_their_mark_and_large_images_are_not_large_scenes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.toml");
+        std::fs::write(&path, PART_MARK).expect("written");
+        let part = super::super::text_now(&path).expect_err("refused");
+        assert!(part.message.contains("a part of an image or a checkpoint"), "{}", part.message);
+        assert_eq!(other_content(&path), Some(part));
+        std::fs::write(&path, b"\x76\x2f\x31\x01").expect("written");
+        let file = std::fs::File::options().write(true).open(&path).expect("opened");
+        file.set_len(super::super::MAX_FILE_BYTES + 1).expect("made longer");
+        let large = super::super::text_now(&path).expect_err("refused");
+        assert_eq!(large.message, "this is an image (EXR), not a scene");
+        std::fs::write(&path, b"v 0 0 0\n").expect("written");
+        assert_eq!(other_content(&path), None, "models are shown");
+    }
+
+    #[test]
+    fn models_without_their_endings_are_known_by_their_start() {
+        let of = |text: &str| OtherContent::of(text.as_bytes());
+        let ending = |text: &str| match of(text) {
+            Some(OtherContent::Model { ending, .. }) => ending,
+            Some(OtherContent::Image(_) | OtherContent::Part) => "image",
+            None => "",
+        };
+        for (text, expected) in [
+            ("# by a program\n\nmtllib a.mtl\nv 0 0 0\n", "obj"),
+            ("v 0 0 0\r\n", "obj"),
+            ("ply\r\nformat ascii 1.0\r\n", "ply"),
+            ("OFF\n3 1 0\n", "off"),
+            ("OFF 3 1 0\n", "off"),
+            ("solid \nfacet", "stl"),
+            ("glTF\u{2}\0\0\0", "glb"),
+            ("P6\n1 1\n255\nabc", "image"),
+            ("#?RADIANCE\n", "image"),
+            ("# a scene\n[camera]\n", ""),
+            ("v = 3\n", ""),
+            ("solid = true\n", ""),
+            ("g \"x\" = 3", ""),
+            ("v\n", ""),
+            ("", ""),
+            ("[render", ""),
+        ] {
+            assert_eq!(ending(text), expected, "{text:?}");
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("model");
+        std::fs::write(&path, "v 0 0 0\n").expect("written");
+        let Diagnostic { message, help, .. } = *super::super::text_now(&path).expect_err("refused");
+        assert_eq!(message, "this is a model (OBJ), but its name does not end in .obj");
+        assert!(help.expect("a way out").contains("rename it to model.obj"));
+    }
+}
