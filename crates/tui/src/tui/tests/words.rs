@@ -105,3 +105,29 @@ fn a_reason_that_has_room_beside_its_stage_is_not_broken() {
     desk.event(Event::Tick);
     assert!(desk.text().contains("skipped  the scene has no mesh"), "{}", desk.text());
 }
+
+/// It would float at the right of an empty screen.
+#[test]
+fn the_hint_about_a_broken_scene_is_whole_and_in_its_line() {
+    for (columns, rows) in [(80, 24), (100, 30), (120, 40), (200, 60)] {
+        let mut desk = Desk::with(state(columns, rows));
+        desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
+        desk.event(Event::Settled);
+        let text = desk.text();
+        let lines: Vec<&str> = text.lines().filter(|line| line.contains("save cornell.toml")).collect();
+        assert_eq!(lines.len(), 1, "{text}");
+        assert_eq!(lines[0].trim_end(), "save cornell.toml to render", "{text}");
+    }
+}
+
+#[test]
+fn nobody_is_asked_to_save_a_model() {
+    let mut state = state(120, 40);
+    state.request.scene = "toy.glb".into();
+    let mut desk = Desk::with(state);
+    desk.finish(RED);
+    let text = desk.text();
+    assert!(text.contains("toy.glb") && !text.contains("save "), "{text}");
+    let words: Vec<&str> = text.split_whitespace().filter(|word| !word.contains('▀')).collect();
+    assert!(words.join(" ").contains("rendered again when toy.glb changes"), "{text}");
+}

@@ -11,7 +11,6 @@ use super::stages::{self, Line};
 use super::text::{Tone, bytes, columns, gauge, percent, row, share, shortened, wrapped};
 use super::under;
 use crate::pipeline::protocol::Stage;
-use crate::scene::report::summary;
 use crate::scene::sanitize::visible;
 use crate::tui::preview_kind::PreviewKind;
 use crate::tui::state::{Activity, AssetBar, State};
@@ -91,7 +90,7 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Li
         lines.extend(Stage::ALL.into_iter().flat_map(of));
     }
     if is_done {
-        lines.extend(results(state, column));
+        lines.extend(results(state));
     }
     lines.extend(hint(state, column));
     // Bars come and go: nothing is below them.
@@ -131,8 +130,8 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
     vec![(name, Tone::Plain), (filled, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
-/// Results: a label and a value in each line of this width.
-fn results(state: &State, width: u16) -> Vec<Line> {
+/// Results: a label and a value in each line.
+fn results(state: &State) -> Vec<Line> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
     let mut lines = Vec::new();
@@ -168,14 +167,6 @@ fn results(state: &State, width: u16) -> Vec<Line> {
         Some(RenderEnd::Error) | None => {}
     }
     lines.extend(under::seen(state).map(|words| vec![(words, Tone::Faint)]));
-    if !state.overlays.warnings.is_empty() {
-        let them = if state.overlays.warnings.len() == 1 { "it" } else { "them" };
-        let all = summary(&state.overlays.warnings);
-        let words = format!("{all}: e shows {them}");
-        // Where that is too long, the key comes first.
-        let words = if columns(&words) > width { format!("e: {all}") } else { words };
-        lines.push(vec![(words, Tone::Warning)]);
-    }
     lines
 }
 
@@ -201,8 +192,11 @@ fn end(state: &State) -> Option<RenderEnd> {
     }
 }
 
-/// The hint for whoever has not saved yet, broken between words.
+/// The hint for a user who has not saved yet, broken between words. A broken scene without an image has it in the line below.
 fn hint(state: &State, width: u16) -> Vec<Line> {
+    if is_broken(state) && state.picture.shown.is_none() {
+        return Vec::new();
+    }
     let mut lines: Vec<String> = Vec::new();
     for word in under::hint(state).split_whitespace() {
         match lines.last_mut() {

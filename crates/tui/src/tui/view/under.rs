@@ -13,6 +13,7 @@ use super::text::{
 };
 use crate::pipeline::protocol::{NoiseProgress, RenderProgress};
 use crate::pipeline::words::samples_so_far;
+use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
 use crate::tui::event::Written;
 use crate::tui::preview_kind::PreviewKind;
@@ -20,6 +21,7 @@ use crate::tui::state::{Activity, State};
 
 /// The hint in a narrow window.
 const SHORT_HINT: &str = "save it to render again";
+const SHORT_HINT_OF_MODEL: &str = "rendered again on changes";
 /// A shorter bar says nothing.
 const LEAST_BAR: u16 = 6;
 
@@ -59,7 +61,7 @@ fn content(state: &State) -> Content {
             let until = if is_missing(state) { "the file is back" } else { "the errors are fixed" };
             Content::Words(format!("the last good picture stays until {until}"))
         }
-        Activity::Broken => Content::Nothing,
+        Activity::Broken => Content::Words(hint(state)),
     }
 }
 
@@ -152,7 +154,8 @@ fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, draw
     }
     let used = drawn.put(state, area, &pieces, buffer);
     let free = rest(area, used + 2);
-    let words = [hint(state), SHORT_HINT.to_owned()];
+    let short = if is_mesh(&state.request.scene) { SHORT_HINT_OF_MODEL } else { SHORT_HINT };
+    let words = [hint(state), short.to_owned()];
     if layout.panel.is_empty() && state.saving.edits == 0 {
         let fitting = words.into_iter().find(|words| columns(words) <= free.width);
         put_right(buffer, free, &fitting.unwrap_or_default(), Tone::Faint, state.display.depth);
@@ -204,8 +207,13 @@ pub(super) fn hint(state: &State) -> String {
     }
     let name =
         state.request.scene.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = visible(&name);
+    // A program writes a model, which the user does not save.
+    if is_mesh(&state.request.scene) {
+        return format!("rendered again when {name} changes");
+    }
     let again = if state.picture.shown.is_some() || state.work.renders > 0 { " again" } else { "" };
-    format!("save {} to render{again}", visible(&name))
+    format!("save {name} to render{again}")
 }
 
 /// Whether what is wrong with the scene is no text in it: it is a folder, or it is not there.
