@@ -42,11 +42,17 @@ fn the_option_decides_whatever_the_terminal_says() {
 
 #[test]
 fn pixels_leave_the_words_as_they_are_and_half_blocks_stand_in_under_words() {
-    for protocol in ["kitty", "sixel", "iterm2"] {
+    let answers = [
+        ("kitty", "\x1b_Gi=4211;OK\x1b\\"),
+        ("sixel", "\x1b[?62;4c"),
+        ("iterm2", "\x1bP>|iTerm2 3.5.0\x1b\\"),
+    ];
+    for (protocol, answer) in answers {
         let folder = Folder::new();
         let call = [folder.program(), "scene.toml", "--preview", protocol];
         let mut terminal = folder.terminal_with(&call, &[]);
         terminal.wait_for_render(1);
+        terminal.press(answer);
         terminal.resize(120, 24);
         // The first column of the picture, which the help leaves free.
         let has_blocks = |screen: &vt100::Screen| {
@@ -58,6 +64,28 @@ fn pixels_leave_the_words_as_they_are_and_half_blocks_stand_in_under_words() {
         terminal.wait("half blocks beside the help", has_blocks);
         terminal.press("?");
         terminal.wait("pixels again", |screen| !has_blocks(screen));
+        terminal.press("q");
+        assert_eq!(terminal.end(), 0);
+    }
+}
+
+#[test]
+fn a_terminal_without_pixels_shows_half_blocks_and_says_so() {
+    for (protocol, variables, words) in [
+        ("kitty", &[][..], "shows no kitty images"),
+        ("sixel", &[], "shows no sixel images"),
+        ("iterm2", &[], "shows no iTerm2 images"),
+        ("kitty", &[("TMUX", "/tmp/tmux-0/default,1,0")], "allow-passthrough on"),
+    ] {
+        let folder = Folder::new();
+        let call = [folder.program(), "scene.toml", "--preview", protocol];
+        let mut terminal = folder.terminal_with(&call, variables);
+        // The terminal has answered all questions, and none about images.
+        terminal.press("\x1b[?62;22c");
+        terminal.wait_for(words);
+        terminal.wait_for_render(1);
+        terminal.press("s");
+        terminal.wait_for("s hard");
         terminal.press("q");
         assert_eq!(terminal.end(), 0);
     }

@@ -13,6 +13,7 @@ use super::known::Answer;
 use super::known::Ask;
 use super::line::{Line, Question};
 use super::paint::{Besides, Fidelity, Painter};
+use super::preview_kind::PreviewKind;
 use super::terminal;
 
 /// Whether the terminal draws what lies between two marks at once (mode 2026).
@@ -31,6 +32,8 @@ const LARGE: usize = 2_000;
 pub(super) struct Way {
     /// Inside tmux or screen, which answer themselves and draw when they like.
     pub(super) is_multiplexed: bool,
+    /// Inside tmux.
+    pub(super) is_in_tmux: bool,
     /// Over a network.
     pub(super) is_remote: bool,
     /// Whether the terminal knows REP.
@@ -114,6 +117,14 @@ impl Display {
             images.forget();
         }
         self.is_complete = false;
+    }
+
+    /// Draws the picture in pixels from now on, if that is its kind.
+    pub(super) fn draw_as(&mut self, kind: PreviewKind) {
+        if let (PreviewKind::Pixels(protocol), None) = (kind, &self.images) {
+            terminal::will_have_images();
+            self.images = Some(Images::new(protocol, self.way.is_in_tmux));
+        }
     }
 
     /// Whether the picture is drawn in pixels.
@@ -251,6 +262,7 @@ impl Display {
             | Answer::TrueColor
             | Answer::Background(_)
             | Answer::Ink { .. }
+            | Answer::Images(_)
             | Answer::Other => {}
         }
     }

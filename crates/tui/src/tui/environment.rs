@@ -2,9 +2,11 @@
 
 use super::color::{ColorChoice, ColorDepth};
 use super::display::Way;
+use super::graphics::Protocol;
 use super::known::Ask;
 use super::options::PreviewChoice;
 use super::paint::can_repeat;
+use super::pixels::PixelRequest;
 use super::preview_kind::PreviewKind;
 
 /// The way to the terminal, from the environment.
@@ -16,6 +18,7 @@ pub(super) fn way(variable: impl Fn(&str) -> Option<String>) -> Way {
             || is_set("STY")
             || term.starts_with("tmux")
             || term.starts_with("screen"),
+        is_in_tmux: is_set("TMUX"),
         is_remote: ["SSH_CONNECTION", "SSH_CLIENT", "SSH_TTY"].into_iter().any(is_set),
         can_repeat: can_repeat(variable),
         ask: Ask::default(),
@@ -27,6 +30,22 @@ pub(super) fn is_plain(variable: impl Fn(&str) -> Option<String>) -> bool {
     let term = variable("TERM").unwrap_or_default();
     ["linux", "dumb", "vt"].iter().any(|name| term.starts_with(name))
         || variable("TERM_PROGRAM").is_some_and(|program| program == "Apple_Terminal")
+}
+
+/// The protocol of a choice of pixels.
+fn protocol(preview: PreviewChoice) -> Option<Protocol> {
+    match preview {
+        PreviewChoice::Kitty => Some(Protocol::Kitty),
+        PreviewChoice::Sixel => Some(Protocol::Sixel),
+        PreviewChoice::Iterm2 => Some(Protocol::Iterm),
+        PreviewChoice::Auto
+        | PreviewChoice::HalfBlock
+        | PreviewChoice::Quadrant
+        | PreviewChoice::Sextant
+        | PreviewChoice::Octant
+        | PreviewChoice::Ascii
+        | PreviewChoice::None => None,
+    }
 }
 
 /// Questions to ask the terminal. Multiplexers answer for themselves or not at all; plain terminals may print them.
@@ -48,6 +67,7 @@ pub(super) fn ask(
         true_color: color == ColorChoice::Auto && has_palette && is_outermost && !is_plain,
         background: is_ramp && get("STY").is_empty() && !term.starts_with("linux") && term != "dumb",
         palette: depth == ColorDepth::Ansi16 && is_outermost && !is_plain,
+        pixels: protocol(preview).map(|protocol| PixelRequest::new(protocol, &variable, is_plain)),
     }
 }
 

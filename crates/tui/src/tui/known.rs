@@ -1,5 +1,7 @@
 //! Answers of terminals, and questions to ask them.
 
+use super::graphics::Protocol;
+use super::pixels::PixelRequest;
 use super::terminals::{Brand, Terminal};
 
 /// The finest blocks that a terminal draws itself, whatever its font.
@@ -53,6 +55,8 @@ pub(super) enum Answer {
     TrueColor,
     /// Its background, in sRGB (OSC 11).
     Background([u8; 3]),
+    /// It shows images by this protocol.
+    Images(Protocol),
     /// One of its palette, in sRGB (OSC 4).
     Ink { index: u8, rgb: [u8; 3] },
     /// Any other report: the cursor's position, modes, colours, other names.
@@ -73,6 +77,8 @@ pub(super) struct Ask {
     pub(super) background: bool,
     /// Its 16 colours.
     pub(super) palette: bool,
+    /// Whether it shows images.
+    pub(super) pixels: Option<PixelRequest>,
 }
 
 impl Ask {
@@ -84,7 +90,9 @@ impl Ask {
                 questions.extend_from_slice(bytes);
             }
         };
+        let pixels = self.pixels.map(PixelRequest::question).unwrap_or_default();
         ask(self.blocks || self.name, b"\x1b[>q");
+        ask(true, &pixels);
         // `RGB` and `Tc`, in hexadecimal digits.
         ask(self.true_color, b"\x1bP+q524742\x1b\\\x1bP+q5463\x1b\\");
         ask(self.background, b"\x1b]11;?\x1b\\");

@@ -24,6 +24,7 @@ mod mosaic;
 mod noise_curve;
 mod options;
 pub mod paint;
+mod pixels;
 mod presenter;
 mod preview_kind;
 mod printed;

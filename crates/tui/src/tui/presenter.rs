@@ -142,6 +142,7 @@ impl Presenter {
         self.drawn.is_refined |= is_refined;
         self.postpone(state, now);
         state.dirty = false;
+        self.display.draw_as(state.display.kind);
         let window = state.display.window;
         let mut buffer = Buffer::empty(Rect::new(0, 0, window.columns, window.rows));
         let drawn = view::draw(state, &mut buffer);

@@ -4,6 +4,7 @@ use super::color::ColorDepth;
 use super::graphics::Protocol;
 use super::mosaic::Grid;
 use super::options::PreviewChoice;
+use super::pixels::PixelRequest;
 
 /// Kinds of previews.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +34,16 @@ impl PreviewKind {
             PreviewChoice::Quadrant => Self::Quadrant,
             PreviewChoice::Sextant => Self::Sextant,
             PreviewChoice::Octant => Self::Octant,
+        }
+    }
+
+    /// The kind to begin with: pixels only if the terminal is known to have them.
+    pub(super) fn at_first(choice: PreviewChoice, depth: ColorDepth, pixels: Option<PixelRequest>) -> Self {
+        match (Self::of(choice, depth), pixels) {
+            (Self::Pixels(_), Some(request)) if !request.is_known => {
+                Self::of(PreviewChoice::HalfBlock, depth)
+            }
+            (kind, _) => kind,
         }
     }
 

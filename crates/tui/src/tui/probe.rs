@@ -12,6 +12,7 @@ use super::display::{ATTRIBUTES, STATUS, SYNCHRONIZED};
 use super::environment::{is_plain, way};
 use super::input::{Decoder, Input};
 use super::known::{Answer, Ask, Blocks};
+use super::pixels::KITTY_QUERY;
 use super::terminal;
 use super::terminals::{Brand, Terminal};
 
@@ -70,9 +71,6 @@ impl Probe {
 /// Time to wait for answers.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// An image of one pixel that kitty's protocol does not keep.
-const IMAGE: &[u8] = b"\x1b_Gi=4211,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\";
-
 /// Asks the terminal. `None` if stdin and stdout are not one.
 ///
 /// It asks multiplexers and consoles for their attributes alone, as they may print other questions.
@@ -85,8 +83,15 @@ pub fn probe() -> Option<Probe> {
     let questions = if is_plain(variable) || way.is_multiplexed {
         Vec::new()
     } else {
-        let ask = Ask { blocks: true, name: true, true_color: true, background: true, palette: false };
-        [&ask.questions(), SYNCHRONIZED, IMAGE].concat()
+        let ask = Ask {
+            blocks: true,
+            name: true,
+            true_color: true,
+            background: true,
+            palette: false,
+            pixels: None,
+        };
+        [&ask.questions(), SYNCHRONIZED, KITTY_QUERY].concat()
     };
     let is_dumb = variable("TERM").is_some_and(|term| term == "dumb");
     let answers = if is_dumb { None } else { ask(&questions).ok().flatten() };
@@ -187,6 +192,7 @@ impl Heard {
             | Answer::Focus { .. }
             | Answer::TrueColor
             | Answer::Ink { .. }
+            | Answer::Images(_)
             | Answer::Other => None,
         };
         let attributes = self.between(b"\x1b[?", b'c').unwrap_or_default();

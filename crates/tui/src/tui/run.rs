@@ -13,7 +13,6 @@ use super::environment::{ask, way};
 use super::event::FilePlace;
 use super::event::{Effect, Event, Source};
 use super::exit_summary;
-use super::graphics::Images;
 use super::input;
 use super::options::{Ended, ExitStatus, Options, TuiError};
 use super::presenter::Presenter;
@@ -53,7 +52,7 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
         scene: options.scene,
         overrides: options.overrides,
         window: terminal::window(options.cell_aspect),
-        preview: PreviewKind::of(options.preview, depth),
+        preview: PreviewKind::at_first(options.preview, depth, way.ask.pixels),
         depth,
         is_light: color::has_light_background(variable),
         ansi: *color::ansi(&variable("TERM").unwrap_or_default()),
@@ -66,20 +65,8 @@ pub fn run(options: Options) -> Result<Ended, TuiError> {
     input::start(&sender).map_err(failed("read keys from"))?;
     writer::start(&sender).map_err(failed("write to"))?;
 
-    let images = match setup.preview {
-        PreviewKind::Pixels(protocol) => {
-            terminal::will_have_images();
-            Some(Images::new(protocol, !variable("TMUX").unwrap_or_default().is_empty()))
-        }
-        PreviewKind::HalfBlock
-        | PreviewKind::Quadrant
-        | PreviewKind::Sextant
-        | PreviewKind::Octant
-        | PreviewKind::Ascii
-        | PreviewKind::None => None,
-    };
     let now = Instant::now();
-    let display = Display::new(depth, way, images, Box::new(writer::send), now);
+    let display = Display::new(depth, way, None, Box::new(writer::send), now);
     let ui = Ui {
         screen,
         presenter: Presenter::new(display, options.previews, now),

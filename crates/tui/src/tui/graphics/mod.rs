@@ -184,7 +184,7 @@ impl Images {
 }
 
 /// Passed on by tmux, where `allow-passthrough` is on.
-fn wrapped(body: &[u8]) -> Vec<u8> {
+pub(super) fn wrapped(body: &[u8]) -> Vec<u8> {
     let mut bytes = b"\x1bPtmux;".to_vec();
     for &byte in body {
         if byte == 0x1b {

@@ -38,6 +38,8 @@ pub(in crate::tui) struct Decoder {
     last: Option<Instant>,
     /// When silence made a key of an escape character.
     escaped: Option<Instant>,
+    /// Text of the application program command (APC) under way, which the parser ignores.
+    command: Vec<u8>,
 }
 
 /// A sequence that has begun and not ended.
@@ -47,6 +49,8 @@ enum Held {
     Nothing,
     /// An escape character alone.
     Escape,
+    /// An escape character in a string, which it ends.
+    StringEnd,
     /// A sequence that began then and has so many bytes. `introducer`: the byte after the escape character.
     Sequence {
         begin: Instant,
@@ -79,6 +83,7 @@ impl Decoder {
         match &self.held {
             Held::Nothing => None,
             Held::Escape => after(LONE_ESCAPE),
+            Held::StringEnd => after(SEQUENCE),
             Held::Sequence { begin, .. } => after(SEQUENCE).map(|end| end.min(*begin + LONGEST)),
             Held::Doubtful(_) => after(DOUBT),
             Held::Paste(paste) => Some(paste.deadline()),
@@ -105,7 +110,7 @@ impl Decoder {
                     self.press_escape();
                     self.replay(&[introducer]);
                 }
-                Held::Nothing | Held::Sequence { .. } => {}
+                Held::Nothing | Held::StringEnd | Held::Sequence { .. } => {}
             }
         }
     }
@@ -113,8 +118,16 @@ impl Decoder {
     fn take(&mut self, byte: u8, now: Instant) {
         match std::mem::take(&mut self.held) {
             Held::Nothing => self.begin(byte, now),
-            Held::Escape => self.follow_escape(byte, now),
-            Held::Sequence { .. } if byte == ESCAPE => self.begin(byte, now),
+            Held::Escape | Held::StringEnd => self.follow_escape(byte, now),
+            Held::Sequence { introducer, .. } if byte == ESCAPE => {
+                if introducer == b'_' {
+                    self.meaning.end_command(&std::mem::take(&mut self.command));
+                }
+                self.begin(byte, now);
+                if b"]P_X^".contains(&introducer) {
+                    self.held = Held::StringEnd;
+                }
+            }
             Held::Sequence { bytes: 2, introducer, .. } if is_key_behind(introducer, byte) => {
                 self.give_up();
                 self.press_escape();
@@ -122,6 +135,9 @@ impl Decoder {
                 self.begin(byte, now);
             }
             Held::Sequence { begin, bytes, introducer } => {
+                if introducer == b'_' {
+                    self.command.push(byte);
+                }
                 self.go_on(byte, (begin, bytes + 1, introducer), now);
             }
             Held::Doubtful(bytes) => self.follow_doubt(bytes, byte, now),
@@ -203,6 +219,7 @@ impl Decoder {
     /// Forgets what began.
     fn give_up(&mut self) -> Held {
         self.meaning.forget();
+        self.command.clear();
         self.parser = vte::Parser::default();
         std::mem::take(&mut self.held)
     }

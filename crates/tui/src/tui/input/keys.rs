@@ -6,6 +6,7 @@ use vte::{Params, Perform};
 use super::reports::{self, Report};
 use super::sent::Input;
 use crate::tui::event::{KeyPress, Mouse, MouseKind};
+use crate::tui::graphics::Protocol;
 use crate::tui::known::Answer;
 
 /// The parser's callbacks; holds the meaning of what was read last.
@@ -43,6 +44,11 @@ impl Meaning {
 
     fn key(&mut self, code: KeyCode, modifiers: KeyModifiers) {
         self.found.push(Input::Key(KeyPress { code, modifiers }));
+    }
+
+    /// An application program command has ended.
+    pub(super) fn end_command(&mut self, text: &[u8]) {
+        self.answer(reports::application(text));
     }
 
     /// A report in SGR form (mode 1006): the button with bits for what else is, and the cell from 1.
@@ -128,7 +134,12 @@ impl Perform for Meaning {
         match (intermediates, action) {
             ([], 'n') if first == 0 => self.answer(Answer::Ready),
             (b"<", 'M' | 'm') => self.mouse(first, (second, number(2)), action == 'M'),
-            (b"?", 'c') => self.answer(Answer::Attributes),
+            (b"?", 'c') => {
+                if params.iter().any(|param| param == [4]) {
+                    self.answer(Answer::Images(Protocol::Sixel));
+                }
+                self.answer(Answer::Attributes);
+            }
             (b"?$", 'y') if first == 2026 => {
                 // 1: set, 2: reset; others: not known, or it cannot be changed.
                 self.answer(Answer::Synchronized { is_known: matches!(second, 1 | 2) });

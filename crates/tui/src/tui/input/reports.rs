@@ -1,6 +1,8 @@
 //! Reports of a terminal in strings: its name, its colours, its abilities.
 
+use crate::tui::graphics::Protocol;
 use crate::tui::known::Answer;
+use crate::tui::pixels::QUERY_ID;
 use crate::tui::terminals::Terminal;
 
 /// A report in a control string (DCS) as it comes.
@@ -68,6 +70,12 @@ pub(super) fn command(params: &[&[u8]]) -> Answer {
         _ => None,
     };
     answer.unwrap_or(Answer::Other)
+}
+
+/// An application program command (APC): kitty's answer to a question about images.
+pub(super) fn application(text: &[u8]) -> Answer {
+    let of_query = format!("Gi={QUERY_ID};OK");
+    if text == of_query.as_bytes() { Answer::Images(Protocol::Kitty) } else { Answer::Other }
 }
 
 fn number(text: &[u8]) -> Option<u8> {

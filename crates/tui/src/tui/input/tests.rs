@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::tui::event::{Mouse, MouseKind};
+use crate::tui::graphics::Protocol;
 use crate::tui::known::Answer;
 use crate::tui::terminals::{Brand, Terminal};
 
@@ -113,6 +114,9 @@ fn answers_are_told_from_keys() {
         (b"\x1b[<2;10;20M", Answer::Other),
         (b"\x1b[<35;10;20M", Answer::Other),
         (b"\x1b[?997;1n", Answer::Other),
+        (b"\x1b_Gi=4211;OK\x1b\\", Answer::Images(Protocol::Kitty)),
+        (b"\x1b_Gi=4211;ENOTSUPPORTED\x1b\\", Answer::Other),
+        (b"\x1b_Gi=31;OK\x1b\\", Answer::Other),
     ] {
         let name = String::from_utf8_lossy(bytes).into_owned();
         assert_eq!(read(bytes), [Input::Answer(answer)], "{name:?}");
@@ -160,6 +164,25 @@ fn an_escape_character_is_the_key_when_nothing_follows() {
     assert_eq!(read(b"\x1b\x1b[A"), [ESC, special(KeyCode::Up)]);
     assert_eq!(read(b"\x1b\x03q"), [ESC, Input::Key(KeyPress::ctrl('c')), plain('q')]);
     assert_eq!(read("\x1béq".as_bytes()), [ESC, plain('é'), plain('q')]);
+}
+
+#[test]
+fn sixels_are_an_attribute() {
+    let answers = [Answer::Images(Protocol::Sixel), Answer::Attributes].map(Input::Answer);
+    assert_eq!(read(b"\x1b[?62;4;22c"), answers);
+    assert_eq!(read(b"\x1b[?1;2;4c"), answers);
+    assert_eq!(read(b"\x1b[?44;14c"), [Input::Answer(Answer::Attributes)]);
+}
+
+#[test]
+fn answers_about_images_eat_no_keys() {
+    let keys = b"q\x1b_Gi=4211;OK\x1b\\s";
+    assert_eq!(read(keys), [plain('q'), Input::Answer(Answer::Images(Protocol::Kitty)), plain('s')]);
+    // The end of the answer is late.
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(b"\x1b_Gi=4211;OK\x1b"), [Input::Answer(Answer::Images(Protocol::Kitty))]);
+    assert_eq!(bench.wait(300), []);
+    assert_eq!(bench.read(b"\\s"), [plain('s')]);
 }
 
 /// No key has alt: a character right behind an escape character is a key of its own.
@@ -342,7 +365,7 @@ proptest! {
     #[test]
     fn splits_do_not_count(parts in prop::collection::vec(0..10_usize, 0..40), cuts in prop::collection::vec(1..5_usize, 200)) {
         let words: [&[u8]; 10] =
-            [b"q", b"\x1b[A", b"\x1b[0n", b"\x1b[?62;4c", "é".as_bytes(), b"\x1bOP", b"\x1b[5~", b"\x03", b"\x1b[200~q\x1b[201~", b"\x1b[3;4R"];
+            [b"q", b"\x1b[A", b"\x1b[0n", b"\x1b[?62;22c", "é".as_bytes(), b"\x1bOP", b"\x1b[5~", b"\x03", b"\x1b[200~q\x1b[201~", b"\x1b[3;4R"];
         let text: Vec<u8> = parts.iter().flat_map(|part| words[*part]).copied().collect();
         let whole = read(&text);
         prop_assert_eq!(whole.len(), parts.len());

@@ -1,6 +1,6 @@
 //! The terminal: its window, its colours, and the means by which pictures are shown.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::Setup;
 use crate::tui::color::{Ansi, ColorDepth, Shades};
@@ -8,6 +8,7 @@ use crate::tui::event::{FrameReport, Window};
 use crate::tui::graphics::Protocol;
 use crate::tui::known::Ask;
 use crate::tui::mosaic::Grid;
+use crate::tui::pixels::PixelRequest;
 use crate::tui::preview_kind::PreviewKind;
 use crate::tui::terminals::Abilities;
 
@@ -29,13 +30,20 @@ pub(in crate::tui) struct DisplayState {
     pub has_focus: bool,
     /// Whether the terminal's background is light.
     pub is_light: bool,
+    /// Pixels that the user wants and the terminal has not confirmed.
+    pub pixels: Option<PixelRequest>,
+    /// Time at which the user is told that the terminal has not answered.
+    pub pixels_until: Option<Instant>,
     /// Cost of the last frame.
     pub frame: Option<FrameReport>,
 }
 
 impl DisplayState {
-    pub(super) fn new(setup: &Setup) -> Self {
+    pub(super) fn new(setup: &Setup, now: Instant) -> Self {
+        let pixels = setup.ask.pixels.filter(|request| !request.is_known);
         Self {
+            pixels,
+            pixels_until: pixels.map(|request| request.deadline(now)),
             window: setup.window,
             kind: setup.preview,
             depth: setup.depth,

@@ -67,7 +67,7 @@ pub(super) struct State {
 impl State {
     pub(super) fn new(setup: Setup, now: Instant) -> Self {
         Self {
-            display: DisplayState::new(&setup),
+            display: DisplayState::new(&setup, now),
             request: RequestState::new(setup.scene, setup.overrides),
             work: WorkState::new(now),
             picture: PictureState::default(),
@@ -135,6 +135,7 @@ impl State {
         let notice = self.overlays.message.as_ref().and_then(|message| message.until);
         // An older picture grows older.
         let age = self.picture.history.is_open().then(|| self.now + AGE);
-        [clock, age, self.request.resize_due, bars, views, notice].into_iter().flatten().min()
+        let pixels = self.display.pixels_until;
+        [clock, age, self.request.resize_due, bars, views, notice, pixels].into_iter().flatten().min()
     }
 }

@@ -1,10 +1,12 @@
 //! Answers of the terminal about itself.
 
 use super::request::resized_preview;
+use super::say::say_until_key;
 use crate::tui::color::{ColorDepth, Shades};
 use crate::tui::event::Effect;
 use crate::tui::known::Answer;
 use crate::tui::known::Blocks;
+use crate::tui::pixels::Verdict;
 use crate::tui::preview_kind::PreviewKind;
 use crate::tui::state::State;
 use crate::tui::terminals::Terminal;
@@ -12,8 +14,9 @@ use crate::tui::view::ramp;
 
 /// Shows everything as well as the terminal can from now on, if the answer belongs to a question.
 pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
+    let mut effects = judge(state, answer);
     match answer {
-        Answer::Name(terminal) => return name(state, terminal),
+        Answer::Name(terminal) => effects.extend(name(state, terminal)),
         Answer::Focus { is_here } => state.display.has_focus = is_here,
         Answer::TrueColor if state.display.ask.true_color => show(state, ColorDepth::TrueColor),
         Answer::Ink { index, rgb } if state.display.ask.palette => {
@@ -26,7 +29,8 @@ pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
             let is_light = ramp::is_light(rgb);
             state.dirty |= std::mem::replace(&mut state.display.is_light, is_light) != is_light;
         }
-        Answer::TrueColor
+        Answer::Images(_)
+        | Answer::TrueColor
         | Answer::Ink { .. }
         | Answer::Background(_)
         | Answer::Ready
@@ -34,7 +38,34 @@ pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
         | Answer::Synchronized { .. }
         | Answer::Other => {}
     }
-    Vec::new()
+    effects
+}
+
+/// Draws in pixels from now on if the answer says that the terminal has them.
+fn judge(state: &mut State, answer: Answer) -> Vec<Effect> {
+    let Some(request) = state.display.pixels else { return Vec::new() };
+    match request.verdict(answer) {
+        Verdict::Nothing => Vec::new(),
+        Verdict::Lacks => {
+            lack_pixels(state);
+            Vec::new()
+        }
+        Verdict::Has => {
+            (state.display.pixels, state.display.pixels_until) = (None, None);
+            state.overlays.message.take_if(|message| message.words == request.refusal());
+            state.display.kind = PreviewKind::Pixels(request.protocol);
+            state.dirty = true;
+            resized_preview(state)
+        }
+    }
+}
+
+/// Says, once, that the terminal does not show pixels. A late answer is still heard.
+pub(super) fn lack_pixels(state: &mut State) {
+    let asked = state.display.pixels_until.take().and(state.display.pixels);
+    if let Some(request) = asked {
+        say_until_key(state, request.refusal());
+    }
 }
 
 fn show(state: &mut State, depth: ColorDepth) {
@@ -73,13 +104,65 @@ fn draw_in(state: &mut State, blocks: Blocks) -> Vec<Effect> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
     use crate::pipeline::protocol::Command;
     use crate::tui::color::XTERM;
-    use crate::tui::fixtures::{state, state_with};
+    use crate::tui::event::Event;
+    use crate::tui::fixtures::{Desk, state, state_with};
+    use crate::tui::graphics::Protocol;
     use crate::tui::known::Ask;
+    use crate::tui::pixels::{Passage, PixelRequest};
     use crate::tui::terminals::{Abilities, Brand};
     use crate::tui::update::start;
+
+    /// A desk of a user who wants kitty's images.
+    fn wanting_pixels(passage: Passage) -> Desk {
+        let mut state = state(80, 24);
+        let request = PixelRequest { protocol: Protocol::Kitty, passage, is_known: false };
+        state.display.pixels = Some(request);
+        state.display.pixels_until = Some(request.deadline(state.now));
+        Desk::with(state)
+    }
+
+    #[test]
+    fn pixels_are_drawn_once_the_terminal_confirms_them() {
+        let mut desk = wanting_pixels(Passage::Direct);
+        assert_eq!(desk.state.display.kind, PreviewKind::HalfBlock);
+        let effects = desk.event(Event::Answer(Answer::Images(Protocol::Kitty)));
+        assert!(matches!(&effects[..], [Effect::Send(Command::Preview(Some(_)))]), "{effects:?}");
+        desk.event(Event::Answer(Answer::Attributes));
+        desk.wait(2000);
+        assert_eq!(desk.state.display.kind, PreviewKind::Pixels(Protocol::Kitty));
+        assert_eq!(desk.state.overlays.message, None);
+    }
+
+    #[test]
+    fn a_terminal_without_pixels_is_told_of_and_gets_half_blocks() {
+        let mut desk = wanting_pixels(Passage::Direct);
+        desk.event(Event::Answer(Answer::Attributes));
+        assert!(desk.text().contains("this terminal shows no kitty images"), "{}", desk.text());
+        assert_eq!(desk.state.display.kind, PreviewKind::HalfBlock);
+        desk.press('s');
+        desk.event(Event::Answer(Answer::Attributes));
+        desk.wait(2000);
+        assert!(!desk.text().contains("kitty images"), "said once: {}", desk.text());
+    }
+
+    #[test]
+    fn a_closed_tmux_is_told_of_after_a_second_and_a_late_answer_counts() {
+        let mut desk = wanting_pixels(Passage::Tmux);
+        desk.event(Event::Answer(Answer::Attributes));
+        desk.wait(900);
+        assert_eq!(desk.state.overlays.message, None);
+        assert!(desk.state.next_tick().is_some_and(|tick| tick <= desk.now + Duration::from_millis(100)));
+        desk.wait(100);
+        assert!(desk.text().contains("allow-passthrough on"), "{}", desk.text());
+        desk.event(Event::Answer(Answer::Images(Protocol::Kitty)));
+        assert_eq!(desk.state.display.kind, PreviewKind::Pixels(Protocol::Kitty));
+        assert!(!desk.text().contains("allow-passthrough"), "{}", desk.text());
+    }
 
     #[test]
     fn a_terminal_that_draws_octants_gets_a_finer_picture() {

@@ -186,6 +186,9 @@ fn tick(state: &mut State) -> Vec<Effect> {
     state.dirty |= state.overlays.views.take_if(|views| now >= views.until).is_some();
     let is_over = |message: &mut Message| message.until.is_some_and(|until| now >= until);
     state.dirty |= state.overlays.message.take_if(is_over).is_some();
+    if state.display.pixels_until.is_some_and(|until| now >= until) {
+        answers::lack_pixels(state);
+    }
     if state.request.resize_due.is_none_or(|due| state.now < due) {
         return Vec::new();
     }

@@ -1,0 +1,165 @@
+//! Whether the terminal shows images by the protocol that `--preview` names: it is asked, and half blocks are drawn until it says so.
+
+use std::time::{Duration, Instant};
+
+use super::graphics::{Protocol, wrapped};
+use super::known::Answer;
+use super::terminals::Terminal;
+
+/// Number of the image in the question about kitty's protocol.
+pub(super) const QUERY_ID: u32 = 4211;
+/// An image of one pixel that kitty's protocol does not keep; the terminal says whether it could be shown.
+pub(super) const KITTY_QUERY: &[u8] = b"\x1b_Gi=4211,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\";
+/// The question for the terminal's name and version (XTVERSION).
+const NAME_QUERY: &[u8] = b"\x1b[>q";
+/// Time for an answer, after which the user is told.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// The way to the terminal, as far as it concerns images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Passage {
+    /// None in between.
+    Direct,
+    /// tmux, which passes on what is wrapped if `allow-passthrough` is on.
+    Tmux,
+    /// screen, or a console that prints sequences that it does not know: nothing is asked.
+    Closed,
+}
+
+/// Pixels that were requested and are not confirmed yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct PixelRequest {
+    pub(super) protocol: Protocol,
+    pub(super) passage: Passage,
+    /// Whether the environment names a terminal that has the protocol.
+    pub(super) is_known: bool,
+}
+
+/// What an answer says about a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Verdict {
+    Nothing,
+    Has,
+    Lacks,
+}
+
+impl PixelRequest {
+    pub(super) fn new(protocol: Protocol, variable: impl Fn(&str) -> Option<String>, is_plain: bool) -> Self {
+        let is_set = |name: &str| variable(name).is_some_and(|value| !value.is_empty());
+        let term = variable("TERM").unwrap_or_default();
+        let passage = match () {
+            () if is_set("TMUX") => Passage::Tmux,
+            () if is_plain || is_set("STY") || term.starts_with("screen") => Passage::Closed,
+            () => Passage::Direct,
+        };
+        let terminal = Terminal::of_environment(variable);
+        let has_iterm = terminal.is_some_and(|terminal| terminal.brand.has_iterm_images());
+        Self { protocol, passage, is_known: protocol == Protocol::Iterm && has_iterm }
+    }
+
+    /// The question, if it is not among those that are asked anyway.
+    pub(super) fn question(self) -> Vec<u8> {
+        match (self.protocol, self.passage) {
+            (Protocol::Kitty, Passage::Direct) => KITTY_QUERY.to_vec(),
+            (Protocol::Kitty, Passage::Tmux) => wrapped(KITTY_QUERY),
+            (Protocol::Iterm, Passage::Tmux) => wrapped(NAME_QUERY),
+            (Protocol::Iterm, Passage::Direct) => NAME_QUERY.to_vec(),
+            // Device attributes are always asked for; tmux draws sixels itself.
+            (Protocol::Sixel, _) | (_, Passage::Closed) => Vec::new(),
+        }
+    }
+
+    /// Time at which the user is told that the terminal has not answered.
+    pub(super) fn deadline(self, now: Instant) -> Instant {
+        if self.passage == Passage::Closed { now } else { now + PATIENCE }
+    }
+
+    /// Answers come in the order of the questions, those of device attributes last. But tmux answers for these before what it
+    /// passes on.
+    pub(super) fn verdict(self, answer: Answer) -> Verdict {
+        let is_last = match (self.protocol, self.passage) {
+            (Protocol::Sixel, _) | (_, Passage::Direct) => true,
+            (Protocol::Kitty | Protocol::Iterm, Passage::Tmux | Passage::Closed) => false,
+        };
+        match answer {
+            Answer::Images(protocol) if protocol == self.protocol => Verdict::Has,
+            Answer::Name(terminal)
+                if self.protocol == Protocol::Iterm && terminal.brand.has_iterm_images() =>
+            {
+                Verdict::Has
+            }
+            Answer::Attributes if is_last => Verdict::Lacks,
+            Answer::Images(_)
+            | Answer::Name(_)
+            | Answer::Attributes
+            | Answer::Ready
+            | Answer::Synchronized { .. }
+            | Answer::Focus { .. }
+            | Answer::TrueColor
+            | Answer::Background(_)
+            | Answer::Ink { .. }
+            | Answer::Other => Verdict::Nothing,
+        }
+    }
+
+    /// Message about a terminal that does not have it, with the way to it.
+    pub(super) fn refusal(self) -> String {
+        let (name, terminals) = match self.protocol {
+            Protocol::Kitty => ("kitty", "kitty, Ghostty, WezTerm or Konsole"),
+            Protocol::Sixel => ("sixel", "foot, xterm -ti vt340, mlterm, or tmux built with sixels"),
+            Protocol::Iterm => ("iTerm2", "iTerm2, WezTerm or VS Code"),
+        };
+        let instead = "half blocks are shown instead";
+        match (self.protocol, self.passage) {
+            (Protocol::Kitty | Protocol::Iterm, Passage::Tmux) => format!(
+                "no {name} images through tmux: {instead}; `tmux set -g allow-passthrough on` enables them if tmux runs in {terminals}"
+            ),
+            (Protocol::Sixel, _) | (_, Passage::Direct | Passage::Closed) => {
+                format!("this terminal shows no {name} images: {instead}; use {terminals}")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(protocol: Protocol, pairs: &[(&str, &str)], is_plain: bool) -> PixelRequest {
+        let variable =
+            |name: &str| pairs.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned());
+        PixelRequest::new(protocol, variable, is_plain)
+    }
+
+    #[test]
+    fn the_environment_decides_how_to_ask() {
+        let xterm = ("TERM", "xterm-256color");
+        let direct = request(Protocol::Kitty, &[xterm], false);
+        assert_eq!((direct.passage, direct.question()), (Passage::Direct, KITTY_QUERY.to_vec()));
+        let tmux = request(Protocol::Kitty, &[("TERM", "tmux-256color"), ("TMUX", "/tmp/tmux,1,0")], false);
+        assert_eq!(tmux.passage, Passage::Tmux);
+        assert!(tmux.question().starts_with(b"\x1bPtmux;\x1b\x1b_G"));
+        let screen = request(Protocol::Kitty, &[("TERM", "screen"), ("STY", "1.a")], false);
+        assert_eq!((screen.passage, screen.question()), (Passage::Closed, Vec::new()));
+        assert_eq!(request(Protocol::Iterm, &[xterm], true).passage, Passage::Closed);
+        assert!(request(Protocol::Iterm, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
+        assert!(!request(Protocol::Iterm, &[xterm], false).is_known);
+        assert!(!request(Protocol::Kitty, &[xterm, ("TERM_PROGRAM", "iTerm.app")], false).is_known);
+        let number = String::from_utf8_lossy(KITTY_QUERY).contains(&format!("i={QUERY_ID},"));
+        assert!(number, "the answer is recognized by the number of the question");
+    }
+
+    #[test]
+    fn tmux_answers_for_itself_too_early() {
+        for protocol in [Protocol::Kitty, Protocol::Iterm] {
+            let tmux = request(protocol, &[("TMUX", "/tmp/tmux,1,0")], false);
+            assert_eq!(tmux.verdict(Answer::Attributes), Verdict::Nothing);
+            assert!(tmux.refusal().contains("allow-passthrough"), "{}", tmux.refusal());
+            assert_eq!(request(protocol, &[], false).verdict(Answer::Attributes), Verdict::Lacks);
+        }
+        let sixel = request(Protocol::Sixel, &[("TMUX", "/tmp/tmux,1,0")], false);
+        assert_eq!(sixel.verdict(Answer::Images(Protocol::Sixel)), Verdict::Has);
+        assert_eq!(sixel.verdict(Answer::Images(Protocol::Kitty)), Verdict::Nothing);
+        assert_eq!(sixel.verdict(Answer::Attributes), Verdict::Lacks);
+    }
+}
