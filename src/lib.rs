@@ -72,15 +72,15 @@
 //!
 //! From the camera to the film; all files are in `integrators/` but where another room is named:
 //!
-//! 1. `mod.rs`: takes the tile's samples and the settings that count; `method.rs` derives how rays behave; `transport/tile.rs` stores all.
-//! 2. `transport/camera.rs` makes rows of sixteen rays; `eye.rs` follows them round by round.
+//! 1. `mod.rs`: takes the tile's samples and the settings that count; `behavior.rs` derives what paths do; `transport/tile.rs` stores all.
+//! 2. `transport/camera.rs` makes rows of sixteen rays; `camera_paths.rs` follows them bounce by bounce.
 //! 3. `transport/packet.rs` intersects a row: `world/geometry.rs`, then the trees of `accel/wide_bvh/`, or `geometry/facets.rs` for few
 //!    triangles.
 //! 4. `transport/packet.rs` puts surfaces of simple materials into rows of sixteen vertices, `transport/batch.rs`; all BSDFs of a row are of
 //!    one kind, `materials/rough/mod.rs`.
 //! 5. Others go one by one: `transport/walk.rs` passes parts of one glass (`transport/crossing.rs`), `transport/vertex.rs` prepares the surface.
 //! 6. At mirrors and glass, `transport/interface.rs` makes the rays of the next round.
-//! 7. `direct/queue.rs` lights rows: `direct/all_lights.rs` or `direct/picked.rs` sample lights, `direct/mis.rs` weighs, `direct/shadow_rays.rs`
+//! 7. `direct/queue.rs` lights rows: `direct/all_lights.rs` or `direct/light_tree.rs` sample lights, `direct/mis.rs` weighs, `direct/shadow_rays.rs`
 //!    traces.
 //! 8. `direct/lobe_rays.rs` finds lights in narrow lobes; `photons/gather.rs` adds photons, which `photons/emit.rs` has traced.
 //! 9. `transport/scatter.rs` scatters paths that go on, for the next round.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use glimt::control::{CancelToken, unwatched};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::{PhotonMap, PhotonMaps, PhotonSettings, Photons, View, render_tile_by};
+use glimt::integrators::{PhotonMap, PhotonMaps, PhotonSettings, Photons, View, render_tile_with_photons};
 use glimt::math::{DVec3, Vec3};
 use glimt::scene::description::Shape;
 use glimt::scene::description::light::Falloff;
@@ -69,7 +69,7 @@ fn where_nothing_mirrors_or_refracts_no_photons_are_sent() {
     let of_photons = settings.photons.expect("photons are on");
     let (photons, pass) =
         Photons::new(&world, &settings, of_photons, &unwatched, &token).expect("nobody cancels");
-    assert!(!photons.are_sent());
+    assert!(!photons.emits_photons());
     assert_eq!((pass.emitted, pass.stored()), (0, 0));
 }
 
@@ -297,7 +297,7 @@ fn the_bits_are_the_same_whatever_the_threads_and_the_cut() {
         }
     }
     let render = |maps: &PhotonMaps, rect: Rect, samples: Range<u32>| {
-        let tile = render_tile_by(Some(maps), &world, &settings, rect, samples, &token);
+        let tile = render_tile_with_photons(Some(maps), &world, &settings, rect, samples, &token);
         tile.expect("nobody cancels").0.radiance
     };
     let whole = Rect { x: 0, y: 0, width: 16, height: 16 };

@@ -8,7 +8,7 @@ use glimt::assets::{FileMaterial, LoadedMesh};
 use glimt::control::{CancelToken, unwatched};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
-use glimt::integrators::{self, PhotonMaps, PhotonSettings, RenderSettings, View, render_tile_by};
+use glimt::integrators::{self, PhotonMaps, PhotonSettings, RenderSettings, View, render_tile_with_photons};
 use glimt::materials::texels::{TexelData, Texels};
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::{Falloff, PointLight};
@@ -297,7 +297,8 @@ pub fn tile_by(
     samples: u32,
 ) -> Vec<DVec3> {
     let token = CancelToken::new();
-    let (tile, _) = render_tile_by(maps, world, settings, rect, 0..samples, &token).expect("nobody cancels");
+    let (tile, _) =
+        render_tile_with_photons(maps, world, settings, rect, 0..samples, &token).expect("nobody cancels");
     let sums = tile.radiance.chunks(samples as usize);
     sums.map(|pixel| pixel.iter().map(|c| c.as_dvec3()).sum::<DVec3>() / f64::from(samples)).collect()
 }

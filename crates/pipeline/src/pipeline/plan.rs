@@ -10,7 +10,7 @@ use crate::choice::Choice;
 use crate::film::stretch::{Kind, Stretch};
 use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
-use crate::integrators::{FirstHit, Measure, PhotonSettings, RenderSettings, Shown};
+use crate::integrators::{AovSource, FirstHit, LightAov, PhotonSettings, RenderSettings};
 use crate::math::Vec3;
 use crate::output::MovingFormat;
 use crate::output::{BitDepth, Format, OutputError};
@@ -300,7 +300,7 @@ fn check_shard(settings: &RenderSettings, overrides: &Overrides) -> Result<(), B
             "--shard cannot divide photons with a noise threshold: each pass needs the whole picture";
         return refused(message, "give --error 0 and --samples, or --photons off");
     }
-    if settings.gathers() && settings.view.shown() == Shown::Film(Quantity::Error) {
+    if settings.gathers() && settings.view.source() == AovSource::Film(Quantity::Error) {
         return refused(
             "--shard cannot divide the view `error` of photons",
             "render it in one, or with --photons off",
@@ -320,23 +320,23 @@ fn check_format(path: &Path, size: (u32, u32), bit_depth: u8) -> Result<(), Box<
 
 /// Exposure and tone curve are for light; numbers that are display values already are shown as they are.
 fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
-    match view.shown() {
-        Shown::Light(Measure::Radiance(_)) | Shown::Bounds | Shown::Film(Quantity::Radiance) => {
+    match view.source() {
+        AovSource::Light(LightAov::Radiance(_)) | AovSource::Bounds | AovSource::Film(Quantity::Radiance) => {
             ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
         }
-        Shown::FirstHit(FirstHit::Depth) => {
+        AovSource::FirstHit(FirstHit::Depth) => {
             ToneMapping { stretch: Stretch::Unknown(Kind::Distances), ..ToneMapping::DATA }
         }
-        Shown::Light(Measure::Work)
-        | Shown::FirstHit(FirstHit::Photons)
-        | Shown::Film(Quantity::Samples | Quantity::Error) => {
+        AovSource::Light(LightAov::TraversalCost)
+        | AovSource::FirstHit(FirstHit::Photons)
+        | AovSource::Film(Quantity::Samples | Quantity::Error) => {
             ToneMapping { stretch: Stretch::Unknown(Kind::Amounts), ..ToneMapping::DATA }
         }
-        Shown::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {
+        AovSource::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {
             ToneMapping::DATA
         }
         // It is linear, but no exposure makes it more than it is.
-        Shown::Light(Measure::ArrivingShare) => ToneMapping::default(),
+        AovSource::Light(LightAov::LitFraction) => ToneMapping::default(),
     }
 }
 
@@ -481,10 +481,10 @@ mod tests {
         for &view in View::ALL {
             let overrides = Overrides { view: Some(view), ..Default::default() };
             let transfer = planned("", &overrides).tone.transfer;
-            let is_display_value = match view.shown() {
-                Shown::FirstHit(_) | Shown::Light(Measure::Work) => true,
-                Shown::Film(quantity) => quantity != Quantity::Radiance,
-                Shown::Light(Measure::Radiance(_) | Measure::ArrivingShare) | Shown::Bounds => false,
+            let is_display_value = match view.source() {
+                AovSource::FirstHit(_) | AovSource::Light(LightAov::TraversalCost) => true,
+                AovSource::Film(quantity) => quantity != Quantity::Radiance,
+                AovSource::Light(LightAov::Radiance(_) | LightAov::LitFraction) | AovSource::Bounds => false,
             };
             assert_eq!(transfer == Transfer::Identity, is_display_value, "{}", view.name());
         }

@@ -13,7 +13,7 @@ use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::system::processor::seconds_of_thread;
 use crate::world::World;
 
-/// The function that renders a tile, with photon maps or without: see [`crate::integrators::render_tile_by`].
+/// The function that renders a tile, with photon maps or without: see [`crate::integrators::render_tile_with_photons`].
 pub(super) type Kernel = fn(
     Option<&PhotonMaps>,
     &World,

@@ -1,4 +1,4 @@
-//! Pictures of numbers at the first hit. All but distances are display values in [0, 1], not radiance.
+//! AOVs of the first hit. All except depth are display values in [0, 1], not radiance.
 
 use super::photons::{GatherPoint, PhotonMaps};
 use super::transport::scratch::Scratch;
@@ -10,10 +10,10 @@ use crate::geometry::SurfacePoint;
 use crate::math::lanes::PlainFolds;
 use crate::math::{DVec2, Vec3};
 
-/// Shows the first hit of each camera ray in the queue; black without a hit.
+/// Writes the AOV `quantity` at the first hit of each camera ray in the queue; black where there is no hit.
 pub fn shade(
     (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
-    number: FirstHit,
+    quantity: FirstHit,
     scratch: &mut Scratch,
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
@@ -22,12 +22,12 @@ pub fn shade(
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let Some(hit) = hit else { continue };
         let passed =
-            if tile.world.has_passable() { Some(tile.first_there(path, hit, counters)) } else { None };
+            if tile.world.has_passable() { Some(tile.first_opaque_hit(path, hit, counters)) } else { None };
         let Some((path, hit)) = passed.unwrap_or(Some((*path, *hit))) else { continue };
         let (path, hit) = (&path, &hit);
         let vertex = Vertex::new(tile, path, hit);
         let surface = &vertex.surface;
-        let value = match number {
+        let value = match quantity {
             FirstHit::Normal => (vertex.front_shading_normal(counters) + Vec3::ONE) * 0.5,
             FirstHit::Depth => Vec3::splat(distance(tile, surface)),
             FirstHit::Barycentric => surface.barycentric,
@@ -46,15 +46,15 @@ pub fn shade(
     Ok(())
 }
 
-/// Photons around a point, of the pass of a sample.
+/// Number of photons within the kernels around a vertex, in the photon pass of a sample.
 fn photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
     let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
     let (_, _, sample) = tile.block.place(slot);
     let pass = maps.pass(sample);
-    [&pass.caustic, &pass.bounced].map(|map| map.count_around(&look, PlainFolds) as f32).iter().sum()
+    [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PlainFolds) as f32).iter().sum()
 }
 
-/// Distance along the view axis.
+/// Depth along the view axis.
 fn distance(tile: &TileContext<'_>, surface: &SurfacePoint) -> f32 {
     tile.world.camera.depth_of(surface.point.as_dvec3()).max(0.0) as f32
 }

@@ -1,4 +1,4 @@
-//! The boxes of the trees, as lines over the picture.
+//! Overlay of the acceleration structures' bounding boxes, drawn as lines.
 
 use super::transport::scratch::Scratch;
 use super::transport::tile::TileContext;
@@ -8,16 +8,16 @@ use crate::math::Vec3;
 use crate::math::elementary::exp2;
 use crate::world::{Cell, Stretch};
 
-/// Width of the lines in pixels.
-const LINE: f32 = 1.25;
+/// Line width in pixels.
+const LINE_WIDTH: f32 = 1.25;
 
-/// Least size of a drawn box, in pixels.
-const LEAST_SIZE: f32 = 40.0;
+/// Boxes that appear smaller than this many pixels are not drawn.
+const MIN_BOX_SIZE: f32 = 40.0;
 
-/// Opacity of a line behind surfaces.
-const FAINT: f32 = 0.3;
+/// Opacity of lines behind surfaces.
+const HIDDEN_OPACITY: f32 = 0.3;
 
-/// Linear colours of levels, from the root down and over again.
+/// Linear colors of the tree levels, starting at the root and repeating.
 const COLORS: [Vec3; 6] = [
     Vec3::new(1.0, 0.85, 0.1),
     Vec3::new(0.1, 0.8, 1.0),
@@ -27,14 +27,14 @@ const COLORS: [Vec3; 6] = [
     Vec3::new(1.0, 1.0, 1.0),
 ];
 
-/// A line that a ray hits.
+/// A box edge close to a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Line {
+struct BoxEdge {
     is_behind: bool,
     depth: u32,
 }
 
-/// Draws lines where the camera rays in the queue come near the edges of boxes.
+/// Draws a line wherever a camera ray in the queue passes close to the edge of a box.
 pub fn draw(tile: &TileContext<'_>, scratch: &mut Scratch, radiance: &mut [Vec3]) -> Result<(), Cancelled> {
     let render = &tile.settings.render;
     let spread = tile.world.camera.pixel_spread(render.height);
@@ -42,32 +42,32 @@ pub fn draw(tile: &TileContext<'_>, scratch: &mut Scratch, radiance: &mut [Vec3]
     tile.closest_hits(&scratch.rays, &mut scratch.hits)?;
     for (path, hit) in scratch.rays.iter().zip(&scratch.hits) {
         let end = hit.map_or(f32::INFINITY, |hit| hit.shape.t);
-        if let Some(Line { is_behind, depth }) = nearest_line(tile, &path.ray, end, spread) {
+        if let Some(BoxEdge { is_behind, depth }) = nearest_edge(tile, &path.ray, end, spread) {
             let color = COLORS[depth as usize % COLORS.len()] * brightness;
             let own = &mut radiance[path.slot as usize];
-            *own = own.lerp(color, if is_behind { FAINT } else { 1.0 });
+            *own = own.lerp(color, if is_behind { HIDDEN_OPACITY } else { 1.0 });
         }
     }
     Ok(())
 }
 
-/// The first of the lines that a ray hits: lines before the surface at `end` precede the others, and among these larger
-/// boxes precede smaller ones.
-fn nearest_line(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<Line> {
-    let mut best: Option<Line> = None;
+/// The box edge that a ray shows: edges in front of the surface at `end` win over edges behind it, then larger boxes
+/// over smaller ones.
+fn nearest_edge(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<BoxEdge> {
+    let mut best: Option<BoxEdge> = None;
     tile.world.geometry.along(ray, |local, Cell { bounds, depth, .. }, stretch| {
         let unit = local.direction.length();
         let pixel = |t: f32| t * spread * unit;
         let Stretch { enter, leave } = *stretch;
         let size = bounds.extent().length();
-        if size < LEAST_SIZE * pixel(enter.0.max(0.0)) {
+        if size < MIN_BOX_SIZE * pixel(enter.0.max(0.0)) {
             return false;
         }
         for (t, side) in [enter, leave].into_iter().filter(|(t, _)| *t > 0.0) {
-            let line = Line { is_behind: t > end, depth: *depth };
+            let line = BoxEdge { is_behind: t > end, depth: *depth };
             let is_first =
                 best.is_none_or(|best| (line.is_behind, line.depth) < (best.is_behind, best.depth));
-            if is_first && edge_distance(bounds, local, (t, side)) < 0.5 * LINE * pixel(t) {
+            if is_first && edge_distance(bounds, local, (t, side)) < 0.5 * LINE_WIDTH * pixel(t) {
                 best = Some(line);
             }
         }
@@ -76,13 +76,13 @@ fn nearest_line(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Opt
     best
 }
 
-/// Distance of a ray from the nearest edge of the side of a box that it goes through at t.
+/// Distance from a ray to the nearest edge of the box face through which it passes at t.
 fn edge_distance(bounds: &Aabb, ray: &Ray, (t, side): (f32, usize)) -> f32 {
     let (point, d) = (ray.at(t), ray.direction);
     let to_edge = |axis: usize| {
-        let beside = (point[axis] - bounds.min[axis]).min(bounds.max[axis] - point[axis]).max(0.0);
-        // The edge is along the third axis: measure the distance from the ray's plane along it.
-        beside * d[side].abs() / (d[side] * d[side] + d[axis] * d[axis]).sqrt()
+        let from_edge = (point[axis] - bounds.min[axis]).min(bounds.max[axis] - point[axis]).max(0.0);
+        // The edge is parallel to the third axis. Project along it, and measure the 2D distance to the ray.
+        from_edge * d[side].abs() / (d[side] * d[side] + d[axis] * d[axis]).sqrt()
     };
     to_edge((side + 1) % 3).min(to_edge((side + 2) % 3))
 }
@@ -92,16 +92,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_distance_to_an_edge_is_that_of_two_lines() {
+    fn edge_distance_is_that_between_two_lines() {
         let cube = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
         let distance = |origin: Vec3, direction: Vec3| {
             let ray = Ray::new(origin, direction);
-            let stretch = Stretch::new(&cube, &ray).expect("the ray meets the cube");
+            let stretch = Stretch::new(&cube, &ray).expect("the ray hits the cube");
             edge_distance(&cube, &ray, stretch.enter)
         };
         assert!((distance(Vec3::new(0.2, 0.7, -3.0), Vec3::Z) - 0.2).abs() < 1e-6);
         // Along (0, 1, 1) through (½, 0.9, 0): 0.1·cos 45° from the upper edge.
-        let slanting = distance(Vec3::new(0.5, -0.1, -1.0), Vec3::new(0.0, 1.0, 1.0));
-        assert!((slanting - 0.1 * 0.5_f32.sqrt()).abs() < 1e-6, "{slanting}");
+        let diagonal = distance(Vec3::new(0.5, -0.1, -1.0), Vec3::new(0.0, 1.0, 1.0));
+        assert!((diagonal - 0.1 * 0.5_f32.sqrt()).abs() < 1e-6, "{diagonal}");
     }
 }

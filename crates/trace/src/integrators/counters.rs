@@ -1,24 +1,24 @@
-//! Counters of rays and look-ups.
+//! Counters of rays and texture lookups.
 
-/// Rays and look-ups of one tile.
+/// Number of rays and texture lookups in one tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RayCounters {
-    /// Rays from the camera.
+    /// Camera rays.
     pub camera_rays: u64,
-    /// Rays towards lights.
+    /// Shadow rays.
     pub shadow_rays: u64,
-    /// Mirrored rays.
+    /// Specular reflection rays.
     pub reflected_rays: u64,
-    /// Refracted rays.
+    /// Specular refraction rays.
     pub refracted_rays: u64,
-    /// Rays scattered by diffuse and glossy surfaces.
+    /// Rays scattered at diffuse and glossy surfaces.
     pub scattered_rays: u64,
-    /// Texture look-ups.
+    /// Texture lookups.
     pub texture_lookups: u64,
 }
 
 impl RayCounters {
-    /// All rays.
+    /// Total number of rays.
     pub fn all(&self) -> u64 {
         let Self {
             camera_rays,

@@ -1,31 +1,31 @@
-//! Memory of a thread's batches.
+//! Buffers that each thread reuses for its batches.
 
 use std::cell::RefCell;
 
 use super::direct::queue::DirectLightQueue;
 use super::transport::scratch::Scratch;
 
-/// Memory that each batch of a thread uses again.
+/// Buffers that all batches of a thread share.
 #[derive(Default)]
-pub struct Memory {
+pub struct ThreadMemory {
     /// Queues of rays and hits.
     pub scratch: Scratch,
-    /// Vertices of a round that wait for direct light.
+    /// Vertices of the current bounce that await direct lighting.
     pub direct: DirectLightQueue,
 }
 
-impl Memory {
-    /// The memory that this thread left after its last tile; [`Memory::leave`] keeps it for the next.
-    pub fn of_thread() -> Self {
+impl ThreadMemory {
+    /// Takes the buffers of this thread's previous tile; [`ThreadMemory::return_to_thread`] gives them back.
+    pub fn take_from_thread() -> Self {
         MEMORY.take()
     }
 
-    /// Keeps the memory for the next tile of this thread.
-    pub fn leave(self) {
+    /// Keeps the buffers for this thread's next tile.
+    pub fn return_to_thread(self) {
         MEMORY.set(self);
     }
 }
 
 thread_local! {
-    static MEMORY: RefCell<Memory> = RefCell::default();
+    static MEMORY: RefCell<ThreadMemory> = RefCell::default();
 }

@@ -1,6 +1,6 @@
-//! Settings of a render.
+//! Render settings.
 
-use super::{FirstHit, Measure, Shown, View};
+use super::{AovSource, FirstHit, LightAov, View};
 use crate::math::{DVec2, Vec3};
 use crate::scene::description::Render;
 use crate::scene::fingerprint::{Fingerprint, Fingerprinted, Referents};
@@ -9,29 +9,29 @@ use crate::world::Lookups;
 /// Settings for rendering a world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
-    /// The scene's settings, with the changes of this run.
+    /// The scene's `[render]` settings with this run's overrides.
     pub render: Render,
-    /// Whether the lens has its aperture; false for a pinhole.
+    /// Whether the lens has an aperture; false for a pinhole camera.
     pub dof: bool,
-    /// View to show.
+    /// The view to render.
     pub view: View,
-    /// Settings of photon maps. `None` if no photons are gathered.
+    /// Photon mapping settings. `None` if no photons are gathered.
     pub photons: Option<PhotonSettings>,
 }
 
-/// Settings of photon emission and gathering.
+/// Settings for photon emission and density estimation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonSettings {
-    /// Photons emitted in a pass.
+    /// Photons emitted per pass.
     pub count: u32,
-    /// Radius of the first pass's kernels; 0 to choose it by the density of photons.
+    /// Kernel radius of the first pass; 0 to derive it from the density of photons.
     pub radius: f32,
-    /// Most scatterings of a photon.
+    /// Maximum number of bounces of a photon.
     pub bounces: u32,
 }
 
 impl RenderSettings {
-    /// The effective settings: ignored ones have their defaults.
+    /// The effective settings: those without effect are reset to their defaults.
     pub fn effective(&self) -> Self {
         let mut render = self.render.effective();
         let photons = self.photons.filter(|_| render.integrator.method().gathers);
@@ -41,46 +41,48 @@ impl RenderSettings {
         Self { render, photons, ..*self }
     }
 
-    /// Whether pictures with these settings show any light of photons. A photon's light was scattered at least twice: by the
-    /// mirror or glass that it met, and at the point where it is gathered.
+    /// Whether images with these settings show any light from photons. Such light has scattered at least twice: at the
+    /// mirror or glass that the photon hit, and at the point where it is gathered.
     pub fn gathers(&self) -> bool {
-        let shows = match self.view.shown() {
-            Shown::FirstHit(number) => number == FirstHit::Photons,
-            Shown::Light(Measure::ArrivingShare) => false,
-            Shown::Light(Measure::Radiance(parts)) => parts.are_reflected() && self.render.max_depth > 1,
-            Shown::Light(Measure::Work) | Shown::Film(_) | Shown::Bounds => self.render.max_depth > 1,
+        let shows = match self.view.source() {
+            AovSource::FirstHit(number) => number == FirstHit::Photons,
+            AovSource::Light(LightAov::LitFraction) => false,
+            AovSource::Light(LightAov::Radiance(parts)) => parts.has_reflected() && self.render.max_depth > 1,
+            AovSource::Light(LightAov::TraversalCost) | AovSource::Film(_) | AovSource::Bounds => {
+                self.render.max_depth > 1
+            }
         };
         shows && self.effective().photons.is_some()
     }
 
-    /// The textures that pictures with these settings look up.
+    /// The textures that images with these settings need.
     pub fn lookups(&self) -> Lookups {
-        match self.view.shown() {
-            Shown::FirstHit(FirstHit::Normal) => Lookups { normals: true, ..Lookups::NONE },
-            Shown::FirstHit(FirstHit::Albedo) => Lookups { diffuse: true, ..Lookups::NONE },
-            // Photons arrive by all kinds of surfaces.
-            Shown::FirstHit(FirstHit::Photons) if self.gathers() => Lookups::ALL,
-            Shown::FirstHit(FirstHit::Depth | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Photons) => {
-                Lookups::NONE
-            }
-            // The colours of surfaces do not count; their normals and the emission of lights do.
-            Shown::Light(Measure::ArrivingShare) => {
+        match self.view.source() {
+            AovSource::FirstHit(FirstHit::Normal) => Lookups { normals: true, ..Lookups::NONE },
+            AovSource::FirstHit(FirstHit::Albedo) => Lookups { diffuse: true, ..Lookups::NONE },
+            // Photons may be scattered by any surface.
+            AovSource::FirstHit(FirstHit::Photons) if self.gathers() => Lookups::ALL,
+            AovSource::FirstHit(
+                FirstHit::Depth | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Photons,
+            ) => Lookups::NONE,
+            // Surface colors do not matter, but normals and emission do.
+            AovSource::Light(LightAov::LitFraction) => {
                 Lookups { diffuse: false, specular: false, ambient: false, ..Lookups::ALL }
             }
-            Shown::Light(Measure::Radiance(parts)) if !parts.are_reflected() => {
-                // Such parts are visible by mirrors and through glass too.
+            AovSource::Light(LightAov::Radiance(parts)) if !parts.has_reflected() => {
+                // These components are also visible in mirrors and through glass.
                 let ambient = parts.ambient && self.effective().render.ambient != Vec3::ZERO;
                 Lookups { ambient, lights: parts.emitted, by_delta: true, ..Lookups::NONE }
             }
-            // Boxes are drawn over the picture.
-            Shown::Light(Measure::Radiance(_) | Measure::Work) | Shown::Bounds | Shown::Film(_) => {
-                Lookups::ALL
-            }
+            // Boxes are drawn over the beauty image.
+            AovSource::Light(LightAov::Radiance(_) | LightAov::TraversalCost)
+            | AovSource::Bounds
+            | AovSource::Film(_) => Lookups::ALL,
         }
     }
 
-    /// A place in the picture, in pixels from its top left corner, in the camera's units: from its middle to the right
-    /// and up, in halves of its height.
+    /// Converts a position in pixels from the top left corner of the image to camera units: to the right and up from
+    /// the center, in half image heights.
     #[inline(always)]
     pub fn from_middle(&self, from_corner: DVec2) -> DVec2 {
         let Render { width, height, .. } = self.render;
@@ -93,12 +95,12 @@ impl Fingerprinted for RenderSettings {
     fn add_to(&self, key: &mut Fingerprint, of: &Referents<'_>) {
         let Self { render, dof, view, photons } = self.effective();
         key.add(&render, of).flag(dof).choice(view.sampled());
-        // All trees give the same hits; these two show the trees themselves.
-        match view.shown() {
-            // Lines over a picture depend on the exposure.
-            Shown::Bounds => key.choice(render.accel).f32(render.exposure),
-            Shown::Light(Measure::Work) => key.choice(render.accel),
-            Shown::Light(_) | Shown::FirstHit(_) | Shown::Film(_) => &mut *key,
+        // All acceleration structures give the same hits, but these two views show the structures themselves.
+        match view.source() {
+            // The brightness of the lines depends on the exposure.
+            AovSource::Bounds => key.choice(render.accel).f32(render.exposure),
+            AovSource::Light(LightAov::TraversalCost) => key.choice(render.accel),
+            AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Film(_) => &mut *key,
         };
         key.flag(photons.is_some());
         if let Some(PhotonSettings { count, radius, bounces }) = photons {

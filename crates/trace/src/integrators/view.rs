@@ -1,211 +1,213 @@
-//! Views: the contents of a picture.
+//! Views: the AOVs that an image can show.
 
 use crate::choice;
 use crate::film::Quantity;
 use crate::materials::bsdf::ShownLobes;
 
 choice! {
-    /// Content of a picture.
+    /// Content of an image.
     pub enum View {
-        /// The picture.
+        /// The rendered image.
         Beauty = "beauty",
-        /// Shading normals, (n + 1)/2.
+        /// Shading normals, as (n + 1)/2.
         Normal = "normal",
-        /// Distance along the view axis, 0 where there is nothing; shown stretched to what is seen, near is bright.
+        /// Depth along the view axis, 0 without a hit; the preview maps the visible range to gray values, near is
+        /// bright.
         Depth = "depth",
-        /// Barycentric coordinates: a red, b green, c blue.
+        /// Barycentric coordinates: a is red, b green, c blue.
         Barycentric = "barycentric",
         /// Texture coordinates.
         Uv = "uv",
         /// Diffuse reflectance.
         Albedo = "albedo",
-        /// Ambient part of Phong.
+        /// Ambient term.
         Ambient = "ambient",
-        /// Diffuse part of Phong.
+        /// Light reflected by diffuse lobes.
         Diffuse = "diffuse",
-        /// Specular part of Phong.
+        /// Light reflected by glossy lobes.
         Specular = "specular",
-        /// What surfaces send out, and what is behind everything.
+        /// Emission of visible surfaces, and the background.
         Emission = "emission",
-        /// Light that comes to the first diffuse or glossy surface by others.
+        /// Light that reaches the first diffuse or glossy surface from other such surfaces.
         Indirect = "indirect",
-        /// Light that comes there by mirrors and glass alone.
+        /// Light that reaches it only through mirrors and glass.
         Caustic = "caustic",
-        /// How many photons a pass has around a point, within its kernel, where photons are on.
+        /// Number of photons of one pass within the kernel at each point, if photons are on.
         Photons = "photons",
-        /// Fraction of the lights' radiance that arrives.
+        /// Fraction of the lights' radiance that is not blocked.
         Shadow = "shadow",
-        /// The boxes of the trees over the picture, a colour for each level; faint behind surfaces.
+        /// Boxes of the acceleration structures over the image, one color per level, faint behind surfaces.
         Bounds = "bounds",
-        /// Boxes and shapes that the rays of a sample meet, up to their ends.
+        /// Boxes and shapes that the rays of a sample are tested against.
         Cost = "cost",
-        /// Samples of each pixel.
+        /// Samples per pixel.
         Samples = "samples",
-        /// Standard error to expect of each pixel's luminance, by what its last samples changed.
+        /// Estimated standard error of each pixel's luminance.
         Error = "error",
     }
 }
 
 impl View {
-    /// Meaning of its numbers.
-    pub fn shown(self) -> Shown {
-        let of = |parts: Parts| Shown::Light(Measure::Radiance(parts));
-        let by = |ways: Ways| of(Parts { diffuse: true, specular: true, ways, ..Parts::NONE });
+    /// Where the values of this view come from.
+    pub fn source(self) -> AovSource {
+        let of = |parts: Components| AovSource::Light(LightAov::Radiance(parts));
+        let by =
+            |paths: PathClasses| of(Components { diffuse: true, specular: true, paths, ..Components::NONE });
         match self {
-            Self::Beauty => of(Parts::ALL),
-            Self::Ambient => of(Parts { ambient: true, ..Parts::NONE }),
-            Self::Diffuse => of(Parts { diffuse: true, ..Parts::NONE }),
-            Self::Specular => of(Parts { specular: true, ..Parts::NONE }),
-            Self::Emission => of(Parts { emitted: true, ..Parts::NONE }),
-            Self::Indirect => by(Ways { indirect: true, ..Ways::NONE }),
-            Self::Caustic => by(Ways { caustic: true, ..Ways::NONE }),
-            Self::Photons => Shown::FirstHit(FirstHit::Photons),
-            Self::Shadow => Shown::Light(Measure::ArrivingShare),
-            Self::Bounds => Shown::Bounds,
-            Self::Cost => Shown::Light(Measure::Work),
-            Self::Samples => Shown::Film(Quantity::Samples),
-            Self::Error => Shown::Film(Quantity::Error),
-            Self::Normal => Shown::FirstHit(FirstHit::Normal),
-            Self::Depth => Shown::FirstHit(FirstHit::Depth),
-            Self::Barycentric => Shown::FirstHit(FirstHit::Barycentric),
-            Self::Uv => Shown::FirstHit(FirstHit::Uv),
-            Self::Albedo => Shown::FirstHit(FirstHit::Albedo),
+            Self::Beauty => of(Components::ALL),
+            Self::Ambient => of(Components { ambient: true, ..Components::NONE }),
+            Self::Diffuse => of(Components { diffuse: true, ..Components::NONE }),
+            Self::Specular => of(Components { specular: true, ..Components::NONE }),
+            Self::Emission => of(Components { emitted: true, ..Components::NONE }),
+            Self::Indirect => by(PathClasses { indirect: true, ..PathClasses::NONE }),
+            Self::Caustic => by(PathClasses { caustic: true, ..PathClasses::NONE }),
+            Self::Photons => AovSource::FirstHit(FirstHit::Photons),
+            Self::Shadow => AovSource::Light(LightAov::LitFraction),
+            Self::Bounds => AovSource::Bounds,
+            Self::Cost => AovSource::Light(LightAov::TraversalCost),
+            Self::Samples => AovSource::Film(Quantity::Samples),
+            Self::Error => AovSource::Film(Quantity::Error),
+            Self::Normal => AovSource::FirstHit(FirstHit::Normal),
+            Self::Depth => AovSource::FirstHit(FirstHit::Depth),
+            Self::Barycentric => AovSource::FirstHit(FirstHit::Barycentric),
+            Self::Uv => AovSource::FirstHit(FirstHit::Uv),
+            Self::Albedo => AovSource::FirstHit(FirstHit::Albedo),
         }
     }
 }
 
 impl View {
-    /// The view whose samples it shows.
+    /// The view whose samples this view is computed from.
     pub fn sampled(self) -> Self {
-        match self.shown() {
-            Shown::Film(Quantity::Radiance | Quantity::Samples | Quantity::Error) => Self::Beauty,
-            Shown::Light(_) | Shown::FirstHit(_) | Shown::Bounds => self,
+        match self.source() {
+            AovSource::Film(Quantity::Radiance | Quantity::Samples | Quantity::Error) => Self::Beauty,
+            AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Bounds => self,
         }
     }
 
-    /// Quantity of the samples that it shows.
+    /// The film quantity that this view shows.
     pub fn quantity(self) -> Quantity {
-        match self.shown() {
-            Shown::Film(quantity) => quantity,
-            Shown::Light(_) | Shown::FirstHit(_) | Shown::Bounds => Quantity::Radiance,
+        match self.source() {
+            AovSource::Film(quantity) => quantity,
+            AovSource::Light(_) | AovSource::FirstHit(_) | AovSource::Bounds => Quantity::Radiance,
         }
     }
 }
 
-/// Meaning of the numbers of a view.
+/// Source of the values of a view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shown {
-    /// A measure of light.
-    Light(Measure),
-    /// A number about the first hit, without exposure or tone curve. All but distances are displayed unchanged.
+pub enum AovSource {
+    /// Light gathered by paths.
+    Light(LightAov),
+    /// A quantity at the first hit, without exposure or tone mapping. All except depth are displayed unchanged.
     FirstHit(FirstHit),
-    /// All radiance, with the boxes of the trees over it.
+    /// The beauty image with the acceleration structures' boxes over it.
     Bounds,
-    /// A number about the samples of the picture.
+    /// A statistic of the samples of the beauty image.
     Film(Quantity),
 }
 
-impl Shown {
-    /// The measure of light of its samples; views of first hits do not use it.
-    pub fn measure(self) -> Measure {
+impl AovSource {
+    /// The light AOV that paths accumulate; first-hit views do not use it.
+    pub fn aov(self) -> LightAov {
         match self {
-            Self::Light(measure) => measure,
-            Self::FirstHit(_) | Self::Bounds | Self::Film(_) => Measure::ALL,
+            Self::Light(aov) => aov,
+            Self::FirstHit(_) | Self::Bounds | Self::Film(_) => LightAov::ALL,
         }
     }
 }
 
-/// A measure of the light that a sample sees.
+/// What paths accumulate in a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Measure {
-    /// Radiance, of these parts.
-    Radiance(Parts),
-    /// The share, from 0 to 1, of the lights' possible radiance that arrives.
-    ArrivingShare,
-    /// The work of all rays of the sample: what they visit in the trees.
-    Work,
+pub enum LightAov {
+    /// Radiance of these components.
+    Radiance(Components),
+    /// The fraction, from 0 to 1, of the lights' unoccluded radiance that arrives.
+    LitFraction,
+    /// The traversal cost of all rays of the sample: boxes and shapes visited.
+    TraversalCost,
 }
 
-impl Measure {
-    /// All radiance.
-    pub const ALL: Self = Self::Radiance(Parts::ALL);
+impl LightAov {
+    /// The beauty image.
+    pub const ALL: Self = Self::Radiance(Components::ALL);
 
-    /// Whether the colours of surfaces are part of the light of lamps.
+    /// Whether surface colors are applied to reflected light.
     pub fn is_colored(self) -> bool {
         match self {
-            Self::Radiance(_) | Self::Work => true,
-            Self::ArrivingShare => false,
+            Self::Radiance(_) | Self::TraversalCost => true,
+            Self::LitFraction => false,
         }
     }
 
-    /// Lobes of rough surfaces that it shows.
+    /// The non-specular lobes that contribute.
     #[inline(always)]
     pub fn lobes(self) -> ShownLobes {
         match self {
-            Self::Radiance(Parts { diffuse, specular, .. }) => ShownLobes::Of { diffuse, specular },
-            Self::Work => ShownLobes::ALL,
-            Self::ArrivingShare => ShownLobes::Unit,
+            Self::Radiance(Components { diffuse, specular, .. }) => ShownLobes::Of { diffuse, specular },
+            Self::TraversalCost => ShownLobes::ALL,
+            Self::LitFraction => ShownLobes::Unit,
         }
     }
 
-    /// Ways by which light may come to the first diffuse or glossy surface.
-    pub fn ways(self) -> Ways {
+    /// Classes of paths by which light may reach the first diffuse or glossy surface.
+    pub fn path_classes(self) -> PathClasses {
         match self {
-            Self::Radiance(parts) => parts.ways,
-            Self::ArrivingShare | Self::Work => Ways::ALL,
+            Self::Radiance(parts) => parts.paths,
+            Self::LitFraction | Self::TraversalCost => PathClasses::ALL,
         }
     }
 }
 
-/// Parts of the light that a sample sees.
+/// Components of the radiance of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Parts {
-    /// Emission of surfaces and of the background.
+pub struct Components {
+    /// Emission of surfaces, and the background.
     pub emitted: bool,
-    /// The ambient part of Phong.
+    /// The ambient term.
     pub ambient: bool,
-    /// The diffuse part of the reflected light of lights.
+    /// Light reflected by diffuse lobes.
     pub diffuse: bool,
-    /// The glossy part of it.
+    /// Light reflected by glossy lobes.
     pub specular: bool,
-    /// Ways by which it may come to the first diffuse or glossy surface.
-    pub ways: Ways,
+    /// Classes of paths by which reflected light may reach the first diffuse or glossy surface.
+    pub paths: PathClasses,
 }
 
-/// Ways of light from the lights to the first diffuse or glossy surface that the camera sees, directly or by mirrors
-/// and glass.
+/// Classes of light paths, by what happens between the light and the first diffuse or glossy surface that the camera
+/// sees, directly or through mirrors and glass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ways {
-    /// The direct way.
+pub struct PathClasses {
+    /// Direct light.
     pub direct: bool,
-    /// The way by mirrors and glass alone.
+    /// Light that was only scattered by mirrors and glass.
     pub caustic: bool,
-    /// All other ways.
+    /// All other paths.
     pub indirect: bool,
 }
 
-impl Ways {
-    /// All ways.
+impl PathClasses {
+    /// All classes.
     pub const ALL: Self = Self { direct: true, caustic: true, indirect: true };
-    /// No way.
+    /// No class.
     pub const NONE: Self = Self { direct: false, caustic: false, indirect: false };
 }
 
-impl Parts {
-    /// Whether any light of lamps is taken.
-    pub fn are_reflected(self) -> bool {
+impl Components {
+    /// Whether any reflected light contributes.
+    pub fn has_reflected(self) -> bool {
         self.diffuse || self.specular
     }
 
-    /// All parts.
+    /// All components.
     pub const ALL: Self =
-        Self { emitted: true, ambient: true, diffuse: true, specular: true, ways: Ways::ALL };
-    /// No parts; parts added to it have all ways.
+        Self { emitted: true, ambient: true, diffuse: true, specular: true, paths: PathClasses::ALL };
+    /// No components. Components added to it include all path classes.
     pub const NONE: Self =
-        Self { emitted: false, ambient: false, diffuse: false, specular: false, ways: Ways::ALL };
+        Self { emitted: false, ambient: false, diffuse: false, specular: false, paths: PathClasses::ALL };
 }
 
-/// A number about the first hit.
+/// A quantity at the first hit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FirstHit {
     /// [`View::Normal`].

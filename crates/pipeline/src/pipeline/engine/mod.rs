@@ -84,7 +84,7 @@ pub(super) struct Means {
 
 impl Default for Means {
     fn default() -> Self {
-        Self { kernel: crate::integrators::render_tile_by, most_film_bytes: u64::MAX, nice: 0 }
+        Self { kernel: crate::integrators::render_tile_with_photons, most_film_bytes: u64::MAX, nice: 0 }
     }
 }
 

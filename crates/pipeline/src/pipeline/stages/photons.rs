@@ -71,7 +71,7 @@ struct Sent {
 impl PhotonStore {
     /// Whether each pass has photons: something throws light.
     pub(in crate::pipeline) fn are_sent(&self) -> bool {
-        self.photons.are_sent()
+        self.photons.emits_photons()
     }
 
     /// Passes that may be in use at once, of the size of the first.
@@ -217,7 +217,7 @@ pub(in crate::pipeline) fn photons(
     let key = key(of_photons);
     if let Some(store) = cache.get(key) {
         store.sent.set(Sent::default());
-        return Ok(match store.photons.are_sent() {
+        return Ok(match store.photons.emits_photons() {
             true => Staged::reused((), "nothing that they meet changed"),
             false => Staged::skipped((), NOTHING_THROWS_LIGHT),
         });
@@ -233,7 +233,7 @@ pub(in crate::pipeline) fn photons(
     let (passes, emitted, stored, lookups) = (1, first.emitted, first.stored(), first.lookups);
     let sent = Sent { passes, emitted, stored, lookups, seconds, most_alive_bytes: 0 };
     let kept = RefCell::new(vec![Arc::new(first)]);
-    let are_sent = photons.are_sent();
+    let are_sent = photons.emits_photons();
     let store = PhotonStore { photons, kept, sent: Cell::new(sent) };
     cache.set(key, store);
     Ok(if are_sent { Staged::done((), "") } else { Staged::skipped((), NOTHING_THROWS_LIGHT) })

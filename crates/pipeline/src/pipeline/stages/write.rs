@@ -19,7 +19,7 @@ use crate::choice::Choice;
 use crate::control::CancelToken;
 use crate::film::tone::develop;
 use crate::film::{Picture, RadianceImage, Rect, SampleStats};
-use crate::integrators::{Measure, Shown};
+use crate::integrators::{AovSource, LightAov};
 use crate::output::part::{self, Kind};
 use crate::output::write::{Durability, Guard};
 use crate::output::{self, BitDepth, Finish, Format, LayerImage, OutputError};
@@ -281,7 +281,7 @@ pub(in crate::pipeline) fn finish(plan: &Plan) -> Finish {
         tone: plan.tone,
         bit_depth: BitDepth::try_from(plan.bit_depth).unwrap_or_default(),
         metadata: metadata(plan),
-        is_light: matches!(plan.settings.view.shown(), Shown::Light(Measure::Radiance(_))),
+        is_light: matches!(plan.settings.view.source(), AovSource::Light(LightAov::Radiance(_))),
     }
 }
 

@@ -73,7 +73,7 @@ intensity = [10, 10, 10]
 
 pub(super) const OBJ: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-pub(super) const KERNEL: Kernel = crate::integrators::render_tile_by;
+pub(super) const KERNEL: Kernel = crate::integrators::render_tile_with_photons;
 
 pub(in crate::pipeline) struct Bench {
     pub(super) folder: tempfile::TempDir,

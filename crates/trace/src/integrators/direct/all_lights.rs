@@ -1,4 +1,4 @@
-//! Direct light (next-event estimation) at vertices, in rows of sixteen: every light with its own shadow rays.
+//! Next-event estimation at packets of vertices, sampling every light.
 
 use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
@@ -6,7 +6,7 @@ use crate::geometry::rows::{Ends, RayRows, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::medium::{Media, absorption};
 use crate::integrators::transport::tile::TileContext;
-use crate::integrators::view::Measure;
+use crate::integrators::view::LightAov;
 use crate::lights::{EmissionTexture, Light, LightRow, Middle, Source, SourceRow};
 use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
@@ -16,33 +16,33 @@ use crate::sampling::Decision;
 use crate::scene::description::Shadows;
 use crate::world::Loops;
 
-/// Lights the vertices of a row whose bits are set. It is compiled without MIS weights for cases in which only light
-/// samples find lamps.
-pub struct Lighting<'a, const WEIGHED: bool> {
+/// Samples all lights at the vertices in `used`. `MIS` is false where only light samples find lights, so that no
+/// weights are computed.
+pub struct SampleAllLights<'a, const MIS: bool> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,
     pub used: u32,
-    pub measure: Measure,
-    /// Competing technique; unused if nothing is weighted.
+    pub aov: LightAov,
+    /// The competing technique; unused without MIS.
     pub competing: CompetingTechnique,
     /// Media of the vertices. `None` if all are in air.
     pub media: Option<&'a Media>,
-    /// Whether to take only the lights from beyond the scene.
-    pub only_beyond: bool,
+    /// Whether to sample only infinite lights.
+    pub only_infinite: bool,
 }
 
-/// Rays for the direct light of vertices.
+/// Numbers of rays and lookups for direct lighting.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct LightRays {
+pub struct LightRayCounts {
     /// Shadow rays.
     pub shadow: u64,
-    /// Rays in lobes.
+    /// Rays in narrow lobes.
     pub scattered: u64,
-    /// Look-ups of emission textures.
+    /// Lookups in emission textures.
     pub lookups: u64,
 }
 
-impl std::ops::AddAssign for LightRays {
+impl std::ops::AddAssign for LightRayCounts {
     fn add_assign(&mut self, other: Self) {
         self.shadow += other.shadow;
         self.scattered += other.scattered;
@@ -50,78 +50,78 @@ impl std::ops::AddAssign for LightRays {
     }
 }
 
-/// Light that arrives at the vertices of a row and is reflected towards the camera.
-pub struct Arrived {
-    /// Reflected light, before the throughput of the paths.
+/// Direct light reflected toward the viewer at a packet of vertices.
+pub struct ReflectedLight {
+    /// Reflected radiance, before the throughput of the paths.
     pub light: Lanes3,
-    pub rays: LightRays,
+    pub rays: LightRayCounts,
 }
 
-/// Sums over the lights.
-pub struct Sums {
-    /// Sum of the light that arrives.
+/// Sums over light samples.
+pub struct LightSums {
+    /// Reflected light that is unoccluded.
     pub light: Lanes3,
-    /// Sum of the light that could arrive.
+    /// Reflected light if nothing were occluded.
     pub total: Lanes,
-    pub rays: LightRays,
+    pub rays: LightRayCounts,
 }
 
-impl Sums {
+impl LightSums {
     pub const NOTHING: Self = Self {
         light: [[0.0; LANES]; 3],
         total: [0.0; LANES],
-        rays: LightRays { shadow: 0, scattered: 0, lookups: 0 },
+        rays: LightRayCounts { shadow: 0, scattered: 0, lookups: 0 },
     };
 
-    /// The result of the sums.
+    /// The reflected light that results from the sums.
     #[inline(always)]
-    pub fn arrived(mut self, measure: Measure) -> Arrived {
-        if measure == Measure::ArrivingShare {
+    pub fn arrived(mut self, aov: LightAov) -> ReflectedLight {
+        if aov == LightAov::LitFraction {
             for i in 0..LANES {
                 let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
                 set_lane(&mut self.light, i, Vec3::splat(share));
             }
         }
-        Arrived { light: self.light, rays: self.rays }
+        ReflectedLight { light: self.light, rays: self.rays }
     }
 }
 
-/// Unoccluded light of a lamp, which waits for one shadow ray.
-struct Waiting {
+/// Light of one source that depends on a single shadow ray.
+struct PendingLight {
     light: Lanes3,
     active: u32,
 }
 
-impl<const WEIGHED: bool> Loops for Lighting<'_, WEIGHED> {
-    type Done = Sums;
+impl<const MIS: bool> Loops for SampleAllLights<'_, MIS> {
+    type Done = LightSums;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Sums {
-        let mut sums = Sums::NOTHING;
+    fn run(self, folds: impl Folds) -> LightSums {
+        let mut sums = LightSums::NOTHING;
         self.add_all(&mut sums, folds);
         sums
     }
 }
 
-impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
-    /// Adds the light of the lights.
+impl<const MIS: bool> SampleAllLights<'_, MIS> {
+    /// Adds the reflected light of all lights.
     #[inline(always)]
-    fn add_all(&self, sums: &mut Sums, folds: impl Folds) {
+    fn add_all(&self, sums: &mut LightSums, folds: impl Folds) {
         let render = &self.tile.settings.render;
-        let takes = |light: &Light| !self.only_beyond || light.is_beyond();
+        let takes = |light: &Light| !self.only_infinite || light.is_beyond();
         let mut sampler = None;
         for (number, light) in self.tile.world.lights.iter().filter(|(_, light)| takes(light)) {
-            if WEIGHED && self.tile.leaves_sky && light.is_from_all_around() {
+            if MIS && self.tile.paths_find_sky && light.is_from_all_around() {
                 continue;
             }
-            // If one ray decides for the whole light, its light waits for that ray.
-            let mut waiting = Waiting { light: [[0.0; LANES]; 3], active: 0 };
-            let waits = match render.shadows {
+            // If a single shadow ray decides for the whole light, defer the sum until it is traced.
+            let mut pending = PendingLight { light: [[0.0; LANES]; 3], active: 0 };
+            let is_deferred = match render.shadows {
                 Shadows::Soft => false,
                 Shadows::Hard => light.middle().is_some(),
                 Shadows::Off => true,
             };
-            // Take the only direction, or the requested number of samples.
+            // Take the only possible sample, or the requested number of samples.
             let is_single = light.is_single();
             let count = if is_single { 1 } else { render.shadow_samples };
             if !is_single && sampler.is_none() {
@@ -138,14 +138,14 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 let (mut values, active, response) = self.values(&samples, 1.0 / count as f32, folds);
                 // Multiply by the emission texture.
                 if let Some(pattern) = light.emission_texture() {
-                    values = self.tinted(pattern, &samples, active, values);
+                    values = self.textured(pattern, &samples, active, values);
                     sums.rays.lookups += u64::from(active.count_ones());
                 }
-                // Weight against the competing technique, which finds no light without extent.
-                if WEIGHED && !is_single {
+                // Apply the MIS weight, unless the light has no extent and only light samples find it.
+                if MIS && !is_single {
                     let leaves_gloss = self.tile.lobes_find_sky && light.is_from_all_around();
                     let of_light = if leaves_gloss && self.competing.are_lobes() {
-                        // Pretend that light samples hardly ever come, so that lobes bring all.
+                        // Pretend a vanishing light-sampling pdf, so that lobe rays account for all of the light.
                         [f32::MAX; LANES]
                     } else {
                         light.inverse_densities(&samples)
@@ -159,19 +159,19 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                         folds,
                     );
                 }
-                self.add(&samples, &values, active, sums, waits.then_some(&mut waiting), folds);
+                self.add(&samples, &values, active, sums, is_deferred.then_some(&mut pending), folds);
             }
-            // Trace the one ray to the middle of the light.
-            if waiting.active != 0 {
-                self.add_waiting(light.middle(), &waiting, sums, folds);
+            // Trace the single ray to the center of the light.
+            if pending.active != 0 {
+                self.add_pending(light.middle(), &pending, sums, folds);
             }
         }
     }
 
-    /// Multiplies values by the transmittance of glass around the vertices on the way to the samples.
+    /// Multiplies values by the transmittance of the vertices' media up to the samples.
     #[cold]
     #[inline(never)]
-    fn left_by_glass(&self, media: &Media, samples: &LightRow, mut values: Lanes3) -> Lanes3 {
+    fn attenuate_by_glass(&self, media: &Media, samples: &LightRow, mut values: Lanes3) -> Lanes3 {
         for i in lanes(self.used) {
             let way = lane(&samples.targets, i) - lane(&self.row.from, i);
             let is_beyond = samples.beyond & 1 << i != 0;
@@ -186,7 +186,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     /// Multiplies values by the emission texture at the sampled points.
     #[cold]
     #[inline(never)]
-    fn tinted(
+    fn textured(
         &self,
         pattern: &EmissionTexture,
         samples: &LightRow,
@@ -196,10 +196,10 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         for i in lanes(active) {
             let (target, direction) = (lane(&samples.targets, i), lane(&samples.directions, i));
             let color = pattern.at(target, samples.sources.part[i], direction);
-            let color = match self.measure {
-                Measure::Radiance(_) => color,
-                Measure::ArrivingShare => Vec3::splat(luminance(color)),
-                Measure::Work => Vec3::ONE,
+            let color = match self.aov {
+                LightAov::Radiance(_) => color,
+                LightAov::LitFraction => Vec3::splat(luminance(color)),
+                LightAov::TraversalCost => Vec3::ONE,
             };
             let value = lane(&values, i) * color;
             set_lane(&mut values, i, value);
@@ -207,15 +207,16 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         values
     }
 
-    /// Adds the contributions of samples of one light, if there are any; values that wait for one ray go to `waiting`.
+    /// Adds the contributions of samples of one light; with `pending`, they are deferred until its shadow ray is
+    /// traced.
     #[inline(always)]
     fn add(
         &self,
         samples: &LightRow,
         values: &Lanes3,
         active: u32,
-        sums: &mut Sums,
-        waiting: Option<&mut Waiting>,
+        sums: &mut LightSums,
+        pending: Option<&mut PendingLight>,
         folds: impl Folds,
     ) {
         if active == 0 {
@@ -225,34 +226,34 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             let is_active = active & 1 << i != 0;
             sums.total[i] += if is_active { values[0][i] } else { 0.0 };
         }
-        if let Some(waiting) = waiting {
-            waiting.active |= active;
-            add_where(active, values, &mut waiting.light);
+        if let Some(pending) = pending {
+            pending.active |= active;
+            add_where(active, values, &mut pending.light);
         } else {
             let traced = active & !self.row.hidden(&samples.directions, folds);
             let (rays, ends) = self.shadow_rays(samples, traced);
-            self.add_seen((&rays, &ends, traced), &samples.sources, values, sums, folds);
+            self.add_unoccluded((&rays, &ends, traced), &samples.sources, values, sums, folds);
         }
     }
 
-    /// Adds the light that waits for one ray to the middle of its light.
+    /// Adds deferred light after tracing one shadow ray to the center of its source.
     #[inline(always)]
-    fn add_waiting(
+    fn add_pending(
         &self,
         middle: Option<(Middle, Source)>,
-        waiting: &Waiting,
-        sums: &mut Sums,
+        pending: &PendingLight,
+        sums: &mut LightSums,
         folds: impl Folds,
     ) {
         let is_untraced = self.tile.settings.render.shadows == Shadows::Off;
-        if is_untraced && self.measure == Measure::Work {
+        if is_untraced && self.aov == LightAov::TraversalCost {
             return;
         }
-        // Without shadows, all of it arrives.
+        // Without shadows, all light arrives.
         let Some((middle, source)) = middle.filter(|_| !is_untraced) else {
-            return add_where(waiting.active, &waiting.light, &mut sums.light);
+            return add_where(pending.active, &pending.light, &mut sums.light);
         };
-        // Aim a ray at the middle of the light.
+        // Aim a ray at the center of the light.
         let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
         for i in 0..LANES {
             let from = lane(&self.row.from, i);
@@ -263,63 +264,64 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             set_lane(&mut direction, i, ray.direction);
             ends[i] = ray.t_max;
         }
-        let traced = waiting.active & !self.row.hidden(&direction, folds);
+        let traced = pending.active & !self.row.hidden(&direction, folds);
         for i in 0..LANES {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
         let rays = RayRows::of(self.row.from, direction).leaving(self.row.starts(&direction));
-        self.add_seen((&rays, &ends, traced), &SourceRow::of(source), &waiting.light, sums, folds);
+        self.add_unoccluded((&rays, &ends, traced), &SourceRow::of(source), &pending.light, sums, folds);
     }
 
-    /// Adds the unoccluded light on the rays of `traced`; the others end below 0.
+    /// Traces the shadow rays in `traced` and adds the light of those that are unoccluded; other rays have a `t_max`
+    /// below 0.
     #[inline(always)]
-    pub fn add_seen(
+    pub fn add_unoccluded(
         &self,
         (rays, ends, traced): (&RayRows, &Ends, u32),
         sources: &SourceRow,
         values: &Lanes3,
-        sums: &mut Sums,
+        sums: &mut LightSums,
         folds: impl Folds,
     ) {
         sums.rays.shadow += u64::from(traced.count_ones());
-        if self.measure == Measure::Work {
+        if self.aov == LightAov::TraversalCost {
             return add_work(self.tile, rays, ends, traced, &mut sums.light);
         }
         if self.tile.world.has_passable() {
-            return self.add_weakened((rays, ends, traced), sources, values, sums);
+            return self.add_attenuated((rays, ends, traced), sources, values, sums);
         }
         let occluded = self.tile.world.geometry.occluded_rows(rays, ends, traced, sources, folds);
         add_where(traced & !occluded, values, &mut sums.light);
     }
 
-    /// [`Lighting::add_seen`], where light may pass surfaces straight on.
+    /// [`SampleAllLights::add_unoccluded`] in a scene with null interactions, where shadow rays have a transmittance.
     #[cold]
     #[inline(never)]
-    fn add_weakened(
+    fn add_attenuated(
         &self,
         (rays, ends, traced): (&RayRows, &Ends, u32),
         sources: &SourceRow,
         values: &Lanes3,
-        sums: &mut Sums,
+        sums: &mut LightSums,
     ) {
         let weakened = self.tile.world.weakened_rows(rays, ends, traced, sources);
         sums.rays.lookups += weakened.lookups;
         let mut values = *values;
         let arriving = traced & !weakened.occluded;
         for i in lanes(arriving) {
-            let value = lane(&values, i) * passed(lane(&weakened.left, i), self.measure);
+            let value = lane(&values, i) * transmitted(lane(&weakened.left, i), self.aov);
             set_lane(&mut values, i, value);
         }
         add_where(arriving, &values, &mut sums.light);
     }
 
-    /// Contribution of each sample if it is not occluded, a bit for each that is not 0, and the response of its vertex.
+    /// The unoccluded contribution of each sample, the mask of nonzero ones, and the response of its vertex.
     #[inline(always)]
     pub fn values(&self, samples: &LightRow, share: f32, folds: impl Folds) -> (Lanes3, u32, Response) {
         let response = self.row.response(&samples.directions, folds);
         let Response { bsdf: BsdfValues { f, .. }, cosines } = &response;
         let mut arriving = samples.weights;
-        if self.measure == Measure::ArrivingShare {
+        if self.aov == LightAov::LitFraction {
             for i in 0..LANES {
                 let light = Vec3::splat(luminance(lane(&samples.weights, i)));
                 set_lane(&mut arriving, i, light);
@@ -332,13 +334,13 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             let brings = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
             active[i] = if brings { TRUE } else { 0 };
         }
-        if let Some(media) = self.media.filter(|_| self.measure != Measure::ArrivingShare) {
-            values = self.left_by_glass(media, samples, values);
+        if let Some(media) = self.media.filter(|_| self.aov != LightAov::LitFraction) {
+            values = self.attenuate_by_glass(media, samples, values);
         }
         (values, folds.bits(&active) & self.used, response)
     }
 
-    /// The shadow rays of the samples in `active`; the other lanes have no end.
+    /// The shadow rays to the samples in `active`; in other lanes, `t_max` is below 0.
     #[inline(always)]
     pub fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayRows, Ends) {
         let (mut direction, mut ends) = (samples.directions, [-1.0; LANES]);
@@ -355,7 +357,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
     }
 }
 
-/// Adds the work of the rays whose bits are set: what they visit in the trees, up to their ends.
+/// Adds the traversal cost of the rays in `traced`, up to their ends.
 #[cold]
 #[inline(never)]
 pub fn add_work(tile: &TileContext<'_>, rays: &RayRows, ends: &Ends, traced: u32, sums: &mut Lanes3) {
@@ -366,7 +368,7 @@ pub fn add_work(tile: &TileContext<'_>, rays: &RayRows, ends: &Ends, traced: u32
     }
 }
 
-/// Adds the values of the lanes whose bits are set, which are chosen by bits as in [`take`](crate::math::lanes::take).
+/// Adds the values in the lanes of `bits`, which are selected with bit masks as in [`take`](crate::math::lanes::take).
 #[inline(always)]
 pub fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
     let of = truths(bits);
@@ -377,10 +379,10 @@ pub fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
     }
 }
 
-/// The part of light that passed surfaces straight on, for a measure of light.
-pub fn passed(left: Vec3, measure: Measure) -> Vec3 {
-    match measure {
-        Measure::Radiance(_) | Measure::Work => left,
-        Measure::ArrivingShare => Vec3::splat(luminance(left)),
+/// The transmittance of null interactions, as it applies to a light AOV.
+pub fn transmitted(left: Vec3, aov: LightAov) -> Vec3 {
+    match aov {
+        LightAov::Radiance(_) | LightAov::TraversalCost => left,
+        LightAov::LitFraction => Vec3::splat(luminance(left)),
     }
 }

@@ -1,11 +1,11 @@
-//! Queue of rows of vertices that wait for direct light, and the light that arrives there.
+//! Queue of vertices that await direct lighting, in packets, and the light that they reflect.
 
 use arrayvec::ArrayVec;
 
-use super::all_lights::{Arrived, LightRays, Lighting, Sums, add_where};
+use super::all_lights::{LightRayCounts, LightSums, ReflectedLight, SampleAllLights, add_where};
+use super::light_tree::SampleLightTree;
 use super::lobe_rays::LobeRays;
 use super::mis::CompetingTechnique;
-use super::picked::Picking;
 use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
@@ -15,10 +15,10 @@ use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::Cone;
 use crate::integrators::transport::medium::{Media, Medium};
 use crate::integrators::transport::ray::PathRay;
-use crate::integrators::transport::scatter::{BsdfSampling, Continuation};
+use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::ShadingVertex;
-use crate::integrators::view::{Measure, Ways};
+use crate::integrators::view::{LightAov, PathClasses};
 use crate::lights::{Source, SourceRow};
 use crate::materials::RoughKind;
 use crate::materials::bsdf::LobeSet;
@@ -27,61 +27,61 @@ use crate::math::lanes::{Folds, LANES, Lanes3, lane};
 use crate::scene::description::Shadows;
 use crate::world::{Geometry, Loops};
 
-/// Vertices that wait for direct light, side by side; each is lit by itself, whatever vertices share its row.
+/// Vertices that await direct lighting. The result for a vertex does not depend on which vertices share its packet.
 #[derive(Default)]
 pub struct DirectLightQueue {
     rows: Vec<VertexBatch>,
-    /// Rows in use; the others are memory.
+    /// Number of packets in use; the others are kept for reuse.
     count: usize,
-    /// Index of the row for single vertices of each kind of BSDF, of dark ones of each kind, and of both kinds with two sides. If no
-    /// row in use has this index, the row is full or there is none.
+    /// Index of the packet that receives single vertices, per kind of BSDF, for dark and other vertices and for one and
+    /// two sides. The packet may be full or not in use.
     open: [[usize; RoughKind::ALL.len()]; 4],
-    /// Light of lamps at the vertices of each path of the round.
+    /// Direct light at the vertices of each path of this bounce.
     arrived: Vec<Vec3>,
     /// Media of the vertices.
     media: Media,
-    /// Shadow rays of several rows.
+    /// Shadow rays of several packets.
     pool: ShadowRayQueue,
-    /// Beams at the vertices of the paths of the round, if requested.
+    /// Ray cones at the vertices of this bounce's paths, if they are used.
     cones: Vec<Cone>,
 }
 
-/// Sides of a vertex. No light sample finds anything from one that is dark.
+/// The sides that a vertex represents. No light sample is visible from a dark side.
 #[derive(Clone, Copy)]
-pub enum Lit<'m> {
-    /// Its light is that of one side.
+pub enum ShadingSides<'m> {
+    /// One side.
     OneSide {
-        /// Whether it is dark.
+        /// Whether the vertex is dark.
         is_dark: bool,
     },
-    /// It stands for the other side of its surface too, where no light sample finds anything.
+    /// Both sides of the surface; no light sample is visible from the other side.
     TwoSides {
-        /// Whether it is dark.
+        /// Whether the vertex is dark.
         is_dark: bool,
-        /// Origin of rays on the other side.
+        /// Ray origin on the other side.
         beyond: Vec3,
-        /// The glass around them.
+        /// The medium on the other side.
         medium: &'m Medium,
     },
 }
 
-/// Rows that are lit together if lights are picked.
+/// Number of packets that are lit together if lights are picked from a tree.
 const ROWS: usize = 64;
 
 impl DirectLightQueue {
-    /// Number of rows from which they are lit before more come, while their data are in the cache.
+    /// Number of packets at which they are lit, while their data is in the cache.
     const FULL: usize = 64;
 
-    /// Fewest vertices of a row of its own; fewer are put together with others.
-    const WORTH_A_ROW: u32 = 8;
+    /// A packet with fewer vertices is merged into another one.
+    const MIN_OWN_ROW: u32 = 8;
 
-    /// Whether the rows are to be lit now.
+    /// Whether the queued packets should be lit now.
     pub fn is_full(&self) -> bool {
         self.count >= Self::FULL
     }
 
-    /// Begins a round of so many paths, with their beams or without.
-    pub fn expect(&mut self, paths: usize, has_cones: bool) {
+    /// Begins a bounce with `paths` paths, with or without ray cones.
+    pub fn begin_round(&mut self, paths: usize, has_cones: bool) {
         self.clear();
         self.cones.clear();
         self.cones.resize(if has_cones { paths } else { 0 }, Cone::default());
@@ -90,45 +90,45 @@ impl DirectLightQueue {
         self.media.clear();
     }
 
-    /// Stores the beam at the vertex of a path.
-    pub fn note_cone(&mut self, place: u32, cone: Cone) {
+    /// Stores the ray cone at a path's vertex.
+    pub fn store_cone(&mut self, place: u32, cone: Cone) {
         if let Some(own) = self.cones.get_mut(place as usize) {
             *own = cone;
         }
     }
 
-    /// Ends the round: the accumulator gets the light of lamps, in the order of the paths. `path` gives the slot of a place, and
-    /// whether the camera sees its vertex.
-    pub fn settle(&mut self, path: impl Fn(usize) -> (u32, bool), accumulator: &mut Accumulator<'_>) {
+    /// Ends the bounce: adds the direct light to the accumulator, in path order. `path` returns the slot of a queue
+    /// index, and whether the camera sees its vertex.
+    pub fn flush(&mut self, path: impl Fn(usize) -> (u32, bool), accumulator: &mut Accumulator<'_>) {
         for (place, light) in self.arrived.iter().enumerate().filter(|(_, light)| **light != Vec3::ZERO) {
             let (slot, only_specular_before) = path(place);
-            accumulator.add_arrived(slot, *light, only_specular_before);
+            accumulator.add_direct(slot, *light, only_specular_before);
         }
     }
 
-    /// [`DirectLightQueue::settle`] for paths whose slots are consecutive.
-    pub fn settle_run(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
-        accumulator.add_arrived_run(first, &self.arrived);
+    /// [`DirectLightQueue::flush`] for paths with consecutive slots.
+    pub fn flush_run(&mut self, first: u32, accumulator: &mut Accumulator<'_>) {
+        accumulator.add_direct_run(first, &self.arrived);
     }
 
-    /// An empty row to fill, then to keep by [`DirectLightQueue::keep`] or to drop.
-    pub fn spare(&mut self) -> &mut VertexBatch {
+    /// An unused packet, to be filled and then kept with [`DirectLightQueue::keep_spare`] or dropped.
+    pub fn spare_batch(&mut self) -> &mut VertexBatch {
         if self.count == self.rows.len() {
             self.rows.push(VertexBatch::EMPTY);
         }
         &mut self.rows[self.count]
     }
 
-    /// Keeps the vertices of the spare row.
-    pub fn keep(&mut self) {
+    /// Keeps the vertices of the spare packet.
+    pub fn keep_spare(&mut self) {
         let (kept, spare) = self.rows.split_at_mut(self.count);
         let Some(row) = spare.first_mut().filter(|row| row.used != 0) else { return };
         row.keep(row.used);
-        if row.used.count_ones() >= Self::WORTH_A_ROW {
+        if row.used.count_ones() >= Self::MIN_OWN_ROW {
             self.count += 1;
             return;
         }
-        // Put few vertices together with others of their kind.
+        // Merge a small packet with others of its kind.
         let mut left = row.used;
         let open = &mut self.open[0][row.bsdf.kind() as usize];
         if let Some(open) = kept.get_mut(*open).filter(|open| open.is_for(row.bsdf.kind(), (false, false))) {
@@ -150,31 +150,31 @@ impl DirectLightQueue {
         &mut self,
         tile: &TileContext<'_>,
         lit: &ShadingVertex<'_>,
-        measure: Measure,
-        sides: Lit<'_>,
+        aov: LightAov,
+        sides: ShadingSides<'_>,
     ) {
-        self.note_cone(lit.place, lit.vertex.cone);
+        self.store_cone(lit.place, lit.vertex.cone);
         let medium = self.media.number(lit.medium);
         let (row, lane) = match sides {
-            Lit::OneSide { is_dark } => self.open_row(lit.bsdf.kind(), (is_dark, false)),
-            Lit::TwoSides { is_dark, beyond, medium } => {
+            ShadingSides::OneSide { is_dark } => self.open_row(lit.bsdf.kind(), (is_dark, false)),
+            ShadingSides::TwoSides { is_dark, beyond, medium } => {
                 let medium = self.media.number(medium);
                 let (row, lane) = self.open_row(lit.bsdf.kind(), (is_dark, true));
                 row.put_beyond(lane, beyond, medium);
                 (row, lane)
             }
         };
-        row.put(lane, tile, lit, measure, medium);
+        row.put(lane, tile, lit, aov, medium);
     }
 
-    /// A row of this kind with a free lane, of dark vertices or of others, with two sides or one.
+    /// A packet for this kind of BSDF with a free lane, dark or not and two-sided or not.
     fn open_row(&mut self, kind: RoughKind, which: (bool, bool)) -> (&mut VertexBatch, usize) {
         let (is_dark, has_two_sides) = which;
         let table = usize::from(is_dark) + 2 * usize::from(has_two_sides);
         let mut number = self.open[table][kind as usize];
         let is_open = |row: &VertexBatch| row.used != ALL && row.is_for(kind, which);
         if number >= self.count || !is_open(&self.rows[number]) {
-            let row = self.spare();
+            let row = self.spare_batch();
             row.reset();
             row.bsdf.prepare(kind);
             (row.is_dark, row.has_two_sides) = which;
@@ -187,68 +187,71 @@ impl DirectLightQueue {
         (row, lane)
     }
 
-    /// Drops all vertices.
+    /// Removes all vertices.
     fn clear(&mut self) {
         (self.count, self.open) = (0, Default::default());
-        // A cancelled round may have left rays.
+        // A cancelled bounce may have left rays.
         self.pool.clear();
     }
 
-    /// Lights all vertices and drops them; returns the rays for it. `gather` gives the light at a row that another technique
-    /// brings. If paths go on from the vertices, the rays of the next round are added to `next`: by the continuation, or in lobes of
-    /// microfacets after `depth` scatterings.
+    /// Lights all queued vertices and removes them; returns the number of rays traced. `gather` returns light from
+    /// another technique at a packet. The rays of continuing paths are added to `next`: with the given continuation, or
+    /// in microfacet lobes after `depth` bounces.
     pub fn light(
         &mut self,
         tile: &TileContext<'_>,
-        measure: Measure,
+        aov: LightAov,
         (continuation, depth): (Option<Continuation>, u32),
         gather: impl Fn(&VertexBatch) -> Option<Lanes3>,
         next: &mut Vec<PathRay>,
-    ) -> Result<LightRays, Cancelled> {
-        let mut rays = LightRays::default();
-        let mut group: ArrayVec<Sums, ROWS> = ArrayVec::new();
-        let together = if tile.world.lights.selection(tile.behaviour.receivers).is_some() { ROWS } else { 1 };
-        // Hard shadows are by light samples alone.
-        let by_paths = continuation.is_some()
-            && (!tile.behaviour.gathers || tile.settings.render.shadows == Shadows::Soft);
-        let mirrors = || tile.behaviour.mirrors.then(|| Continuation::new(tile, depth, LobeSet::Narrow));
+    ) -> Result<LightRayCounts, Cancelled> {
+        let mut rays = LightRayCounts::default();
+        let mut group: ArrayVec<LightSums, ROWS> = ArrayVec::new();
+        let together = if tile.world.lights.selection(tile.behavior.receivers).is_some() { ROWS } else { 1 };
+        // Hard shadows come only from light samples.
+        let shares_with_paths = continuation.is_some()
+            && (!tile.behavior.gathers || tile.settings.render.shadows == Shadows::Soft);
+        let mirrors = || tile.behavior.mirrors.then(|| Continuation::new(tile, depth, LobeSet::Narrow));
         let of_row = |row: &VertexBatch| {
             let own = if row.bsdf.sends_rays() { continuation.or_else(mirrors) } else { continuation };
-            own.filter(|continuation| continuation.leads_on)
+            own.filter(|continuation| continuation.continues)
         };
         for first in (0..self.count).step_by(together) {
             let end = (first + together).min(self.count);
-            // Sample the lights at each row; rays to picked lights wait in the pool.
+            // Sample lights at each packet; shadow rays to picked lights are pooled.
             for number in first..end {
                 tile.token.check()?;
                 let row = &mut self.rows[number];
                 if row.may_lift != 0 {
-                    tile.world.geometry.instructions().run(Lifting { geometry: &tile.world.geometry, row });
+                    tile.world
+                        .geometry
+                        .instructions()
+                        .run(LiftOrigins { geometry: &tile.world.geometry, row });
                 }
-                let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
-                let sums = self.sums(asked, tile, measure, group.len() as u32);
+                let request = BatchRequest { number, used: row.used & shown(row, aov), shares_with_paths };
+                let sums = self.sample_lights(request, tile, aov, group.len() as u32);
                 group.push(sums);
                 if self.pool.is_full() {
-                    self.pool.trace(tile, measure, &mut group);
+                    self.pool.trace(tile, aov, &mut group);
                 }
             }
-            // Trace the rest of the pool.
-            self.pool.trace(tile, measure, &mut group);
-            // Add the light by rays in lobes and by photons, and store the result.
+            // Trace the remaining pooled rays.
+            self.pool.trace(tile, aov, &mut group);
+            // Add light from lobe rays and photons, and store the result.
             for (number, sums) in (first..end).zip(group.drain(..)) {
                 let row = &self.rows[number];
-                let asked = Asked { number, used: row.used & shown(row, measure), by_paths };
-                let mut arrived = self.arrived(asked, tile, measure, sums);
+                let request = BatchRequest { number, used: row.used & shown(row, aov), shares_with_paths };
+                let mut arrived = self.add_lobe_rays(request, tile, aov, sums);
                 if let Some(gathered) = gather(row) {
                     add_where(row.used, &gathered, &mut arrived.light);
                 }
                 rays += arrived.rays;
-                self.note(number, measure, &arrived.light);
+                self.store(number, aov, &arrived.light);
             }
-            // Scatter the paths that go on.
+            // Continue the paths.
             for row in &self.rows[first..end] {
                 if let Some(continuation) = of_row(row) {
-                    BsdfSampling { tile, row, used: row.used, continuation }.scatter(
+                    SampleBsdf { tile, row, used: row.used, continuation }.scatter(
                         &self.media,
                         &self.cones,
                         next,
@@ -260,61 +263,79 @@ impl DirectLightQueue {
         Ok(rays)
     }
 
-    /// Technique that competes with light samples.
-    fn competing(&self, asked: Asked, tile: &TileContext<'_>, measure: Measure) -> CompetingTechnique {
+    /// The technique that competes with light samples at a packet.
+    fn competing_technique(
+        &self,
+        request: BatchRequest,
+        tile: &TileContext<'_>,
+        aov: LightAov,
+    ) -> CompetingTechnique {
         let is_soft = tile.settings.render.shadows == Shadows::Soft;
-        let row = &self.rows[asked.number];
-        if asked.by_paths {
+        let row = &self.rows[request.number];
+        if request.shares_with_paths {
             CompetingTechnique::Paths
-        } else if row.bsdf.sends_rays() && is_soft && tile.behaviour.mirrors {
+        } else if row.bsdf.sends_rays() && is_soft && tile.behavior.mirrors {
             CompetingTechnique::NarrowPaths
-        } else if row.bsdf.sends_rays() && !is_soft && measure != Measure::ArrivingShare {
-            // Paths in the lobes of microfacets do not bring the light of lamps.
-            CompetingTechnique::lobes(row.bsdf.narrow_lobes() & asked.used)
+        } else if row.bsdf.sends_rays() && !is_soft && aov != LightAov::LitFraction {
+            // Paths in microfacet lobes do not account for lights.
+            CompetingTechnique::lobes(row.bsdf.narrow_lobes() & request.used)
         } else {
-            CompetingTechnique::lobes(row.sharp(tile, measure) & asked.used)
+            CompetingTechnique::lobes(row.sharp_lobes(tile, aov) & request.used)
         }
     }
 
-    /// The glass around the vertices of a row. `None` if all are in air.
+    /// The media of a packet's vertices. `None` if all are in air.
     fn media_of(&self, row: &VertexBatch) -> Option<&Media> {
         (!self.media.are_air() && row.is_inside()).then_some(&self.media)
     }
 
-    /// Contributions of light samples; rays to picked lamps wait in the pool, under the row's number.
-    fn sums(&mut self, asked: Asked, tile: &TileContext<'_>, measure: Measure, number: u32) -> Sums {
-        if asked.used == 0 {
-            return Sums::NOTHING;
+    /// Samples lights at a packet; shadow rays to picked lights are pooled under index `number`.
+    fn sample_lights(
+        &mut self,
+        request: BatchRequest,
+        tile: &TileContext<'_>,
+        aov: LightAov,
+        number: u32,
+    ) -> LightSums {
+        if request.used == 0 {
+            return LightSums::NOTHING;
         }
         let mut pool = std::mem::take(&mut self.pool);
-        let row = &self.rows[asked.number];
-        let (competing, media) = (self.competing(asked, tile, measure), self.media_of(row));
-        let (instructions, used) = (tile.world.geometry.instructions(), asked.used);
-        let plain = Lighting::<false> { tile, row, used, measure, competing, media, only_beyond: false };
-        let weighed = Lighting::<true> { tile, row, used, measure, competing, media, only_beyond: false };
+        let row = &self.rows[request.number];
+        let (competing, media) = (self.competing_technique(request, tile, aov), self.media_of(row));
+        let (instructions, used) = (tile.world.geometry.instructions(), request.used);
+        let plain = SampleAllLights::<false> { tile, row, used, aov, competing, media, only_infinite: false };
+        let weighed =
+            SampleAllLights::<true> { tile, row, used, aov, competing, media, only_infinite: false };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
-        let sums = match (competing, tile.world.lights.selection(tile.behaviour.receivers)) {
+        let sums = match (competing, tile.world.lights.selection(tile.behavior.receivers)) {
             (Nothing, None) => instructions.run(plain),
             (Nothing, Some(selection)) => {
-                instructions.run(Picking { lighting: plain, selection, number, pool: &mut pool })
+                instructions.run(SampleLightTree { lighting: plain, selection, number, pool: &mut pool })
             }
             (Paths | NarrowPaths | Lobes(_), None) => instructions.run(weighed),
             (Paths | NarrowPaths | Lobes(_), Some(selection)) => {
-                instructions.run(Picking { lighting: weighed, selection, number, pool: &mut pool })
+                instructions.run(SampleLightTree { lighting: weighed, selection, number, pool: &mut pool })
             }
         };
         self.pool = pool;
         sums
     }
 
-    /// Light that arrives, including that of rays in lobes.
-    fn arrived(&self, asked: Asked, tile: &TileContext<'_>, measure: Measure, sums: Sums) -> Arrived {
-        let row = &self.rows[asked.number];
-        let arrived = sums.arrived(measure);
-        match self.competing(asked, tile, measure) {
+    /// The reflected light, including light that lobe rays find.
+    fn add_lobe_rays(
+        &self,
+        request: BatchRequest,
+        tile: &TileContext<'_>,
+        aov: LightAov,
+        sums: LightSums,
+    ) -> ReflectedLight {
+        let row = &self.rows[request.number];
+        let arrived = sums.arrived(aov);
+        match self.competing_technique(request, tile, aov) {
             CompetingTechnique::Lobes(sharp) => {
                 let media = self.media_of(row);
-                let lobes = LobeRays { tile, row, sharp, measure, media, arrived };
+                let lobes = LobeRays { tile, row, sharp, aov, media, arrived };
                 tile.world.geometry.instructions().run(lobes)
             }
             CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {
@@ -323,12 +344,12 @@ impl DirectLightQueue {
         }
     }
 
-    /// Adds the light that arrives at a row: a path has two vertices at a surface that lets light through.
-    fn note(&mut self, number: usize, measure: Measure, arrived: &Lanes3) {
+    /// Adds a packet's reflected light to its paths; a path has two vertices at a transmissive surface.
+    fn store(&mut self, number: usize, aov: LightAov, arrived: &Lanes3) {
         let row = &self.rows[number];
-        let light = match measure {
-            Measure::Radiance(_) | Measure::ArrivingShare => row.carried_on(arrived),
-            Measure::Work => *arrived,
+        let light = match aov {
+            LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(arrived),
+            LightAov::TraversalCost => *arrived,
         };
         match row.run() {
             Some(first) => {
@@ -346,34 +367,34 @@ impl DirectLightQueue {
     }
 }
 
-/// A bit for each vertex whose direct light is shown, if there may be any.
-fn shown(row: &VertexBatch, measure: Measure) -> u32 {
+/// Mask of vertices whose direct light the view shows, if there may be any.
+fn shown(row: &VertexBatch, aov: LightAov) -> u32 {
     if row.is_dark {
         return 0;
     }
-    let Ways { direct, indirect, .. } = measure.ways();
+    let PathClasses { direct, indirect, .. } = aov.path_classes();
     let hidden = |bits: u32, is_shown: bool| if is_shown { 0 } else { bits };
     !(hidden(row.only_specular_before, direct) | hidden(!row.only_specular_before, indirect))
 }
 
-/// Vertices to light, and options.
+/// A packet to light, and options.
 #[derive(Clone, Copy)]
-struct Asked {
-    /// The number of the row.
+struct BatchRequest {
+    /// The index of the packet.
     number: usize,
-    /// A bit for each vertex.
+    /// Mask of vertices to light.
     used: u32,
-    /// Whether paths that go on from there share the light.
-    by_paths: bool,
+    /// Whether continuing paths compete with the light samples.
+    shares_with_paths: bool,
 }
 
-/// Moves the vertices of a row above their facets, if nothing is on the way.
-struct Lifting<'a> {
+/// Moves the shadow-ray origins of a packet above their facets, where the segment to them is unoccluded.
+struct LiftOrigins<'a> {
     geometry: &'a Geometry,
     row: &'a mut VertexBatch,
 }
 
-impl Loops for Lifting<'_> {
+impl Loops for LiftOrigins<'_> {
     type Done = ();
 
     #[inline(always)]
@@ -391,14 +412,14 @@ impl Loops for Lifting<'_> {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
         let rays = RayRows::of(row.from, direction).leaving(row.start);
-        // Find what is on the way.
+        // Find the occluded rays.
         let blocked = {
             let (traced, nothing) = (traced(&ends, folds), SourceRow::of(Source::Nothing));
             geometry.occluded_rows(&rays, &ends, traced, &nothing, folds)
         };
-        // Move the other vertices.
+        // Move the other origins.
         let lifted = row.may_lift & !blocked;
-        row.is_bounded &= !lifted;
+        row.has_horizon &= !lifted;
         for i in 0..LANES {
             row.start[i] = if lifted & 1 << i != 0 { Ray::NO_TRIANGLE } else { row.start[i] };
         }

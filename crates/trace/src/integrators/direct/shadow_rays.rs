@@ -1,50 +1,50 @@
-//! Shadow rays of many rows of vertices, grouped by light: rays to one corner of the scene visit the same boxes on the way, while
-//! those of one row go everywhere.
+//! Shadow rays of many packets of vertices, regrouped by light. Rays to one corner of the scene visit the same boxes,
+//! whereas the rays of one packet diverge.
 
-use super::all_lights::{Sums, add_where, passed};
+use super::all_lights::{LightSums, add_where, transmitted};
 use crate::geometry::rows::{Ends, RayRows, lanes};
 use crate::integrators::transport::tile::TileContext;
-use crate::integrators::view::Measure;
+use crate::integrators::view::LightAov;
 use crate::lights::{Source, SourceRow};
 use crate::math::lanes::{Folds, LANES, Lanes3, lane, set_lane};
 use crate::world::{Loops, World};
 
-/// Rays of a row of vertices, and their contributions.
-struct QueuedRow {
-    /// The number of the row.
+/// Shadow rays of a packet of vertices, and their contributions.
+struct QueuedShadowRays {
+    /// Index of the packet of vertices.
     row: u32,
     rays: RayRows,
     ends: Ends,
-    /// A bit for each ray.
+    /// Mask of rays to trace.
     traced: u32,
     sources: SourceRow,
     values: Lanes3,
 }
 
-/// Shadow rays that wait to be traced.
+/// Pending shadow rays.
 #[derive(Default)]
 pub struct ShadowRayQueue {
-    rows: Vec<QueuedRow>,
-    /// Each ray's light, by its place in the tree, with the ray's own row and lane.
+    rows: Vec<QueuedShadowRays>,
+    /// Each ray's light, as its position in the tree, and the ray's row and lane.
     order: Vec<(u32, u32)>,
-    /// Rows and lanes of the rays, grouped by place.
+    /// Rows and lanes of the rays, grouped by light.
     sorted: Vec<u32>,
 }
 
-/// Most groups of places.
-const RUNS: usize = 1 << RUN_BITS;
-const RUN_BITS: u32 = 11;
+/// Maximum number of groups of lights.
+const MAX_GROUPS: usize = 1 << GROUP_BITS;
+const GROUP_BITS: u32 = 11;
 
 impl ShadowRayQueue {
-    /// Number of rows of rays from which they are traced before more come, while they are in the cache.
+    /// Number of queued packets at which they are traced, while they are in the cache.
     const FULL: usize = 512;
 
-    /// Whether the rays are to be traced now.
+    /// Whether the queued rays should be traced now.
     pub fn is_full(&self) -> bool {
         self.rows.len() >= Self::FULL
     }
 
-    /// Takes the rays of `traced` of a row of vertices, with the places of their lights.
+    /// Queues the rays in `traced` of a packet of vertices, with their lights' positions in the tree.
     #[inline(always)]
     pub fn push(
         &mut self,
@@ -56,35 +56,42 @@ impl ShadowRayQueue {
     ) {
         let number = self.rows.len() as u32 * LANES as u32;
         self.order.extend(lanes(traced).map(|i| (places[i], number + i as u32)));
-        self.rows.push(QueuedRow { row, rays, ends, traced, sources: sources.clone(), values: *values });
+        self.rows.push(QueuedShadowRays {
+            row,
+            rays,
+            ends,
+            traced,
+            sources: sources.clone(),
+            values: *values,
+        });
     }
 
-    /// Traces all rays and drops them; adds the light that arrives to the sums of the rows, in the order in which rays
-    /// came.
-    pub fn trace(&mut self, tile: &TileContext<'_>, measure: Measure, sums: &mut [Sums]) {
+    /// Traces all rays and removes them; adds the unoccluded light to the sums of the packets, in the order in which
+    /// the rays were queued.
+    pub fn trace(&mut self, tile: &TileContext<'_>, aov: LightAov, sums: &mut [LightSums]) {
         if self.rows.is_empty() {
             return;
         }
         self.sort();
         let Self { rows, sorted, .. } = self;
         let world = tile.world;
-        world.geometry.instructions().run(Tracing { world, measure, rows, rays: sorted });
-        for QueuedRow { row, traced, values, .. } in &*rows {
+        world.geometry.instructions().run(TraceShadowRays { world, aov, rows, rays: sorted });
+        for QueuedShadowRays { row, traced, values, .. } in &*rows {
             add_where(*traced, values, &mut sums[*row as usize].light);
         }
         self.clear();
     }
 
-    /// Groups rays by ranges of consecutive places, by counting; rays of a group stay in their order.
+    /// Groups rays by ranges of consecutive positions with a counting sort; rays of a group keep their order.
     fn sort(&mut self) {
         let Self { order, sorted, .. } = self;
         let greatest = order.iter().map(|&(place, _)| place).max().unwrap_or(0);
-        let shift = (u32::BITS - greatest.leading_zeros()).saturating_sub(RUN_BITS);
-        let mut starts = [0; RUNS + 1];
+        let shift = (u32::BITS - greatest.leading_zeros()).saturating_sub(GROUP_BITS);
+        let mut starts = [0; MAX_GROUPS + 1];
         for (place, _) in &*order {
             starts[(place >> shift) as usize + 1] += 1;
         }
-        for run in 1..RUNS {
+        for run in 1..MAX_GROUPS {
             starts[run] += starts[run - 1];
         }
         sorted.resize(order.len(), 0);
@@ -95,28 +102,28 @@ impl ShadowRayQueue {
         }
     }
 
-    /// Drops all rays.
+    /// Removes all rays.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.order.clear();
     }
 }
 
-/// Test that finds the rays which are occluded.
-struct Tracing<'a> {
+/// Traces the queued rays and clears the bits of occluded ones.
+struct TraceShadowRays<'a> {
     world: &'a World,
-    measure: Measure,
-    rows: &'a mut [QueuedRow],
-    /// Their rows and lanes.
+    aov: LightAov,
+    rows: &'a mut [QueuedShadowRays],
+    /// Rows and lanes of the rays.
     rays: &'a [u32],
 }
 
-impl Loops for Tracing<'_> {
+impl Loops for TraceShadowRays<'_> {
     type Done = ();
 
     #[inline(always)]
     fn run(self, folds: impl Folds) {
-        let Self { world, measure, rows, rays } = self;
+        let Self { world, aov, rows, rays } = self;
         for rays in rays.chunks(LANES) {
             let mut packet = RayRows::of([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
             let mut ends = [-1.0; LANES];
@@ -133,7 +140,7 @@ impl Loops for Tracing<'_> {
             }
             let traced = ((1_u64 << rays.len()) - 1) as u32;
             let occluded = if world.has_passable() {
-                weaken(world, measure, (&packet, &ends, traced), &sources, (rows, rays))
+                attenuate(world, aov, (&packet, &ends, traced), &sources, (rows, rays))
             } else {
                 world.geometry.occluded_rows(&packet, &ends, traced, &sources, folds)
             };
@@ -145,19 +152,20 @@ impl Loops for Tracing<'_> {
     }
 }
 
-/// Weakens the contributions of rays by what they pass straight on; returns a bit for each on which nothing is left.
+/// Multiplies the contributions of rays by the transmittance of null interactions; returns the mask of rays with none
+/// left.
 #[cold]
 #[inline(never)]
-fn weaken(
+fn attenuate(
     world: &World,
-    measure: Measure,
+    aov: LightAov,
     (packet, ends, traced): (&RayRows, &Ends, u32),
     sources: &SourceRow,
-    (rows, rays): (&mut [QueuedRow], &[u32]),
+    (rows, rays): (&mut [QueuedShadowRays], &[u32]),
 ) -> u32 {
     let weakened = world.weakened_rows(packet, ends, traced, sources);
     for from in lanes(traced & !weakened.occluded) {
-        let left = passed(lane(&weakened.left, from), measure);
+        let left = transmitted(lane(&weakened.left, from), aov);
         let (row, to) = (&mut rows[rays[from] as usize / LANES], rays[from] as usize % LANES);
         let value = lane(&row.values, to) * left;
         set_lane(&mut row.values, to, value);

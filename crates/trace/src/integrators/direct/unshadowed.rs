@@ -1,5 +1,5 @@
-//! Light that rays in narrow lobes would meet without soft shadows: that of every light on their way, whatever is before it. For hard
-//! shadows, one ray to the middle of each light decides how much of it arrives.
+//! Light that narrow lobes reflect without soft shadows: the light of every emitter along a lobe ray, whatever is in
+//! front of it. For hard shadows, one ray to the center of each light decides how much of it arrives.
 
 use crate::geometry::{Ray, ShapeHit};
 use crate::integrators::transport::batch::VertexBatch;
@@ -10,28 +10,28 @@ use crate::math::lanes::lane;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, MOST_STRAIGHT};
 
-use super::all_lights::LightRays;
+use super::all_lights::LightRayCounts;
 
-/// A ray in a narrow lobe of a vertex, with the pdf of its direction.
-pub struct Unshadowed<'a> {
+/// A ray in a narrow lobe of a vertex, and the pdf of its direction.
+pub struct UnshadowedLobeRay<'a> {
     pub tile: &'a TileContext<'a>,
     pub row: &'a VertexBatch,
-    /// The vertex in the row.
+    /// Lane of the vertex in the packet.
     pub lane: usize,
     pub ray: Ray,
-    pub density: f32,
+    pub pdf: f32,
 }
 
-impl Unshadowed<'_> {
-    /// Weighted radiance of the lights on the ray; light samples, as many as there are such rays, bring the rest. `transmittance` is
-    /// that of the medium up to a distance.
+impl UnshadowedLobeRay<'_> {
+    /// Radiance of the lights along the ray, with MIS weights against as many light samples as there are such rays.
+    /// `transmittance` gives the transmittance of the medium up to a distance.
     #[cold]
     #[inline(never)]
-    pub fn radiance(&self, transmittance: impl Fn(f32) -> Vec3, rays: &mut LightRays) -> Vec3 {
-        let Self { tile, row, lane: i, ray, density } = self;
+    pub fn radiance(&self, transmittance: impl Fn(f32) -> Vec3, rays: &mut LightRayCounts) -> Vec3 {
+        let Self { tile, row, lane: i, ray, pdf } = self;
         let (world, normal) = (tile.world, lane(&row.normal, *i));
         let (mut sum, mut along, mut passed) = (Vec3::ZERO, *ray, 0.0);
-        // Add the lamps on the ray, one behind the other.
+        // Add the emitters along the ray, front to back.
         for _ in 0..=MOST_STRAIGHT {
             let Some(hit) = world.geometry.closest_of(&along, |object| world.lights.has_object(object))
             else {
@@ -39,7 +39,7 @@ impl Unshadowed<'_> {
             };
             let distance = passed + hit.shape.t;
             let met = Hit { shape: ShapeHit { t: distance, ..hit.shape }, ..hit };
-            let radiance = tile.lamp_radiance(ray, normal, &met, *density, &mut rays.lookups);
+            let radiance = tile.emitter_radiance(ray, normal, &met, *pdf, &mut rays.lookups);
             if radiance != Vec3::ZERO {
                 let front = world.geometry.surface(ray, &met).normal;
                 let side = if front.dot(ray.direction) > 0.0 { Side::Back } else { Side::Front };
@@ -49,9 +49,9 @@ impl Unshadowed<'_> {
             }
             (along, passed) = (world.beyond(&along, &hit, &mut 0).1, distance);
         }
-        // Add those beyond the scene.
+        // Add the infinite lights.
         for (number, light) in world.lights.iter().filter(|(_, light)| light.is_beyond()) {
-            let radiance = tile.radiance_of(Some(number), ray, normal, *density);
+            let radiance = tile.infinite_radiance_of(Some(number), ray, normal, *pdf);
             if radiance != Vec3::ZERO {
                 sum += radiance * transmittance(f32::MAX) * self.arriving(light, rays);
             }
@@ -59,13 +59,13 @@ impl Unshadowed<'_> {
         sum
     }
 
-    /// The part of a light that arrives.
-    fn arriving(&self, light: &Light, rays: &mut LightRays) -> Vec3 {
+    /// The fraction of a light that arrives.
+    fn arriving(&self, light: &Light, rays: &mut LightRayCounts) -> Vec3 {
         match self.tile.settings.render.shadows {
             Shadows::Off => return Vec3::ONE,
             Shadows::Hard | Shadows::Soft => {}
         }
-        // Light from all around has no middle: the ray itself decides.
+        // An environment has no center: the ray itself decides.
         let (segment, source) = match light.middle() {
             Some((Middle::At(middle), source)) => (Ray::segment(self.ray.origin, middle), source),
             Some((Middle::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),

@@ -1,8 +1,10 @@
-//! Photon tracing: from the lights over mirrors and glass to the first other surface, and from there to the next one, round by
-//! round, sixteen at a time, by the surfaces, media and lobes that camera paths meet.
+//! Photon tracing: bounce by bounce from the lights, sixteen photons at a time, through mirrors and glass to the first
+//! other surface and from there to the next one. Photons interact with surfaces, media and lobes in the same way as
+//! camera paths.
 //!
-//! Photons carry basic flux, Φ/n². At a surface whose shading normal Nₛ is not that of its facet N₉, scattering follows the adjoint
-//! of its BSDF: f·|wi·Nₛ|·|wo·N₉|/|wi·N₉| (Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 5.3).
+//! Photons carry basic flux, Φ/n². At a surface whose shading normal Nₛ differs from its geometric normal N₉,
+//! scattering uses the adjoint of its BSDF: f·|wi·Nₛ|·|wo·N₉|/|wi·N₉| (Veach, *Robust Monte Carlo Methods for Light
+//! Transport Simulation*, 1997, section 5.3).
 
 use super::map::Photon;
 use crate::control::Cancelled;
@@ -10,20 +12,20 @@ use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::lanes;
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::integrators::transport::batch::{ALL, UNBENT, VertexBatch};
+use crate::integrators::transport::batch::{ALL, UNPERTURBED, VertexBatch};
 use crate::integrators::transport::cone::Cone;
 use crate::integrators::transport::crossing::CrossingMemory;
-use crate::integrators::transport::interface::{Interface, interface, reflected, through_sheet};
+use crate::integrators::transport::interface::{FresnelSplit, fresnel_split, reflected, through_sheet};
 use crate::integrators::transport::medium::{Inside, Media, Medium, ior};
 use crate::integrators::transport::packet::PacketSource;
 use crate::integrators::transport::ray::{PathRay, PathState};
-use crate::integrators::transport::scatter::{BsdfSampling, Continuation};
+use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::transport::vertex::{ShadingVertex, Vertex};
 use crate::integrators::transport::walk::{
-    Change, MOST_HIDDEN, OpaqueHit, Reached, Straight, Walker, chance, walk,
+    Interaction, Interface, MAX_HIDDEN, NullInteraction, OpaqueHit, PathStepper, opacity_at, walk,
 };
-use crate::integrators::view::Measure;
+use crate::integrators::view::LightAov;
 use crate::integrators::{PACKET, RayCounters};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
 use crate::materials::bsdf::LobeSet;
@@ -33,33 +35,33 @@ use crate::math::lanes::{Folds, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
 use crate::world::{BodyInParts, Hit, Loops, World};
 
-/// Squared difference of directions that are equal within rounding.
+/// Squared difference below which directions are equal within rounding.
 const SAME: f32 = 1e-8;
 
-/// Common data of all photons of a part of a pass.
+/// Context shared by all photons of a chunk of a pass.
 pub struct PhotonTracing<'a> {
-    /// The world, and the numbers of the photons as the samples of a single pixel; their slots count from 0.
+    /// The tile context; photons are numbered as the samples of a single pixel, with slots from 0.
     pub tile: &'a TileContext<'a>,
     /// Emission of the lights.
     pub emission: &'a PhotonSource,
-    /// The closed shapes of glass that lights may be in, with their materials.
+    /// The closed glass shapes that may contain lights, with their materials.
     pub glasses: &'a [Inside],
-    /// Other bodies of glass that lights may be in.
+    /// Other glass solids that may contain lights.
     pub bodies: &'a [BodyInParts],
-    /// Inverse of the number of photons.
+    /// Reciprocal of the number of photons.
     pub share: f32,
-    /// Most scatterings of a photon.
+    /// Maximum number of bounces of a photon.
     pub most_depth: u32,
 }
 
-/// Photons of one part of a pass.
+/// Photons stored by one chunk of a pass.
 #[derive(Default)]
-pub struct EmittedPhotons {
-    /// Caustic photons, which came by mirrors and glass alone, in the order of their numbers within each round.
+pub struct PhotonChunk {
+    /// Caustic photons, which were scattered only by mirrors and glass, in emission order within each bounce.
     pub caustic: Vec<Photon>,
-    /// Bounced photons, scattered at a caustic, in the same order.
+    /// Bounced photons, which were scattered at a caustic, in the same order.
     pub bounced: Vec<Photon>,
-    /// Texture look-ups.
+    /// Number of texture lookups.
     pub lookups: u64,
 }
 
@@ -68,7 +70,7 @@ impl PhotonTracing<'_> {
     ///
     /// # Errors
     /// [`Cancelled`].
-    pub fn trace_photons(&self) -> Result<EmittedPhotons, Cancelled> {
+    pub fn trace_photons(&self) -> Result<PhotonChunk, Cancelled> {
         let count = self.tile.block.len() as u32;
         let mut wavefront = PhotonWavefront {
             tracing: self,
@@ -79,10 +81,10 @@ impl PhotonTracing<'_> {
             open_behind: VertexBatch::EMPTY,
             media: Media::default(),
             crossing: CrossingMemory::default(),
-            shots: EmittedPhotons::default(),
+            stored: PhotonChunk::default(),
             counters: RayCounters::default(),
         };
-        // Emit the photons, then trace them round by round.
+        // Emit the photons, then trace them bounce by bounce.
         let mut rays = Vec::new();
         wavefront.start(count, &mut rays);
         let (mut row, mut surfaces) = (VertexBatch::EMPTY, SurfaceRow::EMPTY);
@@ -99,16 +101,16 @@ impl PhotonTracing<'_> {
             wavefront.next.clear();
             wavefront.depth += 1;
         }
-        wavefront.shots.lookups += wavefront.counters.texture_lookups;
-        Ok(wavefront.shots)
+        wavefront.stored.lookups += wavefront.counters.texture_lookups;
+        Ok(wavefront.stored)
     }
 
-    /// The ray of a photon from beyond all finite objects, started at its hit on planes on the way there that it may pass. `None`
-    /// if something opaque is there.
+    /// The ray of a photon from an infinite light, moved back past transmissive infinite planes in front of its start.
+    /// `None` if an opaque surface blocks it.
     fn past_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.tile.world;
         let mut start = ray.origin;
-        for _ in 0..MOST_HIDDEN {
+        for _ in 0..MAX_HIDDEN {
             let back = Ray::new(start, -ray.direction);
             let Some(hit) = world.geometry.closest(&back) else {
                 return Some(Ray::new(start, ray.direction));
@@ -123,7 +125,7 @@ impl PhotonTracing<'_> {
         None
     }
 
-    /// The glass around the start of a photon.
+    /// The medium at the start of a photon.
     fn medium_at(&self, point: Vec3, emitted: &Emitted) -> Medium {
         let world = self.tile.world;
         let emitter = || Some(world.lights.get(emitted.light).as_area()?.object);
@@ -136,26 +138,26 @@ impl PhotonTracing<'_> {
     }
 }
 
-/// Some photons under way.
+/// The photons in flight.
 struct PhotonWavefront<'a> {
     tracing: &'a PhotonTracing<'a>,
-    /// Scatterings so far.
+    /// Number of bounces so far.
     depth: u32,
-    /// Largest component of each photon at its start, by slot.
+    /// Largest component of each photon's initial flux, by slot.
     references: Vec<f32>,
     next: Vec<PathRay>,
-    /// Row for single vertices.
+    /// Packet that collects single vertices.
     open: VertexBatch,
-    /// Row for those whose light comes through the surface.
+    /// Packet that collects vertices of transmitted photons.
     open_behind: VertexBatch,
-    /// Media of the photons at single vertices.
+    /// Media at single vertices.
     media: Media,
     crossing: CrossingMemory,
-    shots: EmittedPhotons,
+    stored: PhotonChunk,
     counters: RayCounters,
 }
 
-impl<'a> Walker<'a> for PhotonWavefront<'a> {
+impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
     fn tile(&self) -> &'a TileContext<'a> {
         self.tracing.tile
     }
@@ -164,22 +166,24 @@ impl<'a> Walker<'a> for PhotonWavefront<'a> {
         &mut self.crossing
     }
 
-    fn pass(&mut self, _: &PathRay, _: Option<Hit>) {}
+    fn note_null(&mut self, _: &PathRay, _: Option<Hit>) {}
 
     #[inline(always)]
-    fn reach(&mut self, path: &PathRay, reached: Reached<'_, 'a>, has_passed: bool) {
+    fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
         match reached {
-            Reached::Opaque(vertex, _, far) => {
+            Interaction::Opaque(vertex, _, far) => {
                 let lacks_photons = self.depth == 0 && !has_passed;
                 self.shade_surface(path, vertex, (far, lacks_photons));
             }
-            Reached::Glass(vertex, _, Change { far, rough: None }) => self.shade_glass(path, vertex, far),
+            Interaction::Glass(vertex, _, Interface { far, rough: None }) => {
+                self.shade_glass(path, vertex, far)
+            }
             // Light samples find direct light.
-            Reached::Glass(..) if self.depth == 0 && !has_passed => {}
-            Reached::Glass(vertex, _, Change { far, rough: Some(rough) }) => {
+            Interaction::Glass(..) if self.depth == 0 && !has_passed => {}
+            Interaction::Glass(vertex, _, Interface { far, rough: Some(rough) }) => {
                 self.leave_photon(path, vertex, RoughBsdf::GlassReflection(rough), (far, Some(1.0)));
             }
-            Reached::Nothing | Reached::Hidden => {}
+            Interaction::Nothing | Interaction::Hidden => {}
         }
     }
 
@@ -187,32 +191,38 @@ impl<'a> Walker<'a> for PhotonWavefront<'a> {
         &mut self.counters.texture_lookups
     }
 
-    fn meet_pane(&mut self, path: &PathRay, vertex: &Vertex<'a>, _: OpaqueHit, pane: &Pane) -> Straight {
-        let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.to_eye));
-        let tint = vertex.pane_tint(path, pane, &mut self.counters.texture_lookups);
-        if !self.goes_on() {
-            return Straight::Passes(tint * (1.0 - reflectance));
+    fn hit_pane(
+        &mut self,
+        path: &PathRay,
+        vertex: &Vertex<'a>,
+        _: OpaqueHit,
+        pane: &Pane,
+    ) -> NullInteraction {
+        let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
+        let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
+        if !self.may_scatter() {
+            return NullInteraction::Passed(tint * (1.0 - reflectance));
         }
         if !self.tracing.tile.chooses_reflection(path, reflectance) {
-            return Straight::Passes(tint);
+            return NullInteraction::Passed(tint);
         }
         let shading = vertex.shading(&mut self.counters);
         let ray = reflected(path, vertex, &shading, Vec3::ONE);
         self.push(path, vertex, (shading.normal, 1.0), ray);
-        Straight::Ends
+        NullInteraction::Ended
     }
 }
 
 impl PhotonWavefront<'_> {
-    /// Emits photons at the lights.
+    /// Emits the photons.
     fn start(&mut self, count: u32, rays: &mut Vec<PathRay>) {
         let tracing = self.tracing;
         let tile = tracing.tile;
         let has_planes = tile.world.geometry.has_unbounded();
         for begin in (0..count).step_by(PACKET) {
-            let numbers = tile.world.geometry.instructions().run(Drawing { tile, first: begin });
+            let numbers = tile.world.geometry.instructions().run(EmissionNumbers { tile, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
-                // Emit a photon, and start it behind planes of glass on its way.
+                // Emit a photon, and start it in front of all infinite planes that it may pass.
                 let Some(emitted) = tracing.emission.emit(numbers) else { continue };
                 let past_planes = is_beyond(&emitted) && has_planes;
                 let ray = emitted.ray();
@@ -235,25 +245,25 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Whether photons are scattered at the end of their rays.
-    fn goes_on(&self) -> bool {
+    /// Whether photons may scatter at the current hits.
+    fn may_scatter(&self) -> bool {
         self.depth < self.tracing.most_depth
     }
 
-    /// Traces each photon of a packet to its hit.
+    /// Traces a packet of photons to their hits, and stores and scatters them.
     fn intersect(&mut self, rays: &[PathRay], row: &mut VertexBatch, surfaces: &mut SurfaceRow) {
         let tile = self.tracing.tile;
-        let packet = tile.intersect(PacketSource::Paths(rays, 0), Measure::ALL, true, (row, surfaces));
+        let packet = tile.intersect(PacketSource::Paths(rays, 0), LightAov::ALL, true, (row, surfaces));
         self.counters.texture_lookups += packet.lookups;
         // Light samples find direct light.
         if self.depth > 0 {
             for i in lanes(row.used) {
-                let (point, normal) = row.place_of(i);
+                let (point, normal) = row.surface_of(i);
                 self.store(&rays[i], point, normal);
             }
             row.keep(row.only_specular_before);
             for i in lanes(row.used & row.has_facet) {
-                let counts = row.landed(i, -rays[i].ray.direction);
+                let counts = row.photon_weight(i, -rays[i].ray.direction);
                 set_lane(&mut row.throughput, i, rays[i].throughput * counts);
             }
             self.scatter(row);
@@ -266,12 +276,12 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon where it arrives.
+    /// Stores a photon where it lands.
     fn store(&mut self, path: &PathRay, point: Vec3, normal: Vec3) {
         let (direction, flux) = (-path.ray.direction, path.throughput);
         let photon = Photon { point, direction, flux, normal, depth: self.depth };
         let kept =
-            if path.state.only_specular_before { &mut self.shots.caustic } else { &mut self.shots.bounced };
+            if path.state.only_specular_before { &mut self.stored.caustic } else { &mut self.stored.bounced };
         kept.push(photon);
     }
 
@@ -281,7 +291,7 @@ impl PhotonWavefront<'_> {
             Bsdf::Rough(_) if lacks_photons => {}
             Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough, (far, Some(1.0))),
             Bsdf::Coated(coated) => self.shade_coated(path, vertex, coated, (far, lacks_photons)),
-            Bsdf::Mirror(mirror) if self.goes_on() => {
+            Bsdf::Mirror(mirror) if self.may_scatter() => {
                 let shading = vertex.shading(&mut self.counters);
                 let reflectance = vertex.mirror_reflectance(mirror, &shading, true, &mut self.counters);
                 let ray = reflected(path, vertex, &shading, reflectance);
@@ -291,9 +301,9 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Stores a photon at a surface under a smooth coat, and lets the coat reflect it. One that came by mirrors and glass alone is
-    /// reflected as often as the coat reflects, and else scattered at the base. Others are scattered nowhere else, so that all of
-    /// them are reflected.
+    /// Stores a photon at the base of a smooth coat, and reflects it from the coat. Caustic photons are reflected with
+    /// the coat's Fresnel reflectance as probability, and otherwise scattered at the base. Other photons never scatter
+    /// at the base, so all of them are reflected.
     fn shade_coated(
         &mut self,
         path: &PathRay,
@@ -309,15 +319,15 @@ impl PhotonWavefront<'_> {
             let by_chance = (!is_reflected).then(|| 1.0 / (1.0 - fresnel));
             self.shade_rough(path, vertex, &coated.base, (far, by_chance));
         }
-        if is_reflected && self.goes_on() {
+        if is_reflected && self.may_scatter() {
             let specular = coated.specular(&vertex.texture_point, &mut self.counters.texture_lookups);
             let ray = reflected(path, vertex, &shading, specular * if chooses { 1.0 } else { fresnel });
             self.push(path, vertex, (shading.normal, 1.0), ray);
         }
     }
 
-    /// Stores a photon at a rough surface before a medium. If there is a factor on its flux, and it came by mirrors and glass alone,
-    /// it is scattered with that factor.
+    /// Stores a photon at a non-specular surface with the medium `far` behind it. A caustic photon is scattered if
+    /// `scattered` has a factor for its flux.
     fn shade_rough(
         &mut self,
         path: &PathRay,
@@ -332,7 +342,7 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// [`PhotonWavefront::shade_rough`] with a known BSDF, and the medium behind the surface.
+    /// [`PhotonWavefront::shade_rough`] with a known BSDF.
     fn leave_photon(
         &mut self,
         path: &PathRay,
@@ -341,14 +351,15 @@ impl PhotonWavefront<'_> {
         (far, scattered): (&Medium, Option<f32>),
     ) {
         let tile = self.tracing.tile;
-        // Store the photon; it stands for those that passed the surface as if it were not there.
-        let chance = chance(path, vertex, &mut self.counters.texture_lookups);
+        // Store the photon, which also represents those that passed the surface as a null interaction.
+        let chance = opacity_at(path, vertex, &mut self.counters.texture_lookups);
         let all = PathRay { throughput: path.throughput / chance, ..*path };
         self.store(&all, vertex.surface.point, vertex.normal);
-        let Some(by_chance) = scattered.filter(|_| path.state.only_specular_before && self.goes_on()) else {
+        let Some(by_chance) = scattered.filter(|_| path.state.only_specular_before && self.may_scatter())
+        else {
             return;
         };
-        // Let it wait for being scattered.
+        // Queue it for scattering.
         let shading = vertex.shading(&mut self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
         let medium = self.media.number(&path.medium);
@@ -358,16 +369,16 @@ impl PhotonWavefront<'_> {
         }
         let i = self.open.used.trailing_ones() as usize;
         let lit = ShadingVertex { path, medium: &path.medium, place: 0, vertex, shading, bsdf: &bsdf };
-        self.open.put(i, tile, &lit, Measure::ALL, medium);
-        let counts = self.open.landed(i, vertex.to_eye) * by_chance;
+        self.open.put(i, tile, &lit, LightAov::ALL, medium);
+        let counts = self.open.photon_weight(i, vertex.wo) * by_chance;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
-        // It may go on behind the surface, where another medium changes its basic flux.
+        // Queue transmission, where the medium behind the surface changes its basic flux.
         let Some((bsdf, shading)) = behind else { return };
         let part = if vertex.material.bsdf.glass().is_some() {
             let eta = ior(tile.world, far) / ior(tile.world, &path.medium);
             1.0 / (eta * eta)
         } else {
-            // To the viewer's path, this is the way from the other side.
+            // Seen from a camera path, this is transmission from the other side.
             through_sheet(tile.world, far, &path.medium)
         };
         let medium = self.media.number(far);
@@ -378,17 +389,17 @@ impl PhotonWavefront<'_> {
         let i = self.open_behind.used.trailing_ones() as usize;
         let lit =
             ShadingVertex { path, medium: far, place: 0, vertex: &vertex.behind(), shading, bsdf: &bsdf };
-        self.open_behind.put(i, tile, &lit, Measure::ALL, medium);
+        self.open_behind.put(i, tile, &lit, LightAov::ALL, medium);
         set_lane(&mut self.open_behind.throughput, i, path.throughput * (counts * part));
     }
 
     fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &Medium) {
-        if !self.goes_on() {
+        if !self.may_scatter() {
             return;
         }
         let tile = self.tracing.tile;
         let shading = vertex.shading(&mut self.counters);
-        let Interface { reflectance, refracted } = interface(tile.world, path, vertex, &shading, far);
+        let FresnelSplit { reflectance, refracted } = fresnel_split(tile.world, path, vertex, &shading, far);
         match refracted {
             Some(mut ray) if !tile.chooses_reflection(path, reflectance) => {
                 let eta = ior(tile.world, far) / ior(tile.world, &path.medium);
@@ -402,14 +413,14 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Adds a photon after the adjoint of a δ lobe about a shading normal: see the top of this file. `eta` is the ratio of the
-    /// index of refraction ahead of the ray to that behind it.
+    /// Queues a photon after a specular bounce, weighted by the adjoint BSDF at a shading normal (see the module
+    /// documentation). `eta` is the index of refraction on the far side relative to the near side.
     fn push(&mut self, path: &PathRay, vertex: &Vertex<'_>, (shading, eta): (Vec3, f32), mut ray: PathRay) {
         let facet = vertex.normal;
         if shading != facet {
-            let (wi, wo) = (vertex.to_eye, ray.ray.direction);
+            let (wi, wo) = (vertex.wo, ray.ray.direction);
             let along = |direction: Vec3| direction - shading * direction.dot(shading);
-            // Otherwise the facet's own normal replaced the shading normal.
+            // Otherwise the geometric normal was used in place of the shading normal.
             if (along(wi) + along(wo) * eta).length_squared() < SAME {
                 let (over, under) = (wi.dot(shading) * wo.dot(facet), wi.dot(facet) * wo.dot(shading));
                 ray.throughput *= if under == 0.0 { 0.0 } else { (over / under).abs() };
@@ -433,33 +444,37 @@ impl PhotonWavefront<'_> {
         }
     }
 
-    /// Scatters photons at the vertices of a row: directions are drawn by the cosine with the facet, as the adjoint has it.
+    /// Scatters photons at a packet of vertices. Directions are sampled with the cosine of the geometric normal, as the
+    /// adjoint requires.
     fn scatter(&mut self, row: &mut VertexBatch) {
-        if !self.goes_on() || row.used == 0 {
+        if !self.may_scatter() || row.used == 0 {
             return;
         }
         for i in lanes(row.used & row.has_facet) {
             let facet = lane(&row.facet, i);
             set_lane(&mut row.normal, i, facet);
-            row.bend[i] = UNBENT;
+            row.shading_normal_cosine[i] = UNPERTURBED;
         }
-        let continuation = Continuation { leads_on: true, is_risked: false, lobes: LobeSet::All };
+        let continuation = Continuation { continues: true, uses_roulette: false, lobes: LobeSet::All };
         let used = row.used;
-        BsdfSampling { tile: self.tracing.tile, row, used, continuation }.scatter(
+        SampleBsdf { tile: self.tracing.tile, row, used, continuation }.scatter(
             &self.media,
             &[],
             &mut self.next,
         );
     }
 
-    /// Russian roulette by flux: survivors have about the flux that they started with.
+    /// Applies Russian roulette by flux: survivors keep about their initial flux.
     fn russian_roulette(&mut self) {
         let tile = self.tracing.tile;
         let mut kept = 0;
         for begin in (0..self.next.len()).step_by(PACKET) {
             let end = self.next.len().min(begin + PACKET);
-            let risks =
-                tile.world.geometry.instructions().run(Risking { tile, rays: &self.next[begin..end] });
+            let risks = tile
+                .world
+                .geometry
+                .instructions()
+                .run(RouletteNumbers { tile, rays: &self.next[begin..end] });
             for (place, risk) in (begin..end).zip(risks) {
                 let mut ray = self.next[place];
                 let flux = flux(tile.world, &ray);
@@ -478,7 +493,7 @@ impl PhotonWavefront<'_> {
     }
 }
 
-/// The largest component of the flux of a photon, in W: a medium of higher index changes the basic flux, but not this.
+/// Largest component of a photon's flux in W, which unlike basic flux does not depend on the medium.
 fn flux(world: &World, path: &PathRay) -> f32 {
     let index = ior(world, &path.medium);
     path.throughput.max_element() * index * index
@@ -491,13 +506,13 @@ fn is_beyond(emitted: &Emitted) -> bool {
     }
 }
 
-/// The random numbers of photon emission.
-struct Drawing<'a> {
+/// Draws the random numbers for photon emission.
+struct EmissionNumbers<'a> {
     tile: &'a TileContext<'a>,
     first: u32,
 }
 
-impl Loops for Drawing<'_> {
+impl Loops for EmissionNumbers<'_> {
     type Done = [Numbers; PACKET];
 
     #[inline(always)]
@@ -517,13 +532,13 @@ impl Loops for Drawing<'_> {
     }
 }
 
-/// The random numbers of Russian roulette.
-struct Risking<'a> {
+/// Draws the random numbers for Russian roulette.
+struct RouletteNumbers<'a> {
     tile: &'a TileContext<'a>,
     rays: &'a [PathRay],
 }
 
-impl Loops for Risking<'_> {
+impl Loops for RouletteNumbers<'_> {
     type Done = [f32; PACKET];
 
     #[inline(always)]

@@ -1,82 +1,82 @@
-//! Gathering of photons at vertices.
+//! Density estimation: gathers photons at vertices.
 
 use super::PhotonMaps;
-use super::clip::{Clip, clip};
+use super::coverage::{KernelCoverage, kernel_coverage};
 use super::map::{GatherPoint, PhotonMap};
 use super::occlusion::is_occluded;
-use super::reservoir::Place;
-use super::trials::inverse_part;
+use super::reservoir::PhotonPosition;
+use super::trials::inverse_coverage;
 use crate::geometry::rows::lanes;
 use crate::integrators::PACKET;
 use crate::integrators::transport::batch::VertexBatch;
 use crate::integrators::transport::tile::TileContext;
-use crate::integrators::view::{Measure, Ways};
+use crate::integrators::view::{LightAov, PathClasses};
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, Lanes3, set_lane};
 use crate::sampling::Decision;
 use crate::world::Loops;
 
-/// Probability of a look-up at a vertex that the camera does not see: a path has many such vertices, and photons there cause little
-/// of its noise.
-const LOOKS_UNSEEN: f32 = 0.25;
+/// Probability of a lookup at a vertex that the camera does not see: a path has many such vertices, and photons there
+/// contribute little noise.
+const INDIRECT_LOOKUP_PROBABILITY: f32 = 0.25;
 
-/// Probability of a look-up of bounced photons at a vertex that the camera sees: they bring little light, and smooth light.
-const LOOKS_BOUNCED: f32 = 0.5;
+/// Probability of a lookup of bounced photons at a vertex that the camera sees: their light is weak and smooth.
+const BOUNCED_LOOKUP_PROBABILITY: f32 = 0.5;
 
-/// Gathers photons at the vertices of a row.
-pub struct Gathering<'a> {
+/// Gathers photons at a packet of vertices.
+pub struct GatherPhotons<'a> {
     /// Context of the tile.
     pub tile: &'a TileContext<'a>,
     /// The vertices.
     pub row: &'a VertexBatch,
-    /// The maps of the samples that are rendered.
+    /// The photon maps of the samples.
     pub maps: &'a PhotonMaps,
-    /// Scatterings of the paths before the vertices.
+    /// Number of bounces of the paths before the vertices.
     pub depth: u32,
-    /// Measure of light to gather.
-    pub measure: Measure,
+    /// The light AOV to accumulate.
+    pub aov: LightAov,
 }
 
-impl Loops for Gathering<'_> {
+impl Loops for GatherPhotons<'_> {
     type Done = Lanes3;
 
-    /// Gathered light that is reflected towards the camera, before the throughput of the paths.
+    /// The gathered light reflected toward the viewer, before the throughput of the paths.
     #[inline(always)]
     fn run(self, folds: impl Folds) -> Lanes3 {
-        let Self { tile, row, maps, depth, measure } = self;
+        let Self { tile, row, maps, depth, aov } = self;
         let mut sums = [[0.0; PACKET]; 3];
         let [looks, choices] = row.sampler(tile).pairs(&row.path, Decision::Gather, 0, 1);
         let Some(most_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
-        let Ways { caustic, indirect, .. } = measure.ways();
+        let PathClasses { caustic, indirect, .. } = aov.path_classes();
         let narrow = row.bsdf.narrow_lobes();
         for i in lanes(row.used) {
             let (_, _, sample) = tile.block.place(row.slot[i]);
             let pass = maps.pass(sample);
             let only_specular_before = row.only_specular_before & 1 << i != 0;
-            let (point, normal) = row.place_of(i);
-            // Choose the maps that hold light for the vertex.
+            let (point, normal) = row.surface_of(i);
+            // Choose the maps that contribute at the vertex.
             let look = GatherPoint { point, normal, most_depth };
-            // At a surface without a glossy lobe, photons carry the light from a caustic, and the path from there leaves it out.
+            // Without a glossy lobe, bounced photons carry the light from a caustic, and continuing paths ignore it.
             let gathers_bounced = indirect && narrow & 1 << i == 0;
             let gathers_caustic =
                 if only_specular_before { caustic } else { indirect && row.after_gloss & 1 << i != 0 };
-            // Choose the maps to look up by chance.
-            let chances = if measure == Measure::Work {
+            // Decide the lookup probabilities.
+            let chances = if aov == LightAov::TraversalCost {
                 [1.0; 2]
             } else if only_specular_before {
-                [1.0, LOOKS_BOUNCED]
+                [1.0, BOUNCED_LOOKUP_PROBABILITY]
             } else {
-                [LOOKS_UNSEEN; 2]
+                [INDIRECT_LOOKUP_PROBABILITY; 2]
             };
-            // Add their light, if the ways to the photons are free.
+            // Add their light, unless it is occluded.
             let maps = [(gathers_caustic, &pass.caustic), (gathers_bounced, &pass.bounced)];
             let mut sum = Vec3::ZERO;
             for ((gathers, map), chance) in maps.into_iter().zip(chances) {
                 if gathers && looks[i] < chance {
-                    // The rest of the random number is random again.
+                    // Rescale the random number for reuse.
                     let random = [choices[i], looks[i] / chance];
-                    let (light, photon) = brought((row, i), (map, &look), measure, random, folds);
-                    sum += light * (reached(tile, (row, i), &look, photon, map.radius()) / chance);
+                    let (light, photon) = kernel_sum((row, i), (map, &look), aov, random, folds);
+                    sum += light * (coverage_factor(tile, (row, i), &look, photon, map.radius()) / chance);
                 }
             }
             set_lane(&mut sums, i, sum);
@@ -85,39 +85,43 @@ impl Loops for Gathering<'_> {
     }
 }
 
-/// Factor on the light of the photons of a kernel, given one of them: 0 if that one is behind a wall, else the inverse of the part
-/// of the kernel that receives photons, or an estimate of it.
+/// Factor on a kernel's light, given one of its photons: 0 if that photon is occluded, otherwise the reciprocal of the
+/// kernel's coverage, or an estimate of it.
 #[inline(never)]
-fn reached(
+fn coverage_factor(
     tile: &TileContext<'_>,
     (row, i): (&VertexBatch, usize),
     look: &GatherPoint,
-    photon: Option<Place>,
+    photon: Option<PhotonPosition>,
     radius: f32,
 ) -> f32 {
     let Some(photon) = photon else { return 1.0 };
-    match clip(tile.world, look, radius) {
-        Clip::Part(part) => 1.0 / part,
-        Clip::Cut | Clip::Crowded if is_occluded(&tile.world.geometry, look, &photon, radius) => 0.0,
-        by_trials @ (Clip::Cut | Clip::Crowded) => {
+    match kernel_coverage(tile.world, look, radius) {
+        KernelCoverage::Fraction(part) => 1.0 / part,
+        KernelCoverage::Clipped | KernelCoverage::Crowded
+            if is_occluded(&tile.world.geometry, look, &photon, radius) =>
+        {
+            0.0
+        }
+        by_trials @ (KernelCoverage::Clipped | KernelCoverage::Crowded) => {
             let sampler = tile.sampler(row.slot[i]);
             let pair = |number| sampler.pair(row.path[i], Decision::Trial(number));
-            inverse_part(tile.world, look, radius, by_trials, pair)
+            inverse_coverage(tile.world, look, radius, by_trials, pair)
         }
     }
 }
 
-/// Light of a map's photons at a vertex that is reflected towards the camera, and one of the photons.
+/// Light from a map's photons that a vertex reflects toward the viewer, and one of the photons.
 #[inline(always)]
-fn brought(
+fn kernel_sum(
     (row, i): (&VertexBatch, usize),
     (map, look): (&PhotonMap, &GatherPoint),
-    measure: Measure,
+    aov: LightAov,
     random: [f32; 2],
     folds: impl Folds,
-) -> (Vec3, Option<Place>) {
-    if measure == Measure::Work {
-        return (Vec3::splat(map.count_around(look, folds) as f32), None);
+) -> (Vec3, Option<PhotonPosition>) {
+    if aov == LightAov::TraversalCost {
+        return (Vec3::splat(map.count_near(look, folds) as f32), None);
     }
     let is_flat = row.has_facet & 1 << i == 0;
     match row.bsdf.even(i).filter(|_| is_flat) {
@@ -125,30 +129,30 @@ fn brought(
             let (irradiance, photon) = map.irradiance(look, random, folds);
             (f * irradiance, photon)
         }
-        None => reflected((row, i), (map, look), random, folds),
+        None => reflected_kernel_sum((row, i), (map, look), random, folds),
     }
 }
 
-/// [`Gathering::brought`], with each photon weighted by its direction.
+/// [`kernel_sum`] with the BSDF evaluated for the direction of each photon.
 #[inline(always)]
-fn reflected(
+fn reflected_kernel_sum(
     (row, i): (&VertexBatch, usize),
     (map, look): (&PhotonMap, &GatherPoint),
     random: [f32; 2],
     folds: impl Folds,
-) -> (Vec3, Option<Place>) {
+) -> (Vec3, Option<PhotonPosition>) {
     let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
     map.visit(look, folds, |photon, density| {
         let f = row.bsdf.f_at(i, photon.direction);
-        let light = f * photon.flux * (density * row.landed(i, photon.direction));
+        let light = f * photon.flux * (density * row.photon_weight(i, photon.direction));
         sum += light;
         let weight = light.element_sum();
         total += weight;
-        // Choose as `Choices` does.
+        // Choose a photon by reservoir sampling, as `LaneReservoirs` does.
         let part = if weight > 0.0 { weight / total } else { 0.0 };
         if left < part {
             left /= part;
-            chosen = Some(Place { point: photon.point, normal: photon.normal });
+            chosen = Some(PhotonPosition { point: photon.point, normal: photon.normal });
         } else {
             left = (left - part) / (1.0 - part);
         }

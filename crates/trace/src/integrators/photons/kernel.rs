@@ -1,12 +1,12 @@
-//! The weight of Epanechnikov's kernel over flat pieces of its plane, with the kernel's disc as the unit disc.
+//! The Epanechnikov kernel, in units of its radius: its weight over polygons, and sampling.
 
 use std::f64::consts::FRAC_2_PI;
 
 use crate::math::elementary::atan2;
 use crate::math::{DVec2, Vec2};
 
-/// The weight of the kernel (2/π)·(1 − ρ²) over a convex polygon, given its corners in order: 1 if it contains the
-/// disc.
+/// The integral of the kernel (2/π)·(1 − ρ²) over a convex polygon with the given corners in order; 1 if the polygon
+/// contains the disk.
 pub fn weight_over(corners: &[DVec2]) -> f64 {
     let edges = || corners.iter().zip(corners.iter().cycle().skip(1)).map(|(&a, &b)| (a, b));
     let turn = edges().map(|(a, b)| a.perp_dot(b)).sum::<f64>().signum();
@@ -24,12 +24,12 @@ pub fn weight_over(corners: &[DVec2]) -> f64 {
     }
 }
 
-/// The integral of 1 − ρ² over the unit disc's part of the triangle between the middle and an edge, > 0 if the edge goes
-/// counterclockwise.
+/// The integral of 1 − ρ² over the intersection of the unit disk and the triangle between the center and an edge, > 0
+/// if the edge is counterclockwise.
 ///
-/// In polar coordinates it is ∫ R²/2 − R⁴/4 dφ, with R the smaller of 1 and the distance of the edge. Beyond the disc that is a
-/// quarter of the angle. On an edge at the distance d of the middle, by the length s along it, R² = d² + s² and dφ = d/R² ds, so
-/// that it is d·∫ 1/2 − (d² + s²)/4 ds.
+/// In polar coordinates it is ∫ R²/2 − R⁴/4 dφ, where R is the smaller of 1 and the distance of the edge. Outside the
+/// disk this is a quarter of the angle. On an edge at distance d from the center, with arc length s along it, R² = d² +
+/// s² and dφ = d/R² ds, so the integral is d·∫ 1/2 − (d² + s²)/4 ds.
 fn below_edge(a: DVec2, b: DVec2) -> f64 {
     let length = (b - a).length();
     if !(length > 0.0) {
@@ -50,16 +50,17 @@ fn below_edge(a: DVec2, b: DVec2) -> f64 {
     inside + 0.25 * (before + after)
 }
 
-/// The angle from one direction to another, counterclockwise.
+/// The counterclockwise angle from one direction to another.
 fn angle(from: DVec2, to: DVec2) -> f64 {
     f64::from(atan2(from.perp_dot(to) as f32, from.dot(to) as f32))
 }
 
-/// The place in the unit disc that a point uniform on the disc becomes, so that it has the kernel's density: within ρ, the kernel
-/// has 2ρ² − ρ⁴ of its weight, the disc ρ² of its area.
+/// Maps a uniform point on the unit disk to a point distributed as the kernel: within ρ, the kernel has 2ρ² − ρ⁴ of its
+/// weight, the disk ρ² of its area.
 pub fn sample(on_disk: Vec2) -> Vec2 {
     let squared = on_disk.length_squared().min(1.0);
-    // ρ² = 1 − √(1 − u), u the square on the disc, written without a difference of near numbers: ρ²/u = 1/(1 + √(1 − u)).
+    // ρ² = 1 − √(1 − u), where u is the squared radius on the disk, rewritten to avoid cancellation: ρ²/u = 1/(1 + √(1
+    // − u)).
     on_disk * (1.0 + (1.0 - squared).sqrt()).recip().sqrt()
 }
 
@@ -74,8 +75,8 @@ mod tests {
     }
 
     #[test]
-    fn the_weight_beyond_a_straight_edge_is_known() {
-        // ∫ over x ≥ d: (2/π)·(4/3)·∫(1 − x²)^{3/2} dx; by numbers.
+    fn weight_beyond_a_straight_edge_is_exact() {
+        // ∫ over x ≥ d: (2/π)·(4/3)·∫(1 − x²)^{3/2} dx, integrated numerically.
         for d in [-0.9, -0.3, 0.0, 0.2, 0.7, 0.99] {
             let steps = 200_000;
             let step = (1.0 - d) / f64::from(steps);
@@ -83,15 +84,15 @@ mod tests {
             let exact = 8.0 / (3.0 * std::f64::consts::PI) * (0..steps).map(at).sum::<f64>() * step;
             let far = [(d, -9.0), (40.0, -9.0), (40.0, 9.0), (d, 9.0)].map(|(x, y)| DVec2::new(x, y));
             let weight = weight_over(&far);
-            assert!((weight - exact).abs() < 1e-6, "{d}: {weight} is not {exact}");
+            assert!((weight - exact).abs() < 1e-6, "{d}: got {weight}, expected {exact}");
             let mut mirrored = far;
             mirrored.reverse();
-            assert_eq!(weight_over(&mirrored), weight, "whichever way round");
+            assert_eq!(weight_over(&mirrored), weight, "for either orientation");
         }
     }
 
     #[test]
-    fn pieces_of_a_plane_share_the_kernel() {
+    fn weights_of_a_tiling_sum_to_one() {
         let mut next = unit(11);
         for _ in 0..200 {
             let side = 0.05 + 2.0 * f64::from(next());
@@ -111,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_are_as_many_as_the_kernel_weighs() {
+    fn samples_follow_the_kernel() {
         let mut next = unit(3);
         let part = square(DVec2::new(-0.3, 0.1), 0.8);
         const DRAWS: u32 = 400_000;
@@ -123,6 +124,9 @@ mod tests {
             inside += u32::from(from.min_element() > 0.0 && from.max_element() < 1.0);
         }
         let (found, exact) = (f64::from(inside) / f64::from(DRAWS), weight_over(&part));
-        assert!((found - exact).abs() < 4.0 * (exact / f64::from(DRAWS)).sqrt(), "{found} is not {exact}");
+        assert!(
+            (found - exact).abs() < 4.0 * (exact / f64::from(DRAWS)).sqrt(),
+            "got {found}, expected {exact}"
+        );
     }
 }

@@ -1,96 +1,96 @@
-//! A photon map: photons by the cells of a grid. Only a hash of the cells is kept, so that the grid may be as fine as the radius
-//! requires wherever photons are. Look-ups weigh sixteen photons at a time.
+//! A photon map: photons sorted into the cells of a hashed grid, whose cells may therefore be as small as the radius
+//! requires. Lookups weight sixteen photons at a time.
 
 use super::packed::{self, Packed};
-use super::reservoir::{Choices, Place};
+use super::reservoir::{LaneReservoirs, PhotonPosition};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::rows::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane};
 
-/// A photon: light that arrived at a surface.
+/// A photon that landed on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
     /// Position.
     pub point: Vec3,
-    /// Unit direction from which it came.
+    /// Unit direction from which it arrived.
     pub direction: Vec3,
     /// Basic flux in W, Φ/n².
     pub flux: Vec3,
-    /// Unit normal of the facet on the side at which it arrived.
+    /// Unit geometric normal on the side where it arrived.
     pub normal: Vec3,
-    /// Scatterings on its way.
+    /// Number of bounces before it landed.
     pub depth: u32,
 }
 
-/// Photons that are sorted in between two polls of the token.
+/// Number of photons sorted between two polls of the token.
 const POLL_INTERVAL: usize = 1 << 16;
 
-/// Photons side by side: eight cache lines.
+/// Sixteen photons as a struct of arrays: eight cache lines.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-struct Block {
+struct PhotonBlock {
     point: Lanes3,
     normal: Packed,
     direction: Packed,
     flux: Lanes3,
 }
 
-/// A block without photons, whose lanes are nowhere.
-const EMPTY: Block = Block {
+/// A block without photons, whose positions are at infinity.
+const EMPTY: PhotonBlock = PhotonBlock {
     point: [[f32::INFINITY; LANES]; 3],
     normal: [0; LANES],
     direction: [0; LANES],
     flux: [[0.0; LANES]; 3],
 };
 
-/// Photons with their positions.
+/// Photons in a hashed grid.
 #[derive(Clone, Debug)]
 pub struct PhotonMap {
     radius: f32,
-    /// Number of cells in a unit of length.
+    /// Number of cells per unit of length.
     cells: f32,
-    /// Number of buckets less one; the number is a power of two.
+    /// Number of buckets, a power of two, minus one.
     mask: u32,
-    /// Starts of the photons of each bucket, and one more for the end.
+    /// Index of the first photon of each bucket, and one more for the end.
     starts: Vec<u32>,
     count: usize,
-    blocks: Vec<Block>,
+    blocks: Vec<PhotonBlock>,
     depths: Vec<[u32; LANES]>,
-    /// The largest of the depths.
+    /// The largest depth.
     most_depth: u32,
 }
 
-/// Least cosine between the normals of surfaces that a kernel covers.
+/// Minimum cosine between the normals of surfaces within one kernel.
 pub(super) const LEAST_COSINE: f32 = 0.7;
 
-/// Largest distance of photons from the tangent plane, in radii.
+/// Maximum distance of photons from the tangent plane, in radii.
 pub(super) const REACH: f32 = 0.3;
 
-/// Length of a cell in radii: more than that of the box around any kernel, 2·√(1 + REACH²), so that the kernel overlaps at most two
-/// cells along an axis.
+/// Cell size in radii: larger than the bounding box of any kernel, 2·√(1 + REACH²), so that a kernel overlaps at most
+/// two cells along each axis.
 const CELL: f32 = 2.1;
 
-/// Query for photons at a surface.
+/// A query for photons near a surface point.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherPoint {
-    /// A point of the surface.
+    /// The surface point.
     pub point: Vec3,
-    /// Normal of its facet on the queried side.
+    /// Geometric normal on the queried side.
     pub normal: Vec3,
-    /// Most scatterings of the photons.
+    /// Maximum number of bounces of the photons.
     pub most_depth: u32,
 }
 
 impl GatherPoint {
-    /// The box around a kernel of this radius.
+    /// The bounding box of a kernel with this radius.
     pub fn kernel_box(&self, radius: f32) -> Aabb {
         let half = self.half_box() * radius;
         Aabb { min: self.point - half, max: self.point + half }
     }
 
-    /// Half the sides of the box around a kernel of radius 1.
+    /// Half the extents of the bounding box of a kernel with radius 1.
     #[inline(always)]
     fn half_box(&self) -> Vec3 {
         let own = self.normal.abs();
@@ -99,14 +99,14 @@ impl GatherPoint {
     }
 }
 
-/// Ranges that contain the photons of a kernel.
-struct Ranges {
+/// Disjoint ranges of photons that cover a kernel.
+struct PhotonRanges {
     of: [[u32; 2]; 8],
     count: usize,
 }
 
-impl Ranges {
-    /// Adds a range, joined with those that overlap it, as columns of other cells may have the same hash.
+impl PhotonRanges {
+    /// Adds a range, merging it with ranges that it overlaps, as columns of different cells may have the same hash.
     #[inline(always)]
     fn add(&mut self, mut range: [u32; 2]) {
         if range[0] == range[1] {
@@ -130,12 +130,12 @@ impl Ranges {
 }
 
 impl PhotonMap {
-    /// A map of photons, for a kernel of this radius; photons of a cell keep the given order.
+    /// Builds a map for kernels of this radius; photons in one cell keep their order.
     ///
     /// # Errors
     /// [`Cancelled`].
     pub fn new(photons: &[Photon], radius: f32, token: &CancelToken) -> Result<Self, Cancelled> {
-        // Count the photons of each bucket of cells.
+        // Count the photons in each bucket.
         let cells = 1.0 / (CELL * radius);
         let mask = (photons.len().max(1).next_power_of_two() - 1) as u32;
         let mut starts = vec![0_u32; mask as usize + 2];
@@ -164,7 +164,7 @@ impl PhotonMap {
                 *place += 1;
             }
         }
-        // Store them side by side.
+        // Store them in blocks.
         let rows = photons.len().div_ceil(LANES);
         let (mut blocks, mut depths) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
         for order in order.chunks(POLL_INTERVAL) {
@@ -182,15 +182,15 @@ impl PhotonMap {
         Ok(Self { radius, cells, mask, starts, count: photons.len(), blocks, depths, most_depth })
     }
 
-    /// All photons, by their cells.
+    /// All photons, in bucket order.
     pub fn photons(&self) -> impl Iterator<Item = Photon> + '_ {
         (0..self.count).map(|number| self.photon(number / LANES, number % LANES))
     }
 
-    /// A photon; its directions as they are stored, to five digits.
+    /// Returns a photon; its directions were stored with limited precision.
     #[inline(always)]
     fn photon(&self, block: usize, i: usize) -> Photon {
-        let Block { point, normal, direction, flux } = &self.blocks[block];
+        let PhotonBlock { point, normal, direction, flux } = &self.blocks[block];
         Photon {
             point: lane(point, i),
             direction: packed::unit(direction[i]),
@@ -205,31 +205,32 @@ impl PhotonMap {
         self.count
     }
 
-    /// Whether there are no photons.
+    /// Whether the map is empty.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Radius of its kernel.
+    /// Kernel radius.
     pub fn radius(&self) -> f32 {
         self.radius
     }
 
-    /// Bytes that it takes.
+    /// Memory use in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(&*self.blocks) + size_of_val(&*self.depths) + size_of_val(&*self.starts)
     }
 
-    /// The irradiance by photons around a point, W·m⁻², and one of them that two random numbers choose by its contribution.
+    /// Irradiance from the photons around a point in W·m⁻², and one of them, chosen with two random numbers in
+    /// proportion to its contribution.
     #[inline(always)]
     pub fn irradiance(
         &self,
         look: &GatherPoint,
         random: [f32; 2],
         folds: impl Folds,
-    ) -> (Vec3, Option<Place>) {
+    ) -> (Vec3, Option<PhotonPosition>) {
         let mut sums = [[0.0; LANES]; 3];
-        let mut choices = Choices::new(random[0]);
+        let mut choices = LaneReservoirs::new(random[0]);
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks(*range) {
@@ -247,19 +248,19 @@ impl PhotonMap {
             }
         }
         let chosen = choices.chosen(random[1]).map(|(block, i)| self.place(block as usize, i));
-        (Vec3::from(sums.map(folded)) * self.peak(), chosen)
+        (Vec3::from(sums.map(sum_lanes)) * self.peak(), chosen)
     }
 
-    /// Position of a photon, with its normal.
+    /// Position and normal of a photon.
     #[inline(always)]
-    fn place(&self, block: usize, i: usize) -> Place {
-        let Block { point, normal, .. } = &self.blocks[block];
-        Place { point: lane(point, i), normal: packed::unit(normal[i]) }
+    fn place(&self, block: usize, i: usize) -> PhotonPosition {
+        let PhotonBlock { point, normal, .. } = &self.blocks[block];
+        PhotonPosition { point: lane(point, i), normal: packed::unit(normal[i]) }
     }
 
-    /// Number of photons around a point.
+    /// Number of photons in the kernel around a point.
     #[inline(always)]
-    pub fn count_around(&self, look: &GatherPoint, folds: impl Folds) -> u32 {
+    pub fn count_near(&self, look: &GatherPoint, folds: impl Folds) -> u32 {
         let mut count = 0;
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
@@ -271,8 +272,8 @@ impl PhotonMap {
         count
     }
 
-    /// Visits the photons around a point, each with its weight: Epanechnikov's kernel, in m⁻², whose integral over the tangent
-    /// plane is 1 (Silverman, *Density Estimation for Statistics and Data Analysis*, 1986).
+    /// Visits the photons around a point with their weights in m⁻², the values of the Epanechnikov kernel, whose
+    /// integral over the tangent plane is 1 (Silverman, *Density Estimation for Statistics and Data Analysis*, 1986).
     #[inline(always)]
     pub fn visit(&self, look: &GatherPoint, folds: impl Folds, mut visit: impl FnMut(&Photon, f32)) {
         let peak = self.peak();
@@ -287,16 +288,16 @@ impl PhotonMap {
         }
     }
 
-    /// The kernel's value in its middle.
+    /// The kernel's value at its center.
     #[inline(always)]
     fn peak(&self) -> f32 {
         2.0 / (std::f32::consts::PI * (self.radius * self.radius))
     }
 
-    /// Ranges that may contain photons of a kernel.
+    /// The ranges that may contain photons of a kernel.
     #[inline(always)]
-    fn ranges(&self, look: &GatherPoint) -> Ranges {
-        let mut ranges = Ranges { of: [[0; 2]; 8], count: 0 };
+    fn ranges(&self, look: &GatherPoint) -> PhotonRanges {
+        let mut ranges = PhotonRanges { of: [[0; 2]; 8], count: 0 };
         if self.count == 0 {
             return ranges;
         }
@@ -321,8 +322,8 @@ impl PhotonMap {
         ranges
     }
 
-    /// Weights of the photons of a block that are in a range and in a kernel, given its value in the middle. `None` if there are no
-    /// such photons.
+    /// Weights of the photons of a block that are in a range and in the kernel, relative to the kernel's value at its
+    /// center. `None` if there are no such photons.
     #[inline(always)]
     fn weights(
         &self,
@@ -331,7 +332,7 @@ impl PhotonMap {
         number: usize,
         folds: impl Folds,
     ) -> Option<Lanes> {
-        // Weigh the photons within the kernel by their distances.
+        // Weight the photons within the kernel by their distance.
         let GatherPoint { point, normal, most_depth } = *look;
         let block = &self.blocks[number];
         let radius_squared = self.radius * self.radius;
@@ -353,7 +354,7 @@ impl PhotonMap {
         if folds.bits(&near) == 0 {
             return None;
         }
-        // Leave out photons of other surfaces, and those from behind.
+        // Reject photons on other surfaces and photons from behind.
         let (own, from) = (packed::lanes(&block.normal), packed::lanes(&block.direction));
         for i in 0..LANES {
             let cosine = own[0][i] * normal.x + own[1][i] * normal.y + own[2][i] * normal.z;
@@ -363,10 +364,10 @@ impl PhotonMap {
                 & (cosine * cosine > (LEAST_COSINE * LEAST_COSINE) * squared)
                 & (arriving > 0.0);
             near[i] &= if faces { TRUE } else { 0 };
-            // An inclined surface has more photons over a part of the plane.
+            // A tilted surface has more photons per area of the tangent plane.
             weights[i] *= cosine / squared.sqrt();
         }
-        // Leave out photons of too many scatterings.
+        // Reject photons with too many bounces.
         if most_depth < self.most_depth {
             let depths = &self.depths[number];
             for i in 0..LANES {
@@ -380,8 +381,8 @@ impl PhotonMap {
     }
 }
 
-impl Block {
-    /// Puts a photon into a lane; returns its depth.
+impl PhotonBlock {
+    /// Stores a photon in a lane; returns its depth.
     fn put(&mut self, i: usize, photon: &Photon) -> u32 {
         set_lane(&mut self.point, i, photon.point);
         set_lane(&mut self.flux, i, photon.flux);
@@ -391,13 +392,13 @@ impl Block {
     }
 }
 
-/// The blocks of a range that is not empty.
+/// The blocks of a nonempty range.
 #[inline(always)]
 fn blocks([start, end]: [u32; 2]) -> std::ops::Range<usize> {
     start as usize / LANES..(end as usize).div_ceil(LANES)
 }
 
-/// A bit for each lane above 0.
+/// Mask of lanes above 0.
 #[inline(always)]
 fn above_zero(weights: &Lanes, folds: impl Folds) -> u32 {
     let mut above: Truths = [0; LANES];
@@ -407,9 +408,9 @@ fn above_zero(weights: &Lanes, folds: impl Folds) -> u32 {
     folds.bits(&above)
 }
 
-/// The sum of all lanes, by halves.
+/// The sum of all lanes, added in halves.
 #[inline(always)]
-fn folded(mut row: Lanes) -> f32 {
+fn sum_lanes(mut row: Lanes) -> f32 {
     for i in 0..8 {
         row[i] += row[i + 8];
     }
@@ -422,7 +423,7 @@ fn folded(mut row: Lanes) -> f32 {
 /// The cell of a point.
 #[inline(always)]
 fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
-    // The system's floor is a call. A number that is too large for a cell goes into the last one.
+    // `f32::floor` would be a function call. Coordinates out of range are clamped to the last cell.
     let below = |x: f32| {
         let whole = x as i32;
         whole.wrapping_sub(i32::from(whole as f32 > x))
@@ -430,7 +431,7 @@ fn cell_of(point: Vec3, cells: f32) -> [i32; 3] {
     [below(point.x * cells), below(point.y * cells), below(point.z * cells)]
 }
 
-/// The bucket of a cell; cells of one column are consecutive.
+/// The bucket of a cell; the cells of a column have consecutive buckets.
 #[inline(always)]
 fn bucket(x: i32, y: i32, z: i32, mask: u32) -> u32 {
     let hash = (y as u32).wrapping_mul(0x9e37_79b1) ^ (z as u32).wrapping_mul(0x85eb_ca77).rotate_left(16);
@@ -448,7 +449,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_finds_what_a_look_at_all_photons_finds_each_once() {
+    fn lookups_match_brute_force() {
         let mut next = random(5);
         for count in [0, 1, 2, 3, 17, 3000] {
             for radius in [1e-3_f32, 0.05, 0.4, 30.0] {
@@ -491,7 +492,7 @@ mod tests {
                     let mut points: Vec<_> = found.iter().map(|(point, _)| *point).collect();
                     points.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
                     expected.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
-                    assert!(points.len().abs_diff(expected.len()) <= 1, "but for rounding at the edge");
+                    assert!(points.len().abs_diff(expected.len()) <= 1, "except for rounding at the edge");
                     seen += expected.len();
                     let peak = 2.0 / (std::f32::consts::PI * radius * radius);
                     assert!(found.iter().all(|(_, density)| *density >= 0.0 && *density <= peak));
@@ -499,13 +500,13 @@ mod tests {
                     assert_eq!(points.len(), found.len(), "each once");
                     assert!(points.iter().filter(|point| !expected.contains(point)).count() <= 1);
                 }
-                assert!(seen >= count.min(60) / 8, "{seen} of {count} are found within {radius}");
+                assert!(seen >= count.min(60) / 8, "found {seen} of {count} photons within {radius}");
             }
         }
     }
 
     #[test]
-    fn the_kernel_sums_to_one_and_leaves_out_what_came_too_late() {
+    fn kernel_sums_to_one_and_limits_depth() {
         // Photons on a fine grid represent their areas.
         let step = 0.01_f32;
         let at = |i: i32| (i as f32 + 0.3) * step;
@@ -517,7 +518,7 @@ mod tests {
             let look = GatherPoint { point: Vec3::new(0.1, 0.5, -0.2), normal, most_depth };
             map.visit(&look, PlainFolds, |_, density| sum += density * step * step);
             let flux = f64::from(map.irradiance(&look, [0.5; 2], PlainFolds).0.x * step * step);
-            assert!((flux - f64::from(sum)).abs() < 1e-4, "{flux} is not {sum}");
+            assert!((flux - f64::from(sum)).abs() < 1e-4, "got {flux}, expected {sum}");
             sum
         };
         assert!((sum(1, Vec3::Y) - 1.0).abs() < 2e-3, "{}", sum(1, Vec3::Y));

@@ -1,34 +1,35 @@
-//! Photon maps: light that reaches surfaces by mirrors, glass and other surfaces, traced from the lights (Jensen, *Global
-//! Illumination using Photon Maps*, 1996). It comes in passes: the maps of each are right but for the width of a kernel that
-//! shrinks from pass to pass, so that their mean converges (Hachisuka, Ogaki, Jensen, *Progressive Photon Mapping*, 2008; Knaus and
-//! Zwicker, *Progressive Photon Mapping: A Probabilistic Approach*, 2011). Pass i of the photons is sample i of every pixel.
+//! Photon mapping: light that reaches surfaces through mirrors, glass and other surfaces, traced from the lights
+//! (Jensen, *Global Illumination using Photon Maps*, 1996). Photons are traced in passes. The only bias of a pass is
+//! the width of a kernel that shrinks from pass to pass, so the mean over passes converges (Hachisuka, Ogaki, Jensen,
+//! *Progressive Photon Mapping*, 2008; Knaus and Zwicker, *Progressive Photon Mapping: A Probabilistic Approach*,
+//! 2011). Pass i belongs to sample i of every pixel.
 //!
-//! Estimators of the paths from lights L by mirrors and glass S and other surfaces D to the eye E; paths from the eye go on
-//! from each D:
+//! Estimators for paths from lights L through mirrors and glass S and other surfaces D to the eye E; camera paths
+//! continue at each D:
 //!
 //! | paths | estimator |
 //! | --- | --- |
-//! | `L S* E` | the path from the eye meets the light |
-//! | `L D … E` | light samples at that D, and the path that meets the light right behind it, weighed against each other |
+//! | `L S* E` | the camera path hits the light |
+//! | `L D … E` | light samples at that D, and the camera path that hits the light right after it, combined with MIS |
 //! | `L S+ D S* E` | caustic photons at that D |
 //! | `L S+ D S* D … E`, the second D without a glossy lobe | bounced photons, at the second D |
 //! | `L S+ D S* D … E`, the second D with a glossy lobe | caustic photons at the first D |
 //!
-//! Photons therefore carry only light that meets mirrors or glass before anything else. Lights that a path from the eye hits behind
-//! mirrors and glass, after a D, count nothing. Light from a caustic by one more surface arrives nearly everywhere, from a small
-//! place that paths hardly ever find: hence the bounced photons, which are scattered at the caustic. The scatterings of the eye's
-//! path, with the vertex at which photons are gathered, and those of the photon are at most `max_depth` together.
+//! Photons therefore carry only light that hits mirrors or glass first, and camera paths ignore lights that they hit
+//! through mirrors and glass after a D. Light scattered once at a caustic arrives almost everywhere from a small region
+//! that camera paths hardly ever find, so bounced photons are scattered at the caustic. The bounces of the camera path,
+//! including the vertex at which photons are gathered, and the bounces of the photon are together at most `max_depth`.
 //!
-//! The light at a point is its kernel's sum, divided by the part p of the kernel that receives photons: surface with about the
-//! point's normal, to which the way from the point is free. Thereby even light stays even up to edges, rims and walls. Estimators
-//! of p:
+//! The light at a point is the sum over its kernel divided by the kernel's coverage p: the fraction that receives
+//! photons, which is surface with about the point's normal that is not occluded from the point. This keeps constant
+//! light constant up to edges, rims and walls. Estimators of p:
 //!
 //! | around the kernel | estimator |
 //! | --- | --- |
-//! | flat pieces of its plane, walls at their borders, wide spheres | p in closed form; all of it is reached |
-//! | anything else | one photon of the kernel, chosen by its contribution, decides whether the kernel's light arrives; trials, at places chosen by the kernel, give 1/p |
+//! | flat pieces of its plane, walls at their borders, large spheres | p in closed form, without occlusion |
+//! | anything else | one photon of the kernel, chosen by its contribution, decides whether the kernel's light arrives; trials at positions sampled from the kernel estimate 1/p |
 
-mod clip;
+mod coverage;
 mod emit;
 pub(super) mod gather;
 mod kernel;
@@ -48,7 +49,7 @@ use rayon::prelude::*;
 use crate::control::{CancelToken, Cancelled, Progress, unwatched};
 use crate::film::Rect;
 use crate::geometry::{Aabb, ShapeHit};
-use crate::integrators::method::Behaviour;
+use crate::integrators::behavior::PathBehavior;
 use crate::integrators::settings::{PhotonSettings, RenderSettings};
 use crate::integrators::transport::medium::Inside;
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
@@ -56,44 +57,44 @@ use crate::lights::{Ball, PhotonSource};
 use crate::materials::{Glass, Material};
 use crate::scene::description::{Render, Shadows};
 use crate::world::{BodyInParts, Hit, LampBox, World, photon_source};
-use emit::{EmittedPhotons, PhotonTracing};
+use emit::{PhotonChunk, PhotonTracing};
 pub(super) use map::GatherPoint;
 pub use map::{Photon, PhotonMap};
 
-/// Photons that one thread emits together.
+/// Number of photons that a thread emits together.
 const CHUNK: u32 = 2048;
 
-/// α: fraction of the photons of a pass that the shrinking kernel keeps.
+/// α, the fraction of a pass's photons that the shrinking kernel keeps.
 const KEPT: f64 = 2.0 / 3.0;
 
-/// Photons that the first kernels should contain, in the median of the caustic photons and of the bounced ones.
+/// Median number of photons that the first pass's kernels should contain, for caustic and bounced photons.
 const WANTED: [f32; 2] = [12.0, 8.0];
 
-/// Fraction of the photons that are aimed at mirrors and glass: if all of these are in balls, and if some have no bounds.
+/// Fraction of photons aimed at mirrors and glass: if all of these have bounding spheres, and if some are unbounded.
 const AIMED: [f32; 2] = [0.9, 0.5];
 
-/// Common data of all passes of a picture.
+/// Photon emission for an image, shared by all passes.
 #[derive(Debug)]
 pub struct Photons {
     settings: PhotonSettings,
-    /// Most scatterings of a photon before it is gathered.
+    /// Maximum number of bounces of a photon before it is gathered.
     most_depth: u32,
-    /// Source of the photons. `None` if nothing mirrors or refracts light.
+    /// Source of the photons. `None` if the scene has no mirrors or glass.
     emission: Option<PhotonSource>,
-    /// The closed shapes of glass that lights may be in.
+    /// The closed glass shapes that may contain lights.
     glasses: Vec<u32>,
-    /// The other bodies of glass that lights may be in.
+    /// The other glass solids that may contain lights.
     bodies: Vec<BodyInParts>,
-    /// Radii of the first pass: of the kernel for caustic photons, and of that for bounced ones.
+    /// Kernel radii of the first pass, for caustic and for bounced photons.
     radii: [f32; 2],
 }
 
-/// The photons of a pass.
+/// The photon maps of one pass.
 #[derive(Debug)]
 pub struct PhotonPass {
-    /// Caustic photons, which came by mirrors and glass alone.
+    /// Caustic photons, which were scattered only by mirrors and glass.
     pub caustic: PhotonMap,
-    /// Bounced photons: scattered at a caustic, and arrived elsewhere.
+    /// Bounced photons, which were scattered once at a caustic.
     pub bounced: PhotonMap,
     /// Number of emitted photons.
     pub emitted: u64,
@@ -113,25 +114,25 @@ impl PhotonPass {
     }
 }
 
-/// The passes of some samples.
+/// The photon passes of a range of samples.
 #[derive(Clone, Debug)]
 pub struct PhotonMaps {
-    /// The first of the samples.
+    /// The first sample.
     pub first: u32,
-    /// One for each.
+    /// One pass per sample.
     pub passes: Vec<Arc<PhotonPass>>,
 }
 
 impl PhotonMaps {
-    /// The pass of one of these samples.
+    /// The pass of a sample.
     pub fn pass(&self, sample: u32) -> &PhotonPass {
         &self.passes[(sample - self.first) as usize]
     }
 }
 
 impl Photons {
-    /// Prepares the passes for a world, and traces pass 0, whose photons determine the radii. `progress` gets the number of
-    /// photons so far, and of all.
+    /// Prepares photon emission for a world and traces pass 0, whose photons determine the radii. `progress` receives
+    /// the number of photons traced so far and in total.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -143,7 +144,7 @@ impl Photons {
         token: &CancelToken,
     ) -> Result<(Self, PhotonPass), Cancelled> {
         // Aim photons at the mirrors and glass.
-        let specular = Specular::of(world);
+        let specular = SpecularObjects::of(world);
         let emission = photon_source(&world.geometry, &world.lights).filter(|_| specular.exists());
         let aimed = AIMED[usize::from(specular.is_unbounded)];
         let emission = emission.map(|emission| emission.aimed_at(&specular.balls, aimed));
@@ -151,36 +152,36 @@ impl Photons {
         let most_depth = photons.bounces.min(settings.render.max_depth.saturating_sub(1));
         let radii = [photons.radius; 2];
         let mut own = Self { settings: photons, most_depth, emission, glasses, bodies, radii };
-        // Trace pass 0, and choose the radii by its photons.
+        // Trace pass 0, and choose the radii from its photons.
         let sent = own.trace_photons((world, settings), 0, progress, token)?;
         if photons.radius == 0.0 {
             let kinds = [&sent.caustic, &sent.bounced];
             let size = own.emission.as_ref().map_or(1.0, |emission| emission.around().radius as f32);
             let radii = kinds.into_par_iter().zip(WANTED);
-            let radii = radii.map(|(of, wanted)| radius_to_hold(of, wanted, size, token));
+            let radii = radii.map(|(of, wanted)| radius_for_count(of, wanted, size, token));
             let radii = radii.collect::<Result<Vec<_>, _>>()?;
             own.radii.iter_mut().zip(radii).for_each(|(own, radius)| *own = radius);
         }
-        let first = own.mapped(&sent, 0, token)?;
+        let first = own.build_maps(&sent, 0, token)?;
         Ok((own, first))
     }
 
-    /// Radii of the first pass's kernels: for caustic photons, and for bounced ones.
+    /// Kernel radii of the first pass, for caustic and for bounced photons.
     pub fn radii(&self) -> [f32; 2] {
         self.radii
     }
 
-    /// Photons emitted in a pass; 0 if there is no emission.
+    /// Number of photons emitted per pass; 0 if none are emitted.
     pub fn count(&self) -> u64 {
-        if self.are_sent() { self.settings.count.into() } else { 0 }
+        if self.emits_photons() { self.settings.count.into() } else { 0 }
     }
 
-    /// Whether photons are emitted at all: there are mirrors or glass, and lights that illuminate them.
-    pub fn are_sent(&self) -> bool {
+    /// Whether photons are emitted: the scene has mirrors or glass, and lights that illuminate them.
+    pub fn emits_photons(&self) -> bool {
         self.emission.is_some() && self.most_depth > 0
     }
 
-    /// Traces a pass. It depends on its number alone, whatever the threads.
+    /// Traces a pass. The result depends only on its number, not on the number of threads.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -192,12 +193,17 @@ impl Photons {
         token: &CancelToken,
     ) -> Result<PhotonPass, Cancelled> {
         let sent = self.trace_photons((world, settings), number, &unwatched, token)?;
-        self.mapped(&sent, number, token)
+        self.build_maps(&sent, number, token)
     }
 
-    /// The maps of a pass.
-    fn mapped(&self, sent: &Sent, number: u32, token: &CancelToken) -> Result<PhotonPass, Cancelled> {
-        let shrunk = shrunk(number);
+    /// Builds the photon maps of a pass.
+    fn build_maps(
+        &self,
+        sent: &StoredPhotons,
+        number: u32,
+        token: &CancelToken,
+    ) -> Result<PhotonPass, Cancelled> {
+        let shrunk = radius_factor(number);
         let [of_caustic, of_bounced] = self.radii.map(|radius| (f64::from(radius) * shrunk) as f32);
         let map = |of: &[Photon], radius: f32| PhotonMap::new(of, radius, token);
         let (caustic, bounced) =
@@ -205,7 +211,7 @@ impl Photons {
         Ok(PhotonPass { caustic: caustic?, bounced: bounced?, emitted: self.count(), lookups: sent.lookups })
     }
 
-    /// The passes of some samples.
+    /// The photon passes of a range of samples.
     ///
     /// # Errors
     /// [`Cancelled`].
@@ -221,27 +227,27 @@ impl Photons {
         Ok(PhotonMaps { first, passes: samples.map(pass).collect::<Result<_, _>>()? })
     }
 
-    /// The photons of a pass in the order of their numbers.
+    /// Traces the photons of a pass and returns them in emission order.
     fn trace_photons(
         &self,
         (world, settings): (&World, &RenderSettings),
         number: u32,
         progress: Progress<'_>,
         token: &CancelToken,
-    ) -> Result<Sent, Cancelled> {
-        let Some(emission) = self.emission.as_ref().filter(|_| self.are_sent()) else {
-            return Ok(Sent::default());
+    ) -> Result<StoredPhotons, Cancelled> {
+        let Some(emission) = self.emission.as_ref().filter(|_| self.emits_photons()) else {
+            return Ok(StoredPhotons::default());
         };
-        // Photons land on the facets, from which they are scattered in every picture alike.
+        // Photons always land on the facets and scatter from there, whatever the shadow setting.
         let settings =
             RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
         let material = |object| world.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
         let inside = |&body: &u32| Inside { body, material: material(body) };
         let glasses: &[Inside] = &self.glasses.iter().map(inside).collect::<Vec<_>>();
-        let behaviour = Behaviour::of(&settings, false);
+        let behavior = PathBehavior::of(&settings, false);
         let done = AtomicU64::new(0);
         let chunk = |first: u32| {
-            // All photons of a number of passes are samples of one sequence.
+            // Photons of consecutive passes are samples of one sequence.
             let count = self.settings.count;
             let at_once = u32::MAX / count;
             let start = number % at_once * count;
@@ -250,22 +256,22 @@ impl Photons {
             let block = SampleBlock { pixels: place.into(), samples };
             let tile = TileContext {
                 pixel_spread: 0.0,
-                ..TileContext::new(world, &settings, &block, token, behaviour)
+                ..TileContext::new(world, &settings, &block, token, behavior)
             };
             let (share, most_depth) = (1.0 / count as f32, self.most_depth);
-            let shots =
+            let stored =
                 PhotonTracing { tile: &tile, emission, glasses, bodies: &self.bodies, share, most_depth }
                     .trace_photons()?;
             let done = done.fetch_add(block.len() as u64, Ordering::Relaxed) + block.len() as u64;
             progress(done, count.into());
-            Ok(shots)
+            Ok(stored)
         };
-        let chunks: Vec<EmittedPhotons> = (0..self.settings.count.div_ceil(CHUNK))
+        let chunks: Vec<PhotonChunk> = (0..self.settings.count.div_ceil(CHUNK))
             .into_par_iter()
             .map(|number| chunk(number * CHUNK))
             .collect::<Result<_, _>>()?;
         let lookups = chunks.iter().map(|chunk| chunk.lookups).sum();
-        let joined = |of: fn(&EmittedPhotons) -> &[Photon]| -> Result<Vec<Photon>, Cancelled> {
+        let joined = |of: fn(&PhotonChunk) -> &[Photon]| -> Result<Vec<Photon>, Cancelled> {
             let mut all = Vec::with_capacity(chunks.iter().map(|chunk| of(chunk).len()).sum());
             for chunk in &chunks {
                 token.check()?;
@@ -276,33 +282,38 @@ impl Photons {
         let (caustic, bounced) =
             rayon::join(|| joined(|chunk| &chunk.caustic), || joined(|chunk| &chunk.bounced));
         let (caustic, bounced) = (caustic?, bounced?);
-        Ok(Sent { caustic, bounced, lookups })
+        Ok(StoredPhotons { caustic, bounced, lookups })
     }
 }
 
-/// Stored photons of a pass.
+/// Photons stored by a pass.
 #[derive(Default)]
-struct Sent {
-    /// Caustic photons, which came by mirrors and glass alone.
+struct StoredPhotons {
+    /// Caustic photons, which were scattered only by mirrors and glass.
     caustic: Vec<Photon>,
     /// Bounced photons, scattered at a caustic.
     bounced: Vec<Photon>,
     lookups: u64,
 }
 
-/// Radius of a pass relative to that of the first: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1).
-fn shrunk(pass: u32) -> f64 {
+/// Kernel radius of a pass relative to the first pass: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1).
+fn radius_factor(pass: u32) -> f64 {
     (1..=pass).map(f64::from).map(|i| (i + KEPT) / (i + 1.0)).product::<f64>().sqrt()
 }
 
-/// A radius within which the median photon has so many neighbours; `size` is the radius of a ball around the scene.
-fn radius_to_hold(photons: &[Photon], wanted: f32, size: f32, token: &CancelToken) -> Result<f32, Cancelled> {
-    /// Most photons that are examined.
+/// A radius within which the median photon has `wanted` neighbors; `size` is the radius of the scene's bounding sphere.
+fn radius_for_count(
+    photons: &[Photon],
+    wanted: f32,
+    size: f32,
+    token: &CancelToken,
+) -> Result<f32, Cancelled> {
+    /// Maximum number of photons examined.
     const MOST: usize = 1 << 14;
     const LOOKS: usize = 256;
-    /// Neighbours that are found among the examined photons.
+    /// Number of neighbors to find among the examined photons.
     const NEAR: f32 = 12.0;
-    /// Largest radius, and the radius if there are too few photons to decide, in radii of the scene.
+    /// Maximum radius, and the radius if there are too few photons to decide, relative to the scene's radius.
     const LARGEST: f32 = 0.05;
     const BY_DEFAULT: f32 = 0.02;
     let step = photons.len().div_ceil(MOST).max(1);
@@ -316,10 +327,9 @@ fn radius_to_hold(photons: &[Photon], wanted: f32, size: f32, token: &CancelToke
     let mut radius = largest.min(0.05 * extent);
     for _ in 0..12 {
         let map = PhotonMap::new(&some, radius, token)?;
-        // Count others than the photon itself.
+        // Do not count the photon itself.
         let count = |&Photon { point, normal, .. }: &Photon| {
-            map.count_around(&GatherPoint { point, normal, most_depth: u32::MAX }, PlainFolds)
-                .saturating_sub(1)
+            map.count_near(&GatherPoint { point, normal, most_depth: u32::MAX }, PlainFolds).saturating_sub(1)
         };
         let mut counts: Vec<u32> = some.iter().step_by(some.len().div_ceil(LOOKS)).map(count).collect();
         counts.sort_unstable();
@@ -333,7 +343,7 @@ fn radius_to_hold(photons: &[Photon], wanted: f32, size: f32, token: &CancelToke
     Ok(largest.min(radius * (wanted / (NEAR * step as f32)).sqrt()))
 }
 
-/// The closed shapes of glass that lights may be in, and the other bodies.
+/// The closed glass shapes that may contain lights, and the other glass solids that may.
 fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<BodyInParts>) {
     let lamps = world.lamp_boxes();
     let may_hold_light = |object: &u32| {
@@ -341,7 +351,8 @@ fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<BodyInParts>) {
         bounds.is_none_or(|bounds| lamps.iter().any(|lamp| lamp.meets(&bounds)))
     };
     let closed = world.closed_glasses().map(|(object, _)| object).filter(may_hold_light).collect();
-    // What opaque surfaces close may reach out of its box: ask for the middle and the corners of each lamp.
+    // A solid closed by opaque surfaces may extend beyond its bounding box, so test the center and corners of each
+    // light.
     let is_around = |body: &BodyInParts, lamp: &LampBox| {
         lamp.points().any(|point| world.material_around(body, point, lamp.object).is_some())
     };
@@ -352,10 +363,10 @@ fn glasses_at_lights(world: &World) -> (Vec<u32>, Vec<BodyInParts>) {
     (closed, bodies)
 }
 
-/// Objects of glass with their boxes, and their indices of refraction.
-struct Glasses(Vec<(u32, Option<Aabb>, f32)>);
+/// Glass objects with their bounding boxes and indices of refraction.
+struct GlassObjects(Vec<(u32, Option<Aabb>, f32)>);
 
-impl Glasses {
+impl GlassObjects {
     fn of(world: &World) -> Self {
         let each = (0..).zip(world.geometry.objects()).flat_map(|(id, object)| {
             let glasses = world.materials_of(id).filter_map(|material| material.bsdf.glass());
@@ -364,8 +375,8 @@ impl Glasses {
         Self(each.collect())
     }
 
-    /// Whether the surface of an object may be no boundary: its glass has the index of air, or may touch or overlap glass of the same
-    /// index.
+    /// Whether an object's surface may not be a boundary between media: its index of refraction is that of air, or it
+    /// may touch or overlap glass with the same index.
     fn may_vanish(&self, id: u32, ior: f32) -> bool {
         let own = self.0.iter().find(|(other, ..)| *other == id).and_then(|(_, bounds, _)| *bounds);
         let meets = |other: &Aabb| own.is_none_or(|own| own.grown(own.extent() * NEAR).meets(other));
@@ -376,23 +387,23 @@ impl Glasses {
     }
 }
 
-/// Distance between boxes whose shapes may touch, by the size of one.
+/// Distance between boxes whose shapes may touch, relative to the size of one of them.
 const NEAR: f32 = 1e-3;
 
-/// Mirrors and glass.
-struct Specular {
-    /// Balls around those that have bounds.
+/// The mirrors and glass objects of a scene.
+struct SpecularObjects {
+    /// Bounding spheres of the bounded objects.
     balls: Vec<Ball>,
-    /// Whether others exist.
+    /// Whether there are unbounded objects.
     is_unbounded: bool,
 }
 
-impl Specular {
+impl SpecularObjects {
     fn of(world: &World) -> Self {
         let mut own = Self { balls: Vec::new(), is_unbounded: false };
-        let glasses = Glasses::of(world);
+        let glasses = GlassObjects::of(world);
         for (id, object) in (0..).zip(world.geometry.objects()) {
-            // Where indices are equal, light goes through rough glass as if there were nothing, but not on the way of a light sample.
+            // Between equal indices, light passes rough glass undisturbed, but light samples cannot.
             let is_specular = |material: &Material| {
                 let is_passed = |glass: &Glass| glasses.may_vanish(id, glass.ior);
                 material.bsdf.has_delta() || material.bsdf.glass().is_some_and(is_passed)
@@ -416,16 +427,20 @@ mod tests {
     use crate::math::Vec3;
 
     #[test]
-    fn the_radius_shrinks_as_the_squared_error_asks_for() {
+    fn radius_shrinks_by_the_published_rule() {
         // r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1), α = 2/3 (Knaus and Zwicker, 2011).
         for (passes, exact) in [(1, 1.0), (100, 0.4882), (1000, 0.3328), (10_000, 0.2267)] {
-            assert!((shrunk(passes - 1) - exact).abs() < 1e-3, "{passes}: {}", shrunk(passes - 1));
+            assert!(
+                (radius_factor(passes - 1) - exact).abs() < 1e-3,
+                "{passes}: {}",
+                radius_factor(passes - 1)
+            );
         }
     }
 
     #[test]
-    fn radii_are_held_to_a_part_of_the_scene() {
-        // Photons on a square of side 1: 12 are on a disc of radius √(12/100π) = .195.
+    fn first_radius_is_bounded_by_the_scene() {
+        // Photons on a unit square: a disk of radius √(12/100π) = .195 contains 12.
         let photons = |side: u16| -> Vec<Photon> {
             let all = (0..side).flat_map(|x| (0..side).map(move |y| (f32::from(x), f32::from(y))));
             let place = |(x, y)| Photon {
@@ -438,7 +453,7 @@ mod tests {
             all.map(place).collect()
         };
         let radius = |side, size| {
-            radius_to_hold(&photons(side), 12.0, size, &CancelToken::new()).expect("nobody cancels")
+            radius_for_count(&photons(side), 12.0, size, &CancelToken::new()).expect("nobody cancels")
         };
         assert_eq!(radius(10, 1.0), 0.05);
         assert!((radius(10, 100.0) / 0.195 - 1.0).abs() < 0.2, "{}", radius(10, 100.0));

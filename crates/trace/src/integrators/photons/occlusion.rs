@@ -1,23 +1,23 @@
-//! Occlusion between a point and a photon of its kernel.
+//! Occlusion between a point and a photon in its kernel.
 
 use super::map::GatherPoint;
-use super::reservoir::Place;
+use super::reservoir::PhotonPosition;
 use crate::geometry::Ray;
 use crate::lights::Source;
 use crate::world::Geometry;
 
-/// Height of the way to a photon above the surface, in radii of the kernel: over the curvature of the surface itself.
+/// Height of the test segment above the surface, in kernel radii, to clear the curvature of the surface itself.
 const ABOVE: f32 = 0.15;
 
-/// Height of the way if something hangs closer above the surface, such as a ball at rest on it.
+/// Height of the test segment if something is closer above the surface, such as a ball resting on it.
 const BELOW: f32 = 0.02;
 
-/// Length, in radii, below which a way is free.
+/// Length in kernel radii below which a segment counts as unoccluded.
 const NEAR: f32 = 1e-3;
 
-/// Whether something is between a point and a photon of its kernel: on the way above the surface, or, if one of them lacks that
-/// much room above it, on the way close to the surface.
-pub fn is_occluded(geometry: &Geometry, look: &GatherPoint, photon: &Place, radius: f32) -> bool {
+/// Whether a photon is occluded from the center of its kernel: along a segment above the surface or, if either end
+/// lacks the room for that, along a segment close to the surface.
+pub fn is_occluded(geometry: &Geometry, look: &GatherPoint, photon: &PhotonPosition, radius: f32) -> bool {
     if (photon.point - look.point).length_squared() < (NEAR * radius) * (NEAR * radius) {
         return false;
     }

@@ -1,16 +1,16 @@
-//! Directions in 32 bits: a square folded over an octahedron, 16 bits a side (Meyer, Süßmuth, Sußner, Stamminger, Greiner, *On
+//! Octahedral encoding of directions in 32 bits, 16 bits per axis (Meyer, Süßmuth, Sußner, Stamminger, Greiner, *On
 //! Floating-Point Normal Vectors*, 2010).
 
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes3};
 
-/// Directions side by side.
+/// Sixteen encoded directions.
 pub type Packed = [u32; LANES];
 
-/// Half of the side of the square.
+/// Half the side length of the square.
 const SIDE: f32 = 32767.0;
 
-/// The nearest direction of 32 bits, but for its last bits.
+/// Encodes a direction; the result may differ from the nearest code in the last bit.
 pub fn pack(direction: Vec3) -> u32 {
     let Vec3 { x, y, z } = direction * (SIDE / (direction.x.abs() + direction.y.abs() + direction.z.abs()));
     let (u, v) = if z < 0.0 { ((SIDE - y.abs()).copysign(x), (SIDE - x.abs()).copysign(y)) } else { (x, y) };
@@ -18,14 +18,14 @@ pub fn pack(direction: Vec3) -> u32 {
     whole(u) | whole(v) << 16
 }
 
-/// The unit vector.
+/// Decodes a unit vector.
 #[inline(always)]
 pub fn unit(packed: u32) -> Vec3 {
     let [x, y, z] = vector(packed);
     Vec3::new(x, y, z).normalize()
 }
 
-/// Vectors in these directions; their lengths are between SIDE/√3 and SIDE.
+/// Decodes vectors without normalizing them; their lengths are between SIDE/√3 and SIDE.
 #[inline(always)]
 pub fn lanes(packed: &Packed) -> Lanes3 {
     let mut vectors = [[0.0; LANES]; 3];
@@ -51,7 +51,7 @@ mod tests {
     use crate::math::random::signed as random;
 
     #[test]
-    fn directions_come_back_to_four_digits() {
+    fn round_trip_error_is_below_7e_5() {
         let mut next = random(3);
         let mut some: Vec<Vec3> = (0..10_000).map(|_| Vec3::new(next(), next(), next())).collect();
         for axis in Vec3::AXES {

@@ -1,5 +1,5 @@
-//! Choice of a photon. One photon of a kernel, chosen by its contribution, answers for all whether a wall is between them and the
-//! point, so that the light is right in the mean.
+//! Chooses one photon of a kernel in proportion to its contribution. Whether it is occluded decides for the whole
+//! kernel, so that the expected light is right.
 
 use crate::math::Vec3;
 use crate::math::lanes::{LANES, Lanes};
@@ -7,27 +7,27 @@ use crate::math::lanes::{LANES, Lanes};
 /// Largest number below 1.
 const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
-/// Position of a photon, and the normal there.
+/// Position and normal of a photon.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct PhotonPosition {
     /// The point.
     pub point: Vec3,
-    /// Unit normal of the facet on the side at which it arrived.
+    /// Unit geometric normal on the side where it arrived.
     pub normal: Vec3,
 }
 
-/// Reservoir sampling: a choice among numbered items that come one after the other, in proportion to weights whose sum is not known
-/// before (Chao, *A General Purpose Unequal Probability Sampling Plan*, 1982), in each of the lanes. A single random number lasts
-/// for all choices, as its rest after each choice is random again.
+/// Reservoir sampling in each lane: chooses among a stream of items in proportion to weights whose sum is not known in
+/// advance (Chao, *A General Purpose Unequal Probability Sampling Plan*, 1982). A single random number serves all
+/// choices, as it can be rescaled after each choice.
 #[derive(Clone, Copy, Debug)]
-pub struct Choices {
+pub struct LaneReservoirs {
     random: Lanes,
     totals: Lanes,
     chosen: [u32; LANES],
 }
 
-impl Choices {
-    /// Choices by a random number in [0, 1).
+impl LaneReservoirs {
+    /// Creates reservoirs from a random number in [0, 1).
     #[inline(always)]
     pub fn new(random: f32) -> Self {
         let mut randoms = [0.0; LANES];
@@ -38,7 +38,7 @@ impl Choices {
         Self { random: randoms, totals: [0.0; LANES], chosen: [0; LANES] }
     }
 
-    /// Offers item `number` with these weights, which are not negative.
+    /// Offers item `number` with nonnegative weights.
     #[inline(always)]
     pub fn offer(&mut self, number: u32, weights: &Lanes) {
         for i in 0..LANES {
@@ -48,13 +48,13 @@ impl Choices {
             let left = if takes { self.random[i] } else { self.random[i] - part };
             let of = if takes { part } else { 1.0 - part };
             let random = left / of;
-            // For a share next to 1, nothing of the number is left.
+            // For a share close to 1, the rescaled number has no digits left.
             self.random[i] = if random < BELOW_ONE { random } else { BELOW_ONE };
             self.chosen[i] = if takes { number } else { self.chosen[i] };
         }
     }
 
-    /// The result: a lane by the sums of its weights, and its item. `None` if all weights are 0.
+    /// Chooses a lane in proportion to its total weight; returns its item and the lane. `None` if all weights are 0.
     #[inline(always)]
     pub fn chosen(&self, random: f32) -> Option<(u32, usize)> {
         let mut left = random * self.totals.iter().sum::<f32>();
@@ -78,7 +78,7 @@ mod tests {
     use crate::math::random::unit;
 
     #[test]
-    fn things_are_chosen_by_their_weights() {
+    fn items_are_chosen_in_proportion_to_weight() {
         const THINGS: usize = 5;
         let mut next = unit(5);
         let mut weights = [[0.0; LANES]; THINGS];
@@ -88,16 +88,16 @@ mod tests {
         let mut counts = [[0_u32; LANES]; THINGS];
         const DRAWS: u32 = 400_000;
         for _ in 0..DRAWS {
-            let mut choices = Choices::new(next());
+            let mut choices = LaneReservoirs::new(next());
             (0..THINGS).for_each(|number| choices.offer(number as u32, &weights[number]));
-            let (number, lane) = choices.chosen(next()).expect("some weigh something");
+            let (number, lane) = choices.chosen(next()).expect("some weights are positive");
             counts[number as usize][lane] += 1;
         }
         for (weight, count) in weights.as_flattened().iter().zip(counts.as_flattened()) {
             let expected = f64::from(weight / total) * f64::from(DRAWS);
-            let has_facet = (f64::from(*count) - expected).abs();
-            assert!(has_facet <= 5.0 * expected.sqrt(), "{count} times where {expected} are expected");
+            let difference = (f64::from(*count) - expected).abs();
+            assert!(difference <= 5.0 * expected.sqrt(), "got {count}, expected {expected}");
         }
-        assert_eq!(Choices::new(0.3).chosen(0.5), None);
+        assert_eq!(LaneReservoirs::new(0.3).chosen(0.5), None);
     }
 }

@@ -1,10 +1,10 @@
-//! Unbiased estimate, by trials, of the inverse of the part of a kernel that receives photons.
+//! Unbiased estimate of the reciprocal of a kernel's coverage, from random trials.
 
-use super::clip::{Clip, material, receives};
+use super::coverage::{KernelCoverage, material, receives};
 use super::kernel::sample;
 use super::map::{GatherPoint, LEAST_COSINE, REACH};
 use super::occlusion::is_occluded;
-use super::reservoir::Place;
+use super::reservoir::PhotonPosition;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::{Asked, Ray};
 use crate::math::frame::Frame;
@@ -12,47 +12,49 @@ use crate::math::{Vec2, Vec3};
 use crate::sampling::warp;
 use crate::world::World;
 
-/// Number of successes that end the trials.
+/// Number of successes after which the trials end.
 const SUCCESSES: u32 = 4;
 
-/// Most trials: if less than a tenth of a kernel receives photons, a part of its light of at most (1 − p)⁶⁵ is lost.
+/// Maximum number of trials: if less than a tenth of a kernel receives photons, a fraction of at most (1 − p)⁶⁵ of its
+/// light is lost.
 const MOST: u32 = 64;
 
-/// Most surfaces above each other that are examined below a place in a kernel.
+/// Maximum number of surfaces examined along the normal at one position in a kernel.
 const LAYERS: usize = 8;
 
-/// A number whose mean is the inverse of the part of the kernel that receives photons, by trials at places that pairs of
-/// independent random numbers choose.
+/// Estimates the reciprocal of the kernel's coverage with trials at positions that pairs of independent random numbers
+/// choose.
 #[inline(never)]
-pub fn inverse_part(
+pub fn inverse_coverage(
     world: &World,
     look: &GatherPoint,
     radius: f32,
-    clip: Clip,
+    clip: KernelCoverage,
     mut pair: impl FnMut(u32) -> Vec2,
 ) -> f32 {
     let frame = Frame::from_normal(look.normal);
     let mut succeeds = |number: u32| {
         let Vec2 { x, y } = sample(warp::disk(pair(number))) * radius;
-        is_reached(world, look, look.point + frame.s * x + frame.t * y, radius)
+        receives_photons(world, look, look.point + frame.s * x + frame.t * y, radius)
     };
     match clip {
-        Clip::Part(part) => 1.0 / part,
-        Clip::Cut => mean_trials(&mut succeeds),
-        Clip::Crowded => after_first(succeeds),
+        KernelCoverage::Fraction(part) => 1.0 / part,
+        KernelCoverage::Clipped => mean_trials(&mut succeeds),
+        KernelCoverage::Crowded => after_first(succeeds),
     }
 }
 
-/// One if the first trial succeeds, with the probability p, and otherwise 1 + 1/p in the mean:
-/// p + (1 − p)·(1 + 1/p) = 1/p.
+/// Returns 1 if the first trial succeeds, which has probability p, and otherwise 1 + 1/p in expectation: p + (1 − p)·(1
+/// + 1/p) = 1/p.
 fn after_first(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     if succeeds(0) { 1.0 } else { 1.0 + mean_trials(|number| succeeds(number + 1)) }
 }
 
-/// Mean number of trials for each success, until some trials succeeded: 1/p in the mean. If the trials end before, the number of
-/// trials and that of successes each count as one more. The mean is (1 − (1 − p)^(MOST + 1))/p over both ends together: the sums Σ
-/// C(n, m)·pᵐ(1 − p)ⁿ⁻ᵐ over the first and Σ C(MOST + 1, s + 1)·pˢ(1 − p)^(MOST − s) over the second are the probabilities of more
-/// than m, and of 1 to m, successes in MOST + 1 trials, over p, with m = SUCCESSES.
+/// Mean number of trials per success until `SUCCESSES` trials have succeeded, with expectation 1/p. If the trials end
+/// before that, the numbers of trials and of successes are each counted one higher. Over both outcomes, the expectation
+/// is (1 − (1 − p)^(MOST + 1))/p: the sums Σ C(n, m)·pᵐ(1 − p)ⁿ⁻ᵐ over the first and Σ C(MOST + 1, s + 1)·pˢ(1 −
+/// p)^(MOST − s) over the second are the probabilities of more than m, and of 1 to m, successes in MOST + 1 trials,
+/// divided by p, with m = SUCCESSES.
 fn mean_trials(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     let mut successes = 0;
     for number in 0..MOST {
@@ -64,8 +66,9 @@ fn mean_trials(mut succeeds: impl FnMut(u32) -> bool) -> f32 {
     (MOST + 1) as f32 / (successes + 1) as f32
 }
 
-/// Whether a place in the tangent plane has a surface above or below it that may hold photons of the kernel, with nothing between.
-fn is_reached(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bool {
+/// Whether a position in the tangent plane has a surface above or below it that may hold photons of the kernel and is
+/// not occluded.
+fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bool {
     let above = REACH * radius * look.normal;
     let end = place - above;
     let mut start = place + above;
@@ -76,17 +79,17 @@ fn is_reached(world: &World, look: &GatherPoint, place: Vec3, radius: f32) -> bo
         let Some(hit) = world.geometry.closest_of(&ray, may_receive) else { return false };
         let bare = Asked { uv: false, shadow_point: false };
         let surface = world.geometry.asked_surface(&ray, &hit, bare);
-        // Succeed if it does, as surface with about the same normal to which the way is free.
+        // Succeed if it does receive them, has about the same normal, and is not occluded.
         let cosine = surface.normal.dot(look.normal);
         let normal = if cosine < 0.0 { -surface.normal } else { surface.normal };
-        let photon = Place { point: surface.point, normal };
+        let photon = PhotonPosition { point: surface.point, normal };
         if cosine.abs() > LEAST_COSINE
             && receives(material(world, hit.object, hit.shape.primitive))
             && !is_occluded(&world.geometry, look, &photon, radius)
         {
             return true;
         }
-        // Go on below it.
+        // Continue below it.
         start = offset_origin(surface.point, surface.error, surface.normal, ray.direction);
         if (end - start).dot(look.normal) >= 0.0 {
             return false;
@@ -101,7 +104,7 @@ mod tests {
     use crate::math::random::unit;
 
     #[test]
-    fn trials_tell_one_over_a_chance_without_bias() {
+    fn trials_estimate_reciprocal_without_bias() {
         let mut next = unit(7);
         for chance in [0.03_f32, 0.1, 0.3, 0.5, 0.9, 1.0] {
             for is_crowded in [false, true] {

@@ -1,10 +1,10 @@
-//! Vertices that wait for direct light, sixteen side by side.
+//! Packets of sixteen vertices that await direct lighting, as a struct of arrays.
 
 use super::tile::TileContext;
 use super::vertex::{Lift, ShadingVertex};
 use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
-use crate::integrators::view::{Measure, Parts};
+use crate::integrators::view::{Components, LightAov};
 use crate::materials::bsdf::{BsdfValues, Place};
 use crate::materials::{BsdfRow, RoughKind};
 use crate::math::Vec3;
@@ -12,94 +12,94 @@ use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane, trut
 use crate::sampling::SamplerRow;
 use crate::scene::description::Shadows;
 
-/// Vertices to be lit.
+/// A packet of vertices to be lit.
 #[derive(Clone)]
 pub struct VertexBatch {
-    /// A bit for each lane with a vertex.
+    /// Mask of lanes with a vertex.
     pub used: u32,
     /// Origins of light samples and shadow rays.
     pub from: Lanes3,
-    /// Triangles at the origins, for [`VertexBatch::starts`].
+    /// Triangles at the origins; see [`VertexBatch::starts`].
     pub start: [u32; LANES],
-    /// Horizon normals: nothing behind them is visible, in the lanes whose bits are set.
+    /// Horizon normals: in the lanes whose bits are set, nothing behind them is visible.
     pub horizon: Lanes3,
-    pub is_bounded: u32,
-    /// Points above the facets that see lights in all directions, if nothing is on the way to the points, in the lanes whose
-    /// bits are set; with the ends of these ways.
+    pub has_horizon: u32,
+    /// Origins above the facets, from which lights in all directions are visible, and the `t_max` of the rays to them.
+    /// They apply in the lanes whose bits are set, if those rays are unoccluded.
     pub lifted: Lanes3,
     pub lift_end: Lanes,
     pub may_lift: u32,
-    /// Points of the surfaces and normals of their facets on the viewer's side, in the lanes whose bits are set; in other lanes
-    /// these are `from` and `normal`.
+    /// Surface points, and geometric normals on the viewer's side, in the lanes whose bits are set; in other lanes
+    /// `from` and `normal` serve as both.
     pub point: Lanes3,
     /// [`VertexBatch::point`].
     pub facet: Lanes3,
     /// [`VertexBatch::point`].
     pub has_facet: u32,
-    /// A bit for each vertex that the camera sees, directly or by mirrors and glass.
+    /// Mask of vertices that the camera sees, directly or through mirrors and glass.
     pub only_specular_before: u32,
-    /// A bit for each vertex whose path comes from a surface with a glossy lobe.
+    /// Mask of vertices whose path comes from a surface with a glossy lobe.
     pub after_gloss: u32,
-    /// Normals for the cosines.
+    /// Shading normals.
     pub normal: Lanes3,
-    /// Normals before a relief bent them, and the cosine between both; [`UNBENT`] without a relief.
+    /// Interpolated normals before perturbation, and their cosines with the perturbed ones; [`UNPERTURBED`] where they
+    /// are equal.
     pub smooth_normal: Lanes3,
-    pub bend: Lanes,
-    /// BSDFs, all of one kind.
+    pub shading_normal_cosine: Lanes,
+    /// BSDFs, all of the same kind.
     pub bsdf: BsdfRow,
-    /// Throughput of the paths.
+    /// Throughputs of the paths.
     pub throughput: Lanes3,
-    /// Slots of the paths.
+    /// Sample slots of the paths.
     pub slot: [u32; LANES],
     /// Numbers of the paths.
     pub path: [u32; LANES],
-    /// Places of the paths in the round's queue.
+    /// Indices of the paths in the bounce's queue.
     pub place: [u32; LANES],
     /// [`PathState::roulette_throughput`](super::ray::PathState::roulette_throughput) of the paths.
     pub roulette_throughput: Lanes,
     /// Indices of the glass around the vertices.
     pub medium: [u32; LANES],
-    /// Whether any vertex has a bent normal.
-    pub is_bent: bool,
-    /// Whether light samples find nothing from any vertex.
+    /// Whether any vertex has a perturbed normal.
+    pub is_perturbed: bool,
+    /// Whether no light sample is visible from any of the vertices.
     pub is_dark: bool,
-    /// Whether the vertices stand for both sides of their surfaces.
+    /// Whether the vertices represent both sides of their surfaces.
     pub has_two_sides: bool,
-    /// Origins of rays on the other side, and indices of the glass around these, if it has two sides.
+    /// Ray origins on the other side and indices of the glass around them, if `has_two_sides`.
     pub beyond: Lanes3,
     /// [`VertexBatch::beyond`].
     pub medium_beyond: [u32; LANES],
 }
 
-/// Value in place of the cosine between two equal normals.
-pub const UNBENT: f32 = -2.0;
+/// Marks a vertex whose two normals are equal, in place of their cosine.
+pub const UNPERTURBED: f32 = -2.0;
 
 impl VertexBatch {
-    /// Least α of lobes that are worth rays of their own under any light.
-    const SHARP: f32 = 100.0;
+    /// Lobes with at least this exponent α are worth tracing their own rays under any light.
+    const MIN_SHARP_EXPONENT: f32 = 100.0;
 
-    /// Least ratio of the width of light from beyond the scene to that of a lobe, for which the lobe is worth rays of
-    /// its own too.
-    const FILLED: f32 = 1.5;
+    /// Lobes are also worth tracing rays if infinite lights are at least this many times as wide as the lobe.
+    const MIN_WIDTH_RATIO: f32 = 1.5;
 
-    /// A bit for each vertex whose highlights of lamps are too rare for light samples alone.
-    pub fn sharp(&self, tile: &TileContext<'_>, measure: Measure) -> u32 {
-        let shows = match measure {
-            Measure::Radiance(Parts { specular, .. }) => specular,
-            Measure::ArrivingShare => false,
-            Measure::Work => true,
+    /// Mask of vertices whose highlights are too narrow for light samples to find reliably.
+    pub fn sharp_lobes(&self, tile: &TileContext<'_>, aov: LightAov) -> u32 {
+        let shows = match aov {
+            LightAov::Radiance(Components { specular, .. }) => specular,
+            LightAov::LitFraction => false,
+            LightAov::TraversalCost => true,
         };
         let is_soft = tile.settings.render.shadows == Shadows::Soft;
         if !(self.bsdf.has_narrow_lobes() && shows && is_soft && tile.world.lights.can_be_found()) {
             return 0;
         }
-        // A lobe is about as wide as 2π/(α + 1) sr.
-        let filled = Self::FILLED * std::f32::consts::TAU / tile.world.lights.extent_beyond() - 1.0;
-        let least = filled.min(Self::SHARP);
+        // The solid angle of a lobe is about 2π/(α + 1) sr.
+        let filled = Self::MIN_WIDTH_RATIO * std::f32::consts::TAU / tile.world.lights.extent_beyond() - 1.0;
+        let least = filled.min(Self::MIN_SHARP_EXPONENT);
         self.bsdf.narrower_than(self.used, least)
     }
 
-    /// The random numbers of the vertices.
+    /// The samplers of the vertices.
     #[inline(always)]
     pub fn sampler(&self, tile: &TileContext<'_>) -> SamplerRow<LANES> {
         let (block, slots) = (tile.block, &self.slot);
@@ -111,13 +111,13 @@ impl VertexBatch {
         SamplerRow::new(tile.settings.render.seed, &xs, &ys, &samples)
     }
 
-    /// A row without vertices.
+    /// A packet without vertices.
     pub const EMPTY: Self = Self {
         used: 0,
         from: [[0.0; LANES]; 3],
         start: [Ray::NO_TRIANGLE; LANES],
         horizon: [[0.0; LANES]; 3],
-        is_bounded: 0,
+        has_horizon: 0,
         lifted: [[0.0; LANES]; 3],
         lift_end: [0.0; LANES],
         may_lift: 0,
@@ -128,7 +128,7 @@ impl VertexBatch {
         after_gloss: 0,
         normal: [[0.0; LANES]; 3],
         smooth_normal: [[0.0; LANES]; 3],
-        bend: [UNBENT; LANES],
+        shading_normal_cosine: [UNPERTURBED; LANES],
         bsdf: BsdfRow::EMPTY,
         throughput: [[0.0; LANES]; 3],
         slot: [0; LANES],
@@ -136,38 +136,38 @@ impl VertexBatch {
         place: [0; LANES],
         roulette_throughput: [0.0; LANES],
         medium: [0; LANES],
-        is_bent: false,
+        is_perturbed: false,
         is_dark: false,
         has_two_sides: false,
         beyond: [[0.0; LANES]; 3],
         medium_beyond: [0; LANES],
     };
 
-    /// Prepares the row for other vertices, with normals as they are.
+    /// Empties the packet; normals count as unperturbed.
     #[inline(always)]
     pub fn reset(&mut self) {
-        (self.used, self.is_bounded, self.may_lift) = (0, 0, 0);
+        (self.used, self.has_horizon, self.may_lift) = (0, 0, 0);
         (self.has_facet, self.only_specular_before, self.after_gloss) = (0, 0, 0);
-        (self.is_bent, self.is_dark, self.has_two_sides) = (false, false, false);
+        (self.is_perturbed, self.is_dark, self.has_two_sides) = (false, false, false);
         self.bsdf.reset();
-        self.bend = [UNBENT; LANES];
+        self.shading_normal_cosine = [UNPERTURBED; LANES];
     }
 
-    /// Whether it has vertices of this kind, dark ones or others, with two sides or one.
+    /// Whether the packet holds vertices with this kind of BSDF, dark or not, and two-sided or not.
     #[inline(always)]
     pub fn is_for(&self, kind: RoughKind, (is_dark, has_two_sides): (bool, bool)) -> bool {
         self.bsdf.kind() == kind && self.is_dark == is_dark && self.has_two_sides == has_two_sides
     }
 
-    /// Keeps these vertices only.
+    /// Keeps only the vertices in the mask `these`.
     pub fn keep(&mut self, these: u32) {
-        let Self { used, is_bounded, may_lift, has_facet, only_specular_before, after_gloss, .. } = self;
-        for bits in [used, is_bounded, may_lift, has_facet, only_specular_before, after_gloss] {
+        let Self { used, has_horizon, may_lift, has_facet, only_specular_before, after_gloss, .. } = self;
+        for bits in [used, has_horizon, may_lift, has_facet, only_specular_before, after_gloss] {
             *bits &= these;
         }
     }
 
-    /// Takes a vertex of another row, whose BSDFs are of the same kind; neither has two sides.
+    /// Copies a vertex from another packet with the same kind of BSDFs; neither packet has two sides.
     pub fn copy(&mut self, i: usize, other: &Self, from: usize) {
         for (own, other) in [
             (&mut self.from, &other.from),
@@ -182,12 +182,12 @@ impl VertexBatch {
             set_lane(own, i, lane(other, from));
         }
         self.bsdf.copy(i, &other.bsdf, from);
-        self.bend[i] = other.bend[from];
+        self.shading_normal_cosine[i] = other.shading_normal_cosine[from];
         (self.roulette_throughput[i], self.medium[i]) = (other.roulette_throughput[from], other.medium[from]);
         (self.slot[i], self.path[i], self.place[i]) = (other.slot[from], other.path[from], other.place[from]);
         self.start[i] = other.start[from];
-        self.is_bent |= other.is_bent;
-        self.is_bounded |= (other.is_bounded >> from & 1) << i;
+        self.is_perturbed |= other.is_perturbed;
+        self.has_horizon |= (other.has_horizon >> from & 1) << i;
         self.lift_end[i] = other.lift_end[from];
         self.may_lift |= (other.may_lift >> from & 1) << i;
         self.has_facet |= (other.has_facet >> from & 1) << i;
@@ -196,22 +196,22 @@ impl VertexBatch {
         self.used |= 1 << i;
     }
 
-    /// Sets a vertex, whose BSDF is of the row's kind.
+    /// Stores a vertex whose BSDF is of the packet's kind.
     pub fn put(
         &mut self,
         i: usize,
         tile: &TileContext<'_>,
         lit: &ShadingVertex<'_>,
-        measure: Measure,
+        aov: LightAov,
         medium: u32,
     ) {
         let ShadingVertex { path, place, vertex, shading, bsdf, .. } = lit;
-        // Set the origin of light samples.
+        // Set the origin of shadow rays.
         let shadow_origin = vertex.shadow_origin(tile, path.state.only_specular_before);
         set_lane(&mut self.from, i, shadow_origin.point);
         self.start[i] = shadow_origin.start;
         set_lane(&mut self.horizon, i, shadow_origin.horizon.unwrap_or(Vec3::ZERO));
-        self.is_bounded |= u32::from(shadow_origin.horizon.is_some()) << i;
+        self.has_horizon |= u32::from(shadow_origin.horizon.is_some()) << i;
         if let Some(Lift { to, end }) = shadow_origin.lift {
             set_lane(&mut self.lifted, i, to);
             self.lift_end[i] = end;
@@ -223,63 +223,63 @@ impl VertexBatch {
         self.has_facet |= 1 << i;
         self.only_specular_before |= u32::from(path.state.only_specular_before) << i;
         self.after_gloss |= u32::from(path.state.is_after_gloss) << i;
-        let normal = bsdf.turned(shading.normal, vertex.to_eye);
+        let normal = bsdf.turned(shading.normal, vertex.wo);
         set_lane(&mut self.normal, i, normal);
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
-        self.bend[i] = shading.bend.unwrap_or(UNBENT);
+        self.shading_normal_cosine[i] = shading.shading_normal_cosine.unwrap_or(UNPERTURBED);
         // Set the BSDF.
-        let directions = Place { normal, to_eye: vertex.to_eye, tangent: vertex.tangent() };
-        self.bsdf.put(i, bsdf, measure.lobes(), &directions);
+        let directions = Place { normal, to_eye: vertex.wo, tangent: vertex.tangent() };
+        self.bsdf.put(i, bsdf, aov.lobes(), &directions);
         // Copy the state of the path.
         (self.roulette_throughput[i], self.medium[i]) = (path.state.roulette_throughput, medium);
         set_lane(&mut self.throughput, i, path.throughput);
         (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);
-        self.is_bent |= shading.bend.is_some();
+        self.is_perturbed |= shading.shading_normal_cosine.is_some();
         self.used |= 1 << i;
     }
 
-    /// Sets the other side of a vertex: the origin of rays there, and the index of the glass around it.
+    /// Stores the other side of a vertex: its ray origin, and the index of the glass around it.
     pub fn put_beyond(&mut self, i: usize, beyond: Vec3, medium: u32) {
         set_lane(&mut self.beyond, i, beyond);
         self.medium_beyond[i] = medium;
     }
 
-    /// Response of the vertices to light from these directions.
+    /// Evaluates the BSDFs and cosines for light from these directions.
     #[inline(always)]
     pub fn response(&self, directions: &Lanes3, folds: impl Folds) -> Response {
         let mut cosines = [0.0; LANES];
         for i in 0..LANES {
             cosines[i] = lane(&self.normal, i).dot(lane(directions, i));
         }
-        if self.is_bent {
+        if self.is_perturbed {
             for i in 0..LANES {
                 let smooth = lane(&self.smooth_normal, i).dot(lane(directions, i));
-                cosines[i] *= terminator(cosines[i], smooth, self.bend[i]);
+                cosines[i] *= terminator(cosines[i], smooth, self.shading_normal_cosine[i]);
             }
         }
         Response { bsdf: self.bsdf.f(directions, folds), cosines }
     }
 
-    /// Terminator factors of light from these directions, on the sides of the vertices where `sides` is 1, on the others where it
-    /// is −1; not above 0 if nothing arrives.
+    /// Shadow-terminator factors for light from these directions, on the viewer's side where `sides` is 1 and on the
+    /// other side where it is −1. Not above 0 if no light arrives.
     #[inline(always)]
-    pub fn softened(&self, directions: &Lanes3, sides: &Lanes) -> Lanes {
+    pub fn terminator_factors(&self, directions: &Lanes3, sides: &Lanes) -> Lanes {
         let mut left = [1.0; LANES];
-        if self.is_bent {
+        if self.is_perturbed {
             for i in 0..LANES {
                 let direction = lane(directions, i) * sides[i];
                 let cosine = lane(&self.normal, i).dot(direction);
                 let smooth = lane(&self.smooth_normal, i).dot(direction);
-                left[i] = terminator(cosine, smooth, self.bend[i]);
+                left[i] = terminator(cosine, smooth, self.shading_normal_cosine[i]);
             }
         }
         left
     }
 
-    /// [`Ray::start`] of rays from the vertices in these directions: none of a ray that goes behind its facet.
+    /// [`Ray::start`] of rays from the vertices in these directions; rays that go behind their facet have none.
     #[inline(always)]
     pub fn starts(&self, directions: &Lanes3) -> [u32; LANES] {
-        // Vertices of shapes have none.
+        // Vertices on shapes are not on triangles.
         if self.start.iter().fold(!0, |all, start| all & start) == Ray::NO_TRIANGLE {
             return self.start;
         }
@@ -302,14 +302,14 @@ impl VertexBatch {
         if lane(normal, i).dot(direction) > 0.0 { self.start[i] } else { Ray::NO_TRIANGLE }
     }
 
-    /// Whether a vertex certainly sees nothing in a direction.
+    /// Whether a direction is below the horizon of a vertex.
     pub fn hides(&self, i: usize, direction: Vec3) -> bool {
-        self.is_bounded & 1 << i != 0 && !(lane(&self.horizon, i).dot(direction) > 0.0)
+        self.has_horizon & 1 << i != 0 && !(lane(&self.horizon, i).dot(direction) > 0.0)
     }
 
-    /// Position of a vertex's surface, and the normal of its facet on the viewer's side.
+    /// Surface point of a vertex, and its geometric normal on the viewer's side.
     #[inline(always)]
-    pub fn place_of(&self, i: usize) -> (Vec3, Vec3) {
+    pub fn surface_of(&self, i: usize) -> (Vec3, Vec3) {
         if self.has_facet & 1 << i != 0 {
             (lane(&self.point, i), lane(&self.facet, i))
         } else {
@@ -317,33 +317,33 @@ impl VertexBatch {
         }
     }
 
-    /// Weight of photons that land at a vertex: the cosine of the light's direction, times the terminator factor, over the cosine
-    /// with the facet.
+    /// Weight of a photon that lands at a vertex: the cosine with the shading normal, times the terminator factor, over
+    /// the cosine with the geometric normal.
     #[inline(always)]
-    pub fn landed(&self, i: usize, direction: Vec3) -> f32 {
+    pub fn photon_weight(&self, i: usize, direction: Vec3) -> f32 {
         if self.has_facet & 1 << i == 0 {
             return 1.0;
         }
         let cosine = lane(&self.normal, i).dot(direction);
         let smooth = lane(&self.smooth_normal, i).dot(direction);
-        let left = cosine * terminator(cosine, smooth, self.bend[i]);
+        let left = cosine * terminator(cosine, smooth, self.shading_normal_cosine[i]);
         let arriving = lane(&self.facet, i).dot(direction);
         if (left > 0.0) & (arriving > 0.0) { left / arriving } else { 0.0 }
     }
 
-    /// Light of the vertices, times the throughput of the paths.
+    /// Multiplies light at the vertices by the throughputs of the paths.
     #[inline(always)]
-    pub fn carried_on(&self, light: &Lanes3) -> Lanes3 {
-        let mut roulette_throughput = *light;
+    pub fn times_throughput(&self, light: &Lanes3) -> Lanes3 {
+        let mut radiance = *light;
         for axis in 0..3 {
             for i in 0..LANES {
-                roulette_throughput[axis][i] = light[axis][i] * self.throughput[axis][i];
+                radiance[axis][i] = light[axis][i] * self.throughput[axis][i];
             }
         }
-        roulette_throughput
+        radiance
     }
 
-    /// The first place, if there is a vertex in every lane and their places are consecutive. Otherwise `None`.
+    /// The first queue index, if every lane has a vertex and the indices are consecutive; otherwise `None`.
     #[inline(always)]
     pub fn run(&self) -> Option<u32> {
         let mut is_run = self.used == ALL;
@@ -358,41 +358,42 @@ impl VertexBatch {
         lanes(self.used).any(|i| self.medium[i] != 0)
     }
 
-    /// A bit for each vertex that certainly sees nothing in its direction.
+    /// Mask of vertices whose direction is below their horizon.
     #[inline(always)]
     pub fn hidden(&self, directions: &Lanes3, folds: impl Folds) -> u32 {
         let mut hidden = [0; LANES];
-        if self.is_bounded != 0 {
+        if self.has_horizon != 0 {
             for i in 0..LANES {
                 let cosine = lane(&self.horizon, i).dot(lane(directions, i));
                 hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
             }
         }
-        folds.bits(&hidden) & self.is_bounded
+        folds.bits(&hidden) & self.has_horizon
     }
 }
 
-/// Response of vertices to light from directions.
+/// BSDF values and cosines of a packet of vertices for one direction each.
 pub struct Response {
-    /// BSDFs.
+    /// BSDF values.
     pub bsdf: BsdfValues,
-    /// Cosines, times the terminator factor; not above 0 if nothing arrives.
+    /// Cosines times the terminator factors; not above 0 if no light arrives.
     pub cosines: Lanes,
 }
 
-/// A bit for each lane.
+/// Mask of all lanes.
 pub const ALL: u32 = ((1_u64 << LANES) - 1) as u32;
 
-/// Terminator factor: softens the edge at which bent normals lose the light of their surface, 0 behind the surface; 1
-/// without bent normals (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
+/// Shadow-terminator factor: softens the edge of the lit region of perturbed normals; 0 behind the unperturbed surface,
+/// 1 without perturbation (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).
 #[inline(always)]
-fn terminator(cosine: f32, smooth: f32, bend: f32) -> f32 {
-    let g = smooth / (cosine * bend);
+fn terminator(cosine: f32, smooth: f32, shading_normal_cosine: f32) -> f32 {
+    let g = smooth / (cosine * shading_normal_cosine);
     let g = if g < 1.0 { g } else { 1.0 };
-    // Light behind the bent normal is none: of a lesser g, the polynomial would be negative too, and the product not.
+    // No light arrives from behind the shading normal. Clamp g to 0: for g < 0 the polynomial and the cosine are both
+    // negative, and their product would be positive.
     let g = if g > 0.0 { g } else { 0.0 };
-    let soft = if bend > 0.0 { -g * g * g + g * g + g } else { 1.0 };
-    if (smooth > 0.0) | (bend == UNBENT) { soft } else { 0.0 }
+    let soft = if shading_normal_cosine > 0.0 { -g * g * g + g * g + g } else { 1.0 };
+    if (smooth > 0.0) | (shading_normal_cosine == UNPERTURBED) { soft } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -400,11 +401,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_vertex_in_the_place_of_another_keeps_nothing_of_it() {
-        // Row whose bits are set for all vertices, also for unused ones.
+    fn replaced_lanes_keep_no_stale_bits() {
+        // A packet with all bits set, also for unused lanes.
         let noisy = VertexBatch {
             used: ALL,
-            is_bounded: ALL,
+            has_horizon: ALL,
             may_lift: ALL,
             has_facet: ALL,
             only_specular_before: ALL,
@@ -418,7 +419,7 @@ mod tests {
         row.copy(3, &VertexBatch { only_specular_before: 1 << 9, ..plain }, 9);
         let bits = [
             row.used,
-            row.is_bounded,
+            row.has_horizon,
             row.may_lift,
             row.has_facet,
             row.only_specular_before,

@@ -1,4 +1,4 @@
-//! Rays of the camera, in rows.
+//! Camera rays, in packets.
 
 use std::ops::Range;
 
@@ -14,21 +14,20 @@ use crate::sampling::filter::FilterSample;
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow, warp};
 use crate::world::{Loops, PACKET};
 
-/// Packets of camera rays that are made in one loop: each waits long for its random numbers, but not for those of the
-/// others.
+/// Number of camera-ray packets generated in one loop, which hides the latency of each packet's random numbers.
 pub const CAMERA_ROWS: usize = 8;
 
-/// Rays through the pixels of some slots.
+/// A packet of camera rays.
 #[derive(Clone)]
 pub struct CameraRow {
     /// The rays.
     pub rays: RayRows,
-    /// A bit for each ray whose place in the pixel has a negative weight.
+    /// Mask of rays whose filter weight is negative.
     pub negative: u32,
 }
 
 impl TileContext<'_> {
-    /// Makes rays through the pixels of some slots, in place of the queue's content, and marks those with a negative
+    /// Replaces the queue's content with camera rays for the given slots, and reports those with a negative filter
     /// weight.
     pub fn camera_rays(
         &self,
@@ -48,39 +47,45 @@ impl TileContext<'_> {
         }
     }
 
-    /// Makes the rays of the first of some slots, at most [`CAMERA_ROWS`] packets, in place of the content of `rows`.
+    /// Replaces the content of `rows` with camera rays for the first slots, at most [`CAMERA_ROWS`] packets.
     pub fn camera_rows(&self, slots: Range<u32>, rows: &mut Vec<CameraRow>) {
         rows.clear();
         let count = slots.len().div_ceil(PACKET).min(CAMERA_ROWS);
-        self.world.geometry.instructions().run(Camera { tile: self, first: slots.start, count, rows });
+        self.world.geometry.instructions().run(GenerateCameraRays {
+            tile: self,
+            first: slots.start,
+            count,
+            rows,
+        });
     }
 
-    /// The path of a camera ray.
+    /// The path that begins with a camera ray.
     #[inline(always)]
     pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
         let medium =
-            if self.world.is_eye_in_air() { Medium::default() } else { self.medium_of_camera(ray.origin) };
+            if self.world.is_eye_in_air() { Medium::default() } else { self.camera_medium(ray.origin) };
         let state = PathState::CAMERA;
         let cone = Cone { width: 0.0, spread: self.pixel_spread };
         PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, medium, state, cone }
     }
 
-    /// The glass around a point of the lens.
+    /// The glass around a point on the lens.
     #[cold]
     #[inline(never)]
-    fn medium_of_camera(&self, point: Vec3) -> Medium {
+    fn camera_medium(&self, point: Vec3) -> Medium {
         let around = self.world.glass_around(point).map(|(body, material)| Inside { body, material });
         around.fold(Medium::default(), Medium::entered)
     }
 
-    /// The rays of the slots from `first` on, also beyond the last. To be called inside of loops for each instruction set.
+    /// The rays of the sixteen slots from `first` on, even past the last one. Must be called inside a kernel that is
+    /// compiled for each instruction set.
     #[inline(always)]
     fn camera_row(&self, first: u32) -> CameraRow {
         let paths = [CAMERA_PATH; PACKET];
         let (settings, camera) = (self.settings, &self.world.camera);
         let (xs, ys, samples) = self.block.places(first);
         let sampler = SamplerRow::new(settings.render.seed, &xs, &ys, &samples);
-        // Sample places in the pixels.
+        // Sample positions in the pixels.
         let mut in_pixel = sampler.pairs(&paths, Decision::Pixel, 0, 1);
         let mut negative = 0;
         settings.render.filter.sample_row(&mut in_pixel, |lane, sample: FilterSample| {
@@ -93,10 +98,10 @@ impl TileContext<'_> {
             let place = settings.from_middle(place);
             (places[0][lane], places[1][lane]) = (place.x, place.y);
         }
-        // Make rays through them, from points of the lens if it has an aperture.
+        // Generate rays through them, from points on the lens if it has an aperture.
         let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
         if settings.dof && camera.aperture > 0.0 {
-            let lens = lens_row(sampler.pairs(&paths, Decision::Lens, 0, 1));
+            let lens = sample_lens(sampler.pairs(&paths, Decision::Lens, 0, 1));
             for lane in 0..PACKET {
                 let place = DVec2::new(places[0][lane], places[1][lane]);
                 let ray = camera.ray(place, Vec2::new(lens[0][lane], lens[1][lane]));
@@ -115,14 +120,14 @@ impl TileContext<'_> {
 }
 
 /// [`TileContext::camera_row`].
-struct Camera<'a> {
+struct GenerateCameraRays<'a> {
     tile: &'a TileContext<'a>,
     first: u32,
     count: usize,
     rows: &'a mut Vec<CameraRow>,
 }
 
-impl Loops for Camera<'_> {
+impl Loops for GenerateCameraRays<'_> {
     type Done = ();
 
     #[inline(always)]
@@ -133,9 +138,9 @@ impl Loops for Camera<'_> {
     }
 }
 
-/// Points of the unit disk.
+/// Maps pairs of random numbers to the unit disk.
 #[inline(always)]
-fn lens_row([u, v]: [Row; 2]) -> [Row; 2] {
+fn sample_lens([u, v]: [Row; 2]) -> [Row; 2] {
     let mut points = [u, v];
     for lane in 0..PACKET {
         let point = warp::disk(Vec2::new(u[lane], v[lane]));
@@ -151,7 +156,7 @@ mod tests {
     use crate::film::Rect;
 
     #[test]
-    fn rows_of_places_go_on_over_samples_and_pixels() {
+    fn packed_slots_match_single_slots() {
         let tile = Rect { x: 5, y: 7, width: 3, height: 40 };
         for samples in [3..4, 0..5, 100..116, 7..40] {
             let block = SampleBlock { pixels: tile.into(), samples };

@@ -1,4 +1,5 @@
-//! Crossings of a ray at glass: of all surfaces that touch there at once, from one medium to another.
+//! Crossing of coincident surfaces at glass: all surfaces that touch at a hit are crossed at once, from one medium to
+//! another.
 
 use super::medium::{Inside, Medium};
 use super::ray::PathRay;
@@ -6,28 +7,30 @@ use super::tile::TileContext;
 use super::vertex::Vertex;
 use crate::world::{Hit, Meeting, Near, NearMemory, Sides};
 
-/// A ray's crossing at a hit of glass.
+/// The surfaces and media that a ray crosses at a hit on glass.
 pub struct Crossing {
-    /// Starts of the rays that leave.
+    /// Origins for rays that leave on either side.
     pub sides: Sides,
-    /// The glass that the ray came through, and the glass on the side that it comes from. `None` if both are as the ray knows.
+    /// The medium that the ray traveled through, and the medium on the near side. `None` if both are the ray's recorded
+    /// medium.
     pub before: Option<[Medium; 2]>,
-    /// The glass on the other side.
+    /// The medium on the far side.
     pub far: Medium,
-    /// An opaque surface there, as the ray between the sides hits it.
+    /// The hit on a coincident opaque surface, along the ray between the two origins.
     pub opaque: Option<Hit>,
 }
 
-/// The glass whose surface a boundary of two media has: the later one.
+/// The glass whose surface separates two media: the one with the higher priority, which is later in the scene file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Boundary {
-    /// Its material there.
+    /// Its material at this point.
     pub material: u32,
-    /// Its hit by the ray between the sides. `None` if the path itself hits it, or it is known only as one around the far side.
+    /// The hit on its surface, along the ray between the two origins. `None` if the path itself hits it, or if it is
+    /// only known to enclose the far origin.
     pub hit: Option<Hit>,
 }
 
-/// Memory for the search of near surfaces.
+/// Buffers for the search for coincident surfaces.
 #[derive(Default)]
 pub struct CrossingMemory {
     around: NearMemory,
@@ -35,7 +38,7 @@ pub struct CrossingMemory {
 }
 
 impl TileContext<'_> {
-    /// The crossing of a ray at a hit of glass.
+    /// Finds all surfaces that a ray crosses at a hit on glass.
     pub fn crossing(
         &self,
         path: &PathRay,
@@ -48,19 +51,20 @@ impl TileContext<'_> {
         let lead = hit.shape.t * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
         let meeting = Meeting { hit, surface: &vertex.surface, normal: vertex.normal, lead };
         let sides = self.world.contact(&meeting, around, |near| found.push(near));
-        let (before, far) = self.media(&path.medium, found);
+        let (before, far) = self.crossing_media(&path.medium, found);
         let opaque = found.iter().filter_map(|near| self.opaque(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         Crossing { sides, before, far, opaque }
     }
 
-    /// The media before and beyond the near surfaces. The ray's own record gives the medium before; for closed shapes, their
-    /// geometry gives the medium beyond. A ray that leaves another body was in it, whatever its record says. Of open bodies only
-    /// those count that are left or entered here, so that a ray and its reverse see the same, as the ray's way around the others is
-    /// unknown. The first of the media is the one that absorbed on the way here; the first two are `None` if both are as known.
-    fn media(&self, known: &Medium, found: &[Near]) -> (Option<[Medium; 2]>, Medium) {
+    /// The media before and beyond the coincident surfaces. The near medium is the one the ray has recorded; for closed
+    /// shapes, the far medium follows from their geometry. A ray that leaves a solid was inside it, even if its record
+    /// disagrees. Open solids count only if they are entered or left here, so that a ray and its reverse agree, as the
+    /// path of the ray around other open solids is unknown. The first medium of the pair absorbed light on the way
+    /// here; the pair is `None` if both are as recorded.
+    fn crossing_media(&self, known: &Medium, found: &[Near]) -> (Option<[Medium; 2]>, Medium) {
         let is_told_by_record = |glass: Inside| !self.world.is_closed(glass.body);
-        // Of closed shapes alone, most hits find at most the one that they enter.
+        // With only closed shapes, most hits find at most the shape that they enter.
         if !self.world.has_open_glass() {
             match *found {
                 [] => return (None, known.retained(is_told_by_record)),
@@ -71,8 +75,8 @@ impl TileContext<'_> {
                 [Near::Surface { .. }] | [_, _, ..] => {}
             }
         }
-        // Begin with the record of the ray, without open bodies.
-        let (mut arrived, mut near) = (*known, self.without_open(*known));
+        // Begin with the recorded media, without open solids.
+        let (mut arrived, mut near) = (*known, self.without_open_glass(*known));
         let mut far = near.retained(is_told_by_record);
         let crossed = |as_front: bool| {
             found.iter().filter_map(move |thing| match *thing {
@@ -87,7 +91,7 @@ impl TileContext<'_> {
             Near::Around { object, material } => Some(Inside { body: object, material }),
             Near::Surface { .. } => None,
         });
-        // Leave the bodies whose backs are here.
+        // Leave the solids whose back faces are here.
         for glass in crossed(false) {
             if self.world.is_open(glass.body) {
                 near = near.entered(glass);
@@ -99,12 +103,12 @@ impl TileContext<'_> {
                 None => (arrived, near) = (arrived.entered(glass), near.entered(glass)),
             }
         }
-        // Enter those whose fronts are here, and those around the place.
+        // Enter the solids whose front faces are here, and those that enclose the point.
         let far = crossed(true).chain(around).fold(far, Medium::entered);
         (Some([arrived, near]), far)
     }
 
-    /// The surface that counts between two media, at a hit after [`TileContext::crossing`]. `None` if both are air.
+    /// The surface that separates two media at a hit, after [`TileContext::crossing`]. `None` if both media are air.
     pub fn boundary(
         &self,
         hit: &Hit,
@@ -116,7 +120,7 @@ impl TileContext<'_> {
         if self.world.body(hit.object) == later.body && self.world.is_glass(own) {
             return Some(Boundary { material: own, hit: None });
         }
-        // The path hits another one of the surfaces that touch there.
+        // The path hits another one of the coincident surfaces.
         let of_body = memory.near.iter().find_map(|thing| match *thing {
             Near::Surface { hit, material, .. } => {
                 let is_later = self.world.body(hit.object) == later.body && self.world.is_glass(material);
@@ -127,8 +131,8 @@ impl TileContext<'_> {
         Some(of_body.unwrap_or(Boundary { material: later.material, hit: None }))
     }
 
-    /// The closed bodies of a medium.
-    pub fn without_open(&self, medium: Medium) -> Medium {
+    /// A medium without its open solids.
+    pub fn without_open_glass(&self, medium: Medium) -> Medium {
         if self.world.has_open_glass() {
             return medium.retained(|glass| !self.world.is_open(glass.body));
         }

@@ -1,6 +1,6 @@
-//! Reflection and refraction at mirrors and glass.
+//! Specular reflection and refraction.
 
-use super::cone::Bend;
+use super::cone::SpecularEvent;
 use super::medium::{Medium, ior};
 use super::ray::PathRay;
 use super::vertex::{Shading, Vertex};
@@ -9,15 +9,16 @@ use crate::materials::mirror::reflect;
 use crate::math::Vec3;
 use crate::world::World;
 
-/// Branch number of the continuation, which tells the paths of one sample apart.
+/// Branch numbers, which distinguish the continuations of a path.
 const REFLECTED: u32 = 1;
 const REFRACTED: u32 = 2;
-/// Branch number of scattering by a lobe that is not δ.
+/// Branch number of scattering by a non-specular lobe.
 pub const SCATTERED: u32 = 3;
-/// Branch number of the way straight on.
-pub const STRAIGHT: u32 = 4;
+/// Branch number of a null interaction.
+pub const PASSED: u32 = 4;
 
-/// The mirrored ray. A shading normal that sends it below the surface is replaced by the geometric one.
+/// The path after specular reflection. If the shading normal would send it below the surface, the geometric normal is
+/// used.
 pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflectance: Vec3) -> PathRay {
     let incident = path.ray.direction;
     let side = -incident.dot(vertex.normal);
@@ -26,56 +27,56 @@ pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflect
         direction = reflect(incident, vertex.normal);
     }
     PathRay {
-        ray: vertex.leaving(direction.normalize()),
+        ray: vertex.spawn_ray(direction.normalize()),
         throughput: path.throughput * reflectance,
         path: path.next_path(REFLECTED),
-        state: path.state.mirrored(reflectance.max_element()),
-        cone: vertex.bent_cone(Bend::Reflected),
+        state: path.state.after_specular(reflectance.max_element()),
+        cone: vertex.cone_after(SpecularEvent::Reflected),
         ..*path
     }
 }
 
-/// The part of basic radiance that comes through a sheet without thickness from another medium. Light that enters the denser medium
-/// spreads over fewer directions, or it would gain energy; the way back is as bright as without a change (Veach, *Robust Monte Carlo
-/// Methods for Light Transport Simulation*, 1997, section 5.2).
+/// The fraction of basic radiance L/n² that passes an infinitely thin diffusing sheet between two media. Light that
+/// enters the denser medium spreads over fewer directions, and would otherwise gain energy; in the other direction its
+/// radiance is unchanged (Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 5.2).
 pub fn through_sheet(world: &World, near: &Medium, far: &Medium) -> f32 {
     let eta = ior(world, far) / ior(world, near);
     (eta * eta).min(1.0)
 }
 
-/// Interaction of a ray with the surface of a glass.
-pub struct Interface {
+/// Fresnel reflectance at a glass boundary, and the refracted path.
+pub struct FresnelSplit {
     /// Reflectance.
     pub reflectance: f32,
-    /// The ray on the other side, with all of its radiance. `None` for total internal reflection.
+    /// The refracted path, not yet weighted by the transmittance. `None` for total internal reflection.
     pub refracted: Option<PathRay>,
 }
 
-/// The interaction of a ray that goes from one medium to another; it is in the first.
-pub fn interface(
+/// Computes reflection and refraction of a path at the boundary between its medium and `far`.
+pub fn fresnel_split(
     world: &World,
     path: &PathRay,
     vertex: &Vertex<'_>,
     shading: &Shading,
     far: &Medium,
-) -> Interface {
+) -> FresnelSplit {
     let eta = ior(world, far) / ior(world, &path.medium);
-    let (reflectance, direction) = boundary(vertex, shading, path.ray.direction, eta);
-    // Rays carry basic radiance, L/n², which refraction does not change.
+    let (reflectance, direction) = refract_at(vertex, shading, path.ray.direction, eta);
+    // Paths carry basic radiance, L/n², which refraction does not change.
     let refracted = direction.map(|direction| PathRay {
-        ray: vertex.leaving(direction),
+        ray: vertex.spawn_ray(direction),
         path: path.next_path(REFRACTED),
         medium: *far,
-        state: path.state.mirrored(1.0),
-        cone: vertex.bent_cone(Bend::Refracted(eta)),
+        state: path.state.after_specular(1.0),
+        cone: vertex.cone_after(SpecularEvent::Refracted(eta)),
         ..*path
     });
-    Interface { reflectance, refracted }
+    FresnelSplit { reflectance, refracted }
 }
 
-/// Reflectance and refracted direction by the shading normal. If that normal faces away from the ray, or sends the
-/// refracted ray back to its own side, the geometric normal counts: the ray must be where its medium says.
-fn boundary(vertex: &Vertex<'_>, shading: &Shading, incident: Vec3, eta: f32) -> (f32, Option<Vec3>) {
+/// Reflectance and refracted direction, using the shading normal. If that normal faces away from the ray, or would
+/// refract the ray to its own side, the geometric normal is used: the ray must be where its medium says.
+fn refract_at(vertex: &Vertex<'_>, shading: &Shading, incident: Vec3, eta: f32) -> (f32, Option<Vec3>) {
     let (shading, geometric) = (shading.normal, vertex.normal);
     let crosses = |direction: &Vec3| direction.dot(geometric) < 0.0;
     let by = |normal: Vec3| {

@@ -1,24 +1,25 @@
-//! The glass around a ray, and its effects on the ray.
+//! The nested glass solids around a ray, and the medium that results from them.
 
 use crate::materials::Glass;
 use crate::math::Vec3;
 use crate::world::World;
 
-/// A glass around a ray; the parts of one body may have several.
+/// A glass solid around a ray. The parts of one solid may have different materials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Inside {
-    /// Number of the body: its place in the order of the file.
+    /// Index of the solid, in file order.
     pub body: u32,
     /// Material of the surface through which the ray entered.
     pub material: u32,
 }
 
-/// The glasses around a ray, in the order of the file; the last one counts. If the list is full, the first ones are
-/// dropped.
+/// The glass solids around a ray, in file order. The last one has priority and determines the medium. If the list is
+/// full, the first ones are dropped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Medium {
     inside: [Inside; 4],
-    /// Number of known glasses. A whole word, as a copy of a word of which one byte was just written waits for the cache.
+    /// Number of recorded solids. It takes a whole word because copying a word of which one byte was just written
+    /// stalls.
     count: u32,
 }
 
@@ -27,17 +28,17 @@ impl Medium {
         &self.inside[..self.count as usize]
     }
 
-    /// Whether no glass is known.
+    /// Whether the ray is in air.
     pub fn is_air(&self) -> bool {
         self.count == 0
     }
 
-    /// The glass that counts.
+    /// The glass that determines the medium.
     pub fn glass(&self) -> Option<Inside> {
         self.known().last().copied()
     }
 
-    /// The medium after entering a glass.
+    /// The list after entering a solid.
     pub fn entered(mut self, glass: Inside) -> Self {
         if self.count as usize == self.inside.len() {
             if glass < self.inside[0] {
@@ -56,8 +57,8 @@ impl Medium {
         self
     }
 
-    /// The medium after leaving a glass. `None` if the ray was not in that body, as far as it knows. A surface of
-    /// several glasses may be entered by one and left by another: then the body's last one is left.
+    /// The list after leaving a solid. `None` if the ray was not recorded as inside it. A surface made of several
+    /// glasses may be entered through one and left through another; then the solid's last entry is removed.
     pub fn left(self, glass: Inside) -> Option<Self> {
         let same = self.known().iter().rposition(|&own| own == glass);
         same.or_else(|| self.known().iter().rposition(|own| own.body == glass.body))
@@ -71,7 +72,7 @@ impl Medium {
         self
     }
 
-    /// The medium with only the glasses for which `holds` is true.
+    /// Keeps only the solids for which `holds` is true.
     pub fn retained(self, holds: impl Fn(Inside) -> bool) -> Self {
         let mut left = Self::default();
         for &glass in self.known() {
@@ -84,15 +85,15 @@ impl Medium {
     }
 }
 
-/// Media of vertices, by number. Number 0 is air.
+/// Media of vertices, by index. Index 0 is air.
 #[derive(Debug, Default)]
 pub struct Media {
-    /// Media with glass, from number 1 on.
+    /// Media with glass, from index 1 on.
     inside: Vec<Medium>,
 }
 
 impl Media {
-    /// Forgets all media.
+    /// Removes all media.
     pub fn clear(&mut self) {
         self.inside.clear();
     }
@@ -102,7 +103,7 @@ impl Media {
         self.inside.is_empty()
     }
 
-    /// The number of a medium, which it keeps.
+    /// Stores a medium and returns its index.
     pub fn number(&mut self, medium: &Medium) -> u32 {
         if medium.is_air() {
             return 0;
@@ -111,21 +112,21 @@ impl Media {
         self.inside.len() as u32
     }
 
-    /// The medium of a number.
+    /// The medium with an index.
     #[inline]
     pub fn get(&self, number: u32) -> Medium {
         (number as usize).checked_sub(1).map_or(Medium::default(), |index| self.inside[index])
     }
 }
 
-/// Transmittance of glass along a ray to its hit at `distance`.
+/// Transmittance of the medium over a distance.
 #[inline]
 pub fn absorption(world: &World, medium: &Medium, distance: f32) -> Vec3 {
     let glass = medium.glass().and_then(|inside| glass_of(world, inside));
     glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
 }
 
-/// Index of refraction of a ray's medium.
+/// Index of refraction of a medium.
 pub fn ior(world: &World, medium: &Medium) -> f32 {
     medium.glass().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
 }
@@ -143,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn of_nested_and_overlapping_glass_the_last_counts() {
+    fn last_solid_has_priority() {
         let (seven, nine) = (part(7, 0), part(9, 1));
         let air = Medium::default();
         for in_both in [air.entered(seven).entered(nine), air.entered(nine).entered(seven)] {
@@ -164,18 +165,18 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_one_body_are_told_apart_by_their_material() {
+    fn parts_of_a_solid_differ_by_material() {
         let both = Medium::default().entered(part(1, 0)).entered(part(1, 5));
         assert_eq!(both.left(part(1, 0)), Some(Medium::default().entered(part(1, 5))));
-        // Enter by material 0, leave by material 2.
+        // Enter through material 0, leave through material 2.
         assert_eq!(Medium::default().entered(part(1, 0)).left(part(1, 2)), Some(Medium::default()));
-        // Enter one body twice.
+        // Enter one solid twice.
         let twice = Medium::default().entered(part(1, 0)).entered(part(1, 0));
         assert_eq!(twice.left(part(1, 0)), Some(Medium::default().entered(part(1, 0))));
     }
 
     #[test]
-    fn what_is_retained_keeps_its_order() {
+    fn retained_keeps_order() {
         let both = Medium::default().entered(part(3, 0)).entered(part(1, 5)).entered(part(2, 0));
         let odd = Medium::default().entered(part(1, 5)).entered(part(3, 0));
         assert_eq!(both.retained(|glass| glass.body != 2), odd);

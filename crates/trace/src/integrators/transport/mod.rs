@@ -1,10 +1,14 @@
-//! Transport: rays of a tile, their hits, and vertices in rows of sixteen. It knows the world, but neither integrators nor photons.
+//! Transport: rays of a tile, their hits, and packets of sixteen vertices. It depends on the world, but not on
+//! integrators or photons.
 //!
-//! - `tile`: what all rays of a tile have in common; `ray`, `cone`, `medium`: a path's ray, its beam, the glass around it.
-//! - `camera`: the first rays; `trace`, `packet`: rays to hits, and to rows of plain surfaces.
-//! - `walk`, `crossing`: through glass, up to the first surface that matters; `vertex`: that surface, prepared for shading.
-//! - `interface`: reflection and refraction; `batch`: rows of rough vertices; `scatter`: paths that go on from these.
-//! - `accumulator`: the parts of light that the view shows; `scratch`: memory of the queues.
+//! - `tile`: the context shared by all rays of a tile; `ray`, `cone`, `medium`: a path's ray, its ray cone, and the
+//!   glass around it.
+//! - `camera`: camera rays; `trace`, `packet`: intersection, and packets of plain surfaces.
+//! - `walk`, `crossing`: null interactions and glass boundaries up to the next scattering surface; `vertex`: that
+//!   surface, prepared for shading.
+//! - `interface`: specular reflection and refraction; `batch`: packets of non-specular vertices; `scatter`: BSDF
+//!   sampling at these.
+//! - `accumulator`: sums of the components of light that the view shows; `scratch`: reused queues.
 
 pub mod accumulator;
 pub mod batch;

@@ -1,18 +1,18 @@
-//! Hits of a packet of rays, and rows of plain surfaces with all that direct light needs: one vertex at a time would cost more
-//! than the light.
+//! Intersects packets of rays and prepares plain surfaces for direct lighting in packets, since preparing one vertex at
+//! a time would cost more than lighting it.
 
 use arrayvec::ArrayVec;
 
-use super::batch::{UNBENT, VertexBatch};
+use super::batch::{UNPERTURBED, VertexBatch};
 use super::camera::CameraRow;
 use super::ray::PathRay;
 use super::tile::TileContext;
-use super::vertex::way_up;
+use super::vertex::lift_segment;
 use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::{self, HitRows, RayRows};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::integrators::view::Measure;
+use crate::integrators::view::LightAov;
 use crate::materials::Rough;
 use crate::materials::bsdf::ShownLobes;
 use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, lane, set_lane, take, take_u32, truths};
@@ -21,19 +21,19 @@ use crate::sampling::CAMERA_PATH;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Loops, Object, PACKET, PlainMaterial};
 
-/// Source of the rays of a packet.
+/// Where the rays of a packet are.
 #[derive(Clone, Copy)]
 pub enum PacketSource<'a> {
-    /// Rays of the camera: the row, its first slot, their number, and their first place in the round's queue.
+    /// Camera rays: the packet, its first slot, the number of rays, and the queue index of the first ray.
     Camera(&'a CameraRow, u32, usize, u32),
-    /// Rays of a queue, with their first place.
+    /// Rays of a queue, and the queue index of the first one.
     Paths(&'a [PathRay], u32),
-    /// Rays of a queue with known hits, at these places.
+    /// Rays at the given queue indices, with known hits.
     Traced(&'a [PathRay], &'a [Option<Hit>], &'a [u32]),
 }
 
 impl PacketSource<'_> {
-    /// Number of the rays.
+    /// Number of rays.
     pub fn count(&self) -> usize {
         match self {
             Self::Camera(_, _, count, _) => *count,
@@ -42,7 +42,7 @@ impl PacketSource<'_> {
         }
     }
 
-    /// The place of a lane's path in the round's queue; any number for a lane without a path.
+    /// Queue index of a lane's path; arbitrary for a lane without a path.
     #[inline(always)]
     pub fn place(&self, lane: usize) -> u32 {
         match self {
@@ -51,9 +51,9 @@ impl PacketSource<'_> {
         }
     }
 
-    /// The path of a queue in a lane. `None` for camera rays.
+    /// The queued path of a lane. `None` for camera rays.
     #[inline(always)]
-    pub fn of_queue(&self, lane: usize) -> Option<&PathRay> {
+    pub fn queued_path(&self, lane: usize) -> Option<&PathRay> {
         match self {
             Self::Camera(..) => None,
             Self::Paths(paths, _) => paths.get(lane),
@@ -62,32 +62,32 @@ impl PacketSource<'_> {
     }
 }
 
-/// Hits of a packet. A surface is plain if there are loops for its shape and for the look-ups of its material, a rough one, its
-/// ray is not in glass, and its BSDF is of the same kind as those of the other plain surfaces.
+/// Hits of a packet. A surface is plain if its ray is in air, its shape and the textures of its non-specular material
+/// can be evaluated in packets, and all plain surfaces of the packet have the same kind of BSDF.
 pub struct PacketHits {
     hits: HitRows,
     object: [u32; PACKET],
-    /// A bit for each ray that hits anything.
+    /// Mask of rays that hit anything.
     pub any: u32,
-    /// A bit for each plain surface.
+    /// Mask of plain surfaces.
     pub plain: u32,
-    /// A bit for each plain surface that emits towards the ray.
+    /// Mask of plain surfaces that emit toward the ray.
     pub shining: u32,
-    /// A bit for each other surface that is in the row of surfaces.
+    /// Mask of other surfaces in the surface packet.
     found: u32,
-    /// Look-ups of textures of plain surfaces.
+    /// Number of texture lookups for plain surfaces.
     pub lookups: u64,
-    /// [`Environment::arriving_row`](crate::lights::infinite::Environment::arriving_row), if any ray hits nothing.
+    /// [`Environment::arriving_row`](crate::lights::infinite::Environment::arriving_row), if any ray leaves the scene.
     sky: (Lanes3, Lanes),
 }
 
 impl PacketHits {
-    /// The hit of a ray.
+    /// The hit of a lane's ray.
     pub fn hit(&self, lane: usize) -> Option<Hit> {
         self.hits.get(lane).map(|shape| Hit { shape, object: self.object[lane] })
     }
 
-    /// The surface at a hit. `None` if it is plain, or not in the row of surfaces.
+    /// The surface at a hit. `None` if it is plain or not in the surface packet.
     pub fn surface(&self, surfaces: &SurfaceRow, lane_of_ray: usize) -> Option<SurfacePoint> {
         let (i, bit) = (lane_of_ray, 1 << lane_of_ray);
         if self.found & bit == 0 {
@@ -120,44 +120,46 @@ impl PacketHits {
         }
     }
 
-    /// Radiance of the environment along a ray that hits nothing, and its light-sampling pdf in sr⁻¹.
+    /// Radiance of the environment along a ray that leaves the scene, and its light-sampling pdf in sr⁻¹.
     pub fn sky(&self, lane_of_ray: usize) -> (Vec3, f32) {
         (lane(&self.sky.0, lane_of_ray), self.sky.1[lane_of_ray])
     }
 }
 
 impl TileContext<'_> {
-    /// Traces at most [`PACKET`] rays. Plain surfaces go into the row, ready for direct light if requested; `used` are those
-    /// that reflect light. Other surfaces go into the row of surfaces, as far as there are loops for them.
+    /// Intersects at most [`PACKET`] rays. Plain surfaces are stored in the vertex packet, ready for direct lighting if
+    /// `are_lit`; its `used` mask has those that reflect light. Other surfaces are stored in the surface packet where
+    /// this is supported.
     pub fn intersect(
         &self,
         rays: PacketSource<'_>,
-        measure: Measure,
+        aov: LightAov,
         are_lit: bool,
         (row, surface): (&mut VertexBatch, &mut SurfaceRow),
     ) -> PacketHits {
         self.world.geometry.instructions().run(PacketIntersection {
             tile: self,
             rays,
-            measure,
+            aov,
             are_lit,
             row,
             surface,
         })
     }
 
-    /// Whether rows of surfaces hold everything for shading with a material that is not plain: no texture coordinates or tangents.
+    /// Whether surface packets contain all that shading with a non-plain material needs: they have no texture
+    /// coordinates or tangents.
     #[inline(always)]
-    fn is_held_by_rows(&self, material: usize) -> bool {
-        // Beams need tangents and curvatures.
+    fn fits_surface_row(&self, material: usize) -> bool {
+        // Ray cones need tangents and curvatures.
         self.pixel_spread == 0.0 && !self.world.is_textured(material)
     }
 
-    /// A material whose surfaces are plain, with its rough BSDF.
+    /// The material and non-specular BSDF of plain surfaces. `None` if the material's surfaces are not plain.
     #[inline(always)]
     pub fn plain(&self, material: usize) -> Option<(&PlainMaterial, &Rough)> {
         let (plain, rough) = self.world.plain(material)?;
-        // Ambient light needs look-ups for each surface by itself.
+        // The ambient color may be textured, and then needs a lookup per surface.
         let has_ambient = self.settings.render.ambient != Vec3::ZERO;
         (!has_ambient || plain.ambient.is_some()).then_some((plain, rough))
     }
@@ -166,21 +168,21 @@ impl TileContext<'_> {
 struct PacketIntersection<'a> {
     tile: &'a TileContext<'a>,
     rays: PacketSource<'a>,
-    measure: Measure,
+    aov: LightAov,
     are_lit: bool,
     row: &'a mut VertexBatch,
     surface: &'a mut SurfaceRow,
 }
 
-/// Plain surfaces of a packet.
-struct Plain {
-    /// A bit for each.
+/// Masks of the plain surfaces of a packet.
+struct PlainSurfaces {
+    /// All plain surfaces.
     all: u32,
-    /// A bit for each that emits, on either side.
+    /// Surfaces that emit on either side.
     shining: u32,
-    /// A bit for each whose both sides emit alike.
+    /// Surfaces that emit on both sides.
     two_sided: u32,
-    /// Look-ups of their textures.
+    /// Number of their texture lookups.
     lookups: u64,
 }
 
@@ -192,7 +194,7 @@ impl Loops for PacketIntersection<'_> {
         let (tile, rays) = (self.tile, self.rays);
         let world = tile.world;
         self.row.reset();
-        // Put the rays side by side.
+        // Gather the rays into a packet.
         let (of_paths, traced);
         let mut ends = [-1.0; PACKET];
         let rows = match rays {
@@ -205,7 +207,7 @@ impl Loops for PacketIntersection<'_> {
                 let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
                 let mut start = [Ray::NO_TRIANGLE; PACKET];
                 for lane in 0..PACKET {
-                    let Some(path) = rays.of_queue(lane) else { break };
+                    let Some(path) = rays.queued_path(lane) else { break };
                     set_lane(&mut origin, lane, path.ray.origin);
                     set_lane(&mut direction, lane, path.ray.direction);
                     (start[lane], ends[lane]) = (path.ray.start, path.ray.t_max);
@@ -215,14 +217,14 @@ impl Loops for PacketIntersection<'_> {
                 &of_paths
             }
         };
-        // Find their hits, or take the known ones.
+        // Intersect them, or use the known hits.
         let (hits, object) = match rays {
             PacketSource::Camera(..) | PacketSource::Paths(..) => {
                 world.geometry.closest_rows(rows, &mut ends, traced, folds)
             }
             PacketSource::Traced(_, known, places) => known_hits(known, places),
         };
-        // Keep the rays in air, whose surfaces may be plain.
+        // Select the rays in air, whose surfaces may be plain.
         *self.surface = SurfaceRow::EMPTY;
         let any = hits.any(folds);
         let (mut in_air, mut only_specular_before, mut after_gloss) = (any, !0, 0);
@@ -230,23 +232,24 @@ impl Loops for PacketIntersection<'_> {
             PacketSource::Camera(..) => in_air = if world.is_eye_in_air() { any } else { 0 },
             PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 for lane in 0..PACKET {
-                    let Some(path) = rays.of_queue(lane) else { break };
+                    let Some(path) = rays.queued_path(lane) else { break };
                     in_air &= if path.medium.is_air() { !0 } else { !(1 << lane) };
                     only_specular_before &= if path.state.only_specular_before { !0 } else { !(1 << lane) };
                     after_gloss |= u32::from(path.state.is_after_gloss) << lane;
                 }
             }
         }
-        // Compute the plain surfaces, with their BSDFs.
+        // Compute the plain surfaces and their BSDFs.
         (self.row.only_specular_before, self.row.after_gloss) = (only_specular_before, after_gloss);
         let plain = self.fill_plain(rows, (&hits, &object), in_air, folds);
         // Set the positions and normals of the plain vertices.
         let lifts = match tile.settings.render.shadows {
-            Shadows::Off => Lifts::All,
-            Shadows::Hard | Shadows::Soft => Lifts::IfFree(only_specular_before),
+            Shadows::Off => LiftMode::All,
+            Shadows::Hard | Shadows::Soft => LiftMode::IfFree(only_specular_before),
         };
-        let front = if plain.all == 0 { 0 } else { self.row.place(&rays, rows, self.surface, lifts, folds) };
-        // Compute the other surfaces, and the environment for rays without a hit.
+        let front =
+            if plain.all == 0 { 0 } else { self.row.set_positions(&rays, rows, self.surface, lifts, folds) };
+        // Compute the other surfaces, and the environment for rays that leave the scene.
         let found = tile.fill_others(self.surface, rows, (&hits, &object), any & !plain.all, folds);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
@@ -259,7 +262,7 @@ impl Loops for PacketIntersection<'_> {
 }
 
 impl PacketIntersection<'_> {
-    /// Puts the plain surfaces among the hits of `left` into the row of surfaces, and their BSDFs into the row of vertices.
+    /// Stores the plain surfaces among the hits of `left` in the surface packet, and their BSDFs in the vertex packet.
     #[inline(always)]
     fn fill_plain(
         &mut self,
@@ -267,22 +270,22 @@ impl PacketIntersection<'_> {
         (hits, object): (&HitRows, &[u32; PACKET]),
         mut left: u32,
         folds: impl Folds,
-    ) -> Plain {
-        let Self { tile, measure, are_lit, row, surface, .. } = self;
-        let mut plain = Plain { all: 0, shining: 0, two_sided: 0, lookups: 0 };
+    ) -> PlainSurfaces {
+        let Self { tile, aov, are_lit, row, surface, .. } = self;
+        let mut plain = PlainSurfaces { all: 0, shining: 0, two_sided: 0, lookups: 0 };
         while left != 0 {
-            let (id, of_object) = first_alike(object, left, folds);
+            let (id, of_object) = group_first(object, left, folds);
             left &= !of_object;
             if tile.world.is_colored(id) {
                 continue;
             }
-            // Leave out materials that are not plain. The first plain one decides the kind of all BSDFs.
+            // Skip materials that are not plain. The first plain one decides the kind of all BSDFs.
             let materials = tile.world.row_of_materials(id, of_object, &hits.primitive);
             let (mut of, mut asked_uvs) = (0, None);
             let mut groups = ArrayVec::<(&Rough, bool, u32), PACKET>::new();
             let mut waiting = of_object;
             while waiting != 0 {
-                let (material, alike) = first_alike(&materials, waiting, folds);
+                let (material, alike) = group_first(&materials, waiting, folds);
                 waiting &= !alike;
                 let Some((material, rough)) = tile.plain(material as usize) else { continue };
                 if plain.all | of == 0 {
@@ -290,8 +293,8 @@ impl PacketIntersection<'_> {
                 } else if row.bsdf.kind() != material.kind {
                     continue;
                 }
-                let own_uvs = material.row_texture.filter(|_| *are_lit && measure.is_colored());
-                // Rows have room for one set of coordinates.
+                let own_uvs = material.row_texture.filter(|_| *are_lit && aov.is_colored());
+                // Packets have room for one set of texture coordinates.
                 if own_uvs.is_some() && asked_uvs.is_some() && own_uvs != asked_uvs {
                     continue;
                 }
@@ -322,11 +325,11 @@ impl PacketIntersection<'_> {
                 }
             }
             plain.all |= of;
-            // Look the materials up. Beyond the vertices that the camera sees, all lobes count.
+            // Evaluate the materials. At vertices that the camera does not see, all lobes count.
             for (rough, has_uv, of) in groups {
                 plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
-                let shown = [(of, measure.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
-                let shown = if *measure == Measure::ALL { &shown[..1] } else { &shown };
+                let shown = [(of, aov.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
+                let shown = if *aov == LightAov::ALL { &shown[..1] } else { &shown };
                 let black = row.bsdf.fill(rough, has_uv.then_some(&surface.uv), shown, folds);
                 row.used |= of & !black;
             }
@@ -335,9 +338,9 @@ impl PacketIntersection<'_> {
     }
 }
 
-/// The index in the first of the lanes of `left`, and a bit for each of these lanes that has it.
+/// The index in the first lane of `left`, and the mask of lanes in `left` that have the same index.
 #[inline(always)]
-fn first_alike(indices: &[u32; PACKET], left: u32, folds: impl Folds) -> (u32, u32) {
+fn group_first(indices: &[u32; PACKET], left: u32, folds: impl Folds) -> (u32, u32) {
     let index = indices[left.trailing_zeros() as usize % PACKET];
     let mut of = [0; PACKET];
     for lane in 0..PACKET {
@@ -346,7 +349,7 @@ fn first_alike(indices: &[u32; PACKET], left: u32, folds: impl Folds) -> (u32, u
     (index, folds.bits(&of) & left)
 }
 
-/// The hits of the rays at some places of a queue, side by side.
+/// Gathers the known hits at the given queue indices into a packet.
 #[inline(always)]
 fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitRows, [u32; PACKET]) {
     let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET]);
@@ -360,7 +363,7 @@ fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitRows, [u32; PACKET])
 }
 
 impl TileContext<'_> {
-    /// Puts the surfaces of hits that are not plain into the row; returns a bit for each that is there.
+    /// Stores the surfaces of non-plain hits in the surface packet; returns the mask of those stored.
     #[inline(always)]
     fn fill_others(
         &self,
@@ -372,19 +375,19 @@ impl TileContext<'_> {
     ) -> u32 {
         let mut found = 0;
         while left != 0 {
-            let (id, of_object) = first_alike(object, left, folds);
+            let (id, of_object) = group_first(object, left, folds);
             left &= !of_object;
             let thing = &self.world.geometry.objects()[id as usize];
-            // A hit by itself costs less alone.
+            // A single hit on a shape is cheaper to evaluate on its own.
             if matches!(thing, Object::Shape(_)) && of_object.is_power_of_two() {
                 continue;
             }
             let materials = self.world.row_of_materials(id, of_object, &hits.primitive);
             let (mut of, mut waiting) = (0, of_object);
             while waiting != 0 {
-                let (material, alike) = first_alike(&materials, waiting, folds);
+                let (material, alike) = group_first(&materials, waiting, folds);
                 waiting &= !alike;
-                of |= if self.is_held_by_rows(material as usize) { alike } else { 0 };
+                of |= if self.fits_surface_row(material as usize) { alike } else { 0 };
             }
             if of == 0 {
                 continue;
@@ -402,52 +405,58 @@ impl TileContext<'_> {
     }
 }
 
-/// Vertices of smooth meshes to lift above their facets.
+/// Which vertices of smooth meshes to lift above their facets.
 #[derive(Clone, Copy)]
-enum Lifts {
+enum LiftMode {
     /// All vertices.
     All,
-    /// Vertices whose bits are set, if nothing is on the way.
+    /// Vertices whose bits are set, if the segment to the lifted point is unoccluded.
     IfFree(u32),
 }
 
 impl VertexBatch {
-    /// Sets the triangles of some lanes.
+    /// Sets [`VertexBatch::start`] for the lanes in `of`.
     #[inline(always)]
     fn set_starts(&mut self, of: u32, starts: &[u32; PACKET]) {
         take_u32(&truths(of), starts, &mut self.start);
     }
 
-    /// Sets normals and points above facets for the lanes of smooth surfaces.
+    /// Sets shading normals and lifted origins in the lanes of smooth surfaces.
     #[inline(always)]
-    fn smooth(&mut self, rays: &RayRows, surface: &SurfaceRow, lifts: Lifts, folds: impl Folds) {
-        // Turn both normals to the viewer's side.
+    fn set_smooth_normals(
+        &mut self,
+        rays: &RayRows,
+        surface: &SurfaceRow,
+        lifts: LiftMode,
+        folds: impl Folds,
+    ) {
+        // Turn both normals toward the viewer.
         let (mut normals, mut facets) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
         let (mut ends, mut above, mut bent) = ([0.0; PACKET], [0; PACKET], [0; PACKET]);
         for i in 0..PACKET {
             let (geometric, direction) = (lane(&surface.normal, i), lane(&rays.direction, i));
             let shading = lane(&surface.shading_normal, i);
-            let is_bent =
+            let is_perturbed =
                 (shading.x != geometric.x) | (shading.y != geometric.y) | (shading.z != geometric.z);
-            bent[i] = if is_bent { TRUE } else { 0 };
+            bent[i] = if is_perturbed { TRUE } else { 0 };
             let side = if geometric.dot(direction) > 0.0 { -1.0 } else { 1.0 };
             set_lane(&mut normals, i, shading * side);
             set_lane(&mut facets, i, geometric * side);
         }
-        // Find the points above the facets.
+        // Find the lifted points above the facets.
         for i in 0..PACKET {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
-            let (is_above, end) = way_up(from, to, lane(&facets, i), lane(&surface.error, i));
+            let (is_above, end) = lift_segment(from, to, lane(&facets, i), lane(&surface.error, i));
             above[i] = if is_above { TRUE } else { 0 };
             ends[i] = end;
         }
-        // Decide which vertices rise at once, and which if nothing is on the way.
+        // Decide which vertices are lifted now, and which only if the segment is unoccluded.
         let of = truths(surface.smooth);
         let above = folds.bits(&above) & surface.smooth;
         let rises = match lifts {
-            Lifts::All => truths(above),
-            Lifts::IfFree(only_specular_before) => {
-                self.is_bounded |= folds.bits(&bent) & surface.smooth;
+            LiftMode::All => truths(above),
+            LiftMode::IfFree(only_specular_before) => {
+                self.has_horizon |= folds.bits(&bent) & surface.smooth;
                 self.may_lift |= above & only_specular_before;
                 [0; PACKET]
             }
@@ -464,21 +473,21 @@ impl VertexBatch {
         }
         take_u32(&rises, &[Ray::NO_TRIANGLE; PACKET], &mut self.start);
         take(&of, &ends, &mut self.lift_end);
-        take(&of, &[UNBENT; PACKET], &mut self.bend);
+        take(&of, &[UNPERTURBED; PACKET], &mut self.shading_normal_cosine);
         self.has_facet |= surface.smooth;
     }
 
-    /// Sets the positions of plain surfaces; returns a bit for each whose front the path hits.
+    /// Sets the positions and path state of plain vertices; returns the mask of those whose front face was hit.
     #[inline(always)]
-    fn place(
+    fn set_positions(
         &mut self,
         paths: &PacketSource<'_>,
         rays: &RayRows,
         surface: &SurfaceRow,
-        lifts: Lifts,
+        lifts: LiftMode,
         folds: impl Folds,
     ) -> u32 {
-        // Put the vertices on the facets, on the viewer's side.
+        // Place the vertices on the facets, on the viewer's side.
         let mut front = [0; PACKET];
         self.medium = [0; PACKET];
         for i in 0..PACKET {
@@ -493,7 +502,7 @@ impl VertexBatch {
         self.bsdf.orient(None, &mut self.normal, &rays.direction);
         // Replace the normals of smooth surfaces.
         if surface.smooth != 0 {
-            self.smooth(rays, surface, lifts, folds);
+            self.set_smooth_normals(rays, surface, lifts, folds);
         }
         // Copy the state of the paths.
         match paths {
@@ -507,7 +516,7 @@ impl VertexBatch {
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 for i in 0..PACKET {
-                    let Some(path) = paths.of_queue(i) else { break };
+                    let Some(path) = paths.queued_path(i) else { break };
                     set_lane(&mut self.throughput, i, path.throughput);
                     self.roulette_throughput[i] = path.state.roulette_throughput;
                     (self.slot[i], self.path[i]) = (path.slot, path.path);

@@ -1,52 +1,52 @@
-//! A path's ray, and the state of the path that weighs what the ray meets.
+//! A path's ray, and the path state that weights the light the ray finds.
 
 use super::cone::Cone;
 use super::medium::Medium;
 use crate::geometry::Ray;
-use crate::integrators::view::Ways;
+use crate::integrators::view::PathClasses;
 use crate::math::Vec3;
 
-/// A path's ray.
+/// The current ray of a path.
 #[derive(Clone, Copy)]
 pub struct PathRay {
-    /// The ray; its direction is a unit vector.
+    /// The ray; its direction is normalized.
     pub ray: Ray,
-    /// Throughput: the factor on the radiance that the ray meets.
+    /// Throughput: the factor on the radiance that arrives along the ray.
     pub throughput: Vec3,
-    /// The sample that it belongs to.
+    /// Slot of the sample.
     pub slot: u32,
-    /// Number that tells the paths of one sample apart.
+    /// Number that distinguishes the paths of one sample.
     pub path: u32,
-    /// The glass around it.
+    /// The glass around the ray.
     pub medium: Medium,
-    /// Events before this ray.
+    /// Summary of the path before this ray.
     pub state: PathState,
-    /// The beam around it.
+    /// The ray cone, for texture filtering.
     pub cone: Cone,
 }
 
-/// State of a path, beside its ray, that determines the weight of the light which it meets.
+/// Summary of a path's earlier vertices, which determines how the light that it finds is weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathState {
-    /// Pdf in sr⁻¹ of the direction at the last vertex's lobes. 0 after the camera, a mirror or glass, and if the path passed
-    /// through glass since: then no light sample finds what it meets.
-    pub density: f32,
-    /// The normal at the last vertex, by which its light samples went, if there is a pdf.
+    /// BSDF-sampling pdf of the direction at the last vertex, in sr⁻¹. 0 after the camera, a mirror or glass, or if the
+    /// path has passed through glass since: light samples cannot find such light.
+    pub pdf: f32,
+    /// Normal at the last vertex, which its light samples used; set if `pdf` > 0.
     pub normal: Vec3,
-    /// Throughput for Russian roulette: the largest component, of all lobes, whatever the view shows.
+    /// Throughput for Russian roulette: the largest component over all lobes, independent of the view.
     pub roulette_throughput: f32,
-    /// Whether only the camera, mirrors and glass come before.
+    /// Whether all vertices between the camera and this ray are specular.
     pub only_specular_before: bool,
-    /// Whether exactly one diffuse or glossy surface comes before.
+    /// Whether exactly one of the path's vertices is diffuse or glossy.
     pub one_diffuse_before: bool,
-    /// Whether the last such surface had a glossy lobe.
+    /// Whether the last such vertex has a glossy lobe.
     pub is_after_gloss: bool,
 }
 
 impl PathState {
-    /// The state of camera rays.
+    /// State of camera rays.
     pub const CAMERA: Self = Self {
-        density: 0.0,
+        pdf: 0.0,
         normal: Vec3::ZERO,
         roulette_throughput: 1.0,
         only_specular_before: true,
@@ -54,33 +54,33 @@ impl PathState {
         is_after_gloss: false,
     };
 
-    /// The state after a δ lobe that keeps this part of the radiance.
-    pub fn mirrored(self, part: f32) -> Self {
-        Self { density: 0.0, roulette_throughput: self.roulette_throughput * part, ..self }
+    /// The state after a specular bounce with reflectance or transmittance `part`.
+    pub fn after_specular(self, part: f32) -> Self {
+        Self { pdf: 0.0, roulette_throughput: self.roulette_throughput * part, ..self }
     }
 
-    /// The state after a surface that it passed straight on, of which this part is left: light samples find what is behind it.
-    pub fn straight(self, part: f32) -> Self {
+    /// The state after a null interaction with transmittance `part`. Light samples still find the light behind it.
+    pub fn passed_through(self, part: f32) -> Self {
         Self { roulette_throughput: self.roulette_throughput * part, ..self }
     }
 
-    /// Whether the view shows light that reaches the first diffuse or glossy surface by this path.
-    pub fn contributes(&self, ways: Ways) -> bool {
-        match (self.one_diffuse_before, self.density > 0.0) {
-            (true, true) => ways.direct,
-            (true, false) => ways.caustic,
-            (false, _) => ways.indirect,
+    /// Whether the view shows light that arrives along this path at its first diffuse or glossy vertex.
+    pub fn contributes(&self, paths: PathClasses) -> bool {
+        match (self.one_diffuse_before, self.pdf > 0.0) {
+            (true, true) => paths.direct,
+            (true, false) => paths.caustic,
+            (false, _) => paths.indirect,
         }
     }
 
-    /// The state after surfaces that change nothing, but hide from light samples what is behind them.
-    pub fn hidden(self) -> Self {
-        self.mirrored(1.0)
+    /// The state after a surface inside glass that does not change the ray, but blocks light samples.
+    pub fn hidden_from_lights(self) -> Self {
+        self.after_specular(1.0)
     }
 }
 
 impl PathRay {
-    /// Number of the path that goes on from here; `branch` tells its continuations apart.
+    /// Number of the continuation of this path; `branch` distinguishes the continuations.
     pub fn next_path(&self, branch: u32) -> u32 {
         // With XOR, the number 1 would stay 1 at each reflection, and every choice of the path would repeat the first
         // one.
@@ -109,18 +109,17 @@ mod tests {
     }
 
     #[test]
-    fn the_paths_of_a_sample_have_numbers_of_their_own() {
-        // Follow all paths of 12 splits, and one that is always reflected or always refracted.
-        let (mut round, mut only_specular_before) =
-            (vec![CAMERA_PATH + 1], HashSet::from([CAMERA_PATH, CAMERA_PATH + 1]));
+    fn path_numbers_within_a_sample_are_unique() {
+        // Follow all paths through 12 splits, then one that is always reflected and one that is always refracted.
+        let (mut round, mut visited) = (vec![CAMERA_PATH + 1], HashSet::from([CAMERA_PATH, CAMERA_PATH + 1]));
         for _ in 0..12 {
             round = round.iter().flat_map(|&path| [1, 2].map(|way| numbered(path).next_path(way))).collect();
-            assert!(round.iter().all(|&path| only_specular_before.insert(path)));
+            assert!(round.iter().all(|&path| visited.insert(path)));
         }
         for way in [1, 2] {
-            let (mut path, mut only_specular_before) = (CAMERA_PATH + 1, HashSet::from([CAMERA_PATH]));
+            let (mut path, mut visited) = (CAMERA_PATH + 1, HashSet::from([CAMERA_PATH]));
             for length in 0..10_000 {
-                assert!(only_specular_before.insert(path), "way {way} comes back to itself after {length}");
+                assert!(visited.insert(path), "branch {way} repeats after {length} bounces");
                 path = numbered(path).next_path(way);
             }
         }

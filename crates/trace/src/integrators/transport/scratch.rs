@@ -1,4 +1,4 @@
-//! Queues of rays.
+//! Buffers for queues of rays and hits.
 
 use super::camera::CameraRow;
 use super::crossing::CrossingMemory;
@@ -6,39 +6,39 @@ use super::ray::PathRay;
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::world::Hit;
 
-/// The memory of batches, which each uses again.
+/// Buffers that all batches of a thread reuse.
 #[derive(Default)]
 pub struct Scratch {
-    /// Rays of this round; camera rays at first.
+    /// Rays of this bounce; for first-hit AOVs, camera rays.
     pub rays: Vec<PathRay>,
-    /// Rays of the next round.
+    /// Rays of the next bounce.
     pub next: Vec<PathRay>,
-    /// Next rays of the camera.
+    /// Packets of camera rays.
     pub camera: Vec<CameraRow>,
     /// Surfaces at the hits of a packet.
     pub surfaces: SurfaceRow,
-    /// Hits of the rays of this round.
+    /// Hits of the rays of this bounce.
     pub hits: Vec<Option<Hit>>,
-    /// Order of the rays by the objects that they hit.
-    pub by_object: ByObject,
-    /// Memory for the surfaces near a hit of glass.
+    /// The rays ordered by the object that they hit.
+    pub object_order: ObjectOrder,
+    /// Buffers for the search for coincident surfaces.
     pub crossing: CrossingMemory,
 }
 
-/// Places in a queue, grouped by the objects that their rays hit, so that packets of them are shaded by few loops.
+/// Queue indices grouped by the objects that the rays hit, so that shading a packet takes few loop iterations.
 #[derive(Default)]
-pub struct ByObject {
+pub struct ObjectOrder {
     places: Vec<u32>,
 }
 
-impl ByObject {
-    /// Number of groups: the last bits of an object's number choose its group.
-    const KINDS: usize = 64;
+impl ObjectOrder {
+    /// Number of groups. The low bits of an object's index select its group.
+    const GROUPS: usize = 64;
 
-    /// Groups the places of these hits. Rays without a hit come last; a group keeps the order of the queue.
+    /// Groups the indices of these hits. Rays without a hit are last; each group keeps the queue order.
     pub fn sort(&mut self, hits: &[Option<Hit>]) {
-        let kind = |hit: &Option<Hit>| hit.map_or(Self::KINDS, |hit| hit.object as usize % Self::KINDS);
-        let mut starts = [0_u32; Self::KINDS + 2];
+        let kind = |hit: &Option<Hit>| hit.map_or(Self::GROUPS, |hit| hit.object as usize % Self::GROUPS);
+        let mut starts = [0_u32; Self::GROUPS + 2];
         for hit in hits {
             starts[kind(hit) + 1] += 1;
         }
@@ -54,7 +54,7 @@ impl ByObject {
         }
     }
 
-    /// Each place once.
+    /// The grouped queue indices.
     pub fn places(&self) -> &[u32] {
         &self.places
     }
@@ -66,15 +66,15 @@ mod tests {
     use crate::geometry::ShapeHit;
 
     #[test]
-    fn places_are_together_by_object_and_in_order() {
+    fn indices_are_grouped_by_object_in_order() {
         let hit = |object: u32| (object != 9).then_some(Hit { shape: ShapeHit::at(1.0), object });
         let hits: Vec<Option<Hit>> = [5, 9, 0, 5, 63, 9, 0, 5].map(hit).to_vec();
-        let mut by_object = ByObject::default();
+        let mut object_order = ObjectOrder::default();
         for _ in 0..2 {
-            by_object.sort(&hits);
-            assert_eq!(by_object.places(), [2, 6, 0, 3, 7, 4, 1, 5]);
+            object_order.sort(&hits);
+            assert_eq!(object_order.places(), [2, 6, 0, 3, 7, 4, 1, 5]);
         }
-        by_object.sort(&[]);
-        assert!(by_object.places().is_empty());
+        object_order.sort(&[]);
+        assert!(object_order.places().is_empty());
     }
 }

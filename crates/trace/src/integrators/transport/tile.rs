@@ -1,4 +1,4 @@
-//! Common data of all rays of a tile.
+//! Context shared by all rays of a tile.
 
 use std::array;
 use std::ops::Range;
@@ -6,14 +6,14 @@ use std::ops::Range;
 use crate::control::CancelToken;
 use crate::film::{Part, Pixels};
 use crate::integrators::RenderSettings;
-use crate::integrators::method::Behaviour;
+use crate::integrators::behavior::PathBehavior;
 use crate::lights::Receivers;
 use crate::lights::infinite::Environment;
 use crate::sampling::PixelSampler;
 use crate::scene::description::Shadows;
 use crate::world::{PACKET, World};
 
-/// Context of a tile: a world, the settings, and the requested samples.
+/// Context of a tile: the world, the settings, and the samples to render.
 pub struct TileContext<'a> {
     /// The scene.
     pub world: &'a World,
@@ -23,55 +23,56 @@ pub struct TileContext<'a> {
     pub block: &'a SampleBlock,
     /// Cancels the work.
     pub token: &'a CancelToken,
-    /// Growth of a pixel's beam with the distance; 0 if nothing needs it, as without mip levels.
+    /// Spread of a pixel's ray cone; 0 if nothing needs it, as without mip levels.
     pub pixel_spread: f32,
-    /// Behaviour of the rays.
-    pub behaviour: Behaviour,
-    /// Whether paths find a constant environment without light samples: the ray that goes on anyway is at least as good as a
-    /// sample, as only occluders tell one direction from another.
-    pub leaves_sky: bool,
-    /// Whether rays in glossy lobes find the environment's light that they reflect without light samples.
+    /// What paths do at surfaces.
+    pub behavior: PathBehavior,
+    /// Whether a constant environment is left to BSDF sampling. The continuing ray is then at least as good as a light
+    /// sample, as directions differ only by occlusion.
+    pub paths_find_sky: bool,
+    /// Whether rays in glossy lobes account for all light that these lobes reflect from the environment.
     pub lobes_find_sky: bool,
 }
 
 impl<'a> TileContext<'a> {
-    /// The context for these samples.
+    /// Creates the context for rendering these samples.
     pub fn new(
         world: &'a World,
         settings: &'a RenderSettings,
         block: &'a SampleBlock,
         token: &'a CancelToken,
-        behaviour: Behaviour,
+        behavior: PathBehavior,
     ) -> Self {
         let pixel_spread =
             if world.has_mipmaps() { world.camera.pixel_spread(settings.render.height) } else { 0.0 };
         let render = &settings.render;
-        let is_even = match world.lights.environment() {
+        let is_constant = match world.lights.environment() {
             Some(Environment::Constant(_)) => true,
             Some(Environment::Map { .. }) | None => false,
         };
-        let leaves_sky = is_even
-            && behaviour.scatters
-            && !behaviour.gathers
+        let paths_find_sky = is_constant
+            && behavior.scatters
+            && !behavior.gathers
             && render.shadows == Shadows::Soft
             && render.shadow_samples == 1
             && render.clamp == 0.0;
-        let lobes_find_sky = is_even && world.lights.selection(Receivers::Eye).is_none();
-        Self { world, settings, block, token, pixel_spread, behaviour, leaves_sky, lobes_find_sky }
+        let lobes_find_sky = is_constant && world.lights.selection(Receivers::Eye).is_none();
+        Self { world, settings, block, token, pixel_spread, behavior, paths_find_sky, lobes_find_sky }
     }
 
-    /// The random numbers of a slot.
+    /// The sampler of a slot.
     pub fn sampler(&self, slot: u32) -> PixelSampler {
         let (x, y, sample) = self.block.place(slot);
         PixelSampler::new(self.settings.render.seed, x, y, sample)
     }
 }
 
-/// The samples of a tile. A slot is the index of a sample among them: all of the first pixel, then all of the next.
+/// The samples of a tile. A slot is the index of a sample: all samples of the first pixel come first, then the samples
+/// of the next.
 pub struct SampleBlock {
     /// The pixels.
     pub pixels: Pixels,
-    /// Range of the sample numbers of each pixel.
+    /// Range of sample indices of each pixel.
     pub samples: Range<u32>,
 }
 
@@ -81,7 +82,7 @@ impl SampleBlock {
         self.pixels.count() * self.samples.len()
     }
 
-    /// Pixel and sample number of a slot.
+    /// Column, row and sample index of a slot.
     pub fn place(&self, slot: u32) -> (u32, u32, u32) {
         let samples = self.samples.len() as u32;
         let (pixel, sample) = (slot / samples, slot % samples);
@@ -89,13 +90,13 @@ impl SampleBlock {
         (x, y, self.samples.start + sample)
     }
 
-    /// Columns, rows and sample numbers of slots; arbitrary for a slot without a sample.
+    /// Columns, rows and sample indices of slots; arbitrary for a slot without a sample.
     #[inline(always)]
     pub fn places_of(&self, slots: &[u32; PACKET]) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
         let Pixels { rect, part } = self.pixels;
         let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(rect.width));
-        // Number the pixels of the part.
+        // Compute pixel indices within the shard.
         let mut index = [0; PACKET];
         for lane in 0..PACKET {
             let pixel = by_samples.quotient(slots[lane]);
@@ -103,7 +104,7 @@ impl SampleBlock {
             let first = pixel.wrapping_mul(self.samples.len() as u32);
             samples[lane] = self.samples.start.wrapping_add(slots[lane].wrapping_sub(first));
         }
-        // Number them in the rectangle, apart from the other loops, which then have no branch.
+        // Map them to indices within the rectangle. This branch is outside the other loops so that these have none.
         if part != Part::All {
             index = index.map(|pixel| part.index(pixel, rect));
         }
@@ -115,7 +116,7 @@ impl SampleBlock {
         (xs, ys, samples)
     }
 
-    /// Columns, rows and sample numbers of the slots from `first` on, also beyond the last.
+    /// Columns, rows and sample indices of the slots from `first` on, even past the last one.
     #[inline(always)]
     pub fn places(&self, first: u32) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
@@ -144,7 +145,7 @@ impl SampleBlock {
     }
 }
 
-/// Division of whole numbers by a constant one, in `f64`, as no vector instruction divides integers.
+/// Integer division by a constant, in `f64`, as no vector instruction divides integers.
 #[derive(Clone, Copy)]
 struct Divisor {
     inverse: f64,

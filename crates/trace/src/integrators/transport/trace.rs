@@ -1,4 +1,4 @@
-//! From rays in queues to hits.
+//! Intersection of queued rays.
 
 use super::ray::PathRay;
 use super::tile::TileContext;
@@ -6,11 +6,11 @@ use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::world::{Hit, PACKET};
 
-/// Rays between two polls of the token.
+/// Number of rays between two polls of the token.
 const POLL_INTERVAL: usize = 256;
 
 impl TileContext<'_> {
-    /// Finds the nearest hit of every ray in a queue, in place of the content of `hits`.
+    /// Finds the closest hit of every ray in a queue, replacing the content of `hits`.
     pub fn closest_hits(&self, rays: &[PathRay], hits: &mut Vec<Option<Hit>>) -> Result<(), Cancelled> {
         hits.clear();
         hits.resize(rays.len(), None);

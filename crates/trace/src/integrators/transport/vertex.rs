@@ -1,8 +1,8 @@
-//! All data of a hit for shading, prepared once: the geometry, the shading normal, its bounds, and the BSDF.
+//! A path vertex: the geometry, normals and material at a hit, prepared for shading.
 
 use std::borrow::Cow;
 
-use super::cone::{Bend, Cone};
+use super::cone::{Cone, SpecularEvent};
 use super::medium::Medium;
 use super::ray::PathRay;
 use super::tile::TileContext;
@@ -14,33 +14,33 @@ use crate::math::Vec3;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, Sides};
 
-/// A path's vertex at a surface.
+/// A path's vertex on a surface.
 pub struct Vertex<'a> {
     /// The surface.
     pub surface: SurfacePoint,
     /// Its material.
     pub material: &'a Material,
-    /// [`Ray::start`] of rays that leave.
+    /// [`Ray::start`] of rays that leave the vertex.
     start: u32,
-    /// Starts of rays that leave, if they are known better than by the error of the surface.
+    /// Origins for rays on either side, if they are known more precisely than from the error bound of the surface.
     sides: Option<Sides>,
-    /// Whether the path hits the front.
+    /// Whether the path hits the front face.
     pub is_front: bool,
-    /// Whether the surface has texture coordinates; looked up for materials with directions alone.
-    has_coordinates: bool,
-    /// Unit direction to the viewer, from which the path comes.
-    pub to_eye: Vec3,
+    /// Whether the surface has texture coordinates; set only for materials that need tangents.
+    has_uv: bool,
+    /// Unit direction toward the viewer, from which the path arrives.
+    pub wo: Vec3,
     /// Geometric normal on the viewer's side.
     pub normal: Vec3,
-    /// −1 if the viewer's side is the back, else 1.
+    /// −1 if the viewer is on the back side, otherwise 1.
     side: f32,
-    /// Point of the texture look-ups.
+    /// Point for texture lookups.
     pub texture_point: TexturePoint,
-    /// The beam of the path at the surface.
+    /// The ray cone of the path at the surface.
     pub cone: Cone,
-    /// Vertex colour, by which the material's colour is multiplied. `None` if it does not count.
+    /// Vertex color, which multiplies the material's color. `None` if it has none.
     pub color: Option<Vec3>,
-    /// Mean curvature, > 0 if the surface bulges towards the viewer; computed for δ surfaces alone.
+    /// Mean curvature, > 0 if the surface bulges toward the viewer; computed only for specular surfaces.
     pub curvature: f32,
 }
 
@@ -50,18 +50,18 @@ impl<'a> Vertex<'a> {
         Self::on(tile, path, hit, tile.world.geometry.surface(&path.ray, hit))
     }
 
-    /// The vertex at a hit, with only those parts of the surface that its material needs.
-    pub fn to_shade(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
+    /// The vertex at a hit, computing only what its material needs.
+    pub fn for_shading(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
         Self::shaded(tile, path, (&path.ray, hit), hit.shape.t)
     }
 
-    /// The vertex at a hit whose surface is known.
+    /// The vertex at a hit whose surface is already computed.
     pub fn on(tile: &TileContext<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
         Self::at_surface(tile, path, tile.world.material_index(hit), surface, hit, hit.shape.t)
     }
 
-    /// The vertex of a surface that touches the surface of a hit at this distance, as the way between the sides of both
-    /// hits it.
+    /// The vertex on a surface coincident with the surface hit at this distance, where the segment between the two
+    /// origins hits it.
     pub fn touching(
         tile: &TileContext<'a>,
         path: &PathRay,
@@ -79,7 +79,7 @@ impl<'a> Vertex<'a> {
         Self::at_surface(tile, path, index, surface, hit, distance)
     }
 
-    // Surfaces are large: each call would copy them.
+    // Inlined because surfaces are large, and each call would copy them.
     #[inline(always)]
     fn at_surface(
         tile: &TileContext<'a>,
@@ -90,11 +90,11 @@ impl<'a> Vertex<'a> {
         distance: f32,
     ) -> Self {
         let material = &tile.world.materials[index];
-        // Decide which side the path is on.
-        let to_eye = -path.ray.direction;
-        let side = if surface.normal.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
+        // Determine the path's side.
+        let wo = -path.ray.direction;
+        let side = if surface.normal.dot(wo) < 0.0 { -1.0 } else { 1.0 };
         let cone = path.cone.after(distance);
-        // Compute what beams need, if there are any.
+        // Compute what ray cones need, if they are used.
         let has_beam = tile.pixel_spread > 0.0;
         let footprint = |tangents| match has_beam && tile.world.is_mipmapped(index) {
             true => Footprint::of_cone(cone.width.abs(), path.ray.direction, surface.normal, tangents),
@@ -110,9 +110,9 @@ impl<'a> Vertex<'a> {
             color: tile.world.vertex_color(hit),
             curvature,
             material,
-            has_coordinates: tile.world.has_coordinates(hit.object),
+            has_uv: tile.world.has_coordinates(hit.object),
             is_front: surface.normal.dot(path.ray.direction) < 0.0,
-            to_eye,
+            wo,
             normal: surface.normal * side,
             side,
             surface,
@@ -121,42 +121,42 @@ impl<'a> Vertex<'a> {
         }
     }
 
-    /// Whether it emits towards the path.
+    /// Whether the vertex emits toward the path.
     pub fn emits(&self) -> bool {
         self.material.emission.shines_from(self.is_front)
     }
 
-    /// The radiance that it emits. For paths that share their lamps with light samples, it is what light samples find: that of the
-    /// point.
+    /// The radiance emitted toward the path. If light samples compete with the path, textures are looked up at the
+    /// point without filtering, as light samples do.
     pub fn emitted(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
-        let is_shared = path.state.density > 0.0;
-        let at = self.place(is_shared);
-        self.material.emission.at(&at, self.normal.dot(self.to_eye), &mut counters.texture_lookups)
+        let is_shared = path.state.pdf > 0.0;
+        let at = self.lookup_point(is_shared);
+        self.material.emission.at(&at, self.normal.dot(self.wo), &mut counters.texture_lookups)
     }
 
-    /// The point of the texture look-ups, without its extent for paths that share their lamps with light samples.
-    pub fn place(&self, is_shared: bool) -> Cow<'_, TexturePoint> {
+    /// The point for texture lookups, without its footprint if light samples compete with the path.
+    pub fn lookup_point(&self, is_shared: bool) -> Cow<'_, TexturePoint> {
         match is_shared {
             true => Cow::Owned(self.texture_point.without_extent()),
             false => Cow::Borrowed(&self.texture_point),
         }
     }
 
-    /// A colour of the material, multiplied by the vertex colour.
+    /// Multiplies a material color by the vertex color.
     #[inline]
     pub fn tinted(&self, color: Vec3) -> Vec3 {
         self.color.map_or(color, |own| color * own)
     }
 
-    /// Transmittance of a pane here. For paths that share their lamps with light samples, it is what shadow rays find: that of the
-    /// point.
-    pub fn pane_tint(&self, path: &PathRay, pane: &Pane, lookups: &mut u64) -> Vec3 {
-        let is_shared = path.state.density > 0.0;
-        let at = self.place(is_shared);
+    /// Transmittance of a thin pane at this vertex. If light samples compete with the path, the texture is looked up at
+    /// the point without filtering, as shadow rays do.
+    pub fn pane_transmittance(&self, path: &PathRay, pane: &Pane, lookups: &mut u64) -> Vec3 {
+        let is_shared = path.state.pdf > 0.0;
+        let at = self.lookup_point(is_shared);
         self.tinted(pane.tint.at(&at, lookups).min(Vec3::ONE))
     }
 
-    /// Multiplies a BSDF by the vertex colour.
+    /// Multiplies a BSDF by the vertex color.
     #[inline(always)]
     pub fn tint(&self, bsdf: &mut RoughBsdf) {
         if let Some(color) = self.color {
@@ -164,12 +164,12 @@ impl<'a> Vertex<'a> {
         }
     }
 
-    /// Sets the starts of rays that leave.
-    pub fn start_between(&mut self, sides: Sides) {
+    /// Sets the origins for rays on either side.
+    pub fn set_sides(&mut self, sides: Sides) {
         self.sides = Some(sides);
     }
 
-    /// The vertex for light that comes through the surface: on the side that the viewer does not see.
+    /// The vertex for transmitted light, on the side that the viewer does not see.
     pub fn behind(&self) -> Self {
         let turned = |Sides { before, beyond }: Sides| Sides { before: beyond, beyond: before };
         Self {
@@ -181,7 +181,7 @@ impl<'a> Vertex<'a> {
         }
     }
 
-    /// The interpolated normal, bent by the relief, on the front side.
+    /// The shading normal on the front side: interpolated, then perturbed by the normal or bump map.
     pub fn front_shading_normal(&self, counters: &mut RayCounters) -> Vec3 {
         let surface = &self.surface;
         let Some(relief) = &self.material.relief else { return surface.shading_normal };
@@ -189,20 +189,20 @@ impl<'a> Vertex<'a> {
         relief.bend(&self.texture_point, normal, tangents, &mut counters.texture_lookups)
     }
 
-    /// The shading normals.
+    /// The shading normals on the viewer's side.
     pub fn shading(&self, counters: &mut RayCounters) -> Shading {
         let normal = self.front_shading_normal(counters) * self.side;
         let smooth_normal = self.surface.shading_normal * self.side;
-        let bend = (smooth_normal != normal).then(|| smooth_normal.dot(normal));
-        Shading { normal, smooth_normal, bend }
+        let shading_normal_cosine = (smooth_normal != normal).then(|| smooth_normal.dot(normal));
+        Shading { normal, smooth_normal, shading_normal_cosine }
     }
 
-    /// The beam after reflection or refraction here.
-    pub fn bent_cone(&self, bend: Bend) -> Cone {
-        self.cone.bent(bend, self.curvature, self.to_eye.dot(self.normal))
+    /// The ray cone after specular reflection or refraction.
+    pub fn cone_after(&self, event: SpecularEvent) -> Cone {
+        self.cone.after_specular(event, self.curvature, self.wo.dot(self.normal))
     }
 
-    /// Reflectance of a mirror here, by the shading normal; with white in place of textures if colours are not shown.
+    /// Reflectance of a mirror at this vertex, using the shading normal; textures count as white unless `is_colored`.
     pub fn mirror_reflectance(
         &self,
         mirror: &Mirror,
@@ -210,7 +210,7 @@ impl<'a> Vertex<'a> {
         is_colored: bool,
         counters: &mut RayCounters,
     ) -> Vec3 {
-        let cosine = shading.normal.dot(self.to_eye).abs().min(1.0);
+        let cosine = shading.normal.dot(self.wo).abs().min(1.0);
         if is_colored {
             mirror.reflectance(cosine, self.color, &self.texture_point, &mut counters.texture_lookups)
         } else {
@@ -218,23 +218,23 @@ impl<'a> Vertex<'a> {
         }
     }
 
-    /// The part that a smooth coat here reflects, by the shading normal.
+    /// Fresnel reflectance of a smooth coat at this vertex, using the shading normal.
     pub fn coat_reflectance(&self, coated: &Coated, shading: &Shading) -> f32 {
-        coated.fresnel(shading.normal.dot(self.to_eye).abs().min(1.0))
+        coated.fresnel(shading.normal.dot(self.wo).abs().min(1.0))
     }
 
-    /// Derivative of the position by u; zero on a mesh without texture coordinates, whose barycentric ones say nothing about u.
+    /// ∂p/∂u; zero on a mesh without texture coordinates, as its barycentric coordinates do not define u.
     pub fn tangent(&self) -> Vec3 {
-        if self.has_coordinates { self.surface.dpdu } else { Vec3::ZERO }
+        if self.has_uv { self.surface.dpdu } else { Vec3::ZERO }
     }
 
-    /// Origin of rays on the other side, where the starts of rays are known on both.
+    /// Origin for rays on the far side, if origins are known on both sides.
     pub fn beyond(&self) -> Option<Vec3> {
         self.sides.map(|sides| sides.beyond)
     }
 
-    /// A ray that starts here.
-    pub fn leaving(&self, direction: Vec3) -> Ray {
+    /// Spawns a ray in a direction.
+    pub fn spawn_ray(&self, direction: Vec3) -> Ray {
         let SurfacePoint { point, error, normal, .. } = self.surface;
         match self.sides {
             Some(sides) if direction.dot(self.normal) < 0.0 => Ray::new(sides.beyond, direction),
@@ -243,21 +243,22 @@ impl<'a> Vertex<'a> {
         }
     }
 
-    /// Origin of light samples. A facet of a smooth mesh sees lights from a point above it, if nothing is on the way there, so
-    /// that its neighbours do not shadow what the normals say is lit. Light at that point reaches the facet without passing
-    /// around a corner of a closed surface. Otherwise the origin is on the facet itself, and nothing behind it is visible; so
-    /// it is at vertices that the camera does not see, where the way up would cost a ray without a visible difference.
+    /// Origin of shadow rays. On a smooth mesh, lights are sampled from a point above the facet, if the segment to that
+    /// point is unoccluded, so that neighboring facets do not shadow what the normals say is lit. Light at that point
+    /// reaches the facet without passing around a corner of a closed surface. Otherwise the origin is on the facet, and
+    /// nothing behind the facet is visible. This also applies to vertices that the camera does not see, where testing
+    /// the segment would cost a ray without a visible difference.
     pub fn shadow_origin(&self, tile: &TileContext<'_>, only_specular_before: bool) -> ShadowOrigin {
         let SurfacePoint { point, error, shadow_point, shading_normal, normal, .. } = self.surface;
         if let Some(sides) = self.sides {
-            // No ray of rough glass passes its own facet on the way.
-            let is_bent = shading_normal != normal && self.material.bsdf.glass().is_some();
-            let horizon = is_bent.then_some(self.normal);
+            // No ray at rough glass may pass through its own facet.
+            let is_perturbed = shading_normal != normal && self.material.bsdf.glass().is_some();
+            let horizon = is_perturbed.then_some(self.normal);
             return ShadowOrigin { point: sides.before, start: Ray::NO_TRIANGLE, horizon, lift: None };
         }
         let on_facet = offset_origin(point, error, self.normal, self.normal);
         let is_traced = tile.settings.render.shadows != Shadows::Off;
-        let (is_above, end) = way_up(on_facet, shadow_point, self.normal, error);
+        let (is_above, end) = lift_segment(on_facet, shadow_point, self.normal, error);
         if is_above && !is_traced {
             return ShadowOrigin { point: shadow_point, start: Ray::NO_TRIANGLE, horizon: None, lift: None };
         }
@@ -267,64 +268,68 @@ impl<'a> Vertex<'a> {
     }
 }
 
-/// Whether the way from a facet to a point goes up far enough to matter, and the end of the way: 1 at the point, and a margin
-/// for the error.
+/// Whether lifting a point from its facet to `to` is far enough to matter, and the `t_max` of the segment: 1 at the
+/// point, plus a margin for the error.
 #[inline(always)]
-pub fn way_up(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
+pub fn lift_segment(on_facet: Vec3, to: Vec3, normal: Vec3, error: Vec3) -> (bool, f32) {
     let lift = Ray { t_max: 1.0, ..Ray::new(on_facet, to - on_facet) };
-    let is_above = lift.direction.dot(normal) > LEAST_LIFT * normal.abs().dot(error);
+    let is_above = lift.direction.dot(normal) > MIN_LIFT * normal.abs().dot(error);
     (is_above, lift.beyond(error).t_max)
 }
 
-/// Least lift, in errors of the point; for less, the facet serves as well.
-const LEAST_LIFT: f32 = 8.0;
+/// Minimum lift, in units of the point's error; below it, the facet serves as well.
+const MIN_LIFT: f32 = 8.0;
 
-/// Origin of light samples and shadow rays.
+/// Origin of shadow rays.
 #[derive(Clone, Copy, Debug)]
 pub struct ShadowOrigin {
     /// The point from which lights are sampled and shadow rays start.
     pub point: Vec3,
-    /// [`Ray::start`] of the rays in front of the facet.
+    /// [`Ray::start`] of rays in front of the facet.
     pub start: u32,
-    /// Horizon normal: nothing behind it is visible. `None` if the cosines or the shadow rays take care of this.
+    /// Horizon normal: nothing behind it is visible. `None` if the cosines or the shadow rays account for this.
     pub horizon: Option<Vec3>,
-    /// Another point above it. If nothing is on the way there, lights are sampled from it, in all directions.
+    /// A point above it, from which lights in all directions are sampled instead if the segment to it is unoccluded.
     pub lift: Option<Lift>,
 }
 
-/// The way to a point above a facet.
+/// A segment from a facet to a point above it.
 #[derive(Clone, Copy, Debug)]
 pub struct Lift {
     /// The point.
     pub to: Vec3,
-    /// The end of the way: 1 at the point, and a margin for the error.
+    /// `t_max` of the segment: 1 at the point, plus a margin for the error.
     pub end: f32,
 }
 
 impl Shading {
     /// The normals on the other side.
     pub fn behind(&self) -> Self {
-        Self { normal: -self.normal, smooth_normal: -self.smooth_normal, bend: self.bend }
+        Self {
+            normal: -self.normal,
+            smooth_normal: -self.smooth_normal,
+            shading_normal_cosine: self.shading_normal_cosine,
+        }
     }
 }
 
 /// Shading normals on the viewer's side.
 pub struct Shading {
-    /// The interpolated normal, bent by a relief.
+    /// The interpolated normal, perturbed by the normal or bump map.
     pub normal: Vec3,
     /// The interpolated normal.
     pub smooth_normal: Vec3,
-    /// The cosine between them. `None` if they are equal.
-    pub bend: Option<f32>,
+    /// The cosine between the two. `None` if they are equal.
+    pub shading_normal_cosine: Option<f32>,
 }
 
-/// A vertex with a lobe that is not δ, ready for direct light.
+/// A vertex with a non-specular lobe, ready for direct lighting.
 pub struct ShadingVertex<'a> {
-    /// The path that came here.
+    /// The path that arrived at the vertex.
     pub path: &'a PathRay,
-    /// The glass around the side that is lit.
+    /// The medium on the lit side.
     pub medium: &'a Medium,
-    /// Its place in the round's queue.
+    /// Index of the path in the bounce's queue.
     pub place: u32,
     /// The vertex.
     pub vertex: &'a Vertex<'a>,

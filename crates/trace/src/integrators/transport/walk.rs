@@ -1,11 +1,11 @@
-//! Walk of a ray to the first surface where the index of refraction around it changes, or which is opaque and there. Paths from
-//! the eye and photons walk alike; a [`Walker`] decides what happens at that surface.
+//! Traces a path to its next interaction: an opaque surface, or a boundary where the index of refraction changes.
+//! Camera paths and photons share this code; a [`PathStepper`] handles the interaction.
 //!
-//! Thin panes, and surfaces that chance leaves out by their opacity, are passed straight on: to what it meets there, the path comes
-//! from its last vertex, as shadow rays do.
+//! Thin panes and stochastically transparent surfaces are null interactions: they leave the path vertex and its pdf
+//! unchanged, as for shadow rays.
 
 use super::crossing::{Crossing, CrossingMemory};
-use super::interface::STRAIGHT;
+use super::interface::PASSED;
 use super::medium::{Medium, absorption, ior};
 use super::ray::PathRay;
 use super::tile::TileContext;
@@ -17,85 +17,91 @@ use crate::math::Vec3;
 use crate::sampling::Decision;
 use crate::world::{Hit, MOST_STRAIGHT, Sides};
 
-/// Most surfaces without a change of glass that a ray passes in one walk.
-pub const MOST_HIDDEN: usize = 64;
+/// Maximum number of surfaces without a change of medium that a ray passes in one walk.
+pub const MAX_HIDDEN: usize = 64;
 
-/// Surface at which a walk ends.
-pub enum Reached<'v, 'a> {
-    /// An opaque surface, and the medium beyond it.
+/// The interaction at which a walk ends.
+pub enum Interaction<'v, 'a> {
+    /// An opaque surface, and the medium behind it.
     Opaque(&'v Vertex<'a>, OpaqueHit, &'v Medium),
-    /// A change of glass at a hit.
-    Glass(&'v Vertex<'a>, Hit, Change<'v>),
-    /// None: the ray leaves the scene.
+    /// A boundary between media, at a hit on glass.
+    Glass(&'v Vertex<'a>, Hit, Interface<'v>),
+    /// The ray leaves the scene.
     Nothing,
-    /// One more surface within glass, after [`MOST_HIDDEN`] of them.
+    /// The ray has passed [`MAX_HIDDEN`] surfaces without a change of medium.
     Hidden,
 }
 
-/// Change of glass at a surface.
+/// A boundary between two media.
 #[derive(Clone, Copy)]
-pub struct Change<'v> {
-    /// The medium beyond it.
+pub struct Interface<'v> {
+    /// The medium on the far side.
     pub far: &'v Medium,
-    /// The rough surface there. `None` if it is smooth.
+    /// The rough surface of the boundary. `None` if it is smooth.
     pub rough: Option<GlassPoint>,
 }
 
-/// Owner of walking paths: the wavefront of the eye, or that of the photons.
-pub trait Walker<'a> {
+/// Handles the interactions of paths: the wavefront of camera paths or of photons.
+pub trait PathStepper<'a> {
     /// Context of the tile.
     fn tile(&self) -> &'a TileContext<'a>;
 
-    /// Memory for the surfaces near a hit of glass.
+    /// Buffers for the search for coincident surfaces.
     fn crossing(&mut self) -> &mut CrossingMemory;
 
-    /// Takes note of a surface that changed nothing: the path goes on behind it, to the next hit.
-    fn pass(&mut self, path: &PathRay, next: Option<Hit>);
+    /// Records that the path passed a surface; `next` is the next hit behind it.
+    fn note_null(&mut self, path: &PathRay, next: Option<Hit>);
 
-    /// Goes on where the walk ends. The path's ray is the one that arrives, in the medium before the surface, with the absorption on
-    /// the way in its throughput. `has_passed` tells whether any surface was passed.
-    fn reach(&mut self, path: &PathRay, reached: Reached<'_, 'a>, has_passed: bool);
+    /// Handles the interaction that ends a walk. The path's ray is the arriving one, in the medium before the surface,
+    /// with absorption already in its throughput. `has_passed` says whether the walk passed any surface inside glass.
+    fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool);
 
-    /// Number of texture look-ups, to be added to.
+    /// The counter of texture lookups.
     fn lookups(&mut self) -> &mut u64;
 
-    /// Goes on at a thin pane. The path is as for [`Walker::reach`].
-    fn meet_pane(&mut self, path: &PathRay, vertex: &Vertex<'a>, hit: OpaqueHit, pane: &Pane) -> Straight;
+    /// Handles a thin pane. The path is as for [`PathStepper::interact`].
+    fn hit_pane(
+        &mut self,
+        path: &PathRay,
+        vertex: &Vertex<'a>,
+        hit: OpaqueHit,
+        pane: &Pane,
+    ) -> NullInteraction;
 }
 
-/// Continuation of a path at a surface that light may pass straight on.
+/// Outcome at a surface through which light may pass straight.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Straight {
-    /// It passes, with this factor on its throughput.
-    Passes(Vec3),
-    /// The surface is there.
-    Stays,
-    /// It ends, or goes on elsewhere.
-    Ends,
+pub enum NullInteraction {
+    /// The path passes, with this factor on its throughput.
+    Passed(Vec3),
+    /// The surface is opaque here.
+    Opaque,
+    /// The path ends, or continues elsewhere.
+    Ended,
 }
 
-/// Way of a path since its last vertex, if it passed surfaces straight on.
+/// The straight segment of a path since its last vertex, across null interactions.
 #[derive(Clone, Copy)]
-struct Way {
-    /// The last vertex, if there are any surfaces.
+struct Segment {
+    /// The last vertex, if any surface was passed.
     origin: Vec3,
-    /// Distance of the path's current ray from it.
+    /// Distance from it to the origin of the path's current ray.
     distance: f32,
-    /// Number of the surfaces.
+    /// Number of surfaces passed.
     count: u32,
 }
 
-impl Way {
-    /// The way of a path that has passed nothing yet.
+impl Segment {
+    /// The segment of a path that has not passed any surface.
     const DIRECT: Self = Self { origin: Vec3::ZERO, distance: 0.0, count: 0 };
 
-    /// The way behind one more surface, which the path meets at a distance.
+    /// Extends the segment past one more surface, which the path hits at a distance.
     fn behind(self, path: &PathRay, distance: f32) -> Self {
         let origin = if self.count == 0 { path.ray.origin } else { self.origin };
         Self { origin, distance: self.distance + distance, count: self.count + 1 }
     }
 
-    /// Makes the path one that comes from its last vertex without a stop; returns its hit.
+    /// Moves the origin of the path's ray back to its last vertex, and returns the hit with the distance from there.
     #[inline(always)]
     fn straighten(&self, path: &mut PathRay, mut hit: Hit) -> Hit {
         if self.count > 0 {
@@ -106,75 +112,79 @@ impl Way {
     }
 }
 
-/// Hit of an opaque surface.
+/// Hit on an opaque surface.
 #[derive(Clone, Copy, Debug)]
 pub enum OpaqueHit {
-    /// The ray hits it.
+    /// The ray hits the surface itself.
     Own(Hit),
-    /// It touches the glass that the ray hits with it.
+    /// The surface is coincident with glass that the ray hits.
     Touching(Hit),
 }
 
-/// Walks from the hit of a path's ray, which takes the path along; `surface` is that of the hit, if it is known. No path and no
-/// vertex is moved, as they are large.
+/// Walks from the hit of a path's ray to its next interaction, updating the path; `surface` is the surface at the hit,
+/// if it is known. Paths and vertices are large, so they are not moved.
 #[inline(always)]
-pub fn walk<'a, W: Walker<'a>>(
-    walker: &mut W,
+pub fn walk<'a, W: PathStepper<'a>>(
+    stepper: &mut W,
     path: &mut PathRay,
     (mut hit, mut surface): (Hit, Option<SurfacePoint>),
 ) {
-    let tile = walker.tile();
-    let (mut way, mut hidden) = (Way::DIRECT, 0);
-    while hidden < MOST_HIDDEN {
+    let tile = stepper.tile();
+    let (mut way, mut hidden) = (Segment::DIRECT, 0);
+    while hidden < MAX_HIDDEN {
         let has_passed = hidden > 0;
         let mut vertex = match surface.take() {
             Some(surface) => Vertex::on(tile, path, &hit, surface),
-            None => Vertex::to_shade(tile, path, &hit),
+            None => Vertex::for_shading(tile, path, &hit),
         };
-        // Stop at an opaque surface, or pass it straight on.
+        // Stop at an opaque surface, or pass it as a null interaction.
         if vertex.material.bsdf.glass().is_none() {
             path.throughput *= absorption(tile.world, &path.medium, hit.shape.t);
             if vertex.material.lets_pass() {
-                match straight(walker, path, &vertex, (way, hit)) {
-                    Straight::Passes(_) if way.count == MOST_STRAIGHT => return,
-                    Straight::Passes(part) => {
+                match null_interaction(stepper, path, &vertex, (way, hit)) {
+                    NullInteraction::Passed(_) if way.count == MOST_STRAIGHT => return,
+                    NullInteraction::Passed(part) => {
                         way = way.behind(path, hit.shape.t);
-                        *path = passed(*path, &vertex, part);
+                        *path = past_surface(*path, &vertex, part);
                         match tile.world.geometry.closest(&path.ray) {
                             Some(next) => {
-                                walker.pass(path, Some(next));
+                                stepper.note_null(path, Some(next));
                                 hit = next;
                                 continue;
                             }
                             None => {
-                                walker.pass(path, None);
+                                stepper.note_null(path, None);
                                 path.ray.origin = way.origin;
-                                return walker.reach(path, Reached::Nothing, has_passed);
+                                return stepper.interact(path, Interaction::Nothing, has_passed);
                             }
                         }
                     }
-                    Straight::Ends => return,
-                    Straight::Stays => {}
+                    NullInteraction::Ended => return,
+                    NullInteraction::Opaque => {}
                 }
             }
             if tile.world.has_open_glass() {
-                path.medium = tile.without_open(path.medium);
+                path.medium = tile.without_open_glass(path.medium);
             }
             let mut far = path.medium;
             if vertex.material.bsdf.lets_through() && tile.world.has_glass() {
-                // Light may come out of glass that touches it.
-                let crossing = tile.crossing(path, &vertex, &hit, walker.crossing());
+                // Light may arrive from glass that touches the surface.
+                let crossing = tile.crossing(path, &vertex, &hit, stepper.crossing());
                 if let Some([_, near]) = crossing.before {
                     path.medium = near;
                 }
                 far = crossing.far;
-                vertex.start_between(crossing.sides);
+                vertex.set_sides(crossing.sides);
             }
             let hit = way.straighten(path, hit);
-            return walker.reach(path, Reached::Opaque(&vertex, OpaqueHit::Own(hit), &far), has_passed);
+            return stepper.interact(
+                path,
+                Interaction::Opaque(&vertex, OpaqueHit::Own(hit), &far),
+                has_passed,
+            );
         }
-        // At glass, find all surfaces that touch here.
-        let Crossing { sides, before, far, opaque } = tile.crossing(path, &vertex, &hit, walker.crossing());
+        // At glass, find all coincident surfaces.
+        let Crossing { sides, before, far, opaque } = tile.crossing(path, &vertex, &hit, stepper.crossing());
         let arrived = before.as_ref().map_or(&path.medium, |[arrived, _]| arrived);
         path.throughput *= absorption(tile.world, arrived, hit.shape.t);
         if let Some([_, near]) = before {
@@ -182,127 +192,132 @@ pub fn walk<'a, W: Walker<'a>>(
         }
         if let Some(touching) = opaque {
             let vertex = Vertex::touching(tile, path, (sides, &touching), hit.shape.t);
-            if !vertex.material.lets_pass() || is_touched(walker, path, &vertex) {
+            if !vertex.material.lets_pass() || stops_at_touching(stepper, path, &vertex) {
                 let touched = Hit { shape: ShapeHit { t: hit.shape.t, ..touching.shape }, ..touching };
                 let touched = way.straighten(path, touched);
-                let reached = Reached::Opaque(&vertex, OpaqueHit::Touching(touched), &far);
-                return walker.reach(path, reached, has_passed);
+                let reached = Interaction::Opaque(&vertex, OpaqueHit::Touching(touched), &far);
+                return stepper.interact(path, reached, has_passed);
             }
-            path.path = path.next_path(STRAIGHT);
+            path.path = path.next_path(PASSED);
         }
-        // Stop at a change of glass, if both sides refract differently.
+        // Stop at a boundary between media with different indices of refraction.
         let near = &path.medium;
         if near.glass() != far.glass() && ior(tile.world, near) != ior(tile.world, &far) {
-            vertex.start_between(sides);
+            vertex.set_sides(sides);
             let rough = if tile.world.has_rough_glass() {
-                rough(walker, path, (&vertex, &hit), (sides, &far))
+                rough(stepper, path, (&vertex, &hit), (sides, &far))
             } else {
                 None
             };
             let hit = way.straighten(path, hit);
-            return walker.reach(path, Reached::Glass(&vertex, hit, Change { far: &far, rough }), has_passed);
+            return stepper.interact(
+                path,
+                Interaction::Glass(&vertex, hit, Interface { far: &far, rough }),
+                has_passed,
+            );
         }
-        // Pass on, as nothing changes here.
+        // Otherwise pass the surface.
         (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
-        path.state = path.state.hidden();
+        path.state = path.state.hidden_from_lights();
         path.cone = path.cone.after(hit.shape.t);
-        (way, hidden) = (Way::DIRECT, hidden + 1);
+        (way, hidden) = (Segment::DIRECT, hidden + 1);
         let next = tile.world.geometry.closest(&path.ray);
-        walker.pass(path, next);
+        stepper.note_null(path, next);
         match next {
             Some(next) => hit = next,
-            None => return walker.reach(path, Reached::Nothing, true),
+            None => return stepper.interact(path, Interaction::Nothing, true),
         }
     }
-    walker.reach(path, Reached::Hidden, true);
+    stepper.interact(path, Interaction::Hidden, true);
 }
 
-/// The rough surface between a path's medium and that beyond a hit, which refract differently. `None` if it is smooth.
+/// The rough surface between two media with different indices of refraction. `None` if it is smooth.
 #[cold]
 #[inline(never)]
-fn rough<'a, W: Walker<'a>>(
-    walker: &mut W,
+fn rough<'a, W: PathStepper<'a>>(
+    stepper: &mut W,
     path: &PathRay,
     (vertex, hit): (&Vertex<'a>, &Hit),
     (sides, far): (Sides, &Medium),
 ) -> Option<GlassPoint> {
-    let tile = walker.tile();
+    let tile = stepper.tile();
     let media = [&path.medium, far];
     let indices = media.map(|medium| ior(tile.world, medium));
-    let boundary = tile.boundary(hit, media, walker.crossing())?;
+    let boundary = tile.boundary(hit, media, stepper.crossing())?;
     let glass = tile.world.materials[boundary.material as usize].bsdf.glass()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
     let touching = touching.map(|other| Vertex::touching(tile, path, (sides, &other), hit.shape.t));
     let at = touching.as_ref().map_or(&vertex.texture_point, |other| &other.texture_point);
-    let alpha = glass.alpha(at, walker.lookups())?;
+    let alpha = glass.alpha(at, stepper.lookups())?;
     Some(GlassPoint { near: indices[0], far: indices[1], alpha })
 }
 
-/// Continuation of a path at a surface that light may pass.
+/// Decides whether a path passes a surface through which light may pass straight.
 #[cold]
 #[inline(never)]
-fn straight<'a, W: Walker<'a>>(
-    walker: &mut W,
+fn null_interaction<'a, W: PathStepper<'a>>(
+    stepper: &mut W,
     path: &PathRay,
     vertex: &Vertex<'a>,
-    (way, hit): (Way, Hit),
-) -> Straight {
-    if !is_there(walker.tile(), path, vertex, walker.lookups()) {
-        return Straight::Passes(Vec3::ONE);
+    (way, hit): (Segment, Hit),
+) -> NullInteraction {
+    if !is_opaque(stepper.tile(), path, vertex, stepper.lookups()) {
+        return NullInteraction::Passed(Vec3::ONE);
     }
     match &vertex.material.bsdf {
         Bsdf::Pane(pane) => {
             let mut whole = *path;
             let hit = way.straighten(&mut whole, hit);
-            whole.medium = walker.tile().without_open(whole.medium);
-            walker.meet_pane(&whole, vertex, OpaqueHit::Own(hit), pane)
+            whole.medium = stepper.tile().without_open_glass(whole.medium);
+            stepper.hit_pane(&whole, vertex, OpaqueHit::Own(hit), pane)
         }
-        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => Straight::Stays,
+        Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => NullInteraction::Opaque,
     }
 }
 
-/// Whether a surface that touches glass, and which light may pass, stops a path. Panes add nothing to the glass.
+/// Whether a partially transparent surface coincident with glass stops a path. Thin panes have no effect on glass.
 #[cold]
 #[inline(never)]
-fn is_touched<'a, W: Walker<'a>>(walker: &mut W, path: &PathRay, vertex: &Vertex<'a>) -> bool {
+fn stops_at_touching<'a, W: PathStepper<'a>>(stepper: &mut W, path: &PathRay, vertex: &Vertex<'a>) -> bool {
     match &vertex.material.bsdf {
         Bsdf::Pane(_) => false,
         Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => {
-            is_there(walker.tile(), path, vertex, walker.lookups())
+            is_opaque(stepper.tile(), path, vertex, stepper.lookups())
         }
     }
 }
 
-/// The chance that the surface is there. For paths that share their lamps with light samples, it is what these find: that of the
-/// point.
-pub fn chance(path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> f32 {
+/// Opacity of the surface at a vertex. If light samples compete with the path, the texture is looked up at the point
+/// without filtering, as shadow rays do.
+pub fn opacity_at(path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> f32 {
     let Some(opacity) = &vertex.material.opacity else { return 1.0 };
-    let is_shared = path.state.density > 0.0;
-    let at = vertex.place(is_shared);
+    let is_shared = path.state.pdf > 0.0;
+    let at = vertex.lookup_point(is_shared);
     opacity.at(&at, lookups)
 }
 
-/// Whether chance puts the surface there.
-fn is_there(tile: &TileContext<'_>, path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> bool {
-    let chance = chance(path, vertex, lookups);
+/// Randomly decides whether the surface is opaque here, by its opacity.
+fn is_opaque(tile: &TileContext<'_>, path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> bool {
+    let chance = opacity_at(path, vertex, lookups);
     chance >= 1.0 || tile.sampler(path.slot).pair(path.path, Decision::Opacity).x < chance
 }
 
-/// The path behind a surface that it passed straight on.
-fn passed(path: PathRay, vertex: &Vertex<'_>, part: Vec3) -> PathRay {
+/// The path after a null interaction.
+fn past_surface(path: PathRay, vertex: &Vertex<'_>, part: Vec3) -> PathRay {
     PathRay {
-        ray: vertex.leaving(path.ray.direction),
+        ray: vertex.spawn_ray(path.ray.direction),
         throughput: path.throughput * part,
-        path: path.next_path(STRAIGHT),
-        state: path.state.straight(part.max_element()),
+        path: path.next_path(PASSED),
+        state: path.state.passed_through(part.max_element()),
         cone: vertex.cone,
         ..path
     }
 }
 
 impl TileContext<'_> {
-    /// The first surface that is there along a camera ray from its hit on, with the ray's path. `None` if there is none.
-    pub fn first_there(
+    /// The first hit along a camera ray, starting with `hit`, at which the surface is opaque, and the path that reaches
+    /// it. `None` if there is none.
+    pub fn first_opaque_hit(
         &self,
         path: &PathRay,
         hit: &Hit,
@@ -310,17 +325,17 @@ impl TileContext<'_> {
     ) -> Option<(PathRay, Hit)> {
         let (mut path, mut hit) = (*path, *hit);
         for _ in 0..=MOST_STRAIGHT {
-            let vertex = Vertex::to_shade(self, &path, &hit);
-            if is_there(self, &path, &vertex, &mut counters.texture_lookups) {
+            let vertex = Vertex::for_shading(self, &path, &hit);
+            if is_opaque(self, &path, &vertex, &mut counters.texture_lookups) {
                 return Some((path, hit));
             }
-            path = passed(path, &vertex, Vec3::ONE);
+            path = past_surface(path, &vertex, Vec3::ONE);
             hit = self.world.geometry.closest(&path.ray)?;
         }
         None
     }
 
-    /// Whether chance chooses reflection, which has this probability, at a path's vertex.
+    /// Randomly decides between reflection, with this probability, and refraction.
     #[inline]
     pub fn chooses_reflection(&self, path: &PathRay, reflectance: f32) -> bool {
         self.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance

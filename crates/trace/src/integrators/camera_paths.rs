@@ -1,22 +1,23 @@
-//! Camera rays, round by round over queues instead of recursion. In whitted they are split at glass and end at Phong surfaces,
-//! which get direct and ambient light (Whitted, *An Improved Illumination Model for Shaded Display*, 1980); a ray in the lobe of
-//! microfacets goes on to what the lobe mirrors. In path each ray stays
-//! one and goes on from all surfaces (Kajiya, *The Rendering Equation*, 1986); with photons, whitted also goes on from Phong
-//! surfaces so.
+//! Paths from the camera, traced bounce by bounce with queues instead of recursion.
+//!
+//! In `whitted`, paths split at glass and end at diffuse and glossy surfaces, which receive direct and ambient light
+//! (Whitted, *An Improved Illumination Model for Shaded Display*, 1980); at microfacet surfaces, they continue in the
+//! narrow lobe. In `path`, paths do not split, and continue at all surfaces (Kajiya, *The Rendering Equation*, 1986).
+//! With photons, `whitted` also continues at diffuse and glossy surfaces, as `path` does.
 
 use std::ops::Range;
 
 use super::RayCounters;
-use super::direct::queue::{DirectLightQueue, Lit};
-use super::memory::Memory;
-use super::method::Behaviour;
+use super::behavior::PathBehavior;
+use super::direct::queue::{DirectLightQueue, ShadingSides};
+use super::memory::ThreadMemory;
 use super::photons::PhotonMaps;
-use super::photons::gather::Gathering;
-use super::transport::accumulator::{Accumulator, Part};
+use super::photons::gather::GatherPhotons;
+use super::transport::accumulator::{Accumulator, LocalTerm};
 use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
 use super::transport::crossing::CrossingMemory;
-use super::transport::interface::{Interface, interface, reflected, through_sheet};
+use super::transport::interface::{FresnelSplit, fresnel_split, reflected, through_sheet};
 use super::transport::medium::Medium;
 use super::transport::packet::{PacketHits, PacketSource};
 use super::transport::ray::PathRay;
@@ -24,8 +25,8 @@ use super::transport::scatter::Continuation;
 use super::transport::scratch::Scratch;
 use super::transport::tile::TileContext;
 use super::transport::vertex::{ShadingVertex, Vertex};
-use super::transport::walk::{Change, OpaqueHit, Reached, Straight, Walker, walk};
-use super::view::Measure;
+use super::transport::walk::{Interaction, Interface, NullInteraction, OpaqueHit, PathStepper, walk};
+use super::view::LightAov;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, lanes};
@@ -37,24 +38,24 @@ use crate::math::lanes::lane as lane_of;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, PACKET};
 
-/// Least contribution of the weaker part for which a ray is split in two; below it, one part is chosen at random.
-const LEAST_SPLIT: f32 = 0.01;
+/// A path splits only if the weaker branch contributes at least this much; otherwise one branch is chosen at random.
+const MIN_SPLIT: f32 = 0.01;
 
-/// Rays between two polls of the token.
+/// Number of rays between two polls of the token.
 const POLL_INTERVAL: usize = 256;
 
-/// Follows the camera rays of some slots to the end; the accumulator takes the light that they see. `negative` gets the slots of
-/// negative weight.
+/// Traces the camera paths of the given slots and adds their radiance to the accumulator. `negative` receives the first
+/// slot of each packet and the mask of samples with a negative filter weight.
 pub fn trace(
     (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
     slots: Range<u32>,
-    memory: &mut Memory,
+    memory: &mut ThreadMemory,
     accumulator: Accumulator<'_>,
     counters: &mut RayCounters,
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
-    let Memory { scratch, direct } = memory;
-    let Scratch { rays, next, surfaces, crossing, camera, hits, by_object } = scratch;
+    let ThreadMemory { scratch, direct } = memory;
+    let Scratch { rays, next, surfaces, crossing, camera, hits, object_order } = scratch;
     next.clear();
     let mut wavefront = Wavefront {
         depth: 0,
@@ -70,8 +71,8 @@ pub fn trace(
         counters,
     };
     wavefront.begin_round();
-    wavefront.direct.expect(slots.len(), tile.pixel_spread > 0.0);
-    // Make and shade the camera rays, which are the first round.
+    wavefront.direct.begin_round(slots.len(), tile.pixel_spread > 0.0);
+    // Trace and shade the camera rays, which are the first bounce.
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
         tile.camera_rows(start..slots.end, camera);
         for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
@@ -80,18 +81,18 @@ pub fn trace(
             wavefront.shade_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
         }
     }
-    // Light their vertices, and give the light to the accumulator.
+    // Light their vertices, and add the result to the accumulator.
     wavefront.light()?;
-    wavefront.direct.settle_run(slots.start, &mut wavefront.accumulator);
+    wavefront.direct.flush_run(slots.start, &mut wavefront.accumulator);
     wavefront.next_round(rays);
-    // Follow the rays that go on, round by round.
+    // Trace the remaining bounces.
     while !rays.is_empty() {
-        wavefront.direct.expect(rays.len(), tile.pixel_spread > 0.0);
-        if tile.behaviour.scatters {
-            // Find all hits first, so that packets are of one object.
+        wavefront.direct.begin_round(rays.len(), tile.pixel_spread > 0.0);
+        if tile.behavior.scatters {
+            // Find all hits first, so that each packet hits one object.
             tile.closest_hits(rays, hits)?;
-            by_object.sort(hits);
-            for places in by_object.places().chunks(PACKET) {
+            object_order.sort(hits);
+            for places in object_order.places().chunks(PACKET) {
                 wavefront.shade_packet(PacketSource::Traced(rays, hits, places))?;
             }
         } else {
@@ -101,7 +102,7 @@ pub fn trace(
         }
         let slots: &[PathRay] = rays;
         wavefront.light()?;
-        wavefront.direct.settle(
+        wavefront.direct.flush(
             |place| (slots[place].slot, slots[place].state.only_specular_before),
             &mut wavefront.accumulator,
         );
@@ -110,35 +111,35 @@ pub fn trace(
     Ok(())
 }
 
-/// Work of a path's ray up to its hit.
+/// Traversal cost of a path's ray up to its hit.
 fn work(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
     let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
     tile.world.geometry.work(&Ray { t_max, ..path.ray })
 }
 
-/// One round of all rays of a batch.
+/// One bounce of all paths of a batch.
 struct Wavefront<'a, 's> {
-    /// Number of scatterings before the hits of this round.
+    /// Number of bounces before the current hits.
     depth: u32,
-    /// Continuation of paths at Phong surfaces. `None` if they end there.
+    /// How paths continue at diffuse and glossy surfaces. `None` if they end there.
     continuation: Option<Continuation>,
     tile: &'a TileContext<'a>,
-    /// Photons of the samples. `None` if none are gathered.
+    /// Photon maps of the samples. `None` if no photons are gathered.
     maps: Option<&'a PhotonMaps>,
-    /// Vertices of this round that wait for direct light.
+    /// Vertices of this bounce that await direct lighting.
     direct: &'a mut DirectLightQueue,
     /// Surfaces at the hits of the current packet.
     surfaces: &'a mut SurfaceRow,
     accumulator: Accumulator<'s>,
-    /// Rays of the next round.
+    /// Rays of the next bounce.
     next: &'a mut Vec<PathRay>,
-    /// Place of the current path in the round's queue.
+    /// Index of the current path in this bounce's queue.
     place: u32,
     crossing: &'a mut CrossingMemory,
     counters: &'a mut RayCounters,
 }
 
-impl<'a> Walker<'a> for Wavefront<'a, '_> {
+impl<'a> PathStepper<'a> for Wavefront<'a, '_> {
     fn tile(&self) -> &'a TileContext<'a> {
         self.tile
     }
@@ -147,17 +148,17 @@ impl<'a> Walker<'a> for Wavefront<'a, '_> {
         self.crossing
     }
 
-    fn pass(&mut self, path: &PathRay, next: Option<Hit>) {
-        if self.accumulator.measure == Measure::Work {
+    fn note_null(&mut self, path: &PathRay, next: Option<Hit>) {
+        if self.accumulator.aov == LightAov::TraversalCost {
             self.accumulator.add_work(path.slot, work(self.tile, path, next));
         }
     }
 
     #[inline(always)]
-    fn reach(&mut self, path: &PathRay, reached: Reached<'_, 'a>, _has_passed: bool) {
+    fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, _has_passed: bool) {
         match reached {
-            Reached::Opaque(vertex, hit, far) => {
-                if self.arrive(path, vertex, hit) {
+            Interaction::Opaque(vertex, hit, far) => {
+                if self.add_emission(path, vertex, hit) {
                     match &vertex.material.bsdf {
                         Bsdf::Rough(rough) => self.shade_rough(path, vertex, rough, far),
                         Bsdf::Mirror(mirror) => self.shade_mirror(path, vertex, mirror),
@@ -166,17 +167,17 @@ impl<'a> Walker<'a> for Wavefront<'a, '_> {
                     }
                 }
             }
-            Reached::Glass(vertex, hit, Change { far, rough }) => {
-                if self.arrive(path, vertex, OpaqueHit::Own(hit)) {
+            Interaction::Glass(vertex, hit, Interface { far, rough }) => {
+                if self.add_emission(path, vertex, OpaqueHit::Own(hit)) {
                     match rough {
                         Some(rough) => self.shade_rough_glass(path, vertex, rough, far),
                         None => self.shade_glass(path, vertex, far),
                     }
                 }
             }
-            Reached::Hidden if self.goes_on() => self.next.push(*path),
-            Reached::Hidden => {}
-            Reached::Nothing => self.leave(path),
+            Interaction::Hidden if self.may_scatter() => self.next.push(*path),
+            Interaction::Hidden => {}
+            Interaction::Nothing => self.add_escaped(path),
         }
     }
 
@@ -184,26 +185,32 @@ impl<'a> Walker<'a> for Wavefront<'a, '_> {
         &mut self.counters.texture_lookups
     }
 
-    fn meet_pane(&mut self, path: &PathRay, vertex: &Vertex<'a>, hit: OpaqueHit, pane: &Pane) -> Straight {
-        let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.to_eye));
-        let tint = vertex.pane_tint(path, pane, &mut self.counters.texture_lookups);
+    fn hit_pane(
+        &mut self,
+        path: &PathRay,
+        vertex: &Vertex<'a>,
+        hit: OpaqueHit,
+        pane: &Pane,
+    ) -> NullInteraction {
+        let reflectance = pane.reflectance(vertex.surface.shading_normal.dot(vertex.wo));
+        let tint = vertex.pane_transmittance(path, pane, &mut self.counters.texture_lookups);
         let left = tint * (1.0 - reflectance);
-        // After the last scattering, only what goes straight on finds light.
-        if !self.arrive(path, vertex, hit) {
-            return Straight::Passes(left);
+        // After the last bounce, only light that passes straight through the pane is found.
+        if !self.add_emission(path, vertex, hit) {
+            return NullInteraction::Passed(left);
         }
         let shading = vertex.shading(self.counters);
         let mirrored = |weight: f32| reflected(path, vertex, &shading, Vec3::splat(weight));
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
-        let splits = self.tile.behaviour.splits && path.state.only_specular_before;
-        if weaker >= LEAST_SPLIT && splits {
+        let splits = self.tile.behavior.splits && path.state.only_specular_before;
+        if weaker >= MIN_SPLIT && splits {
             self.push_reflected(mirrored(reflectance));
-            Straight::Passes(left)
+            NullInteraction::Passed(left)
         } else if self.tile.chooses_reflection(path, reflectance) {
             self.push_reflected(mirrored(1.0));
-            Straight::Ends
+            NullInteraction::Ended
         } else {
-            Straight::Passes(tint)
+            NullInteraction::Passed(tint)
         }
     }
 }
@@ -211,12 +218,12 @@ impl<'a> Walker<'a> for Wavefront<'a, '_> {
 impl Wavefront<'_, '_> {
     fn light(&mut self) -> Result<(), Cancelled> {
         let before = self.next.len();
-        let (tile, maps, depth, measure) = (self.tile, self.maps, self.depth, self.accumulator.measure);
+        let (tile, maps, depth, aov) = (self.tile, self.maps, self.depth, self.accumulator.aov);
         let gather = |row: &VertexBatch| {
             let maps = maps?;
-            Some(tile.world.geometry.instructions().run(Gathering { tile, row, maps, depth, measure }))
+            Some(tile.world.geometry.instructions().run(GatherPhotons { tile, row, maps, depth, aov }))
         };
-        let rays = self.direct.light(tile, measure, (self.continuation, depth), gather, self.next)?;
+        let rays = self.direct.light(tile, aov, (self.continuation, depth), gather, self.next)?;
         self.counters.shadow_rays += rays.shadow;
         self.counters.texture_lookups += rays.lookups;
         self.counters.scattered_rays += rays.scattered + (self.next.len() - before) as u64;
@@ -225,10 +232,10 @@ impl Wavefront<'_, '_> {
 
     fn begin_round(&mut self) {
         let continuation = || Continuation::new(self.tile, self.depth, LobeSet::All);
-        self.continuation = self.tile.behaviour.scatters.then(continuation);
+        self.continuation = self.tile.behavior.scatters.then(continuation);
     }
 
-    /// Makes the found rays those of the next round; the old ones stay as memory.
+    /// Starts the next bounce with the rays found in this one; the old queue is reused as its output.
     fn next_round(&mut self, rays: &mut Vec<PathRay>) {
         std::mem::swap(rays, self.next);
         self.next.clear();
@@ -236,13 +243,13 @@ impl Wavefront<'_, '_> {
         self.begin_round();
     }
 
-    /// Shades the hit of one ray of a packet. The path is moved here once: it is large.
+    /// Shades the hit of one ray of a packet. The path is large, so it is moved here only once.
     #[inline(never)]
     fn shade(&mut self, mut path: PathRay, (packet, lane): (&PacketHits, usize)) {
         let (tile, bit) = (self.tile, 1 << lane);
         match packet.hit(lane) {
             Some(hit) if packet.plain & bit != 0 => {
-                self.add_own_light(&path, &hit, packet.shining & bit != 0);
+                self.add_local_light(&path, &hit, packet.shining & bit != 0);
             }
             Some(hit) => {
                 let surface = packet.surface(self.surfaces, lane);
@@ -250,12 +257,12 @@ impl Wavefront<'_, '_> {
             }
             None => {
                 let sky = tile.world.lights.environment().map(|_| packet.sky(lane));
-                self.add_beyond(&path, tile.light_beyond_with(sky, &path));
+                self.add_beyond(&path, tile.infinite_light_with_sky(sky, &path));
             }
         }
     }
 
-    /// Shades the hits of a packet's rays.
+    /// Intersects and shades a packet of rays.
     fn shade_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
         let tile = self.tile;
         if (rays.place(0) as usize).is_multiple_of(POLL_INTERVAL) {
@@ -263,26 +270,26 @@ impl Wavefront<'_, '_> {
         }
         let are_lit = self.depth < tile.settings.render.max_depth && self.accumulator.takes_reflected();
         let packet =
-            tile.intersect(rays, self.accumulator.measure, are_lit, (self.direct.spare(), self.surfaces));
+            tile.intersect(rays, self.accumulator.aov, are_lit, (self.direct.spare_batch(), self.surfaces));
         self.counters.texture_lookups += packet.lookups;
-        // Count the work of the rays, if the view shows it.
-        if self.accumulator.measure == Measure::Work {
+        // Record the traversal cost, if the view shows it.
+        if self.accumulator.aov == LightAov::TraversalCost {
             for lane in 0..rays.count() {
                 let path = packet.path(tile, &rays, lane);
                 self.accumulator.add_work(path.slot, work(tile, &path, packet.hit(lane)));
             }
         }
-        // Queue the plain vertices for direct light.
+        // Queue the plain vertices for direct lighting.
         if are_lit {
-            self.direct.keep();
+            self.direct.keep_spare();
             if tile.pixel_spread > 0.0 {
                 for (lane, hit) in lanes(packet.plain).filter_map(|lane| Some((lane, packet.hit(lane)?))) {
                     let cone = packet.path(tile, &rays, lane).cone.after(hit.shape.t);
-                    self.direct.note_cone(rays.place(lane), cone);
+                    self.direct.store_cone(rays.place(lane), cone);
                 }
             }
         }
-        // Select the rays that find light by themselves, and those that need shading one by one.
+        // Select the rays that hit or escape to a light, and those that must be shaded one by one.
         let render = &tile.settings.render;
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let plain = if render.ambient == Vec3::ZERO { packet.shining } else { packet.plain };
@@ -290,24 +297,32 @@ impl Wavefront<'_, '_> {
         let beyond = if is_dark_beyond { 0 } else { all & !packet.any };
         let mut wanted = packet.any & !packet.plain;
         match rays {
-            PacketSource::Camera(row, first, ..) => self.add_seen(&row.rays, first, &packet, (plain, beyond)),
+            PacketSource::Camera(row, first, ..) => {
+                self.add_visible_emission(&row.rays, first, &packet, (plain, beyond))
+            }
             PacketSource::Paths(..) | PacketSource::Traced(..) => wanted |= plain | beyond,
         }
-        // Go in the order of the paths, as the contributions to a sample are added in that order.
+        // Shade in path order, as the contributions to a sample are added in this order.
         for lane in lanes(wanted) {
             self.place = rays.place(lane);
             self.shade(packet.path(tile, &rays, lane), (&packet, lane));
         }
-        // Light the queued vertices while their data are in the cache.
+        // Light the queued vertices while their data is in the cache.
         if self.direct.is_full() {
             self.light()?;
         }
         Ok(())
     }
 
-    /// Adds the emission that camera rays see: of plain surfaces, and from beyond everything. It is all that the sample of each ray
-    /// gets before lamps.
-    fn add_seen(&mut self, rays: &RayRows, first: u32, packet: &PacketHits, (plain, beyond): (u32, u32)) {
+    /// Adds the emission visible to camera rays: from plain surfaces, the background and infinite lights. Each sample
+    /// receives it before any direct light, so it can be added directly.
+    fn add_visible_emission(
+        &mut self,
+        rays: &RayRows,
+        first: u32,
+        packet: &PacketHits,
+        (plain, beyond): (u32, u32),
+    ) {
         let tile = self.tile;
         let render = &tile.settings.render;
         // Add the emission and ambient light of plain surfaces.
@@ -321,28 +336,28 @@ impl Wavefront<'_, '_> {
             let Some((_, (material, _))) = known else { continue };
             let slot = first + lane as u32;
             if packet.shining & 1 << lane != 0 {
-                self.accumulator.add(slot, Part::Emitted, material.emission);
+                self.accumulator.add(slot, LocalTerm::Emitted, material.emission);
             }
             if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
                 let Some(ambient) = material.ambient else { continue };
-                self.accumulator.add(slot, Part::Ambient, render.ambient * ambient);
+                self.accumulator.add(slot, LocalTerm::Ambient, render.ambient * ambient);
             }
         }
-        // Add the background and the lights beyond the scene.
+        // Add the background and the infinite lights.
         let lights = &tile.world.lights;
         for lane in lanes(beyond) {
             let sky = lights.environment().map(|_| packet.sky(lane));
             let beyond = lights.beyond_with(sky, lane_of(&rays.direction, lane), |_, _| 1.0);
-            self.accumulator.add(first + lane as u32, Part::Emitted, render.background + beyond);
+            self.accumulator.add(first + lane as u32, LocalTerm::Emitted, render.background + beyond);
         }
     }
 
     /// Adds the emission and ambient light of a plain surface.
-    fn add_own_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
+    fn add_local_light(&mut self, path: &PathRay, hit: &Hit, is_shining: bool) {
         let index = self.tile.world.material_index(hit);
         let Some((material, _)) = self.tile.plain(index) else { return };
         if is_shining {
-            self.add_emitted(path, material.emission, self.tile.lamp_weight(path, hit));
+            self.add_emitted(path, material.emission, self.tile.emitter_weight(path, hit));
         }
         let render = &self.tile.settings.render;
         if render.ambient != Vec3::ZERO && self.depth < render.max_depth {
@@ -351,65 +366,66 @@ impl Wavefront<'_, '_> {
         }
     }
 
-    /// Adds the weighted emission that a path meets; light samples find the rest.
+    /// Adds the emission that a path hits, with its MIS weight; light samples contribute the rest.
     fn add_emitted(&mut self, path: &PathRay, radiance: Vec3, weight: f32) {
-        if self.is_gathered(path) {
+        if self.is_found_elsewhere(path) {
             return;
         }
         if path.state.only_specular_before {
-            self.accumulator.add(path.slot, Part::Emitted, path.throughput * radiance);
+            self.accumulator.add(path.slot, LocalTerm::Emitted, path.throughput * radiance);
         } else {
-            self.accumulator.add_met(path, path.throughput * radiance * weight);
+            self.accumulator.add_hit_light(path, path.throughput * radiance * weight);
         }
     }
 
-    /// Whether another technique finds the light that a path meets: photons, behind mirrors and glass, or light samples alone, for
-    /// hard shadows.
-    fn is_gathered(&self, path: &PathRay) -> bool {
-        let Behaviour { gathers, mirrors, .. } = self.tile.behaviour;
-        let is_shared = path.state.density > 0.0;
+    /// Whether another technique accounts for the light that a path hits: photons, behind mirrors and glass, or light
+    /// samples, for hard shadows.
+    fn is_found_elsewhere(&self, path: &PathRay) -> bool {
+        let PathBehavior { gathers, mirrors, .. } = self.tile.behavior;
+        let is_shared = path.state.pdf > 0.0;
         let is_soft = self.tile.settings.render.shadows == Shadows::Soft;
         !path.state.only_specular_before && (gathers || mirrors && is_shared) && !(is_shared && is_soft)
     }
 
-    fn leave(&mut self, path: &PathRay) {
-        self.add_beyond(path, self.tile.light_beyond(path));
+    fn add_escaped(&mut self, path: &PathRay) {
+        self.add_beyond(path, self.tile.infinite_light(path));
     }
 
-    /// Adds the light that a path meets beyond everything; the background illuminates nothing.
+    /// Adds the light from infinite lights along a path that leaves the scene. The background is only visible; it
+    /// illuminates nothing.
     fn add_beyond(&mut self, path: &PathRay, beyond: Vec3) {
         if path.state.only_specular_before {
             let background = self.tile.settings.render.background;
-            self.accumulator.add(path.slot, Part::Emitted, path.throughput * (background + beyond));
-        } else if beyond != Vec3::ZERO && !self.is_gathered(path) {
-            self.accumulator.add_met(path, path.throughput * beyond);
+            self.accumulator.add(path.slot, LocalTerm::Emitted, path.throughput * (background + beyond));
+        } else if beyond != Vec3::ZERO && !self.is_found_elsewhere(path) {
+            self.accumulator.add_hit_light(path, path.throughput * beyond);
         }
     }
 
-    /// Whether paths may be scattered at the hits of this round.
-    fn goes_on(&self) -> bool {
+    /// Whether paths may scatter at the current hits.
+    fn may_scatter(&self) -> bool {
         self.depth < self.tile.settings.render.max_depth
     }
 
-    /// Adds the emission of an opaque surface; returns whether the path may be scattered there.
-    fn arrive(&mut self, path: &PathRay, vertex: &Vertex<'_>, hit: OpaqueHit) -> bool {
+    /// Adds the emission of a surface; returns whether the path may scatter there.
+    fn add_emission(&mut self, path: &PathRay, vertex: &Vertex<'_>, hit: OpaqueHit) -> bool {
         if vertex.emits() {
             let weight = match hit {
-                OpaqueHit::Own(hit) => self.tile.lamp_weight(path, &hit),
-                OpaqueHit::Touching(hit) => self.tile.touching_lamp_weight(path, &hit),
+                OpaqueHit::Own(hit) => self.tile.emitter_weight(path, &hit),
+                OpaqueHit::Touching(hit) => self.tile.touching_emitter_weight(path, &hit),
             };
             let radiance = vertex.emitted(path, self.counters);
             self.add_emitted(path, radiance, weight);
         }
-        self.goes_on()
+        self.may_scatter()
     }
 
-    /// Shades a rough surface before a medium.
+    /// Shades a non-specular surface; `far` is the medium behind it.
     fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, far: &Medium) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.tile.settings.render.ambient;
         let takes_ambient = ambient != Vec3::ZERO && self.accumulator.takes_ambient(path);
-        // Look up no more textures than the picture shows.
+        // Look up only the textures that the image shows.
         if !self.accumulator.takes_reflected() {
             if takes_ambient {
                 let reflectance = vertex.tinted(rough.ambient_at(at, lookups));
@@ -417,7 +433,7 @@ impl Wavefront<'_, '_> {
             }
             return;
         }
-        let is_colored = self.accumulator.measure.is_colored();
+        let is_colored = self.accumulator.aov.is_colored();
         let mut bsdf = if is_colored { rough.at(at, lookups) } else { rough.bleached() };
         if is_colored {
             vertex.tint(&mut bsdf);
@@ -428,88 +444,91 @@ impl Wavefront<'_, '_> {
         if bsdf.is_black() {
             return;
         }
-        self.light_rough(path, vertex, &bsdf, far);
+        self.queue_rough(path, vertex, &bsdf, far);
     }
 
-    /// Queues the vertices of a rough surface for direct light, with the medium behind it.
+    /// Queues the vertices of a non-specular surface for direct lighting; `far` is the medium behind it.
     #[inline(always)]
-    fn light_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: &Medium) {
+    fn queue_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: &Medium) {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
-        let measure = self.measure_of(path);
+        let aov = self.measure_of(path);
         let lit = ShadingVertex { path, medium: &path.medium, place, vertex, shading, bsdf };
-        self.direct.push(tile, &lit, measure, Lit::OneSide { is_dark: false });
-        // Light that comes through has a vertex of its own; a share of the light that arrives is that of the viewer's side.
-        if let Some((bsdf, shading)) = behind.filter(|_| measure != Measure::ArrivingShare) {
+        self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
+        // Transmitted light has its own vertex, except for the lit fraction, which is measured on the viewer's side.
+        if let Some((bsdf, shading)) = behind.filter(|_| aov != LightAov::LitFraction) {
             let throughput = path.throughput * through_sheet(tile.world, &path.medium, far);
             let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.behind());
             let lit = ShadingVertex { path, medium: far, place, vertex, shading, bsdf: &bsdf };
-            self.direct.push(tile, &lit, measure, Lit::OneSide { is_dark: false });
+            self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         }
     }
 
-    /// Queues the vertices of rough glass: one for each side, or if light samples find nothing on one of them, a single one.
+    /// Queues the vertices of rough glass: one for each side, or a single one if light samples find nothing from one of
+    /// the sides.
     fn shade_rough_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: GlassPoint, far: &Medium) {
         if !self.accumulator.takes_reflected() {
             return;
         }
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
-        let measure = self.measure_of(path);
+        let aov = self.measure_of(path);
         let near = &path.medium;
         let reflection = RoughBsdf::GlassReflection(rough);
         let transmission = RoughBsdf::GlassTransmission(rough);
-        // The share of the light that arrives is that of the viewer's side, and counts what does not arrive.
-        if measure == Measure::ArrivingShare {
+        // The lit fraction is measured on the viewer's side. Blocked light counts too, so a dark side is sampled like
+        // any other.
+        if aov == LightAov::LitFraction {
             let lit = ShadingVertex { path, medium: near, place, vertex, shading, bsdf: &reflection };
-            return self.direct.push(tile, &lit, measure, Lit::OneSide { is_dark: false });
+            return self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         }
-        // Without shadows, lamps shine into any body.
+        // Without shadows, lights shine into any solid.
         let has_shadows = tile.settings.render.shadows != Shadows::Off;
         let is_dark =
             |medium: &Medium| medium.glass().is_some_and(|inside| tile.world.is_dark_body(inside.body));
         let dark = [near, far].map(|medium| has_shadows && is_dark(medium));
-        // Photons land on both sides.
-        let is_one = dark != [false; 2] && !tile.behaviour.gathers && vertex.beyond().is_some();
+        // Photons land on both sides, so these need a vertex each.
+        let is_one = dark != [false; 2] && !tile.behavior.gathers && vertex.beyond().is_some();
         let is_behind = is_one && dark == [true, false];
         let sides = |vertex: &Vertex<'_>, is_dark: bool, medium| match vertex.beyond() {
-            Some(beyond) if is_one => Lit::TwoSides { is_dark, beyond, medium },
-            Some(_) | None => Lit::OneSide { is_dark },
+            Some(beyond) if is_one => ShadingSides::TwoSides { is_dark, beyond, medium },
+            Some(_) | None => ShadingSides::OneSide { is_dark },
         };
-        // Queue the viewer's side, unless the vertex of the other one stands for it.
+        // Queue the viewer's side, unless the other side's vertex represents both.
         let behind = (!is_one || is_behind).then(|| (vertex.behind(), shading.behind()));
         if !is_behind {
             let lit = ShadingVertex { path, medium: near, place, vertex, shading, bsdf: &reflection };
-            self.direct.push(tile, &lit, measure, sides(vertex, dark[0], far));
+            self.direct.push(tile, &lit, aov, sides(vertex, dark[0], far));
         }
-        // Queue the other side likewise.
+        // Queue the other side.
         if let Some((vertex, shading)) = behind {
             let lit =
                 ShadingVertex { path, medium: far, place, vertex: &vertex, shading, bsdf: &transmission };
-            self.direct.push(tile, &lit, measure, sides(&vertex, dark[1], near));
+            self.direct.push(tile, &lit, aov, sides(&vertex, dark[1], near));
         }
     }
 
-    /// Part of the light at a path's vertex that the view shows.
-    fn measure_of(&self, path: &PathRay) -> Measure {
-        if path.state.only_specular_before { self.accumulator.measure } else { Measure::ALL }
+    /// The light AOV at a path's vertex: after the first non-specular surface, all light counts.
+    fn measure_of(&self, path: &PathRay) -> LightAov {
+        if path.state.only_specular_before { self.accumulator.aov } else { LightAov::ALL }
     }
 
     fn shade_mirror(&mut self, path: &PathRay, vertex: &Vertex<'_>, mirror: &Mirror) {
         let shading = vertex.shading(self.counters);
-        let is_colored = self.accumulator.measure.is_colored();
+        let is_colored = self.accumulator.aov.is_colored();
         let reflectance = vertex.mirror_reflectance(mirror, &shading, is_colored, self.counters);
         self.push_reflected(reflected(path, vertex, &shading, reflectance));
     }
 
-    /// Splits a path at a smooth coat, or chooses between the coat and its base as often as the coat reflects.
+    /// Splits a path at a smooth coat, or chooses between coat and base with the coat's Fresnel reflectance as
+    /// probability.
     fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, far: &Medium) {
         let shading = vertex.shading(self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
-        let splits = self.tile.behaviour.splits && path.state.only_specular_before;
-        let both = weaker >= LEAST_SPLIT && splits;
+        let splits = self.tile.behavior.splits && path.state.only_specular_before;
+        let both = weaker >= MIN_SPLIT && splits;
         let is_coat = !both && self.tile.chooses_reflection(path, fresnel);
         if both || is_coat {
             let lookups = &mut self.counters.texture_lookups;
@@ -519,7 +538,7 @@ impl Wavefront<'_, '_> {
             }
         }
         if !is_coat {
-            // The base is found as often as it is not the coat.
+            // Divide by the probability of choosing the base.
             let by_chance = if both { 1.0 } else { 1.0 / (1.0 - fresnel) };
             let mut state = path.state;
             state.roulette_throughput *= by_chance;
@@ -530,12 +549,13 @@ impl Wavefront<'_, '_> {
 
     fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &Medium) {
         let shading = vertex.shading(self.counters);
-        let Interface { reflectance, refracted } = interface(self.tile.world, path, vertex, &shading, far);
+        let FresnelSplit { reflectance, refracted } =
+            fresnel_split(self.tile.world, path, vertex, &shading, far);
         let mirrored = |weight: f32| reflected(path, vertex, &shading, Vec3::splat(weight));
         let Some(refracted) = refracted else { return self.push_reflected(mirrored(1.0)) };
         let weaker = reflectance.min(1.0 - reflectance) * path.throughput.abs().max_element();
-        let splits = self.tile.behaviour.splits && path.state.only_specular_before;
-        if weaker >= LEAST_SPLIT && splits {
+        let splits = self.tile.behavior.splits && path.state.only_specular_before;
+        if weaker >= MIN_SPLIT && splits {
             self.push_reflected(mirrored(reflectance));
             self.push_refracted(refracted, 1.0 - reflectance);
         } else if self.tile.chooses_reflection(path, reflectance) {
@@ -560,7 +580,7 @@ impl Wavefront<'_, '_> {
 
     fn russian_roulette(&self, ray: PathRay) -> Option<PathRay> {
         match self.continuation {
-            Some(continuation) if !self.tile.behaviour.splits || !ray.state.only_specular_before => {
+            Some(continuation) if !self.tile.behavior.splits || !ray.state.only_specular_before => {
                 continuation.russian_roulette(self.tile, ray)
             }
             Some(_) | None => Some(ray),

@@ -1,5 +1,6 @@
-//! Closed form of the part p of a kernel that receives photons: the surface with about the middle's normal, to which the way from
-//! the middle is free. It exists for a few flat pieces; all other cases are left to trials.
+//! Closed form of the coverage p of a kernel: the fraction that receives photons, which is surface with about the
+//! center's normal that is not occluded from the center. It exists for a few flat pieces; all other cases are estimated
+//! by trials.
 
 use arrayvec::ArrayVec;
 
@@ -12,46 +13,46 @@ use crate::math::frame::Frame;
 use crate::math::{DVec2, DVec3};
 use crate::world::{Hit, MeshInstance, Object, World};
 
-/// Part of a kernel that edges and walls leave.
+/// Coverage of a kernel: what edges and walls leave of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Clip {
-    /// The kernel's weight times this part; nothing is between its points.
-    Part(f32),
-    /// Unknown: edges or walls are near.
-    Cut,
-    /// Unknown: the kernel is among many triangles, most of which are far from an edge.
+pub enum KernelCoverage {
+    /// This fraction of the kernel's weight, without occlusion within it.
+    Fraction(f32),
+    /// Unknown, because edges or walls are near.
+    Clipped,
+    /// Unknown, because many triangles are near; most such kernels are far from an edge.
     Crowded,
 }
 
-/// Distance in radii above which two planes are different.
+/// Distance above which two planes count as different, in radii.
 const FLAT: f64 = 4e-3;
 
-/// Least cosine between the normals of two pieces of one plane.
+/// Minimum cosine between the normals of two pieces of one plane.
 const SAME_PLANE: f64 = 1.0 - 1e-6;
 
-/// Largest distance in radii between a wall and the border of the piece on which it stands.
+/// Maximum distance between a wall and the border of the piece on which it stands, in radii.
 const BORDER: f64 = 2e-3;
 
-/// The largest cosine between a wall and the normal of the piece on which it stands.
+/// Maximum cosine between the normals of a wall and of the piece on which it stands.
 const UPRIGHT: f64 = 0.3;
 
-/// Distance in radii from which surfaces do not matter: √(1 + REACH²) and some more.
+/// Distance from which surfaces do not matter, in radii: √(1 + REACH²) plus a margin.
 const FAR: f64 = 1.05;
 
-/// Least radius of a sphere, in radii of the kernel, that the kernel follows all around its middle.
+/// Minimum radius of a sphere that counts as flat around the kernel's center, in kernel radii.
 const WIDE: f64 = 2.0;
 
-/// Smallest part that the closed form gives; below it, rounding matters.
+/// Minimum coverage for the closed form; below it, rounding errors matter.
 const LEAST_PART: f64 = 1e-3;
 
-/// Room for triangles of a mesh near a kernel, pieces of its plane, and walls.
+/// Capacities for triangles of a mesh near a kernel, pieces of its plane, and walls.
 const TRIANGLES: usize = 32;
 const PIECES: usize = 8;
 const WALLS: usize = 4;
 
-/// Computes the part of a kernel that receives photons.
-pub fn clip(world: &World, look: &GatherPoint, radius: f32) -> Clip {
-    let mut around = Around::new(look, radius);
+/// Computes the coverage of a kernel.
+pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> KernelCoverage {
+    let mut around = KernelNeighborhood::new(look, radius);
     let mut is_crowded = false;
     let bounds = look.kernel_box(radius);
     let is_told = world.geometry.around(&bounds, |id, object| match object {
@@ -59,34 +60,34 @@ pub fn clip(world: &World, look: &GatherPoint, radius: f32) -> Clip {
         Object::Mesh(mesh) => around.add_mesh((world, id), mesh, &bounds, &mut is_crowded),
     });
     match around.part().filter(|_| is_told) {
-        Some(part) => Clip::Part(part as f32),
-        None if is_crowded => Clip::Crowded,
-        None => Clip::Cut,
+        Some(part) => KernelCoverage::Fraction(part as f32),
+        None if is_crowded => KernelCoverage::Crowded,
+        None => KernelCoverage::Clipped,
     }
 }
 
-/// The material of a part of an object.
+/// The material of a primitive of an object.
 pub fn material(world: &World, object: u32, primitive: u32) -> &Material {
     let shape = ShapeHit { primitive, ..ShapeHit::at(0.0) };
     &world.materials[world.material_index(&Hit { shape, object })]
 }
 
-/// Whether photons are kept on a material.
+/// Whether photons are stored on a material.
 pub fn receives(material: &Material) -> bool {
     let is_lit = |rough: &Rough| rough.constant().is_none_or(|bsdf| !bsdf.is_black());
     let is_rough_glass = || material.bsdf.glass().is_some_and(|glass| !glass.is_smooth());
     material.bsdf.rough().is_some_and(is_lit) || is_rough_glass()
 }
 
-/// A wall that stands on the plane of a kernel, with the middle before it: for points before it, the product with the normal is at
-/// most the distance.
+/// A wall perpendicular to the kernel's plane, as a half-plane that contains the center: points inside have a dot
+/// product with the normal of at most `distance`.
 struct Wall {
     normal: DVec2,
     distance: f64,
 }
 
 impl Wall {
-    /// Whether all corners are on the side of the middle.
+    /// Whether all corners are on the center's side.
     fn is_beyond(&self, corners: &[DVec2]) -> bool {
         corners
             .iter()
@@ -94,21 +95,21 @@ impl Wall {
     }
 }
 
-/// Surfaces around the middle of a kernel.
-struct Around {
+/// The surfaces around the center of a kernel.
+struct KernelNeighborhood {
     point: DVec3,
     normal: DVec3,
     radius: f64,
     /// Tangents, divided by the radius.
     tangents: [DVec3; 2],
-    /// Pieces of its plane that receive photons.
+    /// Pieces of the kernel's plane that receive photons.
     pieces: ArrayVec<Piece, PIECES>,
-    /// Number of surfaces that contain all of the kernel.
+    /// Number of surfaces that contain the whole kernel.
     whole: u32,
     walls: ArrayVec<Wall, WALLS>,
 }
 
-impl Around {
+impl KernelNeighborhood {
     fn new(look: &GatherPoint, radius: f32) -> Self {
         let Frame { s, t, n } = Frame::from_normal(look.normal);
         let radius = f64::from(radius);
@@ -123,18 +124,18 @@ impl Around {
         }
     }
 
-    /// A vector along the plane, in radii.
+    /// Projects a vector onto the plane, in radii.
     #[inline]
     fn along(&self, vector: DVec3) -> DVec2 {
         DVec2::new(self.tangents[0].dot(vector), self.tangents[1].dot(vector))
     }
 
-    /// The corners of a piece in the plane, in radii from the middle.
+    /// The corners of a piece relative to the center, projected onto the plane, in radii.
     fn flat(&self, piece: &Piece) -> ArrayVec<DVec2, 4> {
         piece.iter().map(|&corner| self.along(corner - self.point)).collect()
     }
 
-    /// Computes the part of the kernel on the pieces; `None` if a wall parts them or they overlap.
+    /// Computes the kernel's weight over the pieces; `None` if a wall separates them or they overlap.
     fn part(&self) -> Option<f64> {
         if !self.walls.is_empty() && self.whole > 0 {
             return None;
@@ -150,7 +151,7 @@ impl Around {
         (LEAST_PART..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
     }
 
-    /// Adds a shape; returns whether the part still has a closed form.
+    /// Adds a shape; returns whether the coverage still has a closed form.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
         match shape.local_form(self.point) {
             LocalForm::Pieces(count) => (0..count)
@@ -163,7 +164,7 @@ impl Around {
         }
     }
 
-    /// Adds a surface that extends over the whole kernel and has its normal in the middle; returns whether it does.
+    /// Adds a surface that extends over the whole kernel and has its normal at the center; returns whether it does.
     fn add_ground(&mut self, ground: &Ground, receives: impl Fn() -> bool) -> bool {
         let is_wide = match ground.extent {
             Extent::Flat(reach) => reach > FAR * self.radius,
@@ -183,7 +184,8 @@ impl Around {
         is_crowded: &mut bool,
     ) -> bool {
         let mut near: ArrayVec<u32, TRIANGLES> = ArrayVec::new();
-        // Trees visit some triangles twice, and others that are only nearly there: neither may count, or trees would differ.
+        // Trees visit some triangles twice, and others that are only close. Skip both, or the result would depend on
+        // the tree.
         let is_told = mesh.around(bounds, |triangle| {
             let is_known = near.contains(&triangle);
             is_known
@@ -201,14 +203,14 @@ impl Around {
         })
     }
 
-    /// Adds a flat piece; returns whether the part still has a closed form.
+    /// Adds a flat piece; returns whether the coverage still has a closed form.
     fn add_piece(&mut self, piece: &Piece, receives: impl Fn() -> bool) -> bool {
         let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
         let from = piece[0] - self.point;
         let (size, distance, cosine) = (normal.length_squared(), normal.dot(from), normal.dot(self.normal));
         let is_within =
             |radii: f64| distance * distance < (radii * self.radius) * (radii * self.radius) * size;
-        // The piece is out of reach, or without area.
+        // Ignore pieces that are out of reach or have no area.
         if !(size > 0.0 && is_within(FAR)) {
             return true;
         }
@@ -229,7 +231,7 @@ impl Around {
         rises && self.add_wall(normal / size.sqrt(), distance / size.sqrt())
     }
 
-    /// Adds the plane of a wall, by its normal and its distance from the middle along that.
+    /// Adds a wall, given its plane's normal and signed distance from the center.
     fn add_wall(&mut self, normal: DVec3, distance: f64) -> bool {
         let along = self.along(normal) * (self.radius * distance.signum());
         let length = along.length();
@@ -238,7 +240,7 @@ impl Around {
     }
 }
 
-/// Whether a polygon has a point in the unit disc.
+/// Whether a polygon overlaps the unit disk.
 fn meets_disc(corners: &[DVec2]) -> bool {
     let edges = || corners.iter().zip(corners.iter().cycle().skip(1));
     let is_near = |a: DVec2, b: DVec2| {
@@ -258,10 +260,10 @@ mod tests {
     use crate::geometry::sphere::Sphere;
     use crate::math::Vec3;
 
-    /// Part of a kernel of radius 0.1 at (x, 0, z), which faces up, among shapes.
+    /// Coverage of an upward-facing kernel of radius 0.1 at (x, 0, z) among shapes.
     fn told(x: f32, z: f32, shapes: &[Shape]) -> Option<f64> {
         let look = GatherPoint { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
-        let mut around = Around::new(&look, 0.1);
+        let mut around = KernelNeighborhood::new(&look, 0.1);
         let are_told = shapes.iter().all(|shape| around.add_shape(shape, || true));
         around.part().filter(|_| are_told)
     }
@@ -271,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_pieces_and_walls_at_their_borders_are_told_and_nothing_else() {
+    fn coverage_is_exact_only_for_flat_pieces() {
         let floor = quad(DVec3::ZERO, DVec3::Z, DVec3::X);
         let other = quad(DVec3::X, DVec3::Z, DVec3::X);
         let wall = quad(DVec3::ZERO, DVec3::Y, DVec3::Z);
@@ -285,7 +287,7 @@ mod tests {
             told(0.0005, 0.0005, &[floor, wall, back]),
             told(0.0005, 0.0005, &[floor]).expect("flat")
         ));
-        // A wall between two pieces, a box on the floor, a sheet over it, a ball at rest.
+        // A wall between two pieces, a box on the floor, a sheet above it, a ball resting on it.
         assert_eq!(told(0.95, 0.5, &[floor, other, quad(DVec3::X, DVec3::Y, DVec3::Z)]), None);
         let cuboid = Shape::Box(Cuboid::new(DVec3::new(0.5, 0.1, 0.5), DVec3::splat(0.2), DVec3::ZERO));
         assert_eq!(told(0.35, 0.5, &[floor, cuboid]), None);
@@ -294,7 +296,7 @@ mod tests {
         assert_eq!(told(0.35, 0.5, &[floor, sheet]), None);
         let ball = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, radius, 0.5), radius });
         assert_eq!(told(0.45, 0.5, &[floor, ball(0.1)]), None);
-        // Kernels on balls, wide and small.
+        // Kernels on large and small balls.
         let under = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, -radius, 0.5), radius });
         assert_eq!((told(0.5, 0.5, &[under(1.0)]), told(0.5, 0.5, &[under(0.15)])), (Some(1.0), None));
     }

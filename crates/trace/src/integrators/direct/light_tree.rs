@@ -1,11 +1,11 @@
-//! Direct light with more lights than a vertex samples: it picks some by a tree over all lights.
+//! Next-event estimation with more lights than each vertex samples: lights are picked from a tree.
 
 use std::ops::Range;
 
-use super::all_lights::{Lighting, Sums, add_where};
+use super::all_lights::{LightSums, SampleAllLights, add_where};
 use super::shadow_rays::ShadowRayQueue;
 use crate::geometry::rows::lanes;
-use crate::integrators::view::Measure;
+use crate::integrators::view::LightAov;
 use crate::lights::{LightRow, LightTree, Lobe, Middle, Picks, Receiver, ReceiverRow, Selection};
 use crate::materials::bsdf::NarrowLobe;
 use crate::math::Vec3;
@@ -14,71 +14,71 @@ use crate::sampling::{Decision, SamplerRow};
 use crate::scene::description::Shadows;
 use crate::world::Loops;
 
-/// Lights the vertices of a row by picked lights.
-pub struct Picking<'a, const WEIGHED: bool> {
-    pub lighting: Lighting<'a, WEIGHED>,
+/// Samples lights picked from a tree at a packet of vertices.
+pub struct SampleLightTree<'a, const MIS: bool> {
+    pub lighting: SampleAllLights<'a, MIS>,
     pub selection: Selection<'a>,
-    /// Number of the row; then the pool for its rays.
+    /// Index of the packet, under which its shadow rays are queued in the pool.
     pub number: u32,
     pub pool: &'a mut ShadowRayQueue,
 }
 
-/// One pick for each vertex of a row. The picks of one sample are in the order of the tree, so that rows of rays go to places
-/// close together.
+/// One picked light per vertex of a packet. The picks of one sample are in tree order, so that shadow rays in one
+/// packet go to nearby lights.
 #[derive(Clone)]
-struct PickRow {
-    /// Numbers of the lights.
+struct LightPicks {
+    /// Indices of the lights.
     lights: [u32; LANES],
-    /// Inverse of the expected numbers of samples; 0 without a pick.
+    /// Reciprocals of the expected number of samples; 0 without a pick.
     shares: Lanes,
-    /// The same for a vertex without a glossy lobe: MIS weights use it, as other rays that find the light know no more.
+    /// The same ignoring glossy lobes. MIS weights use it, as rays that hit the light do not know the vertex's lobe.
     weighed: Lanes,
 }
 
-/// Samples whose picks are made together.
-const TOGETHER: u32 = 8;
+/// Number of samples whose lights are picked together.
+const PICK_BLOCK: u32 = 8;
 
-impl<const WEIGHED: bool> Loops for Picking<'_, WEIGHED> {
-    type Done = Sums;
+impl<const MIS: bool> Loops for SampleLightTree<'_, MIS> {
+    type Done = LightSums;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Sums {
+    fn run(self, folds: impl Folds) -> LightSums {
         let Self { lighting, selection, number, pool } = self;
         let sampler = lighting.row.sampler(lighting.tile);
-        let mut sums = Sums::NOTHING;
-        // Sample all lights beyond the scene, if the tree leaves them out.
+        let mut sums = LightSums::NOTHING;
+        // Sample all infinite lights, if the tree excludes them.
         if selection.leaves_beyond {
-            sums = folds.call(Lighting { only_beyond: true, ..lighting });
+            sums = folds.call(SampleAllLights { only_infinite: true, ..lighting });
         }
         let samples = lighting.tile.settings.render.shadow_samples;
         let (each, tree) = (selection.picks.count, selection.tree);
-        // With many samples, the rays of one row of picks already go to one place.
-        let mut pool = (samples <= TOGETHER).then_some(pool);
-        // Pick lights for several samples together, and sample the picked ones.
-        for first in (0..samples).step_by(TOGETHER as usize) {
-            let picks = lighting.picks(selection, &sampler, first..(first + TOGETHER).min(samples));
+        // With many samples, the shadow rays of one packet are already coherent.
+        let mut pool = (samples <= PICK_BLOCK).then_some(pool);
+        // Pick lights for several samples together, and sample the picked lights.
+        for first in (0..samples).step_by(PICK_BLOCK as usize) {
+            let picks = lighting.picks(selection, &sampler, first..(first + PICK_BLOCK).min(samples));
             for (k, pick) in (first * each..).zip(&picks) {
-                let mut taking = Taking { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
-                lighting.add_pick(pick, &sampler, (k, samples * each), &mut taking, folds);
+                let mut sink = PickSink { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
+                lighting.add_pick(pick, &sampler, (k, samples * each), &mut sink, folds);
             }
         }
         sums
     }
 }
 
-/// Collector of the light that a row picks, or of its rays.
-struct Taking<'a> {
+/// Destination of the sampled light or of its shadow rays.
+struct PickSink<'a> {
     tree: &'a LightTree,
     row: u32,
-    /// Pool for the rays. `None` to trace rays at once.
+    /// Pool for the shadow rays. `None` to trace them immediately.
     pool: Option<&'a mut ShadowRayQueue>,
-    sums: &'a mut Sums,
+    sums: &'a mut LightSums,
 }
 
-impl PickRow {
+impl LightPicks {
     const NOTHING: Self = Self { lights: [0; LANES], shares: [0.0; LANES], weighed: [0.0; LANES] };
 
-    /// Turns probabilities into shares, 0 for a probability of 0.
+    /// Replaces probabilities with the reciprocals of expected sample counts, or 0 for a probability of 0.
     #[inline(always)]
     fn invert(&mut self, count: f32, is_weighed: bool) {
         for i in 0..LANES {
@@ -89,7 +89,7 @@ impl PickRow {
         }
     }
 
-    /// The lights, and a bit for each vertex that picked one. Other vertices get a light as well, without effect.
+    /// The lights, and the mask of vertices that picked one. Other vertices get an arbitrary light, without effect.
     #[inline(always)]
     fn lights(&self) -> ([u32; LANES], u32) {
         let (mut lights, shares, mut used) = (self.lights, &self.shares, 0);
@@ -104,18 +104,18 @@ impl PickRow {
     }
 }
 
-/// Value of the digits that follow those of a random number.
-const DIGITS: f64 = 1.0 / (1 << 24) as f64;
+/// Weight of the second random number, whose digits follow the digits of the first.
+const LOW_DIGITS: f64 = 1.0 / (1 << 24) as f64;
 
-impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
-    /// The picks of the vertices for some samples.
+impl<const MIS: bool> SampleAllLights<'_, MIS> {
+    /// Picks lights at each vertex for some samples.
     #[inline(always)]
     fn picks(
         &self,
         Selection { tree, picks: way, .. }: Selection<'_>,
         sampler: &SamplerRow<LANES>,
         samples: Range<u32>,
-    ) -> Vec<PickRow> {
+    ) -> Vec<LightPicks> {
         let row = self.row;
         let count = self.tile.settings.render.shadow_samples * way.count;
         let group = way.count as usize;
@@ -126,35 +126,35 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             let u = sampler.pairs(&row.path, Decision::Pick, k, count);
             let place = (k - first) as usize / group * group;
             // One pick of each group is in each part of [0, 1), so that they are sorted. Both numbers of a pair are the
-            // digits of one number: a light among many has a small share.
+            // digits of one number: a light among many has a small probability.
             let (mut parts, mut digits) = ([0; LANES], [0.0; LANES]);
             for i in 0..LANES {
                 let part = (u[0][i] * way.count as f32) as i32 as u32;
                 parts[i] = if part < way.count { part } else { way.count - 1 };
-                digits[i] = f64::from(u[0][i]) + f64::from(u[1][i]) * DIGITS;
+                digits[i] = f64::from(u[0][i]) + f64::from(u[1][i]) * LOW_DIGITS;
             }
             for i in 0..LANES {
                 numbers[place + parts[i] as usize][i] = digits[i];
             }
         }
-        // Pick lights by the numbers.
-        let mut picks = vec![PickRow::NOTHING; numbers.len()];
+        // Pick lights with these numbers.
+        let mut picks = vec![LightPicks::NOTHING; numbers.len()];
         if tree.is_flat() {
             self.pick_flat(tree, &numbers, &mut picks);
         } else {
             self.pick_by_cuts(tree, way, &numbers, &mut picks);
         }
         for row in &mut picks {
-            row.invert(count as f32, WEIGHED);
+            row.invert(count as f32, MIS);
         }
         picks
     }
 
-    /// Picks from a tree of one node, all vertices side by side.
+    /// Picks from a tree with a single node, for all vertices at once.
     #[inline(always)]
-    fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; LANES]], picks: &mut [PickRow]) {
+    fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; LANES]], picks: &mut [LightPicks]) {
         let row = self.row;
-        // Estimate the light of each lamp at each vertex, with glossy lobes and without.
+        // Estimate the light from each source at each vertex, with and without glossy lobes.
         let plain = ReceiverRow::plain(&row.from, &row.normal);
         let mut glossy = plain.clone();
         for i in lanes(if row.bsdf.has_narrow_lobes() { self.used } else { 0 }) {
@@ -162,11 +162,10 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 glossy.set_lobe(i, &lobe);
             }
         }
-        // Turn the estimates into probabilities.
+        // Normalize the estimates.
         let Some(shares) = tree.flat_shares(&glossy, row.bsdf.has_narrow_lobes()) else { return };
-        let without =
-            (WEIGHED && row.bsdf.has_narrow_lobes()).then(|| tree.flat_shares(&plain, false)).flatten();
-        // Pick by each row of numbers.
+        let without = (MIS && row.bsdf.has_narrow_lobes()).then(|| tree.flat_shares(&plain, false)).flatten();
+        // Pick with each row of numbers.
         for (numbers, pick) in numbers.iter().zip(picks) {
             let picked = shares.pick(numbers);
             pick.lights = picked.lights;
@@ -182,11 +181,11 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         }
     }
 
-    /// Picks from any tree, one vertex after the other.
+    /// Picks from a tree of any size, one vertex at a time.
     #[inline(always)]
-    fn pick_by_cuts(&self, tree: &LightTree, way: Picks, numbers: &[[f64; LANES]], picks: &mut [PickRow]) {
+    fn pick_by_cuts(&self, tree: &LightTree, way: Picks, numbers: &[[f64; LANES]], picks: &mut [LightPicks]) {
         let (row, group) = (self.row, way.count as usize);
-        let (mut cut, mut without) = (way.cut(tree), WEIGHED.then(|| way.cut(tree)));
+        let (mut cut, mut without) = (way.cut(tree), MIS.then(|| way.cut(tree)));
         for i in lanes(self.used) {
             let plain = Receiver::plain(lane(&row.from, i), lane(&row.normal, i));
             let lobe = self.lobe(i);
@@ -200,7 +199,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                     let row = &mut picks[place];
                     row.lights[i] = light;
                     row.shares[i] = probability;
-                    if WEIGHED {
+                    if MIS {
                         row.weighed[i] = without.map_or(probability, |without| without.probability(light));
                     }
                 });
@@ -208,7 +207,7 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         }
     }
 
-    /// The narrow lobe of a vertex, relative to its wide ones.
+    /// The narrow lobe of a vertex, relative to its wide lobes.
     #[inline(always)]
     fn lobe(&self, i: usize) -> Option<Lobe> {
         let NarrowLobe { axis, exponent, peak, wide } = self.row.bsdf.narrow_lobe(i)?;
@@ -221,17 +220,17 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
         })
     }
 
-    /// Adds the light of a row of picked lights.
+    /// Samples one picked light per vertex and adds its light, or queues its shadow rays.
     #[inline(always)]
     fn add_pick(
         &self,
-        pick: &PickRow,
+        pick: &LightPicks,
         sampler: &SamplerRow<LANES>,
         (number, count): (u32, u32),
-        taking: &mut Taking<'_>,
+        sink: &mut PickSink<'_>,
         folds: impl Folds,
     ) {
-        let Taking { tree, row: row_number, pool, sums } = taking;
+        let PickSink { tree, row: row_number, pool, sums } = sink;
         let (row, render) = (self.row, &self.tile.settings.render);
         let (lights, used) = pick.lights();
         // Sample a point on each picked light.
@@ -244,11 +243,11 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             set_lane(&mut samples.weights, i, weight);
             inverse[i] *= pick.weighed[i];
         }
-        // Compute what would arrive from it.
+        // Compute the unoccluded contributions.
         let (mut values, active, response) = self.values(&samples, 1.0, folds);
         let active = active & used;
-        if WEIGHED {
-            // Each group of picks has its own pdf, and as many rays in lobes as requested samples compete with all groups.
+        if MIS {
+            // Each group of picks has its own pdf, and all requested BSDF samples compete with every group.
             let competing =
                 self.competing.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
             values =
@@ -262,17 +261,17 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
             sums.total[i] += if is_active { values[0][i] } else { 0.0 };
         }
         match render.shadows {
-            // Nothing is traced, so there is no work.
-            Shadows::Off if self.measure == Measure::Work => return,
+            // Nothing is traced, so there is no traversal cost.
+            Shadows::Off if self.aov == LightAov::TraversalCost => return,
             Shadows::Off => return add_where(active, &values, &mut sums.light),
             Shadows::Hard => self.aim_at_middles(&mut samples, &lights, active),
             Shadows::Soft => {}
         }
-        // Trace shadow rays, or let them wait for others to the same lights.
+        // Trace the shadow rays, or queue them with others to the same lights.
         let traced = active & !row.hidden(&samples.directions, folds);
         let (rays, ends) = self.shadow_rays(&samples, traced);
         match pool {
-            Some(pool) if self.measure != Measure::Work => {
+            Some(pool) if self.aov != LightAov::TraversalCost => {
                 sums.rays.shadow += u64::from(traced.count_ones());
                 let mut places = [0; LANES];
                 for i in 0..LANES {
@@ -280,11 +279,13 @@ impl<const WEIGHED: bool> Lighting<'_, WEIGHED> {
                 }
                 pool.push(*row_number, (rays, ends, traced), &samples.sources, &values, &places);
             }
-            Some(_) | None => self.add_seen((&rays, &ends, traced), &samples.sources, &values, sums, folds),
+            Some(_) | None => {
+                self.add_unoccluded((&rays, &ends, traced), &samples.sources, &values, sums, folds)
+            }
         }
     }
 
-    /// Aims rays at the middles of the lights that have one.
+    /// Aims rays at the centers of lights that have one.
     fn aim_at_middles(&self, samples: &mut LightRow, lights: &[u32; LANES], active: u32) {
         for i in lanes(active) {
             let Some((middle, source)) = self.tile.world.lights.get(lights[i]).middle() else { continue };

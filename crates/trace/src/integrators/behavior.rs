@@ -1,0 +1,47 @@
+//! What paths do at surfaces, derived from the integrator's method, the view and photon mapping.
+
+use super::settings::RenderSettings;
+use super::view::LightAov;
+use crate::lights::Receivers;
+use crate::scene::description::Method;
+
+/// What camera paths do at surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PathBehavior {
+    /// Whether camera paths split into a reflected and a refracted path at glass.
+    pub splits: bool,
+    /// Whether paths scatter at non-specular surfaces: in `path`, and in `whitted` with photons, to find light that
+    /// photons do not carry.
+    pub scatters: bool,
+    /// Whether paths continue in microfacet lobes although they end at other non-specular surfaces.
+    pub mirrors: bool,
+    /// Whether photons are gathered at non-specular surfaces. Paths then ignore the lights that they hit through
+    /// mirrors and glass.
+    pub gathers: bool,
+    /// How lights are sampled.
+    pub receivers: Receivers,
+}
+
+impl PathBehavior {
+    /// The behavior for these settings, with or without photon maps.
+    pub fn of(settings: &RenderSettings, has_photons: bool) -> Self {
+        let Method { splits, scatters, gathers, .. } = settings.render.integrator.method();
+        let gathers = gathers && has_photons;
+        match settings.view.source().aov() {
+            // The lit fraction is measured at the first visible surface, which samples all lights.
+            LightAov::LitFraction => {
+                Self { splits: true, scatters: gathers, mirrors: false, gathers, receivers: Receivers::Eye }
+            }
+            LightAov::Radiance(_) | LightAov::TraversalCost => {
+                let scatters = scatters || gathers;
+                let receivers = if scatters { Receivers::Paths } else { Receivers::Eye };
+                Self { splits, scatters, mirrors: !scatters, gathers, receivers }
+            }
+        }
+    }
+}
+
+/// How lights are sampled with these settings, with or without photons.
+pub fn receivers(settings: &RenderSettings, are_gathered: bool) -> Receivers {
+    PathBehavior::of(settings, are_gathered).receivers
+}
