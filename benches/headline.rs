@@ -1,7 +1,7 @@
-//! The headline figures: whole processes, files and all, on all threads.
+//! Headline figures: time of whole processes, including reading and writing files, on all threads.
 //!
-//! `cargo bench --bench headline` makes its meshes and scenes in a scratch folder, renders each three times and prints the
-//! best: wall and processor time, with the shares of loading, building and rendering.
+//! `cargo bench --bench headline` generates its meshes and scenes in a temporary folder, renders each three times and
+//! prints the fastest run: wall-clock and processor time, and the time spent on loading, building and rendering.
 
 #![allow(clippy::print_stdout)]
 
@@ -16,7 +16,7 @@ use nix::sys::time::TimeValLike;
 
 const RUNS: usize = 3;
 
-/// A row: its title, its scene, the goal in words, options.
+/// A row of the table: title, scene, goal and options.
 struct Row {
     name: &'static str,
     goal: &'static str,
@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     let rows = [
         Row {
             name: "950,000 triangles, 10 samples, 10 shadow rays",
-            goal: "< 1.5 s in all",
+            goal: "< 1.5 s wall clock",
             scene: meshes(10, 10, &["large.off", "small.off"]),
             options: &[],
         },
@@ -54,7 +54,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
             options: &[],
         },
         Row {
-            name: "the same by the kd-tree",
+            name: "the same with the k-d tree",
             goal: "",
             scene: meshes(1, 1, &["largest.off"]),
             options: &["--accel", "kdtree"],
@@ -62,7 +62,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     ];
     println!(
         "{:<48} {:>7} {:>9} {:>7} {:>7} {:>7}  goal",
-        "480 × 480 pixels, seconds", "in all", "processor", "meshes", "accel", "render"
+        "480 × 480 pixels, seconds", "wall", "processor", "meshes", "accel", "render"
     );
     for row in rows {
         fs::write(path("scene.toml"), &row.scene)?;
@@ -82,7 +82,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     Ok(())
 }
 
-/// Renders once; returns the seconds of the whole and of the processor, and of the stages meshes, accel and render.
+/// Renders once; returns wall-clock and processor seconds, and the seconds of the stages meshes, accel and render.
 fn render(folder: &Path, options: &[&str]) -> Result<[f64; 5], Box<dyn error::Error>> {
     let processor = || -> nix::Result<f64> {
         let usage = getrusage(UsageWho::RUSAGE_CHILDREN)?;
@@ -104,7 +104,7 @@ fn render(folder: &Path, options: &[&str]) -> Result<[f64; 5], Box<dyn error::Er
     Ok([all, processor()? - before, stage("meshes"), stage("accel"), stage("render")])
 }
 
-/// A floor, a lamp, and these meshes.
+/// A floor, a light, and the given meshes.
 fn meshes(samples: u32, shadow_samples: u32, files: &[&str]) -> String {
     let mut scene = format!(
         r#"[render]
@@ -141,7 +141,7 @@ material = "lamp"
     scene
 }
 
-/// A bumpy ball that stands on the ground at x, as an OFF file of 2·rings·columns triangles less those at the poles.
+/// A bumpy ball on the ground at `x`, as an OFF file of 2·rings·columns triangles minus those at the poles.
 fn ball(rings: u32, columns: u32, x: f64) -> String {
     use std::f64::consts::{PI, TAU};
     let mut text = format!("OFF\n{} {} 0\n", (rings + 1) * columns, 2 * rings * columns - 2 * columns);

@@ -1,12 +1,11 @@
-//! Seconds to the same error with ever more lamps, whose total power is the same.
+//! Time to the same error with increasing numbers of lights of constant total power.
 //!
-//! `cargo bench --bench lamps` renders one room, lit by 10, 100, 1000 and 10,000 small lamps, by both integrators. The program
-//! itself renders a reference with many samples; then it renders four samples a pixel, three times.
+//! `cargo bench --bench lamps` renders a room with 10, 100, 1000 and 10,000 small lights, with both integrators. It
+//! renders a reference with many samples, then four samples per pixel three times.
 //!
-//! Errors fall with one over the samples: (seconds × relMSE) / 1e-2 are therefore the seconds to a relMSE of 1e-2, if a pixel could
-//! take parts of a sample. The last columns give the real wait: the least whole number of samples with a relMSE of at most 1e-2,
-//! and their seconds, lights and render together.
-//! `-- whitted 10 1000` chooses rows.
+//! The error is inversely proportional to the number of samples, so (seconds × relMSE) / 1e-2 is the time to a relMSE
+//! of 1e-2, if fractional samples were possible. The last columns give the actual wait: the smallest number of samples
+//! with a relMSE of at most 1e-2, and their seconds in the stages lights and render. `-- whitted 10 1000` selects rows.
 
 #![allow(clippy::print_stdout)]
 
@@ -21,7 +20,7 @@ const RUNS: usize = 3;
 /// The relMSE for which the table gives seconds.
 const GOAL: f64 = 1e-2;
 
-/// Most samples that are tried.
+/// Maximum number of samples to try.
 const MOST_SAMPLES: u32 = 64;
 
 fn main() -> Result<(), Box<dyn error::Error>> {
@@ -34,7 +33,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     let folder = tempfile::tempdir()?;
     println!(
         "{:<8} {:>6} {:>8} {:>9} {:>12} {:>12} {:>15} {:>8} {:>9}",
-        "", "lamps", "lights", "render", "shadow rays", "relMSE", "s x relMSE/1e-2", "samples", "s waited"
+        "", "lights", "build", "render", "shadow rays", "relMSE", "s x relMSE/1e-2", "samples", "s in all"
     );
     for integrator in integrators.into_iter().filter(|name| is_asked(name, &integrators)) {
         for count in counts.into_iter().filter(|count| is_asked(count, &counts)) {
@@ -56,18 +55,18 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     Ok(())
 }
 
-/// Figures of renders with some samples.
+/// Measurements of a render.
 struct Measured {
     /// Seconds of the stage lights.
     lights: f64,
     /// Seconds of the stage render.
     seconds: f64,
-    /// Shadow rays.
+    /// Number of shadow rays.
     rays: f64,
     relmse: f64,
 }
 
-/// The fastest of some renders.
+/// The fastest of several renders.
 fn measured(folder: &Path, samples: u32) -> Result<Measured, Box<dyn error::Error>> {
     let mut best: Option<[f64; 3]> = None;
     for _ in 0..RUNS {
@@ -80,7 +79,7 @@ fn measured(folder: &Path, samples: u32) -> Result<Measured, Box<dyn error::Erro
     Ok(Measured { lights, seconds, rays, relmse: error_of(folder)? })
 }
 
-/// Renders once; returns the seconds of the stages lights and render, and the shadow rays.
+/// Renders once; returns the seconds of the stages lights and render, and the number of shadow rays.
 fn render(folder: &Path, options: &[&str]) -> Result<[f64; 3], Box<dyn error::Error>> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_glimt"));
     command.current_dir(folder).args(["scene.toml", "--once", "--report", "report.json"]).args(options);
@@ -95,7 +94,7 @@ fn render(folder: &Path, options: &[&str]) -> Result<[f64; 3], Box<dyn error::Er
     Ok([stage("lights"), stage("render"), report["counters"]["shadow_rays"].as_f64().unwrap_or(f64::NAN)])
 }
 
-/// relMSE of the picture.
+/// The relMSE of the image.
 fn error_of(folder: &Path) -> Result<f64, Box<dyn error::Error>> {
     let mut command = Command::new(env!("CARGO_BIN_EXE_glimt"));
     let output =
@@ -104,7 +103,7 @@ fn error_of(folder: &Path) -> Result<f64, Box<dyn error::Error>> {
     errors["relmse"].as_f64().ok_or_else(|| "no relMSE".into())
 }
 
-/// A room with objects, under this many balls of light, which the camera does not see.
+/// A room with objects and `count` small sphere lights that the camera does not see.
 fn scene(integrator: &str, count: u32) -> String {
     let mut scene = format!(
         r#"[render]
@@ -152,7 +151,7 @@ material = "clay"
 "#,
         emission = 12_000.0 / f64::from(count)
     );
-    // Multiples of powers of the plastic number, and their like in three dimensions: even without a grid.
+    // Multiples of powers of the plastic number and its analog in three dimensions: a low-discrepancy sequence.
     let place = |i: u32, step: f64| (f64::from(i) * step).fract();
     for i in 0..count {
         let [x, y, z] = [0.819_172_51, 0.671_043_61, 0.549_700_48].map(|step| place(i, step));

@@ -1,5 +1,5 @@
-//! Processor time of `check` for large scene files: a million spheres, and files that repeat an element, right or
-//! wrong, N and 4N times. A growth well above 4 reveals a quadratic search.
+//! Processor time of `check` for large scene files: a million spheres, and files that repeat a valid or invalid element
+//! N and 4N times. A growth well above 4 reveals a quadratic algorithm.
 //!
 //! `cargo bench --bench scenes [NAME…]`
 
@@ -13,7 +13,7 @@ use nix::sys::time::TimeValLike;
 
 const HEAD: &str = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]\n[[light]]\n";
 
-/// Function that makes a scene file with so many elements.
+/// Generates a scene file with a number of elements.
 type Family = fn(usize) -> String;
 
 const FAMILIES: [(&str, Family); 14] = [
@@ -50,7 +50,7 @@ fn sphere(number: usize, material: &str) -> String {
     format!("[[sphere]]\ncenter = [{number}, 0, 0]\nradius = 0.5\nmaterial = \"{material}{number}\"\n")
 }
 
-/// A million spheres of eight materials at places that look random.
+/// A million spheres of eight materials at pseudo-random positions.
 fn million() -> String {
     let place = |number: usize| (number.wrapping_mul(2_654_435_761) % 2_000_003) as f64 / 1e4 - 100.0;
     let sphere = |i: usize| {
@@ -63,7 +63,7 @@ fn million() -> String {
     each(8, |i| format!("[materials.m{i}]\ndiffuse = [0.5, 0.5, 0.3]\n")) + &each(1_000_000, sphere)
 }
 
-/// Processor seconds that `check` takes for this file.
+/// Processor seconds of `check` for a file.
 fn seconds(folder: &Path, text: &str) -> f64 {
     let scene = folder.join("scene.toml");
     std::fs::write(&scene, format!("{HEAD}{text}")).expect("written");

@@ -1,4 +1,4 @@
-//! Keys on the camera: the first changed cell after a press, and pictures a second while a key is held.
+//! Camera keys: time from a press to the first changed cell, and images per second while a key is held.
 
 use std::path::Path;
 use std::thread;
@@ -8,14 +8,14 @@ use super::terminal::{Cells, Terminal};
 use super::{COLUMNS, PAUSE, ROUNDS, ROWS, figures};
 use crate::Outcome;
 
-/// Time for which a key is held.
+/// How long a key is held.
 const HELD: Duration = Duration::from_secs(2);
-/// Time between its repeats.
+/// Key repeat interval.
 const REPEAT: Duration = Duration::from_millis(33);
 
-/// A line of figures for a scene of this path.
+/// Measures one scene and returns a line of figures.
 pub fn row(folder: &Path, scene: &Path) -> Outcome<String> {
-    let path = scene.to_str().ok_or("a name that is no text")?;
+    let path = scene.to_str().ok_or("a file name is not valid UTF-8")?;
     let arguments = [path, "--samples", "100000", "-o", "out.png"];
     let mut terminal = Terminal::open(folder, &arguments, COLUMNS, ROWS)?;
     terminal.wait("a picture", |screen| screen.contents().contains('▀'))?;
@@ -27,11 +27,11 @@ pub fn row(folder: &Path, scene: &Path) -> Outcome<String> {
         terminal.press(["l", "k", ">"][round % 3])?;
         times.push(terminal.when(PAUSE, |now| is_other(&before, now))? - begin);
     }
-    Ok(format!("first {}  held {:5.1} pictures a second", figures(times), held(&mut terminal)?))
+    Ok(format!("first {}  held {:5.1} images per second", figures(times), held(&mut terminal)?))
 }
 
-/// Holds a key that repeats as keyboards do, to and fro. Refined pictures of the same camera come later than the next press, so
-/// that each burst of bytes is a picture of another camera.
+/// Holds a camera key with keyboard repeat, back and forth. Refined images of the same camera arrive only after the
+/// next press, so each burst of bytes is the image of another camera position.
 fn held(terminal: &mut Terminal) -> Outcome<f64> {
     terminal.cells();
     let begin = Instant::now();
@@ -44,7 +44,7 @@ fn held(terminal: &mut Terminal) -> Outcome<f64> {
     Ok(terminal.bursts() as f64 / begin.elapsed().as_secs_f64())
 }
 
-/// Whether another picture is shown; less noise does not count.
+/// Whether a different image is shown; less noise does not count.
 fn is_other(before: &Cells, now: &Cells) -> bool {
     let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
     let far = |(a, b): &([[u8; 3]; 2], [[u8; 3]; 2])| {

@@ -1,4 +1,4 @@
-//! Time until the worker is free for a newer request, whatever it is doing.
+//! Time until the worker starts a newer request, whatever it is doing.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -11,8 +11,8 @@ use super::Outcome;
 
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// Times of cancellations after 0, 1, 2, … 60 ms, at first with nothing loaded: while the worker reads the scene,
-/// builds its trees, traces the first picture and the first passes; then well into the render.
+/// Measures cancellations after 0, 1, 2, … 60 ms, at first with nothing loaded: while the worker reads the scene,
+/// builds its acceleration structures, and traces the first image and passes; then late in the render.
 pub fn times(scene: &Path) -> Outcome<Vec<Duration>> {
     let mut times = Vec::new();
     for step in 0..12 {
@@ -44,7 +44,7 @@ fn cancel(worker: &Handle, scene: &Path, generation: &mut u64, after: Duration) 
     }
 }
 
-/// Each request is of another picture.
+/// Sends a request for a different image each time.
 fn send(worker: &Handle, scene: &Path, generation: &mut u64) {
     *generation += 1;
     let overrides =

@@ -1,14 +1,14 @@
-//! Latency: from a save or a key to the first changed cell of the picture, and until a render stops.
+//! Latency: from a save or a key press to the first changed cell of the image, and until a render stops.
 //!
-//! `cargo bench --bench latency [-- [settled] [busy] [cancel] [camera] [SCENE…]]` copies scenes and assets into a scratch folder,
-//! runs glimt on each in a pseudo-terminal of 120×40 cells, edits the file, presses keys, and prints medians and maxima in
-//! milliseconds. A time runs from before the file is written, or the key pressed, until the terminal has read the first bytes that
-//! change the picture.
+//! `cargo bench --bench latency [-- [settled] [busy] [cancel] [camera] [SCENE…]]` copies scenes and assets to a
+//! temporary folder, runs glimt on each in a pseudo-terminal of 120×40 cells, edits the file, presses keys, and prints
+//! medians and maxima in milliseconds. Times run from before the file is written or the key is pressed until the
+//! terminal has read the first bytes that change the image.
 //!
-//! `settled` saves the file while nothing is rendering; `busy` while the previous picture still is. `GLIMT` may name another build
-//! of the program. `cancel` measures from a newer request until the worker takes it up, whatever it was doing. `camera` presses
-//! camera keys while the previous picture is being rendered, on every bundled scene: the first changed cell, and the number of
-//! pictures a second while a key is held.
+//! `settled` saves the file while nothing is rendering, `busy` while the previous image still is. `GLIMT` may name
+//! another build of the program. `cancel` measures the time from a newer request until the worker starts it, whatever
+//! it was doing. `camera` presses camera keys on every bundled scene while the previous image is rendering, and reports
+//! the first changed cell and the images per second while a key is held.
 
 #![allow(clippy::print_stdout)]
 
@@ -28,9 +28,9 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 
 const COLUMNS: u16 = 120;
 const ROWS: u16 = 40;
-/// Measurements of each kind.
+/// Number of measurements of each kind.
 const ROUNDS: usize = 7;
-/// Pause after a save, in which the machine does nothing else.
+/// Pause after a save in which nothing else runs.
 const PAUSE: Duration = Duration::from_millis(300);
 
 fn main() -> Outcome<()> {
@@ -44,20 +44,20 @@ fn main() -> Outcome<()> {
     let scenes: Vec<&Scene> = scenes.collect();
     for mode in [Mode::Settled, Mode::Busy] {
         if is_wanted(mode.name()) {
-            println!("{}: from a save or a key to the first changed cell, ms, median (most)", mode.name());
+            println!("{}: from a save or a key to the first changed cell, ms, median (maximum)", mode.name());
             for scene in &scenes {
                 row(&mut copies, scene, mode)?;
             }
         }
     }
     if is_wanted("cancel") {
-        println!("cancel: until the worker takes the next request up, ms, median (most)");
+        println!("cancel: until the worker starts the next request, ms, median (maximum)");
         for scene in &scenes {
             println!("{:<14} {}", scene.name, figures(cancel::times(&copies.scene(scene))?));
         }
     }
     if is_wanted("camera") {
-        println!("camera: from a key to the first changed cell, ms, median (most)");
+        println!("camera: from a key to the first changed cell, ms, median (maximum)");
         for path in copies.all()? {
             let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
             if all_scenes || arguments.contains(&name) {
@@ -82,7 +82,7 @@ impl Mode {
         }
     }
 
-    /// Whether the picture is another one. While it is still being rendered, less noise does not count.
+    /// Whether the image is a different one. While it is still rendering, less noise does not count.
     fn is_other(self, before: &Cells, now: &Cells) -> bool {
         let differ = |most: u8| {
             let pairs = before.iter().zip(now).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
@@ -98,15 +98,15 @@ impl Mode {
     }
 }
 
-/// Measures one scene: every edit, every key.
+/// Measures one scene with every edit and every key.
 fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
     let path = copies.scene(scene);
-    let path = path.to_str().ok_or("a name that is no text")?;
+    let path = path.to_str().ok_or("a file name is not valid UTF-8")?;
     let samples = if mode == Mode::Settled { "2" } else { "100000" };
     let arguments = [path, "--samples", samples, "-o", "out.png"];
     let mut terminal = Terminal::open(copies.folder(), &arguments, COLUMNS, ROWS)?;
     terminal.wait("a picture", |screen| screen.contents().contains('▀'))?;
-    // Wait until the files are so old that their times alone identify them.
+    // Wait until the files are old enough that their modification times identify them.
     std::thread::sleep(Duration::from_millis(2500));
     let mut words = Vec::new();
     for edit in scene.edits {
@@ -126,7 +126,7 @@ fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
     for key in scene.keys {
         let mut times = Vec::new();
         for _ in 0..ROUNDS {
-            // Each request is for another picture, so that none is cached. The camera changes every view.
+            // Request a different image each time, so that none is cached. The camera changes every view.
             ready(&mut terminal, mode)?;
             let (file, bytes) = copies.edit(scene, scene.camera())?;
             fs::write(&file, &bytes)?;
@@ -145,7 +145,7 @@ fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
     Ok(())
 }
 
-/// Waits for the picture before an edit or a key.
+/// Waits for the image before an edit or a key press.
 fn ready(terminal: &mut Terminal, mode: Mode) -> Outcome<Cells> {
     if mode == Mode::Settled {
         terminal.wait("the end of the render", |screen| {
@@ -156,7 +156,7 @@ fn ready(terminal: &mut Terminal, mode: Mode) -> Outcome<Cells> {
     Ok(terminal.cells())
 }
 
-/// Median and largest in milliseconds.
+/// Formats the median and the maximum in milliseconds.
 fn figures(mut times: Vec<Duration>) -> String {
     times.sort();
     let milliseconds = |time: Option<&Duration>| time.map_or(0.0, |time| time.as_secs_f64() * 1e3);

@@ -5,19 +5,19 @@ use std::path::{Path, PathBuf};
 
 use super::Outcome;
 
-/// A bundled scene with edits of it: the kind, the replaced text and its replacement. `{}` stands for a number between
-/// 0.1 and 1 that differs each time; without `{}`, the edit darkens the picture file of this name.
+/// A bundled scene with edits: the kind, the text to replace and its replacement. `{}` is replaced with a number
+/// between 0.1 and 1 that differs each time. An edit without `{}` darkens the texture file of this name.
 pub struct Scene {
     pub name: &'static str,
     pub edits: &'static [Edit],
     pub keys: &'static [&'static str],
 }
 
-/// The kind of an edit, the replaced text, its replacement.
+/// The kind of an edit, the text to replace, and its replacement.
 pub type Edit = (&'static str, &'static str, &'static str);
 
 impl Scene {
-    /// The edit of the camera, which stands second everywhere.
+    /// The camera edit, which is always the second one.
     pub fn camera(&self) -> Edit {
         self.edits[1]
     }
@@ -110,12 +110,12 @@ pub const SCENES: &[Scene] = &[
 /// Copies of scenes and assets, to be edited.
 pub struct Copies {
     folder: tempfile::TempDir,
-    /// Edits so far.
+    /// Number of edits so far.
     edits: u32,
 }
 
 impl Copies {
-    /// Copies all of them, with the large mesh, which is generated.
+    /// Copies all scenes and assets, and generates the large mesh.
     pub fn new() -> Outcome<Self> {
         let folder = tempfile::tempdir()?;
         let project = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -131,7 +131,7 @@ impl Copies {
         let mut make = std::process::Command::new(env!("CARGO_BIN_EXE_glimt-assets"));
         make.arg("million").current_dir(folder.path()).stdout(std::process::Stdio::null());
         if !make.status()?.success() {
-            return Err("the large mesh was not made".into());
+            return Err("the large mesh could not be generated".into());
         }
         Ok(Self { folder, edits: 0 })
     }
@@ -153,7 +153,7 @@ impl Copies {
         self.folder.path().join("scenes").join(scene.name).with_extension("toml")
     }
 
-    /// The file that an edit changes, and its new content.
+    /// Returns the file that an edit changes, and its new content.
     pub fn edit(&mut self, scene: &Scene, (_, from, to): Edit) -> Outcome<(PathBuf, Vec<u8>)> {
         self.edits += 1;
         let number = 0.1 + f64::from(self.edits) * 0.377 % 0.9;
@@ -169,7 +169,7 @@ impl Copies {
         let name = Path::new("scenes").join(scene.name).with_extension("toml");
         let text = fs::read_to_string(of_project(&name))?;
         if !text.contains(from) {
-            return Err(format!("{} has no {from:?}", name.display()).into());
+            return Err(format!("{} does not contain {from:?}", name.display()).into());
         }
         Ok((path, text.replacen(from, &to.replace("{}", &format!("{number:.3}")), 1).into_bytes()))
     }

@@ -1,4 +1,4 @@
-//! A terminal that notes the times of bytes and parses them later, so that it takes no time from the program during a
+//! A terminal that timestamps bytes and parses them later, so that it takes no time from the program during a
 //! measurement.
 
 use std::io::{Read, Write};
@@ -12,15 +12,15 @@ use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system}
 
 use super::Outcome;
 
-/// Longest time to wait for anything.
+/// Maximum time to wait for anything.
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// Bytes that the program wrote, with their time.
+/// Bytes written by the program, with a timestamp.
 type Chunk = (Instant, Vec<u8>);
 
-/// The program in a pseudo-terminal of truecolour.
+/// The program in a truecolor pseudo-terminal.
 pub struct Terminal {
-    // Held so that the terminal stays.
+    // Keeps the terminal open.
     _master: Box<dyn MasterPty + Send>,
     child: Box<dyn Child + Send + Sync>,
     keys: Arc<Mutex<Box<dyn Write + Send>>>,
@@ -28,11 +28,11 @@ pub struct Terminal {
     screen: vt100::Parser,
 }
 
-/// The colours of every picture cell; text is none.
+/// The colors of every image cell; `None` for text.
 pub type Cells = Vec<Option<[[u8; 3]; 2]>>;
 
 impl Terminal {
-    /// Starts the program in this folder.
+    /// Starts the program in a folder.
     pub fn open(folder: &Path, arguments: &[&str], columns: u16, rows: u16) -> Outcome<Self> {
         let size = PtySize { rows, cols: columns, pixel_width: 0, pixel_height: 0 };
         let pair = native_pty_system().openpty(size)?;
@@ -49,12 +49,12 @@ impl Terminal {
         let keys = Arc::new(Mutex::new(pair.master.take_writer()?));
         let chunks = Arc::<Mutex<Vec<Chunk>>>::default();
         read(pair.master.try_clone_reader()?, chunks.clone(), keys.clone());
-        let side = |length| NonZeroU16::new(length).ok_or("a terminal has no cells");
+        let side = |length| NonZeroU16::new(length).ok_or("the terminal has no cells");
         let screen = vt100::Parser::new(side(rows)?, side(columns)?, 0);
         Ok(Self { _master: pair.master, child, keys, chunks, screen })
     }
 
-    /// Types these characters.
+    /// Types characters.
     pub fn press(&self, keys: &str) -> Outcome<()> {
         Ok(lock(&self.keys).write_all(keys.as_bytes())?)
     }
@@ -68,19 +68,22 @@ impl Terminal {
                 return Ok(());
             }
             if Instant::now() > deadline {
-                return Err(format!("not seen: {what}\n{}", self.screen.screen().contents()).into());
+                return Err(
+                    format!("timed out waiting for {what}\n{}", self.screen.screen().contents()).into()
+                );
             }
             thread::sleep(Duration::from_millis(10));
         }
     }
 
-    /// Current cells of the picture.
+    /// The current cells of the image.
     pub fn cells(&mut self) -> Cells {
         self.catch_up();
         cells(self.screen.screen())
     }
 
-    /// Time at which the picture first satisfies `differs`, searched for once `pause` is over, then until it is found.
+    /// Time at which the image first satisfies `differs`; the search begins after `pause` and continues until it is
+    /// found.
     pub fn when(&mut self, pause: Duration, differs: impl Fn(&Cells) -> bool) -> Outcome<Instant> {
         let deadline = Instant::now() + LIMIT;
         thread::sleep(pause);
@@ -98,10 +101,10 @@ impl Terminal {
             }
             thread::sleep(Duration::from_millis(20));
         }
-        Err(format!("the picture does not change\n{}", self.screen.screen().contents()).into())
+        Err(format!("the image did not change\n{}", self.screen.screen().contents()).into())
     }
 
-    /// Number of bursts, after a pause, with enough bytes for a picture.
+    /// Number of bursts, separated by pauses, with enough bytes for an image.
     pub fn bursts(&mut self) -> usize {
         const LEAST: usize = 300;
         const GAP: Duration = Duration::from_millis(8);
@@ -126,7 +129,7 @@ impl Terminal {
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        // The measurement is complete; a failure to end the program does not matter.
+        // The measurement is complete; failing to stop the program does not matter.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -136,7 +139,7 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Notes incoming bytes, and answers the program's queries: whether there is a terminal, and its kind.
+/// Timestamps incoming bytes, and answers the program's queries for the terminal's status and type.
 fn read(
     mut output: Box<dyn Read + Send>,
     chunks: Arc<Mutex<Vec<Chunk>>>,
@@ -152,11 +155,11 @@ fn read(
             for (question, answer) in ANSWERS {
                 while let Some(at) = tail.windows(question.len()).position(|window| window == question) {
                     tail.drain(at..at + question.len());
-                    // A program that is gone needs no answer.
+                    // A program that has exited needs no answer.
                     let _ = lock(&keys).write_all(answer);
                 }
             }
-            // A query may be cut in two.
+            // A query may be split across reads.
             tail.drain(..tail.len().saturating_sub(3));
         }
     });
@@ -173,7 +176,7 @@ fn cells(screen: &vt100::Screen) -> Cells {
     cells
 }
 
-/// The upper and the lower half of a picture cell.
+/// The colors of the upper and lower half of an image cell.
 fn shades(cell: &vt100::Cell) -> Option<[[u8; 3]; 2]> {
     let rgb = |color| match color {
         vt100::Color::Rgb(r, g, b) => Some([r, g, b]),

@@ -1,8 +1,9 @@
-//! A model from the command line to a picture: `glimt MODEL --once` as a new process, files and all.
+//! Time from the command line to the image of a model: `glimt MODEL --once` as a new process, including reading and
+//! writing files.
 //!
-//! `cargo bench --bench models` makes a model of 100,352 triangles in a scratch folder, renders it twenty times to a PNG of
-//! 512 × 512 pixels at `--error 0.05`, and prints the seconds, how many runs took at most one, and how busy the machine was.
-//! `-- FILE` renders another model. `others.py` beside this file does the same by f3d and Blender.
+//! `cargo bench --bench models` generates a model of 100,352 triangles in a temporary folder, renders it twenty times
+//! to a 512 × 512 PNG at `--error 0.05`, and prints the seconds, how many runs reached the goal, and the load of the
+//! machine. `-- FILE` renders another model. `others.py` next to this file does the same with f3d and Blender.
 
 #![allow(clippy::print_stdout)]
 
@@ -13,7 +14,7 @@ use std::time::Instant;
 use std::{error, fs};
 
 const RUNS: usize = 20;
-/// Seconds that a run is to take at most.
+/// Goal for the seconds of a run.
 const GOAL: f64 = 1.0;
 
 fn main() -> Result<(), Box<dyn error::Error>> {
@@ -33,9 +34,9 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     }
     seconds.sort_by(f64::total_cmp);
     let within = seconds.iter().filter(|seconds| **seconds <= GOAL).count();
-    let (least, median, most) = (seconds[0], seconds[RUNS / 2], seconds[RUNS - 1]);
+    let (minimum, median, maximum) = (seconds[0], seconds[RUNS / 2], seconds[RUNS - 1]);
     println!(
-        "{}, 512 × 512, --error 0.05: {least:.2} {median:.2} {most:.2} s (least, median, most)",
+        "{}, 512 × 512, --error 0.05: {minimum:.2} {median:.2} {maximum:.2} s (minimum, median, maximum)",
         model.display()
     );
     println!("{within} of {RUNS} runs took at most {GOAL} s");
@@ -43,7 +44,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     Ok(())
 }
 
-/// Seconds of a process.
+/// Wall-clock seconds of a process.
 fn run(folder: &Path, model: &Path) -> Result<f64, Box<dyn error::Error>> {
     let begin = Instant::now();
     let status = Command::new(env!("CARGO_BIN_EXE_glimt"))
@@ -67,7 +68,7 @@ fn run(folder: &Path, model: &Path) -> Result<f64, Box<dyn error::Error>> {
     if status.success() { Ok(begin.elapsed().as_secs_f64()) } else { Err("glimt failed".into()) }
 }
 
-/// A ball with bumps as a text of PLY: 2·rows² triangles, near enough.
+/// A bumpy ball in ASCII PLY with about 2·rows² triangles.
 fn bumps(rows: u32) -> String {
     let at = |i: u32| {
         let (row, column) = (f64::from(i / rows), f64::from(i % rows));

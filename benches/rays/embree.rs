@@ -1,6 +1,6 @@
-//! Embree 4 by its C interface, loaded at run time from a path that the user gives, for comparison.
+//! Embree 4 through its C API, loaded at run time from a path that the user gives, for comparison.
 //!
-//! Names, numbers and layouts are those of the headers `rtcore_common.h`, `rtcore_ray.h`, `rtcore_buffer.h` and
+//! Names, numbers and layouts follow the headers `rtcore_common.h`, `rtcore_ray.h`, `rtcore_buffer.h` and
 //! `rtcore_scene.h` of Embree 4.
 
 #![allow(unsafe_code, clippy::panic)]
@@ -15,7 +15,7 @@ use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
 use libloading::{Library, Symbol};
 
-/// No primitive.
+/// Primitive id of a miss.
 pub const NONE: u32 = u32::MAX;
 
 const GEOMETRY_TYPE_TRIANGLE: c_int = 0;
@@ -26,10 +26,10 @@ const FORMAT_FLOAT3: c_int = 0x9003;
 const SCENE_FLAG_ROBUST: c_int = 1 << 2;
 const RAY_QUERY_FLAG_COHERENT: c_int = 1 << 16;
 
-/// Effort of building a tree.
+/// Build quality.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
-    /// `RTC_BUILD_QUALITY_MEDIUM`, its default.
+    /// `RTC_BUILD_QUALITY_MEDIUM`, the default.
     Medium = 1,
     /// `RTC_BUILD_QUALITY_HIGH`: spatial splits.
     High = 2,
@@ -56,7 +56,7 @@ struct RayHit {
     padding: [u32; 3],
 }
 
-/// `RTCRay16` and after it `RTCHit16`: one row for each member.
+/// `RTCRay16` followed by `RTCHit16`: one row per member.
 #[repr(C, align(64))]
 struct RayHit16 {
     rows: [[f32; 16]; 12],
@@ -68,7 +68,7 @@ struct RayHit16 {
     instance: [[u32; 16]; 2],
 }
 
-/// `RTCIntersectArguments`; `RTCOccludedArguments` begins alike.
+/// `RTCIntersectArguments`; `RTCOccludedArguments` begins with the same fields.
 #[repr(C)]
 struct Arguments {
     flags: c_int,
@@ -81,7 +81,7 @@ struct Arguments {
 
 type Handle = *mut c_void;
 
-/// Functions that are called for every ray.
+/// The functions called for every ray.
 #[derive(Clone, Copy)]
 struct Queries {
     intersect1: unsafe extern "C" fn(Handle, *mut RayHit, *const Arguments),
@@ -91,18 +91,18 @@ struct Queries {
 
 /// A loaded library.
 pub struct Embree {
-    /// Never unloaded: its threads outlive its devices.
+    /// Never unloaded, as its threads outlive its devices.
     library: ManuallyDrop<Library>,
     queries: Queries,
 }
 
-/// A mesh under Embree's tree, with the robust flag.
+/// A mesh in an Embree scene with the robust flag.
 pub struct Scene<'a> {
     embree: &'a Embree,
     _mesh: &'a TriangleMesh,
     device: Handle,
     scene: Handle,
-    /// Bytes that the library takes for it, by its own count.
+    /// Memory that the library reports for the scene, in bytes.
     pub memory_bytes: usize,
 }
 
@@ -116,9 +116,9 @@ extern "C" fn count_memory(_user: *mut c_void, bytes: isize, _post: bool) -> boo
 impl Embree {
     /// Loads the library.
     pub fn load(path: &Path) -> Result<Self, libloading::Error> {
-        // SAFETY: the user names a library to run; Embree's initialisers ask for nothing.
+        // SAFETY: the user names a library to run; Embree's initializers have no preconditions.
         let library = unsafe { Library::new(path)? };
-        // SAFETY: the types are those of the C interface.
+        // SAFETY: the types match the C API.
         let queries = unsafe {
             Queries {
                 intersect1: *library.get(b"rtcIntersect1")?,
@@ -129,16 +129,16 @@ impl Embree {
         Ok(Self { library: ManuallyDrop::new(library), queries })
     }
 
-    /// A function of the interface.
+    /// Looks up a function of the API.
     ///
     /// # Safety
-    /// `F` is its type.
+    /// `F` must be its type.
     unsafe fn function<F>(&self, name: &str) -> Symbol<'_, F> {
-        // SAFETY: the caller knows the type.
+        // SAFETY: the caller guarantees the type.
         unsafe { self.library.get(name.as_bytes()) }.unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    /// Builds the tree over a mesh by `threads` threads.
+    /// Prepares a scene for a mesh, to be built with `threads` threads.
     pub fn build<'a>(
         &'a self,
         mesh: &'a TriangleMesh,
@@ -147,13 +147,14 @@ impl Embree {
         isa: &str,
     ) -> Scene<'a> {
         MEMORY_BYTES.store(0, Ordering::Relaxed);
-        let options = CString::new(format!("threads={threads},isa={isa}")).expect("no zero byte inside");
+        let options =
+            CString::new(format!("threads={threads},isa={isa}")).expect("the options contain no NUL byte");
         // SAFETY: every call has its C signature; the buffers outlive the scene, which borrows the mesh.
         unsafe {
             let device = self.function::<unsafe extern "C" fn(*const c_char) -> Handle>("rtcNewDevice")(
                 options.as_ptr(),
             );
-            assert!(!device.is_null(), "Embree makes no device");
+            assert!(!device.is_null(), "Embree could not create a device");
             type Monitor = extern "C" fn(*mut c_void, isize, bool) -> bool;
             self.function::<unsafe extern "C" fn(Handle, Monitor, *mut c_void)>(
                 "rtcSetDeviceMemoryMonitorFunction",
@@ -217,18 +218,18 @@ impl Embree {
 }
 
 impl Scene<'_> {
-    /// Builds the tree; this call is timed as the build.
+    /// Builds the acceleration structure; this call is timed as the build.
     pub fn commit(&mut self) {
         // SAFETY: the scene is alive.
         unsafe { self.embree.function::<unsafe extern "C" fn(Handle)>("rtcCommitScene")(self.scene) };
         self.memory_bytes = MEMORY_BYTES.load(Ordering::Relaxed).max(0) as usize;
     }
 
-    /// Nearest hit: t, primitive, u, v.
+    /// Closest hit: t, primitive, u, v.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<(f32, u32, f32, f32)> {
         let mut query = query(ray);
-        // SAFETY: the scene is committed and the query laid out as `RTCRayHit`.
+        // SAFETY: the scene is committed, and the query has the layout of `RTCRayHit`.
         unsafe { (self.embree.queries.intersect1)(self.scene, &mut query, null()) };
         (query.geometry != NONE).then_some((query.t_far, query.primitive, query.u, query.v))
     }
@@ -237,12 +238,12 @@ impl Scene<'_> {
     #[inline]
     pub fn any(&self, ray: &Ray) -> bool {
         let mut query = query(ray);
-        // SAFETY: as above; `RTCRay` is the beginning of `RTCRayHit`.
+        // SAFETY: as above; `RTCRayHit` begins with `RTCRay`.
         unsafe { (self.embree.queries.occluded1)(self.scene, &mut query, null()) };
         query.t_far < 0.0
     }
 
-    /// Number of primitives that rays hit, traced sixteen at a time; a remainder is left out.
+    /// Number of rays that hit a primitive, traced sixteen at a time; a remainder is ignored.
     pub fn closest16(&self, rays: &[Ray], coherent: bool) -> usize {
         let arguments = Arguments {
             flags: if coherent { RAY_QUERY_FLAG_COHERENT } else { 0 },
@@ -272,7 +273,7 @@ impl Scene<'_> {
                 packet.rows[8][lane] = ray.t_max;
                 packet.rows[9][lane] = f32::from_bits(u32::MAX);
             }
-            // SAFETY: the scene is committed, packet and mask are laid out and aligned as the interface asks.
+            // SAFETY: the scene is committed, and packet and mask have the layout and alignment that the API requires.
             unsafe {
                 (self.embree.queries.intersect16)(valid.0.as_ptr(), self.scene, &mut packet, &arguments);
             };
@@ -308,7 +309,7 @@ fn query(ray: &Ray) -> RayHit {
 
 impl Drop for Scene<'_> {
     fn drop(&mut self) {
-        // SAFETY: both were made by `build` and are released once.
+        // SAFETY: `build` created both, and each is released once.
         unsafe {
             self.embree.function::<unsafe extern "C" fn(Handle)>("rtcReleaseScene")(self.scene);
             self.embree.function::<unsafe extern "C" fn(Handle)>("rtcReleaseDevice")(self.device);

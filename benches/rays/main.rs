@@ -1,18 +1,19 @@
-//! The ray kernel: time and memory of building, and millions of rays a second, on one thread and on all. Rays are
-//! primary rays, one cosine-distributed bounce, and shadow rays (any hit) towards a point light.
+//! The ray kernel: build time and memory, and millions of rays per second, on one thread and on all. The rays are
+//! primary rays, one cosine-distributed bounce, and shadow rays (any hit) to a point light.
 //!
-//! - `cargo bench --bench rays` runs on generated meshes, `-- a.ply b.obj c.mesh` on files; `-- ball` on a generated one
-//!   of a million triangles.
-//! - `--embree LIB` compares with Embree 4: `LIB` is a `libembree4.so`; its scene is robust and of medium quality.
-//!   `--embree-isa avx512` lets it use AVX-512 (its packets of 16 need it, its single rays are faster by AVX2).
-//! - `--instructions NAME` traverses by these instructions alone.
-//! - `--high` cuts large triangles first, `Quality::High`, also in Embree.
-//! - `--build` builds and traces nothing.
-//! - `--closest FILE`, `--any FILE` time rays of a file too: nearest hits of the rays, or whether they hit anything.
-//! - `--rays FILE --hits FILE` (or `--occluded FILE`), any number of times, counts differences from given answers.
+//! - `cargo bench --bench rays` uses generated meshes, `-- a.ply b.obj c.mesh` files, and `-- ball` a generated mesh
+//!   with a million triangles.
+//! - `--embree LIB` compares with Embree 4, where `LIB` is a `libembree4.so`; its scene is robust and of medium
+//!   quality. `--embree-isa avx512` lets it use AVX-512, which its packets of 16 need; its single rays are faster with
+//!   AVX2.
+//! - `--instructions NAME` traverses only with this instruction set.
+//! - `--high` splits large triangles first (`Quality::High`), also in Embree.
+//! - `--build` only builds.
+//! - `--closest FILE` and `--any FILE` also time the rays of a file, for the closest or any hit.
+//! - `--rays FILE --hits FILE` (or `--occluded FILE`) counts differences from expected results; may be repeated.
 //!
-//! Runs of glimt and of Embree alternate chunk by chunk, and each chunk counts by its fastest run. Other load on the
-//! machine therefore affects both alike, or neither.
+//! Runs of glimt and Embree alternate chunk by chunk, and the fastest run of each chunk counts, so other load on the
+//! machine affects both or neither.
 
 #![allow(clippy::print_stdout)]
 
@@ -34,7 +35,7 @@ use rayon::prelude::*;
 /// Number of timed runs of each chunk.
 const RUNS: usize = 7;
 
-/// Rays of a chunk.
+/// Number of rays per chunk.
 const CHUNK: usize = 1 << 15;
 
 #[derive(Default)]
@@ -44,9 +45,9 @@ struct Asked {
     isa: Option<String>,
     build_only: bool,
     high: bool,
-    /// Files of rays to be timed, and whether any hit ends them.
+    /// Ray files to time, and whether any hit suffices.
     timed: Vec<(PathBuf, bool)>,
-    /// Files of rays, each with its answers.
+    /// Ray files, each with its expected results.
     given: Vec<(PathBuf, PathBuf)>,
     files: Vec<String>,
 }
@@ -117,7 +118,7 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
     let quality = if asked.high { Quality::High } else { Quality::Medium };
     let build = || {
         let corners = |id| mesh.corners(id);
-        WideBvh::build_with(quality, count, corners, &CancelToken::new()).expect("nobody cancels")
+        WideBvh::build_with(quality, count, corners, &CancelToken::new()).expect("the token is not cancelled")
     };
     let (mut own_build, mut peer_build) = (f64::INFINITY, f64::INFINITY);
     let mut tree = None;
@@ -138,7 +139,7 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
         }
     }
     let Some(mut tree) = tree else { return };
-    println!("{name}: {count} triangles, {threads} threads build, 1 traces");
+    println!("{name}: {count} triangles, built with {threads} threads, traced with 1");
     line("build", "s", own_build, scene.as_ref().map(|_| peer_build));
     line(
         "memory",
@@ -182,7 +183,8 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
     }
 }
 
-/// Seconds of rays from a file, by one thread: one by one, and sixteen at a time in the file's order. Of Embree's ways, the fastest.
+/// Times the rays of a file on one thread: one by one, and sixteen at a time in file order. For Embree, the fastest way
+/// counts.
 fn timed(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray], any_hit: bool) {
     let seconds = |rate: f64| rays.len() as f64 / 1e6 / rate;
     let mut single = |rays: &[Ray]| match any_hit {
@@ -208,18 +210,18 @@ fn timed(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray], any_hit: bool)
         };
         let mut plain = |rays: &[Ray]| scene.closest16(rays, false);
         let mut coherent = |rays: &[Ray]| scene.closest16(rays, true);
-        // Packets ask for nearest hits alone.
+        // Packets only find closest hits.
         let ways: &mut [Way<'_>] = &mut [&mut single, &mut plain, &mut coherent];
         let count = if any_hit { 1 } else { ways.len() };
         ways[..count].iter_mut().map(|way| rates(rays, [*way])[0]).fold(0.0, f64::max)
     });
-    let kind = if any_hit { "any hit" } else { "nearest" };
-    println!("  {kind}: {} rays of a file", rays.len());
+    let kind = if any_hit { "any hit" } else { "closest" };
+    println!("  {kind}: {} rays from a file", rays.len());
     line("one by one", "s", seconds(own[0]), peer.map(seconds));
     line("packets", "s", seconds(own[1]), peer.map(seconds));
 }
 
-/// The rates on all threads: packets of primary and shadow rays, single diffuse ones.
+/// Prints the rates on all threads: packets of primary and shadow rays, single diffuse rays.
 fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
     let chunks = |rays: &[Ray], way: &(dyn Fn(&[Ray]) -> usize + Sync)| {
         let mut best = f64::INFINITY;
@@ -254,10 +256,12 @@ fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
     line("shadow", "Mrays/s", chunks(&rays.shadow, &any), None);
 }
 
-/// The rates of the tree of planes.
+/// Prints the rates of the k-d tree.
 fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
     let count = mesh.triangles.len() as u32;
-    let build = || KdTree::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("nobody cancels");
+    let build = || {
+        KdTree::build(count, |id| mesh.corners(id), &CancelToken::new()).expect("the token is not cancelled")
+    };
     let mut best = f64::INFINITY;
     let mut tree = None;
     for _ in 0..3 {
@@ -276,7 +280,7 @@ fn kd_tree(mesh: &TriangleMesh, rays: &meshes::Rays) {
     line("shadow", "Mrays/s", rates(&rays.shadow, [&mut any])[0], None);
 }
 
-/// Prints a figure, Embree's, and their ratio.
+/// Prints a figure, Embree's figure, and their ratio.
 fn line(name: &str, unit: &str, own: f64, peer: Option<f64>) {
     match peer {
         Some(peer) => println!("  {name:<10} {unit:>9} {own:>9.3} {peer:>9.3}  ratio {:.3}", own / peer),
@@ -308,7 +312,7 @@ fn any(name: &str, tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray]) {
     }
 }
 
-/// Rates for sixteen rays at a time; Embree's with and without the hint that they are coherent.
+/// Prints the rates for sixteen rays at a time, for Embree with and without the coherent flag.
 fn packets(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &meshes::Rays) {
     let mut closest = |rays: &[Ray]| {
         let mut found = 0;
@@ -337,10 +341,10 @@ fn packets(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &meshes::Rays) {
     line("shadow", "Mrays/s", rates(&rays.shadow, [&mut any])[0], None);
 }
 
-/// Traces rays and counts what is hit.
+/// A function that traces rays and counts hits.
 type Way<'a> = &'a mut dyn FnMut(&[Ray]) -> usize;
 
-/// Millions of rays a second by each function; every chunk counts by the fastest of its runs.
+/// Millions of rays per second for each function; the fastest run of every chunk counts.
 fn rates<const N: usize>(rays: &[Ray], mut ways: [Way<'_>; N]) -> [f64; N] {
     let mut total = [0.0; N];
     for chunk in rays.chunks(CHUNK) {

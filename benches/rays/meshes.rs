@@ -1,4 +1,4 @@
-//! Test data: generated meshes, meshes and rays from files, rays generated for a mesh.
+//! Test data: generated meshes, meshes and rays from files, and rays generated for a mesh.
 
 use std::io;
 use std::path::Path;
@@ -13,10 +13,10 @@ use glimt::math::frame::Frame;
 use glimt::math::{Vec2, Vec3};
 use glimt::sampling::{CAMERA_PATH, Decision, PixelSampler, warp};
 
-/// Pixels along a side: a million rays.
+/// Image width and height: a million rays.
 const SIDE: u32 = 1000;
 
-/// A closed ball with bumps: `rings` rings of twice as many squares of two triangles, less half of those at the poles.
+/// A closed bumpy ball: `rings` rings of twice as many quads, each of two triangles; those at the poles have one.
 pub fn rippled_ball(rings: u32) -> TriangleMesh {
     let columns = rings;
     let point = |ring: u32, column: u32| {
@@ -40,8 +40,7 @@ pub fn rippled_ball(rings: u32) -> TriangleMesh {
     mesh
 }
 
-/// Reads a mesh file in a format that glimt knows, or one of counts, positions and indices as they lie in memory
-/// (`.mesh`).
+/// Reads a mesh file in any supported format, or raw counts, positions and indices (`.mesh`).
 pub fn load(path: &Path) -> Result<TriangleMesh, String> {
     if path.extension().is_some_and(|ending| ending == "mesh") {
         return raw_mesh(&std::fs::read(path).map_err(|error| error.to_string())?)
@@ -51,10 +50,10 @@ pub fn load(path: &Path) -> Result<TriangleMesh, String> {
     Ok(loaded.mesh)
 }
 
-/// `u32` vertices, `u32` triangles, `f32` positions, `u32` indices; little endian.
+/// Little endian: `u32` vertex count, `u32` triangle count, `f32` positions, `u32` indices.
 fn raw_mesh(bytes: &[u8]) -> io::Result<TriangleMesh> {
     let words: Vec<[u8; 4]> = bytes.as_chunks().0.to_vec();
-    let short = || io::Error::new(io::ErrorKind::UnexpectedEof, "shorter than its counts say");
+    let short = || io::Error::new(io::ErrorKind::UnexpectedEof, "shorter than its counts require");
     let count = |i: usize| words.get(i).map(|&word| u32::from_le_bytes(word) as usize).ok_or_else(short);
     let (vertices, triangles) = (count(0)?, count(1)?);
     let positions = words.get(2..2 + 3 * vertices).ok_or_else(short)?;
@@ -69,9 +68,9 @@ fn raw_mesh(bytes: &[u8]) -> io::Result<TriangleMesh> {
     })
 }
 
-/// Rays of one kind.
+/// Rays of three kinds.
 pub struct Rays {
-    /// Rays from outside, in the order of pixels.
+    /// Rays from outside, in pixel order.
     pub primary: Vec<Ray>,
     /// Cosine-distributed rays from their hits.
     pub diffuse: Vec<Ray>,
@@ -79,7 +78,7 @@ pub struct Rays {
     pub shadow: Vec<Ray>,
 }
 
-/// Primary rays in squares of 4 × 4 pixels, and from their hits a bounce and a segment to a light.
+/// Generates primary rays in squares of 4 × 4 pixels, and from their hits a diffuse bounce and a segment to a light.
 pub fn rays(tree: &WideBvh, mesh: &TriangleMesh) -> Rays {
     let Aabb { min, max } = tree.bounds();
     let (center, size) = ((min + max) * 0.5, (max - min).length());
@@ -108,7 +107,7 @@ pub fn rays(tree: &WideBvh, mesh: &TriangleMesh) -> Rays {
     rays
 }
 
-/// Rays from a file: origin, direction, least and greatest t, `f32` each, little endian.
+/// Reads rays from a file: origin, direction, minimum and maximum t, as little-endian `f32`.
 pub fn ray_file(path: &Path) -> io::Result<Vec<Ray>> {
     let bytes = std::fs::read(path)?;
     let rows = bytes.as_chunks::<32>().0.iter().map(|row| {
@@ -124,7 +123,8 @@ pub fn ray_file(path: &Path) -> io::Result<Vec<Ray>> {
     Ok(rows.collect())
 }
 
-/// Hits from a file: t and primitive, `f32` and `u32`, then the weights of the second and third corner.
+/// Reads hits from a file: t (`f32`) and primitive (`u32`), then the barycentric weights of the second and third
+/// corner.
 pub fn hit_file(path: &Path) -> io::Result<Vec<Option<(f32, u32)>>> {
     let bytes = std::fs::read(path)?;
     let rows = bytes.as_chunks::<16>().0.iter().map(|row| {

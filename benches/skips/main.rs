@@ -1,16 +1,16 @@
-//! Unused features must cost nothing: renders in turns, without and with them.
+//! Unused features must cost nothing: compares interleaved renders with and without them.
 //!
-//! `cargo bench --bench skips` prints for each pair: the least seconds without the feature; the median of the ratios of its rounds
-//! with its standard error; the ratio of the instructions that valgrind, if installed, counts in smaller pictures; and whether the
-//! pictures have the same bits. It exits with 1 if the instructions (without valgrind, the seconds) differ by more than 1 %, or
-//! bits differ. Seconds include the load of other programs; instructions are those of this program alone. `-- WORD` chooses pairs,
-//! `-- rounds=N` the number of rounds.
+//! `cargo bench --bench skips` prints for each pair the minimum seconds without the feature, the median ratio over all
+//! rounds with its standard error, the ratio of instructions that valgrind counts for smaller images, if it is
+//! installed, and whether the images have the same bits. It exits with 1 if the instructions (without valgrind, the
+//! seconds) differ by more than 1 % or the bits differ. Seconds include the load of other programs; instructions do
+//! not. `-- WORD` selects pairs, `-- rounds=N` sets the number of rounds.
 
 #![allow(clippy::print_stdout)]
 
 mod pairs;
 #[path = "../stress/row.rs"]
-#[allow(dead_code, reason = "rows are for the stress table")]
+#[allow(dead_code, reason = "rows are only used by the stress table")]
 mod row;
 #[path = "../stress/run.rs"]
 #[allow(dead_code, reason = "the same")]
@@ -21,10 +21,10 @@ use std::process::{Command, ExitCode};
 use pairs::Pair;
 use row::Picture;
 
-/// Largest deviation of a ratio from 1.
+/// Maximum deviation of a ratio from 1.
 const BOUND: f64 = 0.01;
 
-/// Width, height and samples: a fifth of a second.
+/// Width, height and samples, for a render of a fifth of a second.
 const SIZE: [u32; 3] = [640, 480, 16];
 
 fn main() -> ExitCode {
@@ -33,7 +33,7 @@ fn main() -> ExitCode {
     let words: Vec<&String> = asked.iter().filter(|word| !word.starts_with("rounds=")).collect();
     let is_asked =
         |pair: &Pair| words.is_empty() || words.iter().any(|word| pair.name.contains(word.as_str()));
-    println!("| not used | s without, least | s, ratio with | ± | instructions | bits | report |");
+    println!("| unused feature | s without, minimum | s, ratio with | ± | instructions | bits | report |");
     println!("| --- | --- | --- | --- | --- | --- | --- |");
     let mut faulty = false;
     for pair in pairs::pairs(SIZE).iter().filter(|pair| is_asked(pair)) {
@@ -59,20 +59,20 @@ fn main() -> ExitCode {
     ExitCode::from(u8::from(faulty))
 }
 
-/// Results of the rounds of a pair.
+/// Results for a pair.
 struct Paired {
-    /// Least seconds, without the feature.
+    /// Minimum seconds without the feature.
     seconds: f64,
-    /// The median of the ratios of the rounds.
+    /// Median ratio over all rounds.
     ratio: f64,
     /// Its standard error.
     error: f64,
     is_same: bool,
-    /// Reason in the report for which a stage was skipped.
+    /// The report's reason for skipping a stage.
     said: String,
 }
 
-/// Runs rounds in turns; the first of a round changes from round to round.
+/// Runs the rounds; the order within a round alternates.
 fn ratios(pair: &Pair, rounds: usize) -> Result<Paired, String> {
     let (mut ratios, mut seconds, mut is_same, mut said) = (Vec::new(), f64::INFINITY, true, String::new());
     for round in 0..rounds.max(1) {
@@ -90,17 +90,18 @@ fn ratios(pair: &Pair, rounds: usize) -> Result<Paired, String> {
     }
     ratios.sort_by(f64::total_cmp);
     let at = |quarter: usize| ratios[(ratios.len() - 1) * quarter / 4];
-    // Quartiles of a normal distribution lie 1.35 standard deviations apart, and its median has 1.25 times the error of its mean.
+    // The quartiles of a normal distribution are 1.35 standard deviations apart, and its median has 1.25 times the
+    // error of its mean.
     let error = 1.25 / 1.35 * (at(3) - at(1)) / (ratios.len() as f64).sqrt();
     Ok(Paired { seconds, ratio: at(2), error, is_same, said })
 }
 
-/// Millions of instructions of a smaller picture, by valgrind. `None` if valgrind is not installed or fails.
+/// Millions of instructions for a smaller image, counted by valgrind. `None` if valgrind is not installed or fails.
 fn instructions(picture: &Picture) -> Option<f64> {
     let folder = tempfile::tempdir().ok()?;
     let mut program = Command::new("valgrind");
     program.args(["--tool=callgrind", "--callgrind-out-file=/dev/null", env!("CARGO_BIN_EXE_glimt")]);
-    // valgrind does not know AVX-512.
+    // valgrind does not support AVX-512.
     program.env("GLIMT_SIMD", "avx2");
     let mut command = run::call(folder.path(), picture, program).ok()?;
     let output =
@@ -111,7 +112,7 @@ fn instructions(picture: &Picture) -> Option<f64> {
     count.split_whitespace().next()?.parse::<f64>().ok().map(|count| count * 1e-6)
 }
 
-/// The report's reason for the state of a stage.
+/// The report's reason for the status of a stage.
 fn why(report: &serde_json::Value, stage: &str) -> String {
     let stages = report["stages"].as_array().into_iter().flatten();
     let said = stages.filter(|one| one["name"] == stage);

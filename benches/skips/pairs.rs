@@ -1,17 +1,17 @@
-//! Scenes with a feature that they do not use, on and off.
+//! Scenes with and without a feature that they do not use.
 
 use super::row::Picture;
 
-/// A picture without and with a feature that the scene does not use.
+/// An image without and with a feature that the scene does not use.
 pub(crate) struct Pair {
     pub(crate) name: &'static str,
     pub(crate) off: Picture,
     pub(crate) on: Picture,
-    /// A stage that the report calls skipped with `on`, and a part of the reason.
+    /// A stage that must be skipped with `on`, and part of the reason in the report.
     pub(crate) skipped: Option<(&'static str, &'static str)>,
 }
 
-/// A small room; `RENDER` keys, `CAMERA` keys and other elements can be inserted.
+/// A small room with placeholders for `RENDER` keys, `CAMERA` keys and other elements.
 const ROOM: &str = r#"
 [render]
 width = WIDTH
@@ -47,7 +47,7 @@ const LAMP: &str = "[materials.lamp]\nemission = 5\n[[quad]]\ncorner = [-0.5, 3,
 
 const PICTURE: &str = "P3 2 2 255 90 120 200 20 30 40 255 250 200 70 70 80";
 
-/// All pairs, in pictures of this size.
+/// All pairs, for images of this size.
 pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<Pair> {
     let scene = |render: &str, camera: &str, ball: &str, rest: &str| {
         let size = [("WIDTH", width), ("HEIGHT", height), ("SAMPLES", samples)];
@@ -67,12 +67,12 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<Pair> {
     vec![
         Pair {
             skipped: Some(("photons", "path needs none")),
-            ..pair("photons, by path", path(), path().by("--photons on"))
+            ..pair("photons, with path", path(), path().by("--photons on"))
         },
         Pair {
             skipped: Some(("photons", "max_depth")),
             ..pair(
-                "photons, direct light alone",
+                "photons, direct light only",
                 scene("max_depth = 1", "", "", POINT),
                 scene("max_depth = 1", "", "", POINT).by("--photons on"),
             )
@@ -89,29 +89,25 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<Pair> {
         pair("an aperture, switched off", plain(), lens("--dof off")),
         pair("soft shadows of point lights", plain().by("--shadows hard"), plain().by("--shadows soft")),
         pair("shadow samples of point lights", plain(), scene("shadow_samples = 8", "", "", POINT)),
-        pair("shadows, by path", path().by("--shadows off"), path().by("--shadows soft")),
+        pair("shadows, with path", path().by("--shadows off"), path().by("--shadows soft")),
         Pair {
             skipped: Some(("textures", "names a texture")),
-            ..pair("a texture that nothing names", plain(), with(texture))
+            ..pair("a texture that nothing uses", plain(), with(texture))
         },
         Pair {
             skipped: Some(("textures", "names a texture")),
-            ..pair("a material with pictures that no shape has", plain(), with(unused))
+            ..pair("a textured material that no shape uses", plain(), with(unused))
         },
         pair(
-            "glass and mirror that no shape has",
+            "glass and mirror that no shape uses",
             plain(),
             with("[materials.g]\ntype = \"glass\"\ntint = 0.5\n[materials.r]\ntype = \"mirror\"\n"),
         ),
         pair("a highlight of strength 0", plain(), scene("", "", ", specular = 0, shininess = 1e5", POINT)),
         pair("an emission of 0", plain(), scene("", "", ", emission = 0", POINT)),
-        pair("samples where the noise is, no error asked", lit(), lit().by("--error 0")),
+        pair("adaptive sampling without a requested error", lit(), lit().by("--error 0")),
         pair("a clamp of 0", lit(), scene("clamp = 0", "", "", LAMP)),
-        pair(
-            "ambient light of a scene by path",
-            path(),
-            scene("integrator = \"path\"\nambient = 0.5", "", "", LAMP),
-        ),
+        pair("ambient light, with path", path(), scene("integrator = \"path\"\nambient = 0.5", "", "", LAMP)),
         pair("a light of intensity 0", plain(), with("[[light]]\nposition = [2, 3, 2]\nintensity = 0\n")),
         pair("a black sky", plain(), with("[environment]\ncolor = 0\n")),
     ]

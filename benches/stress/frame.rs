@@ -1,4 +1,4 @@
-//! A frame of a scene: its origin and its unit of length.
+//! A scene's coordinate frame: its origin and its unit of length.
 
 /// Origin and unit of length.
 #[derive(Clone, Copy)]
@@ -7,11 +7,11 @@ pub(crate) struct Frame {
     pub(crate) unit: f64,
 }
 
-/// Size of the scenes that are moved, in units.
+/// Size of the moved scenes, in units.
 const SIZE: f64 = 8.0;
 
 impl Frame {
-    /// The frame that moves and scales nothing.
+    /// The identity frame.
     pub(crate) const PLAIN: Self = Self { at: [0.0; 3], unit: 1.0 };
 
     /// A frame 2ᵏ times as large.
@@ -19,7 +19,7 @@ impl Frame {
         Self { unit: 2.0_f64.powi(k), ..Self::PLAIN }
     }
 
-    /// A frame moved by so many times the scene's size.
+    /// A frame moved by a multiple of the scene's size.
     pub(crate) fn moved(sizes: f64) -> Self {
         Self { at: [SIZE * sizes, -0.5 * SIZE * sizes, 0.25 * SIZE * sizes], ..Self::PLAIN }
     }
@@ -41,7 +41,7 @@ impl Frame {
         format!("{:?}", x * self.unit)
     }
 
-    /// An intensity that gives the same irradiance at distances of this frame.
+    /// An intensity that gives the same irradiance at this frame's distances.
     pub(crate) fn intensity(self, x: f64) -> String {
         format!("{:?}", x * self.unit * self.unit)
     }

@@ -1,15 +1,15 @@
-//! The program at the limits of scenes: every case beside a plain twin, whose right answer or cost is known.
+//! Scenes at the limits: every case is compared with a plain reference scene whose result or cost is known.
 //!
-//! `cargo bench --bench stress` renders all cases, prints the table and writes it to `benches/stress/table.md`; `-- WORD` only
-//! prints the rows that contain the word. It exits with 1 if a row is not within its bounds.
+//! `cargo bench --bench stress` renders all cases, prints the table and writes it to `benches/stress/table.md`; `--
+//! WORD` only prints the rows that contain the word. It exits with 1 if a row exceeds its bound.
 
 #![allow(clippy::print_stdout)]
 
 mod cases;
 mod frame;
-#[allow(dead_code, reason = "options are for other scenes")]
+#[allow(dead_code, reason = "options are used by other benchmarks")]
 mod row;
-#[allow(dead_code, reason = "reports are for other readers")]
+#[allow(dead_code, reason = "reports are used by other benchmarks")]
 mod run;
 
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ use std::process::ExitCode;
 
 use row::{Extent, Figure, Row};
 
-/// Renders of a timed row.
+/// Number of renders of a timed row.
 const ROUNDS: u32 = 3;
 
 fn main() -> ExitCode {
@@ -31,21 +31,21 @@ fn main() -> ExitCode {
         print!("{line}");
         table += &line;
     }
-    let _ = write!(table, "\n{faulty} rows are not within their bounds.\n");
-    println!("\n{faulty} rows are not within their bounds.");
+    let _ = write!(table, "\n{faulty} rows exceed their bounds.\n");
+    println!("\n{faulty} rows exceed their bounds.");
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/stress/table.md");
     let is_written = !asked.is_empty() || std::fs::write(path, table).is_ok();
     ExitCode::from(u8::from(faulty > 0 || !is_written))
 }
 
-const HEAD: &str = "# The program at the ends of what scenes may be
+const HEAD: &str = "# Scenes at the limits
 
-`cargo bench --bench stress` writes this table. A difference is the relative root mean square error against the twin, the worst of
-the row's pictures; a mean is how far that of the picture is from the right answer. Seconds are those of all stages but reading and
-writing, on one thread, of the pictures of the row and of their twins; where the twin is as much work (a ratio is told), three times its
-time is the most. No row has a sample that is not finite, a crash or a hang unless it says so.
+`cargo bench --bench stress` writes this table. A difference is the relative RMS error against the reference scene, for the row's worst
+image; a mean is the deviation of the image's mean from the expected value. Seconds include all stages except reading and writing, on one
+thread, for the row's images and for their references; rows with a ratio may take at most three times as long as the reference. No row
+has non-finite samples, crashes or hangs unless it says so.
 
-| case | pictures | figure | | bound | s | twin's | ratio | |
+| case | images | measure | value | bound | s | reference, s | ratio | |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 ";
 

@@ -1,11 +1,11 @@
-//! Rows of the table: pictures, their twins, and bounds.
+//! Rows of the table: images, reference images, and bounds.
 
-/// A scene file and the files that it names.
+/// A scene file and the files that it refers to.
 #[derive(Clone)]
 pub(crate) struct Picture {
     pub(crate) scene: String,
     pub(crate) files: Vec<(&'static str, String)>,
-    /// Options of the program.
+    /// Command-line options.
     pub(crate) options: &'static str,
 }
 
@@ -25,46 +25,46 @@ impl Picture {
     }
 }
 
-/// Measure of a row.
+/// How a row is measured.
 #[derive(Clone, Copy)]
 pub(crate) enum Figure {
-    /// √(Σ(t·a − b)²/Σb²) of the picture a and its twin b, t given.
+    /// √(Σ(t·a − b)²/Σb²) of the image a and the reference b, for a given t.
     Difference(f64),
-    /// Deviation of the picture's mean from the right answer, relative to it.
+    /// Relative deviation of the image's mean from the expected value.
     Mean(f64),
 }
 
-/// A row of the table: pictures with their twins; the worst of them counts.
+/// A row of the table: images with their references; the worst one counts.
 pub(crate) struct Row {
     pub(crate) name: String,
     pub(crate) pairs: Vec<(Picture, Picture)>,
     pub(crate) figure: Figure,
     pub(crate) bound: f64,
-    /// Whether the case is as much work as its twin, so that it may take at most three times its time.
+    /// Whether the case is as much work as its reference, so that it may take at most three times as long.
     pub(crate) is_timed: bool,
 }
 
 impl Row {
-    /// A row of pictures that must look like their twins.
+    /// A row of images that must match their references.
     pub(crate) fn alike(name: impl Into<String>, pairs: Vec<(Picture, Picture)>, bound: f64) -> Self {
         Self { name: name.into(), pairs, figure: Figure::Difference(1.0), bound, is_timed: false }
     }
 
-    /// A row for a picture whose mean is known.
+    /// A row for an image whose mean is known.
     pub(crate) fn mean(name: impl Into<String>, pair: (Picture, Picture), mean: f64, bound: f64) -> Self {
         Self { name: name.into(), pairs: vec![pair], figure: Figure::Mean(mean), bound, is_timed: false }
     }
 
-    /// The row with its time compared: the twin is as much work.
+    /// Also compares the time with the reference, which is as much work.
     pub(crate) fn timed(self) -> Self {
         Self { is_timed: true, ..self }
     }
 }
 
-/// Extent of the cases.
+/// Which cases to run.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Extent {
-    /// The cases for every run of the tests.
+    /// The cases that run with the tests.
     Short,
     /// All cases.
     Long,

@@ -1,4 +1,4 @@
-//! Renders by the program and compares.
+//! Renders scenes with the program and compares the images.
 
 use std::fs;
 use std::path::Path;
@@ -7,20 +7,20 @@ use std::time::{Duration, Instant};
 
 use super::row::{Figure, Picture, Row};
 
-/// Longest time of a render; a longer one hangs.
+/// Time limit of a render, after which it counts as hung.
 const LONGEST: Duration = Duration::from_secs(120);
 
-/// Most time of a case, in times of its twin's.
+/// Maximum time of a case relative to its reference.
 pub(crate) const MOST_SLOWER: f64 = 3.0;
 
-/// A rendered picture.
+/// A rendered image.
 #[derive(Clone)]
 pub(crate) struct Rendered {
     pub(crate) pixels: Vec<f32>,
-    /// Seconds of all stages but reading and writing.
+    /// Seconds of all stages except reading and writing.
     pub(crate) seconds: f64,
     pub(crate) non_finite: u64,
-    /// Report as it was written.
+    /// The render report.
     pub(crate) report: serde_json::Value,
 }
 
@@ -29,29 +29,29 @@ pub(crate) struct Measured {
     /// The worst figure.
     pub(crate) figure: f64,
     pub(crate) non_finite: u64,
-    /// Seconds in all, of the cases and of their twins.
+    /// Total seconds of the cases and of their references.
     pub(crate) seconds: [f64; 2],
 }
 
 impl Measured {
-    /// Whether the pictures are within their bound; times do not count.
+    /// Whether the images are within their bound, regardless of time.
     pub(crate) fn is_right(&self, row: &Row) -> bool {
         self.figure <= row.bound && self.non_finite == 0
     }
 
-    /// Faults of the row; the goal is an empty list.
+    /// Faults of the row.
     pub(crate) fn faults(&self, row: &Row) -> Vec<&'static str> {
         let slower = self.seconds[0] / self.seconds[1];
         let faults = [
-            (!(self.figure <= row.bound), "over its bound"),
-            (self.non_finite > 0, "samples that are not finite"),
+            (!(self.figure <= row.bound), "exceeds its bound"),
+            (self.non_finite > 0, "has non-finite samples"),
             (row.is_timed && !(slower <= MOST_SLOWER), "too slow"),
         ];
         faults.into_iter().filter(|(holds, _)| *holds).map(|(_, what)| what).collect()
     }
 }
 
-/// Renders all pictures of a row, `rounds` times in turns; the shortest times count.
+/// Renders all images of a row `rounds` times, interleaved; the shortest times count.
 ///
 /// # Errors
 /// The program failed, crashed or took too long.
@@ -70,7 +70,7 @@ pub(crate) fn measure(row: &Row, rounds: u32) -> Result<Measured, String> {
             case_of.seconds = case_of.seconds.min(render(case)?.seconds);
             twin_of.seconds = twin_of.seconds.min(render(twin)?.seconds);
         }
-        // A NaN counts as the worst figure.
+        // NaN counts as the worst figure.
         let figure = figure(row.figure, &case_of.pixels, &twin_of.pixels)?;
         measured.figure = if figure <= measured.figure { measured.figure } else { figure };
         measured.non_finite += case_of.non_finite + twin_of.non_finite;
@@ -89,7 +89,7 @@ fn figure(figure: Figure, case: &[f32], twin: &[f32]) -> Result<f64, String> {
         }
         Figure::Difference(times) => {
             if case.len() != twin.len() {
-                return Err("pictures of different sizes".to_owned());
+                return Err("the images have different sizes".to_owned());
             }
             let pairs = case.iter().zip(twin).map(|(&a, &b)| (f64::from(a) * times, f64::from(b)));
             let off: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
@@ -107,10 +107,10 @@ pub(crate) fn render(picture: &Picture) -> Result<Rendered, String> {
     render_in(folder.path(), picture)
 }
 
-/// A command of the program, or of another one that runs it, to render a picture in a folder, on one thread.
+/// A command that renders a scene in a folder on one thread, with the program itself or another one that runs it.
 ///
 /// # Errors
-/// Files cannot be written.
+/// The files cannot be written.
 pub(crate) fn call(
     folder: &Path,
     picture: &Picture,
@@ -154,7 +154,7 @@ fn render_in(folder: &Path, picture: &Picture) -> Result<Rendered, String> {
     })
 }
 
-/// Seconds of the stages but parse and write.
+/// Seconds of all stages except parse and write.
 fn seconds(report: &serde_json::Value) -> f64 {
     let stages = report["stages"].as_array().into_iter().flatten();
     let counts = |stage: &&serde_json::Value| stage["name"] != "parse" && stage["name"] != "write";

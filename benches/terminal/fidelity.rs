@@ -1,7 +1,8 @@
-//! Fidelity of the terminal's output to the picture.
+//! Fidelity of the terminal's output to the image.
 //!
-//! Cells become pixels, and these are compared with the picture in Oklab: as they are, and blurred as by an eye that does not look
-//! at single cells. Characters count by their mean. chafa is measured beside it, with the same characters and its best dithering.
+//! Cells are converted to pixels and compared with the image in Oklab: directly, and blurred as by an eye that does not
+//! resolve single cells. Characters count as their mean. chafa is measured for comparison, with the same characters and
+//! its best dithering.
 
 use std::error::Error;
 use std::path::Path;
@@ -15,20 +16,19 @@ use ratatui::buffer::{Buffer, Cell};
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-/// Pixels of a cell: a multiple of all its parts.
+/// Pixels per cell: a common multiple of all its subdivisions.
 const CELL: (usize, usize) = (12, 24);
-/// The blur, in pixels: a quarter of a cell's height.
+/// Standard deviation of the blur in pixels: a quarter of a cell's height.
 const BLUR: f32 = 6.0;
 const WINDOW: Rect = Rect { x: 0, y: 0, width: 80, height: 30 };
-/// A terminal's own colours, and the part of a cell that the ink of its brightest character covers.
+/// The terminal's default colors.
 const INK: [u8; 3] = [229; 3];
 const GROUND: [u8; 3] = [0; 3];
-/// Part of its cell, of 255, that the ink of each character from the space to ~ covers: the means of DejaVu Sans Mono's
-/// bitmaps.
+/// Ink coverage, of 255, of the ASCII characters from space to `~`: the means of DejaVu Sans Mono's bitmaps.
 #[rustfmt::skip]
 const INK_OF_ASCII: [u8; 95] = [0, 21, 16, 61, 52, 45, 58, 8, 28, 28, 24, 27, 11, 7, 7, 27, 61, 38, 44, 46, 49, 48, 58, 36, 62, 58, 14, 17, 29, 28, 29, 31, 66, 54, 68, 40, 60, 53, 43, 53, 59, 43, 39, 57, 35, 68, 68, 58, 52, 63, 62, 49, 38, 55, 47, 67, 50, 39, 48, 35, 27, 35, 17, 17, 6, 48, 54, 32, 54, 48, 37, 60, 47, 34, 36, 47, 32, 54, 40, 45, 54, 54, 26, 38, 36, 40, 34, 47, 36, 42, 36, 39, 30, 38, 15];
 
-/// A way to show a picture, by glimt and by chafa.
+/// A way to show an image, for glimt and chafa.
 struct Mode {
     name: &'static str,
     preview: PreviewChoice,
@@ -60,7 +60,7 @@ const MODES: [Mode; 16] = [
     mode("ASCII, 24 bits", PreviewChoice::Ascii, ColorDepth::TrueColor, "ascii", "full"),
     mode("ASCII, 256", PreviewChoice::Ascii, ColorDepth::Indexed256, "ascii", "256"),
     mode("ASCII, 16", PreviewChoice::Ascii, ColorDepth::Ansi16, "ascii", "16"),
-    mode("ASCII, no colours", PreviewChoice::Ascii, ColorDepth::None, "ascii", "none"),
+    mode("ASCII, no colors", PreviewChoice::Ascii, ColorDepth::None, "ascii", "none"),
 ];
 
 const fn mode(
@@ -73,13 +73,10 @@ const fn mode(
     Mode { name, preview, depth, symbols, colors }
 }
 
-/// Prints a table over the pictures of the bundled scenes.
+/// Prints a table for images of the bundled scenes.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/pictures");
-    println!(
-        "\nerror of what is shown in {}×{} cells, sharp and blurred; chafa in brackets",
-        WINDOW.width, WINDOW.height
-    );
+    println!("\nerror in {}×{} cells, sharp and blurred; chafa in parentheses", WINDOW.width, WINDOW.height);
     println!("{:<22} {:>26} {:>26} {:>26}", "", "cornell_glass", "textures", "shapes");
     for mode in MODES {
         print!("{:<22}", mode.name);
@@ -101,7 +98,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The errors of a picture in the cells that `draw` makes of it, which has no border.
+/// The errors of an image in the cells that `draw` produces, without a border.
 fn errors(
     file: &Path,
     draw: impl Fn(&Picture, Rect) -> Result<Option<Buffer>, Box<dyn Error>>,
@@ -117,7 +114,7 @@ fn errors(
     Ok(Some([seen.error(&truth), seen.blurred().error(&truth.blurred())]))
 }
 
-/// Position of the picture.
+/// Position of the image.
 fn place(buffer: &Buffer) -> Rect {
     let is_picture = |x: u16, y: u16| buffer[(x, y)].symbol() != " ";
     let columns: Vec<u16> =
@@ -128,7 +125,7 @@ fn place(buffer: &Buffer) -> Rect {
     Rect::new(*left, *top, columns.len() as u16, rows.len() as u16)
 }
 
-/// The picture by chafa in these cells. `None` without chafa, or if it lacks such characters.
+/// The image drawn by chafa in these cells. `None` without chafa, or if it lacks such characters.
 fn chafa(file: &Path, area: Rect, mode: &Mode, dither: &str) -> Result<Option<Buffer>, Box<dyn Error>> {
     if mode.symbols.is_empty() {
         return Ok(None);
@@ -141,7 +138,7 @@ fn chafa(file: &Path, area: Rect, mode: &Mode, dither: &str) -> Result<Option<Bu
         .stderr(Stdio::null())
         .output();
     let Some(output) = output.ok().filter(|output| output.status.success()) else { return Ok(None) };
-    let side = |length: u16| std::num::NonZero::new(length).ok_or("an empty window");
+    let side = |length: u16| std::num::NonZero::new(length).ok_or("the window is empty");
     let mut terminal = vt100::Parser::new(side(area.height + 1)?, side(area.width)?, 0);
     let bytes: Vec<u8> = output
         .stdout
@@ -179,7 +176,7 @@ fn copy(from: &vt100::Cell, to: &mut Cell) {
     to.set_symbol(if from.has_contents() { from.contents() } else { " " }).set_fg(fg).set_bg(bg);
 }
 
-/// Linear light in rows.
+/// An image in linear light.
 struct Plane {
     width: usize,
     height: usize,
@@ -236,7 +233,7 @@ impl Plane {
         Self { pixels, ..*self }
     }
 
-    /// The root of the mean squared distance in Oklab, in percent of that from black to white.
+    /// RMS distance in Oklab, in percent of the distance from black to white.
     fn error(&self, other: &Self) -> f32 {
         let squares = self
             .pixels

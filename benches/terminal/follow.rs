@@ -1,4 +1,4 @@
-//! Distance of the screen from the final picture while glimt renders.
+//! Difference between the screen and the final image while glimt renders.
 
 use std::error::Error;
 use std::fs;
@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::watched::{COLUMNS, Line, ROWS, Watched};
 
-/// Percent of the render at which the screen is examined, and its largest allowed deviation in codes of 255.
+/// Percentages of the render at which the screen is examined, and the maximum difference in codes of 255.
 const LOOKS: [(u32, f64); 3] = [(10, 1.5), (25, 0.8), (50, 0.5)];
 
 const WAYS: [(&str, &[&str]); 5] = [
@@ -19,18 +19,18 @@ const WAYS: [(&str, &[&str]); 5] = [
     ("sixel", &["--preview", "sixel", "--color", "truecolor"]),
 ];
 
-/// Settings for tmux: 24 bits of colour, on both sides.
+/// Settings for tmux: 24-bit color on both sides.
 const TMUX: &str =
     "set -g default-terminal tmux-256color\nset -as terminal-features ',*:RGB'\nset -g status off\n";
 
-/// Prints a line for each way to show a picture.
+/// Prints a line for each way to show an image.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
-    println!("mean absolute difference to the final screen, in codes of 255: cornell_glass, 256 samples,");
+    println!("mean absolute difference from the final screen, in codes of 255: cornell_glass, 256 samples,");
     println!("{COLUMNS}×{ROWS} cells, a terminal that answers at once; bars {LOOKS:?}\n");
     println!("{:<14} {:>7} {:>7} {:>7} {:>9} {:>9}", "", "10 %", "25 %", "50 %", "seconds", "kB/s");
     let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell_glass.toml");
-    let scene = scene.to_str().ok_or("a name that is no text")?;
+    let scene = scene.to_str().ok_or("a file name is not valid UTF-8")?;
     let folder = tempfile::tempdir()?;
     let render = [&*program, scene, "--samples", "256", "-o", "out.png"];
     for (name, options) in WAYS {
@@ -38,17 +38,17 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     }
     let settings = folder.path().join("tmux.conf");
     fs::write(&settings, TMUX)?;
-    let settings = settings.to_str().ok_or("a name that is no text")?;
+    let settings = settings.to_str().ok_or("a file name is not valid UTF-8")?;
     let socket = format!("glimt-bench-{}", std::process::id());
     let tmux = ["tmux", "-L", &socket, "-f", settings, "new-session"];
     let line = follow(&[&tmux, &render[..], WAYS[0].1].concat(), folder.path());
-    // The server ends with its last session.
+    // The server exits with its last session.
     let _ = std::process::Command::new("tmux").args(["-L", &socket, "kill-server"]).output();
     println!("{:<14} {}", "through tmux", line?);
     Ok(())
 }
 
-/// Renders once, and reports the distance of the screen from its final state on the way.
+/// Renders once, and reports the difference between the screen and its final state during the render.
 fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     let terminal = Watched::open(command, folder, Line::NONE)?;
     let begin = std::time::Instant::now();
@@ -59,7 +59,7 @@ fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     }
     terminal.wait("the end", |far| far.percent() == Some(100))?;
     let (seconds, came) = (begin.elapsed().as_secs_f64(), terminal.far().came);
-    // Wait, as the last picture may still be on its way.
+    // Wait, as the last image may still be in transit.
     thread::sleep(Duration::from_secs(2));
     let last = terminal.far().seen();
     let figures: Vec<String> = screens
@@ -70,7 +70,7 @@ fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
     Ok(format!("{:>7} {:>7} {:>7} {seconds:>9.1} {rate:>9.0}", figures[0], figures[1], figures[2]))
 }
 
-/// The mean absolute difference of pixels that either shows; `None` if they have different sizes.
+/// The mean absolute difference of pixels; `None` if the sizes differ.
 fn apart(a: &[[u8; 3]], b: &[[u8; 3]]) -> Option<f64> {
     let pairs = a.iter().zip(b).filter(|(a, b)| **a != [0; 3] || **b != [0; 3]);
     let (mut sum, mut count) = (0, 0);

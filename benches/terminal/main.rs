@@ -1,10 +1,10 @@
-//! Bytes that glimt sends to the terminal.
+//! Number of bytes that glimt sends to the terminal.
 //!
-//! `cargo bench --bench terminal` renders bundled scenes and edits of them, replays their previews as the front end gets them,
-//! and prints the bytes of three programs: the painter; plain ratatui on crossterm, which draws every preview; and chafa, if
-//! installed, which draws the last one. `-- fidelity` prints the fidelity of the output for each number of colours and each set
-//! of characters. `-- follow` prints the distance of a quick terminal's screen from the final one during a render. `-- orbit`
-//! prints how much of a thin line is used while a key moves the camera.
+//! `cargo bench --bench terminal` renders bundled scenes and edits of them, replays their previews as the front end
+//! receives them, and prints the bytes sent by three programs: glimt's painter; plain ratatui on crossterm, which draws
+//! every preview; and chafa, if installed, which draws the last one. `-- fidelity` prints the fidelity of the output
+//! for each color depth and character set. `-- follow` prints the difference of a fast terminal's screen from the final
+//! one during a render. `-- orbit` prints how much of a slow connection is used while a key moves the camera.
 
 #![allow(clippy::print_stdout)]
 
@@ -31,14 +31,14 @@ use ratatui::style::Color;
 use crate::others::{Plain, chafa};
 use crate::sequence::Shot;
 
-/// Columns and rows of the window; the picture has a few less.
+/// Columns and rows of the window; the image is a little smaller.
 const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
 const BESIDE: u16 = 30;
 const ABOVE_AND_BELOW: u16 = 4;
-/// Largest difference in a channel that does not count as a change.
+/// Maximum difference in a channel that does not count as a change.
 const SAME: u8 = 1;
 
-/// An edit that is saved after a scene was rendered.
+/// An edit that is saved after the scene has been rendered.
 struct Edit {
     scene: &'static str,
     name: &'static str,
@@ -87,7 +87,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return orbit::print();
     }
     for (columns, rows) in WINDOWS {
-        println!("\n{columns}×{rows}: bytes a cell, in brackets those of ratatui and chafa");
+        println!("\n{columns}×{rows}: bytes per cell, in parentheses for ratatui and chafa");
         println!(
             "{:<18} {:>6} {:>6} {:>16} {:>6} {:>7} {:>7} {:>15}",
             "", "cells", "first", "exact", "ms", "pictures", "changed", "until still"
@@ -111,7 +111,7 @@ fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     if !text.contains(edit.from) {
         return Err(format!("{} has no `{}`", edit.scene, edit.from).into());
     }
-    // Save beside the scenes, for the files that they name.
+    // Save next to the scenes, so that relative paths work.
     let scene = tempfile::Builder::new().prefix("bench").suffix(".toml").tempfile_in(&scenes)?;
     let handle = glimt::pipeline::start(0)?;
     let mut window = Window::new(columns, rows);
@@ -127,12 +127,12 @@ fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A terminal with both ways to draw on it.
+/// A terminal, drawn by both glimt and ratatui.
 struct Window {
     area: Rect,
     painter: Painter,
     plain: Plain,
-    /// Picture on the screen.
+    /// Image on the screen.
     last: Option<Picture>,
 }
 
@@ -142,7 +142,7 @@ impl Window {
         Self { area, painter: Painter::new(ColorDepth::TrueColor), plain: Plain::new(area), last: None }
     }
 
-    /// Shows the previews of one render; only those worth it are drawn.
+    /// Shows the previews of one render; only those worth drawing are drawn.
     fn show(&mut self, shots: &[Shot]) -> Result<String, Box<dyn Error>> {
         let (Some(first), Some(last)) = (shots.first(), shots.last()) else {
             return Err("no preview".into());
@@ -190,7 +190,7 @@ impl Window {
         ))
     }
 
-    /// Fills the screen with a rectangle of 5 % of the cells in other colours, then noise, then nothing.
+    /// Changes the colors of a rectangle of 5 % of the cells, then adds noise, then changes nothing.
     fn settle(&mut self) {
         let Some(last) = self.last.take() else { return };
         let (width, height) = (last.width, last.height);
@@ -217,7 +217,7 @@ impl Window {
         );
     }
 
-    /// Bytes of a picture on a screen of unknown content.
+    /// Bytes to draw an image on a screen with unknown content.
     fn exact(&self, picture: &Picture) -> usize {
         let mut painter = Painter::new(ColorDepth::TrueColor);
         let (buffer, place) = self.cells(picture);
@@ -235,7 +235,7 @@ impl Window {
         drain(&mut self.painter)
     }
 
-    /// The picture in half blocks, and its position.
+    /// The image in half blocks, and its position.
     fn cells(&self, picture: &Picture) -> (Buffer, Rect) {
         let mut buffer = Buffer::empty(self.area);
         let place = Rect::new(0, 1, picture.width as u16, picture.height.div_ceil(2) as u16);
@@ -253,12 +253,12 @@ impl Window {
     }
 }
 
-/// Number of bytes that the painter still has to send.
+/// Sends everything that the painter has pending; returns the number of bytes.
 fn drain(painter: &mut Painter) -> usize {
     std::iter::from_fn(|| Some(painter.slice(24_000).len()).filter(|bytes| *bytes > 0)).sum()
 }
 
-/// Number of cells that differ; all cells if there was nothing before.
+/// Number of cells that differ; all cells if nothing was shown before.
 fn changed(before: Option<&Picture>, after: &Picture) -> usize {
     let width = after.width as usize;
     let differs = |i: usize| match before.and_then(|before| before.pixels.get(i)) {

@@ -1,4 +1,4 @@
-//! Share of a thin line that pictures use while a held key moves the camera.
+//! Utilization of a slow connection while a held key moves the camera.
 
 use std::error::Error;
 use std::path::Path;
@@ -7,22 +7,18 @@ use std::time::{Duration, Instant};
 
 use crate::watched::{Line, Watched};
 
-/// Time between repeats of the key; then the time for which it is held before the line is measured, and the time of the
-/// measurement.
+/// Key repeat interval. The key is held for `BEFORE`, then for `HELD` while the connection is measured.
 const REPEAT: Duration = Duration::from_millis(33);
-/// Presses in one direction. The camera swings in front of the scene: behind the wall of a room all is black, and there is nothing
-/// to send.
+/// Number of presses in one direction. The camera swings in front of the scene: behind the wall of a room everything is
+/// black, and there is nothing to send.
 const SWING: u32 = 8;
 const BEFORE: Duration = Duration::from_secs(2);
 const HELD: Duration = Duration::from_secs(6);
 
-/// Prints a line for each of some scenes.
+/// Prints a line per scene.
 pub(crate) fn print() -> Result<(), Box<dyn Error>> {
-    println!(
-        "keys on the camera are held for {} s, at the end of a line of 1 Mbit/s and 150 ms",
-        HELD.as_secs()
-    );
-    println!("{:<16} {:>14} {:>22}", "", "line used", "most unanswered bytes");
+    println!("camera keys held for {} s over a connection with 1 Mbit/s and 150 ms", HELD.as_secs());
+    println!("{:<16} {:>14} {:>22}", "", "used", "max. unacknowledged bytes");
     for scene in ["cornell", "cornell_glass", "textures", "spheres"] {
         let (share, most) = orbit(scene)?;
         println!("{scene:<16} {:>12.0} % {most:>22}", 100.0 * share);
@@ -30,12 +26,12 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The used part of the line, and the most bytes without an answer.
+/// Returns the utilization, and the maximum number of unacknowledged bytes.
 fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
     let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(scene).with_extension("toml");
     let folder = tempfile::tempdir()?;
-    let scene = scene.to_str().ok_or("a name that is no text")?;
+    let scene = scene.to_str().ok_or("a file name is not valid UTF-8")?;
     let command = [&*program, scene, "--samples", "100000", "-o", "out.png"];
     let terminal = Watched::open(&command, folder.path(), Line::THIN)?;
     terminal.wait("a picture", |far| far.percent().is_some())?;
@@ -48,12 +44,12 @@ fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
     Ok(((far.came - before) as f64 / most, far.most_unanswered))
 }
 
-/// Holds two opposite keys that orbit, in turns, and repeats them as keyboards do.
+/// Alternately holds two opposite orbit keys, with keyboard repeat.
 fn hold(terminal: &Watched, time: Duration) -> Result<(), Box<dyn Error>> {
     let begin = Instant::now();
     let mut presses = 0;
     while begin.elapsed() < time {
-        // The first and the last swing are halves, so that the scene's own camera is in the middle.
+        // The first and the last swing are half as long, so that the scene's own camera is in the middle.
         let is_right = ((presses + SWING / 2) / SWING).is_multiple_of(2);
         terminal.press(if is_right { "l" } else { "h" })?;
         presses += 1;

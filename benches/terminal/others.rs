@@ -40,7 +40,7 @@ impl Plain {
         Self { backend, sent, shown: Buffer::empty(area) }
     }
 
-    /// Bytes that change the screen to this picture.
+    /// Bytes needed to change the screen to this image.
     pub(crate) fn draw(&mut self, wanted: &Buffer) -> usize {
         let before = self.sent.get();
         let difference = self.shown.diff(wanted);
@@ -51,7 +51,7 @@ impl Plain {
     }
 }
 
-/// Bytes of the picture by chafa in half blocks of 24 bits. `None` without chafa.
+/// Bytes that chafa writes for the image in 24-bit half blocks. `None` without chafa.
 pub(crate) fn chafa(picture: &Picture) -> Result<Option<usize>, Box<dyn Error>> {
     let file = tempfile::Builder::new().suffix(".png").tempfile()?;
     let pixels = picture.pixels.as_flattened();

@@ -1,4 +1,4 @@
-//! The previews of a render, as a front end gets them.
+//! The previews of a render, as the front end receives them.
 
 use std::error::Error;
 use std::path::Path;
@@ -10,17 +10,17 @@ use glimt::pipeline::Handle;
 use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
 use glimt::pipeline::settings::Overrides;
 
-/// A preview on the way to the final picture.
+/// A preview of an unfinished or final image.
 pub(crate) struct Shot {
     /// Seconds since the request.
     pub(crate) seconds: f64,
-    /// Mean samples of a pixel of the film; 0 for a coarse picture.
+    /// Mean samples per pixel; 0 for the coarse first image.
     pub(crate) samples: f64,
     pub(crate) picture: Picture,
     pub(crate) is_final: bool,
 }
 
-/// Renders the scene and keeps every preview that the front end saw; the last one is final.
+/// Renders the scene and records every preview that the front end receives; the last one is final.
 pub(crate) fn render(
     handle: &Handle,
     generation: u64,
@@ -75,6 +75,6 @@ pub(crate) fn render(
             | Event::Cancelled { .. } => {}
         }
     }
-    shots.last_mut().ok_or("no preview came")?.is_final = true;
+    shots.last_mut().ok_or("no preview arrived")?.is_final = true;
     Ok(shots)
 }

@@ -1,4 +1,4 @@
-//! The program in a pseudo-terminal at one end of a line, and the screen at the other end.
+//! The program in a pseudo-terminal at one end of a connection, and the screen at the other end.
 
 use std::error::Error;
 use std::io::{Read, Write};
@@ -17,41 +17,41 @@ pub(crate) const COLUMNS: u16 = 120;
 pub(crate) const ROWS: u16 = 40;
 /// Width and height of a cell in pixels.
 const CELL: (u16, u16) = (8, 16);
-/// Longest time to wait for anything.
+/// Maximum time to wait for anything.
 const LIMIT: Duration = Duration::from_secs(600);
-/// A terminal's answers to queries: whether it is there, its kind, whether it synchronises its output.
+/// Answers to terminal queries: status, device attributes, and synchronized output.
 const ANSWERS: [(&[u8], &[u8]); 3] =
     [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;4;22c"), (b"\x1b[?2026$p", b"\x1b[?2026;2$y")];
 
-/// A line to the terminal.
+/// A connection to the terminal.
 #[derive(Clone, Copy)]
 pub(crate) struct Line {
     pub(crate) bytes_per_second: f64,
-    /// Delay in one direction.
+    /// One-way delay.
     pub(crate) delay: Duration,
 }
 
 impl Line {
-    /// The line to a terminal on the same machine.
+    /// The connection to a terminal on the same machine.
     pub(crate) const NONE: Self = Self { bytes_per_second: f64::INFINITY, delay: Duration::ZERO };
-    /// 1 Mbit/s, 150 ms there and back.
+    /// 1 Mbit/s with a round-trip time of 150 ms.
     pub(crate) const THIN: Self = Self { bytes_per_second: 125e3, delay: Duration::from_millis(75) };
 }
 
-/// Byte counts and screen at the other end.
+/// Byte counts and screen at the far end.
 pub(crate) struct Far {
     pub(crate) cells: vt100::Parser,
     pub(crate) pixels: PixelScreen,
-    /// Bytes that have arrived.
+    /// Number of bytes that have arrived.
     pub(crate) came: usize,
-    /// Bytes sent, and those up to the last query that was answered.
+    /// Number of bytes sent, and sent before the last answered query.
     sent: usize,
     answered: usize,
     pub(crate) most_unanswered: usize,
 }
 
 impl Far {
-    /// The colours of the parts of the picture's cells, or of its pixels.
+    /// The colors of the subdivisions of the image's cells, or of its pixels.
     pub(crate) fn seen(&self) -> Vec<[u8; 3]> {
         if let Some(picture) = self.pixels.shown() {
             return picture.pixels.clone();
@@ -62,7 +62,7 @@ impl Far {
         cells.flat_map(parts).collect()
     }
 
-    /// Percent of the render that the screen reports; 100 at the end.
+    /// Progress in percent that the screen shows; 100 at the end.
     pub(crate) fn percent(&self) -> Option<u32> {
         let row =
             self.cells.screen().rows(0, COLUMNS).find(|row| row.contains("glimt") || !row.is_empty())?;
@@ -75,7 +75,8 @@ impl Far {
     }
 }
 
-/// The colours of the parts of a cell; black for other characters than blocks, so that all screens have equally many.
+/// The colors of a cell's subdivisions; black for characters other than blocks, so that all screens have the same
+/// number.
 fn parts(cell: &vt100::Cell) -> [[u8; 3]; 24] {
     let color = |color| match color {
         vt100::Color::Default => None,
@@ -87,9 +88,9 @@ fn parts(cell: &vt100::Cell) -> [[u8; 3]; 24] {
     filled.map(|is_ink| if is_ink { fg } else { bg }.unwrap_or_default())
 }
 
-/// A terminal with the program inside.
+/// A terminal that runs the program.
 pub(crate) struct Watched {
-    // Held so that the terminal stays.
+    // Keeps the terminal open.
     _master: Box<dyn MasterPty + Send>,
     child: Box<dyn Child + Send + Sync>,
     keys: Arc<Mutex<Box<dyn Write + Send>>>,
@@ -97,7 +98,7 @@ pub(crate) struct Watched {
 }
 
 impl Watched {
-    /// Starts a command in this folder.
+    /// Starts a command in a folder.
     pub(crate) fn open(command: &[&str], folder: &Path, line: Line) -> Result<Self, Box<dyn Error>> {
         let size =
             PtySize { rows: ROWS, cols: COLUMNS, pixel_width: COLUMNS * CELL.0, pixel_height: ROWS * CELL.1 };
@@ -112,7 +113,7 @@ impl Watched {
         builder.env("COLORTERM", "truecolor");
         let child = pair.slave.spawn_command(builder)?;
         let keys = Arc::new(Mutex::new(pair.master.take_writer()?));
-        let side = |length| NonZeroU16::new(length).ok_or("a terminal has no cells");
+        let side = |length| NonZeroU16::new(length).ok_or("the terminal has no cells");
         let far = Arc::new(Mutex::new(Far {
             cells: vt100::Parser::new(side(ROWS)?, side(COLUMNS)?, 0),
             pixels: PixelScreen::default(),
@@ -125,23 +126,23 @@ impl Watched {
         Ok(Self { _master: pair.master, child, keys, far })
     }
 
-    /// Types these characters.
+    /// Types characters.
     pub(crate) fn press(&self, keys: &str) -> Result<(), Box<dyn Error>> {
         Ok(lock(&self.keys).write_all(keys.as_bytes())?)
     }
 
-    /// Returns the state at the other end.
+    /// The state at the far end.
     pub(crate) fn far(&self) -> MutexGuard<'_, Far> {
         lock(&self.far)
     }
 
-    /// Waits until the other end satisfies `holds`.
+    /// Waits until the far end satisfies `holds`.
     pub(crate) fn wait(&self, what: &str, holds: impl Fn(&Far) -> bool) -> Result<(), Box<dyn Error>> {
         let deadline = Instant::now() + LIMIT;
         while !holds(&self.far()) {
             if Instant::now() > deadline {
                 let screen = self.far().cells.screen().contents();
-                return Err(format!("not seen: {what}\n{screen}").into());
+                return Err(format!("timed out waiting for {what}\n{screen}").into());
             }
             thread::sleep(Duration::from_millis(2));
         }
@@ -151,7 +152,7 @@ impl Watched {
 
 impl Drop for Watched {
     fn drop(&mut self) {
-        // The measurement is complete; a failure to end the program does not matter.
+        // The measurement is complete; failing to stop the program does not matter.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -161,10 +162,10 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Bytes, with the time of their arrival.
+/// Bytes with their arrival time.
 type Due = (Instant, Vec<u8>);
 
-/// Runs the line: the program's output goes to the other end, and the answers come back.
+/// Simulates the connection: carries output to the far end, and answers back.
 fn carry(
     mut output: Box<dyn Read + Send>,
     far: Arc<Mutex<Far>>,
@@ -219,7 +220,7 @@ fn arrive(
             far.came += 1;
             tail.push(byte);
             if let Some((_, answer)) = ANSWERS.iter().find(|(question, _)| tail.ends_with(question)) {
-                // A program that is gone needs no answer.
+                // A program that has exited needs no answer.
                 let _ = up.send((Instant::now() + delay, far.came, *answer));
             }
             if tail.len() > 64 {

@@ -1,8 +1,8 @@
-//! Lenses, angles of view, cameras inside and on objects, pictures of extreme shape.
+//! Lenses, fields of view, cameras inside and on objects, images of extreme shape.
 
 use super::{CAMERA, Extent, Picture, Row, furnace, head, signs};
 
-/// A white surface: under light 1 from all around it has the radiance 1.
+/// A white surface: under uniform light of radiance 1, its radiance is 1.
 const WHITE: &str =
     "[materials.w]\ndiffuse = 1\n[[sphere]]\ncenter = [0, 0, -5]\nradius = 1\nmaterial = \"w\"\n";
 
@@ -11,7 +11,7 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
     let plain = signs("", CAMERA, "");
     rows.push(
         Row::alike(
-            "an aperture of 0, as no lens",
+            "an aperture of 0, as without a lens",
             vec![(signs("", &with("aperture = 0\nfocus = 3"), ""), plain.clone())],
             0.0,
         )
@@ -19,7 +19,7 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
     );
     rows.push(
         Row::alike(
-            "an aperture of 1e-12, as no lens",
+            "an aperture of 1e-12, as without a lens",
             vec![(signs("", &with("aperture = 1e-12"), ""), plain.clone())],
             1e-3,
         )
@@ -31,20 +31,18 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
             .timed(),
     );
     rows.push(
-        Row::mean("an angle of view of 179°, a white ball", white(&with("fov = 179")), 1.0, 1e-2).timed(),
+        Row::mean("a field of view of 179°, a white ball", white(&with("fov = 179")), 1.0, 1e-2).timed(),
     );
     rows.extend([1e-3, 179.0].map(angle_of_view));
     for (name, place) in [("glass of ior 1", "1"), ("glass of ior 1.000001", "1.000001")] {
         let ball = around_the_camera(place);
         let pairs = vec![(signs("", CAMERA, &ball), plain.clone())];
-        rows.push(Row::alike(format!("a camera in {name}, as in the open"), pairs, 1e-3));
+        rows.push(Row::alike(format!("a camera in {name}, as in air"), pairs, 1e-3));
         let white = (furnace(64, CAMERA, &ball), furnace(64, CAMERA, &around_the_camera("1.5")));
-        rows.push(
-            Row::mean(format!("a camera in {name} under light from all around"), white, 1.0, 1e-3).timed(),
-        );
+        rows.push(Row::mean(format!("a camera in {name} under uniform light"), white, 1.0, 1e-3).timed());
     }
     let inside = (furnace(64, CAMERA, &around_the_camera("1.5")), furnace(64, CAMERA, WHITE));
-    rows.push(Row::mean("a camera in glass of ior 1.5 under light from all around", inside, 1.0, 1e-3));
+    rows.push(Row::mean("a camera in glass of ior 1.5 under uniform light", inside, 1.0, 1e-3));
     let black = "[materials.k]\ndiffuse = 0\n";
     for (name, thing) in [
         ("sphere", "[[sphere]]\ncenter = [0, 0, 1]\nradius = 1"),
@@ -66,8 +64,8 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
             vec![(picture(0.0), plain.clone())],
             0.0,
         ));
-        // The cost of an invisible object is no matter of cameras: compare with one as far in front as single precision
-        // allows.
+        // The cost of an invisible object is not what is tested, so compare with a camera as far in front of it as
+        // single precision allows.
         let beside = vec![(picture(0.0), picture(-2_f64.powi(-20)))];
         rows.push(Row::alike(format!("a camera on a {name}, as in front of it"), beside, 1e-3).timed());
     }
@@ -85,7 +83,7 @@ fn around_the_camera(ior: &str) -> String {
     )
 }
 
-/// A wall at a distance d has the height 2 d tan(fov / 2) in the picture: the twin is one at 40°.
+/// A wall at distance d has height 2 d tan(fov / 2) in the image: compare with a field of view of 40°.
 fn angle_of_view(fov: f64) -> Row {
     let distance = |fov: f64| 1.0 / (0.5 * fov.to_radians()).tan();
     let picture = |fov: f64| {
@@ -108,11 +106,12 @@ material = "blue"
 "#;
         Picture::new(head(64, "") + &camera + wall)
     };
-    let name = format!("a wall by an angle of view of {fov}°, as by 40°");
+    let name = format!("a wall with a field of view of {fov}°, as with 40°");
     Row::alike(name, vec![(picture(fov), picture(40.0))], 1e-3).timed()
 }
 
-/// A ball of reflectance ρ around the eye and a point light of intensity I: every pixel has the radiance ρ I / (π R²), here 1.
+/// A sphere of reflectance ρ around the camera and a point light of intensity I: every pixel has the radiance ρ I / (π
+/// R²), here 1.
 fn images() -> Vec<Row> {
     let around =
         "[materials.w]\ndiffuse = 0.5\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 5\nmaterial = \"w\"\n";
@@ -122,7 +121,7 @@ fn images() -> Vec<Row> {
         Picture::new(render + CAMERA + around + &light)
     };
     let row = |(width, height, samples)| {
-        let name = format!("a picture of {width} × {height}, {samples} samples, beside 256 × 256");
+        let name = format!("an image of {width} × {height}, {samples} samples, as 256 × 256");
         Row::mean(name, (sized(width, height, samples), sized(256, 256, 1)), 1.0, 1e-5).timed()
     };
     [(1, 1, 65_536), (65_536, 1, 1), (1, 65_536, 1)].map(row).into()

@@ -1,4 +1,4 @@
-//! The whole scene scaled and moved: the picture must stay the same.
+//! The whole scene scaled and moved: the image must stay the same.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -6,10 +6,10 @@ use std::fmt::Write as _;
 use super::super::frame::Frame;
 use super::{Extent, Picture, Row};
 
-/// Bound on the difference of all moved pictures.
+/// Bound on the difference of moved images.
 const MOVED: f64 = 1e-3;
 
-/// Samples of each pixel.
+/// Samples per pixel.
 const SAMPLES: u32 = 4;
 
 pub(super) fn rows(extent: Extent) -> Vec<Row> {
@@ -27,8 +27,8 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
         ("lens", "LENS"),
         ("64 lamps", "LAMPS"),
     ];
-    // Rounding at another place picks another lamp of a tree, or photon of a kernel, here and there; that is one sample of many.
-    // Lamps therefore come in the long run alone, with more samples.
+    // Rounding at another position occasionally picks another light of the tree or another photon of a kernel, which
+    // changes one sample of many. Scenes with lights therefore run only in the long variant, with more samples.
     let settings = settings.iter().filter(|(_, setting)| extent == Extent::Long || *setting != "LAMPS");
     for &(name, setting) in settings {
         let is_picking = setting == PHOTONS || setting == "LAMPS";
@@ -50,14 +50,14 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
     rows
 }
 
-/// Setting that stands for photons.
+/// Placeholder setting for photons.
 const PHOTONS: &str = "PHOTONS";
 
-/// Every shape with every material and both trees, far away; scaled as well, in the long run.
+/// Every shape with every material and both acceleration structures, far away; in the long variant also scaled.
 fn of_shapes(extent: Extent) -> Vec<Row> {
     let trees: &[&str] = if extent == Extent::Short { &["bvh"] } else { &["bvh", "kdtree"] };
     let one = |shape: &str| {
-        // A plane cannot be a lamp, and has one texture tile per unit of length, whatever the scale.
+        // A plane cannot be a light, and has one texture tile per unit of length at every scale.
         let materials = MATERIALS.iter().filter(|name| shape != "plane" || !["lamp", "tiles"].contains(name));
         let both = materials.flat_map(|name| trees.iter().map(move |tree| (*name, *tree)));
         both.collect::<Vec<_>>()
@@ -74,14 +74,14 @@ fn of_shapes(extent: Extent) -> Vec<Row> {
     let mut rows = Vec::new();
     for shape in SHAPES {
         rows.push(Row::alike(
-            format!("a {shape} of every material, moved by 1e8 sizes"),
+            format!("a {shape} with every material, moved by 1e8 sizes"),
             pairs(shape, Frame::moved(1e8)),
             MOVED,
         ));
         if extent == Extent::Long {
             let scaled = [-30, -11, 7, 30].into_iter().flat_map(|k| pairs(shape, Frame::scaled(k)));
             rows.push(Row::alike(
-                format!("a {shape} of every material, × 2^−30 … 2^30"),
+                format!("a {shape} with every material, × 2^−30 … 2^30"),
                 scaled.collect(),
                 0.0,
             ));
@@ -90,7 +90,7 @@ fn of_shapes(extent: Extent) -> Vec<Row> {
     rows
 }
 
-/// Every light alone.
+/// Every light on its own.
 fn of_lights(extent: Extent) -> Vec<Row> {
     let integrators: &[&str] = if extent == Extent::Short { &["whitted"] } else { &["whitted", "path"] };
     let picture = |frame, light: &str, integrator: &str| {
@@ -112,7 +112,7 @@ fn of_lights(extent: Extent) -> Vec<Row> {
     rows.collect()
 }
 
-/// A mesh whose file has its vertices 1e8 sizes from the origin.
+/// A mesh whose file has its vertices 1e8 scene sizes from the origin.
 fn georeferenced(ending: &'static str) -> Row {
     let name = match ending {
         "obj" => "far.obj",
@@ -140,8 +140,8 @@ const LIGHTS: [&str; 9] = [
     "directional",
     "steady point",
     "sun",
-    "sky of one colour",
-    "sky with a picture",
+    "constant sky",
+    "sky with an image",
     "quad",
     "sphere",
 ];
@@ -222,8 +222,8 @@ fn lights_of(frame: Frame, lights: &[&str]) -> String {
             "[[light]]\ntype = \"directional\"\ndirection = [0.5, -1, -0.75]\nirradiance = 0.1\nangle = 5\n"
                 .to_owned()
         }
-        "sky of one colour" => "[environment]\ncolor = [0.1, 0.2, 0.3]\n".to_owned(),
-        "sky with a picture" => "[environment]\nfile = \"tiles.ppm\"\n".to_owned(),
+        "constant sky" => "[environment]\ncolor = [0.1, 0.2, 0.3]\n".to_owned(),
+        "sky with an image" => "[environment]\nfile = \"tiles.ppm\"\n".to_owned(),
         "quad" => format!(
             "[[quad]]\ncorner = {}\nu = {}\nv = {}\nmaterial = \"lamp\"\n",
             p(-0.5, 2.0, -5.5),
@@ -237,7 +237,7 @@ fn lights_of(frame: Frame, lights: &[&str]) -> String {
     lights.iter().map(|light| one(light)).collect()
 }
 
-/// All shapes beside each other, some of them lamps, and lights.
+/// All shapes next to each other, some of them emissive, and lights.
 fn everything(frame: Frame, setting: &str, samples: u32) -> Picture {
     let (render, more) = match setting {
         "LENS" => ("", format!("aperture = {}\nfocus = {}", frame.length(0.0625), frame.length(5.0))),
@@ -267,14 +267,14 @@ fn everything(frame: Frame, setting: &str, samples: u32) -> Picture {
     with_files(&scene)
 }
 
-/// A picture with the files that such scenes name.
+/// A scene with the files that it refers to.
 fn with_files(scene: &str) -> Picture {
     let tiles = "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3";
     let ball = ball("obj", Frame::PLAIN, [0.0; 3], 1.0);
     Picture::new(scene.to_owned()).with("tiles.ppm", tiles.to_owned()).with("ball.obj", ball)
 }
 
-/// A ball of facets as the text of a file.
+/// A faceted ball as the text of a mesh file.
 fn ball(ending: &str, frame: Frame, center: [f64; 3], radius: f64) -> String {
     const RINGS: usize = 9;
     const STEPS: usize = 14;
@@ -303,7 +303,7 @@ fn ball(ending: &str, frame: Frame, center: [f64; 3], radius: f64) -> String {
     mesh(ending, &points, &faces)
 }
 
-/// The text of a file of points and triangles.
+/// The text of a mesh file with points and triangles.
 pub(super) fn mesh(ending: &str, points: &[String], faces: &[[usize; 3]]) -> String {
     let (from, mut text) = match ending {
         "obj" => (1, String::new()),

@@ -1,4 +1,4 @@
-//! Slivers, needles, layers and a million spheres.
+//! Slivers, needles, coplanar layers and a million spheres.
 
 use std::fmt::Write as _;
 
@@ -18,8 +18,8 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
     rows
 }
 
-/// Most nested spheres. A ray visits the boxes of all spheres around one middle that it passes: the time grows with their
-/// number, and so does the twin's.
+/// Maximum number of nested spheres. A ray visits the boxes of all concentric spheres that it passes: the time grows
+/// with their number, and so does the reference's.
 const MOST_NESTED: u32 = 1_000_000;
 
 const LAMP: &str = "[[light]]\nposition = [1, 2, 0]\nintensity = 9\n";
@@ -36,7 +36,8 @@ fn point(x: f64, y: f64, z: f64) -> String {
     format!("{x:?} {y:?} {z:?}")
 }
 
-/// A wall of 2 × 1024 triangles: slivers of 1 : 10⁴ · 2⁻¹⁰ with all their height, or 32 × 32 squares.
+/// A wall of 2 × 1024 triangles: slivers of full height with an aspect ratio of 1 : 10⁴ · 2⁻¹⁰, compared with 32 × 32
+/// squares.
 fn slivers() -> Row {
     let wall = |columns: usize, lines: usize| {
         let at = |column: usize, line: usize| {
@@ -54,7 +55,7 @@ fn slivers() -> Row {
     Row::alike("a wall of 32,768 slivers, each 1 : 12,000", pairs, 1e-3).timed()
 }
 
-/// Sixteen surfaces in one plane, of one material; the twin has a single one.
+/// Sixteen coplanar surfaces of one material, compared with a single one.
 fn coplanar(kind: &str) -> Row {
     let layers = |count: usize| match kind {
         "mesh" => {
@@ -72,8 +73,8 @@ fn coplanar(kind: &str) -> Row {
     Row::alike(format!("16 layers {what} in one plane, as one"), vec![(layers(16), layers(1))], 0.0)
 }
 
-/// Fifty thousand needles across space, as long as the scene and a thousandth as thick, in one kind of tree; the other kind is
-/// the twin.
+/// Needles across the scene, as long as the scene and a thousandth as thick, in one acceleration structure compared
+/// with the other.
 fn needles(accel: &str) -> Row {
     let mut random = Random(5);
     let (mut points, mut faces) = (Vec::new(), Vec::new());
@@ -89,7 +90,7 @@ fn needles(accel: &str) -> Row {
     Row::alike(format!("20,000 needles 1 : 1000, {accel} as {other}"), vec![(by(accel), by(other))], 0.0)
 }
 
-/// Spheres at pseudo-random places; the twin's are so small that hardly any two overlap.
+/// Spheres at pseudo-random positions, compared with spheres so small that hardly any overlap.
 fn overlapping(count: u32, accel: &str) -> Row {
     let spheres = |radius: f64, accel: &str| {
         let mut random = Random(9);
@@ -104,13 +105,13 @@ fn overlapping(count: u32, accel: &str) -> Row {
         }
         Picture::new(scene)
     };
-    // Twice the mean distance: every point is inside of about 30 spheres.
+    // Twice the mean distance: every point is inside about 30 spheres.
     let spacing = (8.0 * 6.0 * 6.0 / f64::from(count)).cbrt();
     let (wide, narrow) = (2.0 * spacing, 0.25 * spacing);
     Row {
         figure: super::super::row::Figure::Difference(0.0),
         ..Row::alike(
-            format!("{count} spheres that overlap, beside as many that do not"),
+            format!("{count} overlapping spheres, as separate ones"),
             vec![(spheres(wide, accel), spheres(narrow, accel))],
             1.0,
         )
@@ -118,7 +119,7 @@ fn overlapping(count: u32, accel: &str) -> Row {
     .timed()
 }
 
-/// Spheres around one middle; the twin has the outermost alone.
+/// Concentric spheres, compared with only the outermost.
 fn nested(count: u32, accel: &str) -> Row {
     let spheres = |count: u32| {
         let (width, height) = if count > 10_000 { (4, 3) } else { (64, 48) };
@@ -141,10 +142,10 @@ fn nested(count: u32, accel: &str) -> Row {
     };
     let all = spheres(count);
     let pairs = vec![(Picture::new(all.clone()), Picture::new(outermost(all)))];
-    Row::alike(format!("{count} spheres in each other, {accel}, as the outermost"), pairs, 0.0)
+    Row::alike(format!("{count} nested spheres, {accel}, as the outermost"), pairs, 0.0)
 }
 
-/// A small generator of numbers.
+/// A small random number generator.
 struct Random(u64);
 
 impl Random {

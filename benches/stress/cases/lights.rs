@@ -13,7 +13,7 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
                 Row {
                     figure: Figure::Difference(1.0 / times),
                     ..Row::alike(
-                        format!("{name} of {times:e} times the power"),
+                        format!("{name} with {times:e} times the power"),
                         vec![(powered(light, times), powered(light, 1.0))],
                         1e-6,
                     )
@@ -59,11 +59,11 @@ fn powered(light: &str, power: f64) -> Picture {
     Picture::new(head(64, "") + CAMERA + THINGS + &light.replace("POWER", &format!("{power:?}")))
 }
 
-/// A lamp of size 1e-9 above the scene; the twin is a point light of its intensity, radiance × projected area. The lit part lies
-/// straight below, so that the cosine of a flat lamp is nearly one.
+/// A light of size 1e-9 above the scene, compared with a point light of its intensity, radiance × projected area. The
+/// lit area is directly below, so that the cosine of a flat light is nearly one.
 fn tiny(kind: &str) -> Row {
     let size = 1e-9;
-    // The radiance stays below the largest number.
+    // The radiance must stay finite.
     let (radiance, area) = (1e16, if kind == "quad" { size * size } else { PI * size * size });
     let lamp = match kind {
         "sphere" => format!("[[sphere]]\ncenter = [0, 2, -5]\nradius = {size:?}\nmaterial = \"lamp\"\n"),
@@ -79,10 +79,11 @@ fn tiny(kind: &str) -> Row {
     let picture = |light: String| Picture::new(head(64, "") + camera + receiver + &light);
     let case = picture(format!("[materials.lamp]\ndiffuse = 0\nemission = {radiance:?}\n{lamp}"));
     let twin = picture(format!("[[light]]\nposition = [0, 2, -5]\nintensity = {:?}\n", radiance * area));
-    Row::alike(format!("a {kind} lamp of size 1e-9, as a point light"), vec![(case, twin)], 1e-3).timed()
+    Row::alike(format!("a {kind} light of size 1e-9, as a point light"), vec![(case, twin)], 1e-3).timed()
 }
 
-/// Under a quad of 2e9, the sky emits everywhere: E = πL, and a floor of reflectance 0.6 has 0.6 L.
+/// Under a quad of size 2e9, light arrives from the whole hemisphere: E = πL, and a floor of reflectance 0.6 has
+/// radiance 0.6 L.
 fn vast() -> Row {
     let picture = |size: f64| {
         let lamp = format!(
@@ -94,6 +95,5 @@ fn vast() -> Row {
         let camera = "[camera]\nposition = [0, 0, 0]\nlook_at = [0, -1, -1]\n";
         Picture::new(head(64, "") + camera + floor + &lamp)
     };
-    Row::mean("under a quad lamp of size 2e9 a floor has its albedo", (picture(2e9), picture(2e3)), 0.6, 1e-2)
-        .timed()
+    Row::mean("a floor under a quad light of size 2e9", (picture(2e9), picture(2e3)), 0.6, 1e-2).timed()
 }

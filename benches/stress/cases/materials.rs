@@ -1,4 +1,4 @@
-//! Glass with little or much refraction, highlights wide or narrow.
+//! Glass with weak or strong refraction, wide and narrow highlights.
 
 use super::{CAMERA, Extent, Picture, Row, furnace, head, signs};
 
@@ -11,19 +11,19 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
     let clear = |ior: &str| (signs("", CAMERA, &ball(ior)), signs("", CAMERA, ""));
     let white = |ior: &str| (furnace(64, CAMERA, &ball(ior)), furnace(64, CAMERA, &ball("1.5")));
     vec![
-        Row::alike("a ball of ior 1, as nothing", vec![clear("1")], 1e-3),
-        Row::alike("a ball of ior 1.000001, as nothing", vec![clear("1.000001")], 1e-3),
-        Row::mean("a ball of ior 3 under light from all around", white("3"), 1.0, 1e-3).timed(),
-        Row::mean("a ball of ior 1 under light from all around", white("1"), 1.0, 1e-3).timed(),
-        Row::mean("a ball of ior 1.000001 under light from all around", white("1.000001"), 1.0, 1e-3).timed(),
+        Row::alike("a ball of ior 1, as without it", vec![clear("1")], 1e-3),
+        Row::alike("a ball of ior 1.000001, as without it", vec![clear("1.000001")], 1e-3),
+        Row::mean("a ball of ior 3 under uniform light", white("3"), 1.0, 1e-3).timed(),
+        Row::mean("a ball of ior 1 under uniform light", white("1"), 1.0, 1e-3).timed(),
+        Row::mean("a ball of ior 1.000001 under uniform light", white("1.000001"), 1.0, 1e-3).timed(),
         wide_highlight(),
         narrow_highlight("whitted"),
         narrow_highlight("path"),
     ]
 }
 
-/// The exponent 0 gives 2/2π everywhere on the side of the reflected ray; the twin is a diffuse surface, under a light
-/// at the camera.
+/// The exponent 0 gives 2/2π everywhere on the side of the reflected ray; compared with a diffuse surface, under a
+/// light at the camera.
 fn wide_highlight() -> Row {
     let picture = |material: &str| {
         let floor = format!(
@@ -32,10 +32,10 @@ fn wide_highlight() -> Row {
         Picture::new(head(64, "") + CAMERA + &floor + "[[light]]\nposition = [0, 0, 0]\nintensity = 9\n")
     };
     let pair = (picture("diffuse = 0\nspecular = 0.6\nshininess = 0"), picture("diffuse = 0.6"));
-    Row::alike("a highlight of exponent 0, as diffuse", vec![pair], 1e-5).timed()
+    Row::alike("a highlight with exponent 0, as diffuse", vec![pair], 1e-5).timed()
 }
 
-/// The exponent 1e5 reflects light within 0.3°; the twin is a mirror, under light from all around. The factor is the cosine,
+/// The exponent 1e5 reflects light within 0.3°; compared with a mirror, under uniform light. The factor is the cosine,
 /// here nearly 1.
 fn narrow_highlight(integrator: &str) -> Row {
     let picture = |material: &str| {
@@ -49,5 +49,6 @@ fn narrow_highlight(integrator: &str) -> Row {
         picture("diffuse = 0\nspecular = 0.9\nshininess = 1e5"),
         picture("type = \"mirror\"\nreflectance = 0.9"),
     );
-    Row::mean(format!("a highlight of exponent 1e5 by {integrator}, as a mirror"), pair, 0.9, 1e-3).timed()
+    Row::mean(format!("a highlight with exponent 1e5 with {integrator}, as a mirror"), pair, 0.9, 1e-3)
+        .timed()
 }

@@ -14,7 +14,7 @@ pub(crate) fn rows(extent: Extent) -> Vec<Row> {
     groups.into_iter().flat_map(|group| group(extent)).collect()
 }
 
-/// The head of a small scene, with more keys of `[render]`.
+/// The `[render]` table of a small scene, with additional keys.
 fn head(samples: u32, more: &str) -> String {
     format!("[render]\nwidth = 64\nheight = 48\nsamples = {samples}\n{more}\n")
 }
@@ -22,7 +22,7 @@ fn head(samples: u32, more: &str) -> String {
 /// A camera at the origin that looks along −z.
 const CAMERA: &str = "[camera]\nposition = [0, 0, 0]\nlook_at = [0, 0, -5]\n";
 
-/// Emissive objects, all around: they need no light samples.
+/// Emissive objects all around, which need no light samples.
 const SIGNS: &str = r#"
 [materials]
 red = { diffuse = 0, emission = [0.9, 0.2, 0.1] }
@@ -44,13 +44,13 @@ v = [0, 0, -40]
 material = "blue"
 "#;
 
-/// The signs by path tracing, with keys of `[render]` and other elements.
+/// The emissive objects, path-traced, with keys of `[render]` and other elements.
 fn signs(more: &str, camera: &str, rest: &str) -> Picture {
     let render = head(16, &format!("integrator = \"path\"\nbackground = [0.3, 0.4, 0.5]\n{more}"));
     Picture::new(format!("{render}{camera}{SIGNS}{rest}"))
 }
 
-/// Light 1 from all around, by path tracing: every pixel has the radiance 1, unless light is lost.
+/// A white furnace, path-traced: every pixel has the radiance 1 unless light is lost.
 fn furnace(samples: u32, camera: &str, rest: &str) -> Picture {
     let render = head(samples, "integrator = \"path\"\nmax_depth = 64");
     Picture::new(format!("{render}{camera}[environment]\ncolor = [1, 1, 1]\n{rest}"))
