@@ -1,17 +1,18 @@
-//! A bear of balls and round cones with smooth joints, for `scenes/figure.toml`: 0.33 high, its seat at the origin.
+//! A bear made of balls and round cones with smooth joints, for `scenes/figure.toml`: 0.33 high, with its seat at the
+//! origin.
 
 use super::surface::Surface;
 use super::vector::{Vector, add, dot, mix, scale, subtract, unit};
 
-/// The corner of the lattice, the edge of a cell, and the cells along each axis.
+/// Corner of the lattice, size of a cell, and number of cells along each axis.
 const CORNER: Vector = [-0.13, -0.025, -0.1];
 const CELL: f64 = 0.0029;
 const CELLS: [usize; 3] = [91, 124, 91];
 
-/// Distance between two parts below which they blend.
+/// Distance below which two parts blend.
 const BLEND: f64 = 0.022;
 
-/// Both ends of each part, with their radii; parts off the middle exist on both sides.
+/// Both ends of each part, with their radii; parts off the center exist on both sides.
 const PARTS: [[(Vector, f64); 2]; 8] = [
     // Trunk, head, snout.
     [([0.0, 0.068, 0.0], 0.076), ([0.0, 0.165, -0.004], 0.058)],
@@ -25,14 +26,14 @@ const PARTS: [[(Vector, f64); 2]; 8] = [
     [([0.0, 0.04, -0.07], 0.022), ([0.0, 0.042, -0.076], 0.022)],
 ];
 
-/// The isosurface of the distance at 0, by dual cells (Gibson, *Constrained Elastic Surface Nets*, MICCAI 1998): a vertex, moved
-/// onto the surface, in each cell that it crosses; a quad around each edge that it crosses.
+/// The zero level set of the distance, extracted with surface nets (Gibson, *Constrained Elastic Surface Nets*, MICCAI
+/// 1998): a vertex, moved onto the surface, in each cell that it crosses, and a quad around each edge that it crosses.
 pub(crate) fn bear() -> Surface {
     let inside = lattice();
     let [nx, ny, nz] = CELLS;
     let corner = |[x, y, z]: [usize; 3]| inside[(x * (ny + 1) + y) * (nz + 1) + z];
     let mut surface = Surface::default();
-    // A vertex in each cell that has corners on both sides.
+    // Add a vertex in each cell that has corners on both sides.
     let mut vertices = vec![u32::MAX; nx * ny * nz];
     let cell = |[x, y, z]: [usize; 3]| (x * ny + y) * nz + z;
     for at in all(CELLS) {
@@ -43,7 +44,7 @@ pub(crate) fn bear() -> Surface {
             surface.positions.push(onto(place(at, 0.5)));
         }
     }
-    // A quad around each edge between the two sides, its front outside.
+    // Add a quad around each edge that crosses the surface, facing outward.
     for (at, axis) in all(CELLS).flat_map(|at| (0..3).map(move |axis| (at, axis))) {
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
         if at[next] == 0 || at[last] == 0 {
@@ -68,22 +69,22 @@ pub(crate) fn bear() -> Surface {
     surface
 }
 
-/// Whether each corner of the lattice is inside.
+/// Whether each lattice point is inside.
 fn lattice() -> Vec<bool> {
     all(CELLS.map(|cells| cells + 1)).map(|at| distance(place(at, 0.0)) < 0.0).collect()
 }
 
-/// All places of a lattice, the last axis first.
+/// All points of a lattice, with the last axis varying fastest.
 fn all([nx, ny, nz]: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     (0..nx).flat_map(move |x| (0..ny).flat_map(move |y| (0..nz).map(move |z| [x, y, z])))
 }
 
-/// A place of the lattice, moved by a part of a cell along all axes.
+/// Position of a lattice point, offset by a fraction of a cell along all axes.
 fn place(at: [usize; 3], by: f64) -> Vector {
     add(CORNER, at.map(|index| (index as f64 + by) * CELL))
 }
 
-/// The nearest point of the surface, by Newton's steps along the gradient.
+/// Moves a point onto the surface with Newton steps along the gradient.
 fn onto(mut point: Vector) -> Vector {
     for _ in 0..6 {
         point = subtract(point, scale(gradient(point), distance(point)));
@@ -101,9 +102,9 @@ fn gradient(point: Vector) -> Vector {
     unit([slope(0), slope(1), slope(2)])
 }
 
-/// About the distance to the bear, negative inside.
+/// Approximate signed distance to the bear, negative inside.
 fn distance([x, y, z]: Vector) -> f64 {
-    // Both sides are alike.
+    // The bear is symmetric.
     let point = [x.abs(), y, z];
     PARTS.iter().map(|ends| round_cone(point, ends)).fold(f64::MAX, |a, b| {
         let near = (BLEND - (a - b).abs()).max(0.0) / BLEND;
@@ -111,7 +112,7 @@ fn distance([x, y, z]: Vector) -> f64 {
     })
 }
 
-/// The distance to a ball that moves from one end to the other and changes its radius on the way.
+/// Distance to a round cone: a ball swept from one end to the other with a changing radius.
 fn round_cone(point: Vector, [(from, first), (to, second)]: &[(Vector, f64); 2]) -> f64 {
     let along = subtract(*to, *from);
     let t = (dot(subtract(point, *from), along) / dot(along, along)).clamp(0.0, 1.0);

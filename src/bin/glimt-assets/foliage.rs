@@ -1,4 +1,4 @@
-//! A shrub: leaves as squares with a texture whose alpha is the shape of a leaf.
+//! A shrub whose leaves are squares with an alpha-textured leaf.
 
 use std::f64::consts::SQRT_2;
 
@@ -6,13 +6,13 @@ use super::noise::{random, value};
 use super::surface::Surface;
 use super::vector::{Vector, add, cross, dot, mix, scale, smooth_step, subtract, turn, unit};
 
-/// Columns and rows of the leaf.
+/// Width and height of the leaf texture.
 const SIDE: u32 = 256;
 
-/// Leaves of the shrub.
+/// Number of leaves.
 const LEAVES: i64 = 700;
 
-/// A leaf that points up, with alpha, in sRGB.
+/// A leaf that points up, with alpha, as an sRGB PNG.
 pub(crate) fn leaf() -> Vec<u8> {
     let mut pixels = Vec::new();
     for row in 0..SIDE {
@@ -29,7 +29,7 @@ pub(crate) fn leaf() -> Vec<u8> {
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::High);
     let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(&pixels));
-    written.expect("a picture of a fixed size into memory cannot fail");
+    written.expect("encoding a fixed-size image in memory cannot fail");
     file
 }
 
@@ -39,7 +39,7 @@ fn width(v: f64) -> f64 {
     0.62 * t.sqrt() * (1.0 - t)
 }
 
-/// Whether the leaf or its stalk is there, with a soft border of about a pixel.
+/// Coverage by the leaf or its stalk, with a soft border about a pixel wide.
 fn shape(u: f64, v: f64) -> f64 {
     let (side, teeth) = ((u - 0.5).abs(), 0.012 * ((v * 26.0).fract() - 0.5));
     let blade = smooth_step(-0.004, 0.004, width(v - 0.01) + teeth - side);
@@ -48,7 +48,7 @@ fn shape(u: f64, v: f64) -> f64 {
     stalk.max(if is_inside { blade } else { 0.0 })
 }
 
-/// Green between light veins; beyond the border it goes on, so that no other colour shows there.
+/// Green between light veins. The color extends beyond the border, so that no other color bleeds in.
 fn color(u: f64, v: f64) -> Vector {
     let side = (u - 0.5).abs();
     let along = (v * 9.0 - side * 7.0).rem_euclid(1.0);
@@ -59,12 +59,12 @@ fn color(u: f64, v: f64) -> Vector {
     mix(green, [0.60, 0.72, 0.38], 0.6 * vein)
 }
 
-/// Leaves around a ball, each a square with its stalk at the ball.
+/// Leaves around a ball, each a square whose stalk starts at the ball.
 pub(crate) fn shrub() -> Surface {
     let mut surface = Surface::default();
     for number in 0..LEAVES {
         let chance = |place: i64| random([number, place, 0], 83);
-        // Choose the stalk's end in the crown, and the way that the leaf points.
+        // Choose the position of the stalk in the crown and the direction of the leaf.
         let height = 2.0 * chance(0) - 1.0;
         let (sin, cos) = turn(chance(1));
         let flat = (1.0 - height * height).sqrt();
@@ -72,7 +72,7 @@ pub(crate) fn shrub() -> Surface {
         let start = scale(outwards, 0.45 + 0.5 * chance(2));
         let sway = [chance(3) - 0.5, 0.2 - 0.9 * chance(4), chance(5) - 0.5];
         let up = unit(add(outwards, sway));
-        // Turn the leaf about its stalk, mostly with its face to the sky.
+        // Rotate the leaf about its stalk, mostly facing the sky.
         let face = add([0.0, 1.0, 0.0], scale([chance(6) - 0.5, 0.0, chance(7) - 0.5], SQRT_2));
         let normal = unit(subtract(face, scale(up, dot(face, up))));
         let across = cross(up, normal);

@@ -1,10 +1,11 @@
-//! Furniture for `scenes/furnished.toml` and `scenes/ajar.toml`. Metres; each piece stands on the origin, its front towards +z.
+//! Furniture for `scenes/furnished.toml` and `scenes/ajar.toml`. Units are meters; each piece stands on the origin and
+//! faces +z.
 
 use super::parts::{ball, bar, block, join, moved, turned_body};
 use super::surface::Surface;
 use super::vector::{Vector, turn};
 
-/// Each piece and its file.
+/// All pieces with their files.
 pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
     vec![
         ("furniture/cushion.ply", cushion()),
@@ -34,7 +35,7 @@ pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
     ]
 }
 
-/// A cushion of 1 by 0.2 by 1, thinner at its edges.
+/// A cushion of 1 by 0.2 by 1, thinner toward its edges.
 fn cushion() -> Surface {
     let (rings, sides) = (9, 32);
     let outline = |ring: u32| {
@@ -47,7 +48,7 @@ fn cushion() -> Surface {
         let count = if ring == 0 || ring == rings - 1 { 1 } else { sides };
         surface.positions.extend((0..count).map(|side| {
             let (sin, cos) = turn(f64::from(side) / f64::from(sides));
-            // A square with round corners.
+            // A square with rounded corners.
             let round = |along: f64| 0.5 * along.signum() * along.abs().sqrt();
             [reach * round(cos), height, reach * round(sin)]
         }));
@@ -77,12 +78,12 @@ fn foot() -> Surface {
     turned_body(&[[0.0, 0.0], [0.018, 0.0], [0.018, 0.0], [0.03, 0.1], [0.0, 0.1]], 10)
 }
 
-/// A leg of a table, 1 high, to be scaled.
+/// A table leg of height 1, to be scaled.
 fn leg() -> Surface {
     turned_body(&[[0.0, 0.0], [0.016, 0.0], [0.016, 0.0], [0.026, 1.0], [0.026, 1.0], [0.0, 1.0]], 12)
 }
 
-/// A round plate of glass, radius 0.5, with a soft edge.
+/// A round glass plate of radius 0.5 with a rounded edge.
 fn plate() -> Surface {
     let outline =
         [[0.0, 0.0], [0.494, 0.0], [0.498, 0.002], [0.5, 0.006], [0.498, 0.01], [0.494, 0.012], [0.0, 0.012]];
@@ -103,7 +104,7 @@ fn shelf() -> Surface {
     )
 }
 
-/// The cover of a book of 1 by 1 by 1, to be scaled; its back is at +z.
+/// The cover of a 1 by 1 by 1 book, to be scaled; its spine is at +z.
 fn cover() -> Surface {
     join([
         block([-0.5, 0.0, -0.5], [-0.42, 1.0, 0.5], 0.01),
@@ -112,7 +113,7 @@ fn cover() -> Surface {
     ])
 }
 
-/// The pages in that cover.
+/// The pages inside that cover.
 fn pages() -> Surface {
     block([-0.425, 0.01, -0.48], [0.425, 0.985, 0.445], 0.005)
 }
@@ -137,7 +138,7 @@ fn chair() -> Surface {
     ])
 }
 
-/// A lamp's stand on the floor, 1.5 high.
+/// The stand of a floor lamp, 1.5 high.
 fn stand() -> Surface {
     let outline = [
         [0.0, 0.0],
@@ -152,7 +153,7 @@ fn stand() -> Surface {
     turned_body(&outline, 24)
 }
 
-/// A cone of cloth, open at both ends, 0.26 high.
+/// A conical lampshade, open at both ends, 0.26 high.
 fn shade() -> Surface {
     let outline = [
         [0.22, 0.0],
@@ -168,7 +169,7 @@ fn shade() -> Surface {
     turned_body(&outline, 32)
 }
 
-/// A hollow bottle of glass with a round belly, 0.27 high.
+/// A hollow glass decanter with a round belly, 0.27 high.
 fn decanter() -> Surface {
     let outside = [
         [0.0, 0.0],
@@ -200,7 +201,7 @@ fn decanter() -> Surface {
     turned_body(&[&outside[..], &inside[..]].concat(), 40)
 }
 
-/// A glass to drink from, 0.095 high.
+/// A drinking glass, 0.095 high.
 fn tumbler() -> Surface {
     let outside = [[0.0, 0.0], [0.03, 0.0], [0.034, 0.004], [0.036, 0.02], [0.04, 0.092], [0.039, 0.095]];
     let inside = [[0.0375, 0.092], [0.0335, 0.024], [0.03, 0.016], [0.0, 0.014]];
@@ -215,7 +216,7 @@ fn bowl() -> Surface {
     turned_body(&[&outside[..], &inside[..]].concat(), 32)
 }
 
-/// A pot with earth in it.
+/// A flower pot with soil.
 fn pot() -> Surface {
     let outline = [
         [0.0, 0.0],
@@ -232,7 +233,7 @@ fn pot() -> Surface {
     turned_body(&outline, 28)
 }
 
-/// A leaf of 1 along z, bent down, that has two sides.
+/// A two-sided leaf of length 1 along z, bent downward.
 fn leaf() -> Surface {
     let steps = 8;
     let place = |step: u32, across: f64| {
@@ -253,7 +254,7 @@ fn leaf() -> Surface {
     surface
 }
 
-/// Cloth in folds, 0.5 wide and 1 high, in the plane z = 0.
+/// A pleated curtain, 0.5 wide and 1 high, in the plane z = 0.
 fn curtain() -> Surface {
     let columns = 48;
     let mut surface = Surface::default();
@@ -274,7 +275,7 @@ fn curtain() -> Surface {
     surface
 }
 
-/// The frame of a window of 1.8 by 1.6 with two bars, around the middle of its sill.
+/// A window frame of 1.8 by 1.6 with two bars, centered on its sill.
 fn window() -> Surface {
     let upright = |x: f64, half: f64| block([x - half, 0.0, -0.04], [x + half, 1.6, 0.04], 0.006);
     join([
@@ -288,7 +289,7 @@ fn window() -> Surface {
     ])
 }
 
-/// The frame of a picture of 1 by 1 before a wall that faces +z.
+/// A 1 by 1 picture frame on a wall that faces +z.
 fn frame() -> Surface {
     let (inside, outside) = (0.5, 0.55);
     join([
@@ -315,7 +316,7 @@ fn door() -> Surface {
     ])
 }
 
-/// The frame around that door, in a wall of 0.12 behind the origin.
+/// The frame of that door, in a wall 0.12 thick behind the origin.
 fn jamb() -> Surface {
     join([
         block([-0.09, 0.0, -0.14], [0.0, 2.06, 0.02], 0.006),
@@ -324,7 +325,7 @@ fn jamb() -> Surface {
     ])
 }
 
-/// A bed of 1.0 by 2.0 without its cushions; its head is at −z.
+/// A bed of 1.0 by 2.0 without cushions; its head is at −z.
 fn bed() -> Surface {
     let post =
         |x: f64, z: f64, height: f64| block([x - 0.03, 0.0, z - 0.03], [x + 0.03, height, z + 0.03], 0.008);

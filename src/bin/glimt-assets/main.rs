@@ -1,6 +1,6 @@
-//! Generates the objects of the bundled scenes. `glimt-assets` writes the stored files of `assets/`, bit for bit the same on every
-//! machine. `glimt-assets million` writes `assets/million.ply`, `glimt-assets figure` writes `assets/figure.ply`: both are too
-//! large to store.
+//! Generates the assets of the bundled scenes. `glimt-assets` writes the files of `assets/` that are stored in the
+//! repository, with the same bits on every machine. `glimt-assets million` writes `assets/million.ply` and
+//! `glimt-assets figure` writes `assets/figure.ply`, which are too large to store.
 
 mod figure;
 mod foliage;
@@ -20,9 +20,10 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: glimt-assets [million | figure]   (in the project's folder; writes into assets/)";
+const USAGE: &str =
+    "usage: glimt-assets [million | figure]   (run in the repository root; writes to assets/)";
 
-/// A file below `assets/` and its bytes.
+/// Path below `assets/` and content of a file.
 type Asset = (&'static str, Vec<u8>);
 
 fn main() -> ExitCode {
@@ -52,7 +53,7 @@ fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     fs::write(path, bytes)
 }
 
-/// All files that the repository keeps.
+/// All files stored in the repository.
 fn stored() -> Vec<Asset> {
     let single = vec![
         ("coral.ply", shapes::coral().to_ply()),
@@ -92,19 +93,19 @@ mod tests {
     }
 
     #[test]
-    fn the_stored_files_are_what_is_made_here() {
+    fn stored_files_match_the_generator() {
         let mut total = 0;
         for (name, bytes) in stored() {
             let found = fs::read(folder().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
-            assert!(found == bytes, "{name} is not what glimt-assets makes: run it");
+            assert!(found == bytes, "{name} differs from the output of glimt-assets: run it");
             total += bytes.len();
         }
         assert!(total < 5_000_000, "{total} bytes are too many to store");
     }
 
-    /// In a closed surface each edge is passed once in each direction.
+    /// In a closed surface, each edge occurs once in each direction.
     #[test]
-    fn meshes_load_whole_and_closed_ones_are_closed() {
+    fn meshes_load_and_closed_ones_are_watertight() {
         let mut together = 0;
         for (name, closed) in [
             ("coral.ply", true),
@@ -122,7 +123,7 @@ mod tests {
             );
             let mesh = loaded.mesh;
             together += if name.ends_with("ply") { mesh.triangles.len() } else { 0 };
-            // Places, not indices: seams of texture coordinates have two vertices at one place.
+            // Compare positions, not indices: seams of texture coordinates have two vertices at one position.
             let mut edges = HashMap::new();
             for corners in (0..mesh.triangles.len() as u32).map(|triangle| mesh.corners(triangle)) {
                 let place = corners.map(|corner| (corner + 0.0).to_array().map(f32::to_bits));
@@ -142,9 +143,9 @@ mod tests {
         assert!(together >= 100_000, "{together}");
     }
 
-    /// In a closed surface each edge is passed as often in one direction as in the other; cloth and leaves are open.
+    /// In a closed surface, each edge occurs equally often in both directions; cloth and leaves are open.
     #[test]
-    fn furniture_is_closed_and_its_front_outside() {
+    fn furniture_is_closed_and_faces_outward() {
         let parts =
             stairs::parts().into_iter().chain(furniture::parts()).chain([("figure.ply", figure::bear())]);
         for (name, surface) in parts {
@@ -176,13 +177,13 @@ mod tests {
     }
 
     #[test]
-    fn the_figure_is_of_many_triangles() {
+    fn figure_has_many_triangles() {
         let count = figure::bear().triangle_count();
         assert!((20_000..=80_000).contains(&count), "{count}");
     }
 
     #[test]
-    fn stored_normals_point_away_from_the_front() {
+    fn stored_normals_point_to_the_front() {
         for name in ["knot.obj", "vase.obj", "room.obj"] {
             let mesh = mesh::load(&folder().join(name), &unwatched, &CancelToken::new()).expect(name).mesh;
             let against = (0..mesh.triangles.len() as u32)
@@ -198,11 +199,11 @@ mod tests {
         }
     }
 
-    /// Files that scenes name and the repository does not keep.
+    /// Files that scenes refer to but that are not stored in the repository.
     const MADE_ON_DEMAND: [&str; 2] = ["../assets/million.ply", "../assets/figure.ply"];
 
     #[test]
-    fn the_scenes_name_files_that_are_made_here() {
+    fn scenes_refer_only_to_generated_files() {
         let scenes = folder().with_file_name("scenes");
         let mut named = 0;
         for entry in fs::read_dir(&scenes).expect("the scenes") {
@@ -219,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn a_million_is_more_than_a_million() {
+    fn million_has_over_a_million_triangles() {
         assert!(shapes::million().triangle_count() >= 1_000_000);
     }
 }

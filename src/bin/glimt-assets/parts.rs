@@ -1,10 +1,10 @@
-//! Parts of furniture: blocks, turned bodies, tubes, balls. All of them are closed, their front outside.
+//! Building blocks of furniture: boxes, solids of revolution, tubes and balls. All of them are closed and face outward.
 
 use super::shapes::displaced_sphere;
 use super::surface::Surface;
 use super::vector::{Vector, add, cross, dot, scale, subtract, turn, unit};
 
-/// Several bodies as one surface.
+/// Joins several solids into one surface.
 pub(crate) fn join(parts: impl IntoIterator<Item = Surface>) -> Surface {
     let mut whole = Surface::default();
     for part in parts {
@@ -15,7 +15,7 @@ pub(crate) fn join(parts: impl IntoIterator<Item = Surface>) -> Surface {
     whole
 }
 
-/// The surface, moved.
+/// Translates a surface.
 pub(crate) fn moved(surface: Surface, by: Vector) -> Surface {
     mapped(surface, |position| add(position, by))
 }
@@ -24,11 +24,11 @@ fn mapped(surface: Surface, map: impl Fn(Vector) -> Vector) -> Surface {
     Surface { positions: surface.positions.into_iter().map(map).collect(), ..surface }
 }
 
-/// A block between two corners, its edges cut off by `edge`.
+/// A box between two corners with edges beveled by `edge`.
 pub(crate) fn block(from: Vector, to: Vector, edge: f64) -> Surface {
     let (middle, half) = (scale(add(from, to), 0.5), scale(subtract(to, from), 0.5));
     let sign = |corner: u32, axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
-    // Three vertices for each corner, one on each of the sides that meet there.
+    // Use three vertices per corner, one on each adjacent side.
     let mut positions = Vec::new();
     for (corner, side) in (0..8).flat_map(|corner| (0..3).map(move |side| (corner, side))) {
         let reach = |axis: usize| half[axis] - if axis == side { 0.0 } else { edge };
@@ -41,7 +41,7 @@ pub(crate) fn block(from: Vector, to: Vector, edge: f64) -> Surface {
         let (next, last) = ((axis + 1) % 3, (axis + 2) % 3);
         let corner = |a: u32, b: u32, c: u32| a << axis | b << next | c << last;
         for a in 0..2 {
-            // The side, and the edges between the other two sides.
+            // Add the side, and the bevels between the other two axes.
             let around = [(0, 0), (1, 0), (1, 1), (0, 1)];
             faces.push(around.map(|(b, c)| vertex(corner(a, b, c), axis)).to_vec());
             for b in 0..2 {
@@ -58,17 +58,17 @@ pub(crate) fn block(from: Vector, to: Vector, edge: f64) -> Surface {
     outward(positions, faces, middle)
 }
 
-/// A body with six sides: the corners of its lower side in order, then those above them.
+/// A hexahedron, given the corners of its lower side in order, then those above them.
 pub(crate) fn hexahedron(corners: [Vector; 8]) -> Surface {
     let middle = scale(corners.iter().fold([0.0; 3], |sum, &corner| add(sum, corner)), 0.125);
     let sides = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
-    // Each side has its own vertices: its edges are sharp.
+    // Each side has its own vertices, as the edges are sharp.
     let positions = sides.iter().flat_map(|side| side.map(|corner: usize| corners[corner])).collect();
     let faces = (0..6).map(|side| (4 * side..4 * side + 4).collect()).collect();
     outward(positions, faces, middle)
 }
 
-/// A convex body whose faces are turned so that their front is outside.
+/// A convex solid whose faces are flipped to face outward.
 fn outward(positions: Vec<Vector>, mut faces: Vec<Vec<u32>>, middle: Vector) -> Surface {
     for face in &mut faces {
         let [a, b, c] = [0, 1, 2].map(|corner| positions[face[corner] as usize]);
@@ -79,8 +79,8 @@ fn outward(positions: Vec<Vector>, mut faces: Vec<Vec<u32>>, middle: Vector) -> 
     Surface { positions, faces, ..Surface::default() }
 }
 
-/// A body turned about y by its outline of radii and heights, from its foot over its outside to its top. Radius 0 is on the axis; two
-/// equal points are an edge.
+/// A solid of revolution about y, given its outline of radii and heights from its foot over the outside to its top.
+/// Radius 0 is on the axis; two equal points form a sharp edge.
 pub(crate) fn turned_body(outline: &[[f64; 2]], sides: u32) -> Surface {
     let mut surface = Surface::default();
     let mut below: Option<(u32, [f64; 2])> = None;
@@ -106,7 +106,7 @@ pub(crate) fn turned_body(outline: &[[f64; 2]], sides: u32) -> Surface {
     surface
 }
 
-/// A round bar along a path, closed at its ends.
+/// A round bar along a path, closed at both ends.
 pub(crate) fn bar(path: &[Vector], radius: f64, sides: u32) -> Surface {
     let mut surface = Surface::default();
     let last = path.len() - 1;
@@ -115,7 +115,7 @@ pub(crate) fn bar(path: &[Vector], radius: f64, sides: u32) -> Surface {
     let aside = if first[1].abs() < 0.9 { [0.0, 1.0, 0.0] } else { [1.0, 0.0, 0.0] };
     let mut normal = unit(cross(first, aside));
     for (at, &point) in path.iter().enumerate() {
-        // Turn the frame as little as the path allows.
+        // Rotate the frame as little as possible along the path.
         let along = tangent(at);
         normal = unit(subtract(normal, scale(along, dot(normal, along))));
         let binormal = cross(along, normal);
@@ -128,7 +128,7 @@ pub(crate) fn bar(path: &[Vector], radius: f64, sides: u32) -> Surface {
         let (here, next) = (ring * sides + side, ring * sides + (side + 1) % sides);
         surface.faces.push(vec![here, next, next + sides, here + sides]);
     }
-    // The ends have their own vertices: their edges are sharp.
+    // The ends have their own vertices, as their edges are sharp.
     for ring in [0, last as u32] {
         let base = surface.positions.len() as u32;
         let end = (ring * sides) as usize;

@@ -1,16 +1,16 @@
-//! The textures. All of them repeat without a seam. Coordinates are u to the right and v up, in [0, 1).
+//! The textures, all of which tile seamlessly. Coordinates are u to the right and v up, in [0, 1).
 
 use super::noise::{fractal, random, value};
 use super::vector::{Vector, mix, scale, smooth_step, turn, unit};
 
-/// Columns and rows of the larger pictures.
+/// Width and height of the larger textures.
 const SIDE: u32 = 512;
 
-/// Rows of bricks, and bricks in a row.
+/// Rows of bricks, and bricks per row.
 const COURSES: f64 = 8.0;
 const BRICKS: f64 = 4.0;
 
-/// sRGB bytes of a picture, rows from the top.
+/// Renders a texture to sRGB bytes, rows from the top.
 fn render(side: u32, color: impl Fn(f64, f64) -> Vector) -> Vec<u8> {
     let middle = |index: u32| (f64::from(index) + 0.5) / f64::from(side);
     (0..side)
@@ -26,17 +26,17 @@ fn png(side: u32, pixels: &[u8]) -> Vec<u8> {
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::High);
     let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(pixels));
-    written.expect("a picture of a fixed size into memory cannot fail");
+    written.expect("encoding a fixed-size image in memory cannot fail");
     file
 }
 
-/// Noise in few steps, as invisible detail costs bytes.
+/// Quantized noise, as invisible detail costs bytes.
 fn grain(u: f64, v: f64, seed: u64) -> f64 {
     let fine = fractal([u * 32.0, v * 32.0, 0.5], 3, 32, seed);
     (fine * 24.0).round() / 24.0
 }
 
-/// The brick at (u, v): its number, and the distance from its mortar (0 in the joint, 1 on the brick).
+/// The brick at (u, v): its index, and the distance from its mortar (0 in the joint, 1 on the brick).
 fn brick(u: f64, v: f64) -> ([i64; 2], f64) {
     let course = (v * COURSES).floor();
     let shift = if course % 2.0 == 0.0 { 0.0 } else { 0.5 };
@@ -61,13 +61,13 @@ pub(crate) fn bricks() -> Vec<u8> {
     png(SIDE, &pixels)
 }
 
-/// Height of the bricks over the joints, in the picture's width.
+/// Height of the bricks above the joints, relative to the texture's width.
 fn brick_height(u: f64, v: f64) -> f64 {
     let (_, inside) = brick(u, v);
     0.006 * inside + 0.002 * fractal([u * 16.0, v * 16.0, 0.5], 3, 16, 31)
 }
 
-/// The normals of the bricks: red along u, green along v, blue out of the wall.
+/// Normal map of the bricks: red along u, green along v, blue out of the wall.
 pub(crate) fn bumps() -> Vec<u8> {
     let step = 1.0 / f64::from(SIDE);
     let pixels = render(SIDE, |u, v| {
@@ -82,7 +82,7 @@ pub(crate) fn bumps() -> Vec<u8> {
     png(SIDE, &pixels)
 }
 
-/// Eight by eight squares, the lower left one dark.
+/// An eight by eight checkerboard whose lower left square is dark.
 pub(crate) fn checker() -> Vec<u8> {
     let pixels = render(64, |u, v| {
         let dark = ((u * 8.0).floor() + (v * 8.0).floor()) % 2.0 == 0.0;
@@ -91,7 +91,7 @@ pub(crate) fn checker() -> Vec<u8> {
     png(64, &pixels)
 }
 
-/// Boards along u with grain and butt joints.
+/// Planks along u with grain and butt joints.
 pub(crate) fn planks() -> Vec<u8> {
     let pixels = render(SIDE, |u, v| {
         let board = (v * 8.0).floor();
@@ -100,7 +100,7 @@ pub(crate) fn planks() -> Vec<u8> {
         let tint = random([board as i64, 2, 0], 3);
         let stretched = value([u * 6.0, v * 96.0, board + 0.5], 0, 9);
         let edge = value([0.0, v * 96.0, board + 0.5], 0, 9);
-        // Fade to the value at the left edge, so that the grain repeats.
+        // Fade to the value at the left edge, so that the grain tiles.
         let blend = smooth_step(0.9, 1.0, u);
         let grain = ((stretched * (1.0 - blend) + edge * blend) * 24.0).round() / 24.0;
         let wood = mix([0.46, 0.30, 0.17], [0.70, 0.50, 0.31], 0.6 * tint + 0.4 * grain);
@@ -124,7 +124,7 @@ pub(crate) fn marble() -> Vec<u8> {
     png(SIDE, &pixels)
 }
 
-/// Four by four glazed tiles, as a PPM with a comment, as paint programs write it.
+/// Four by four glazed tiles, as a PPM with a comment, like those that paint programs write.
 pub(crate) fn tiles() -> Vec<u8> {
     let side = 64;
     let mut file = format!("P6\n# made by glimt-assets\n{side} {side}\n255\n").into_bytes();

@@ -1,10 +1,10 @@
-//! A room with its materials and the orbiter camera that looks into it.
+//! A room with its materials, and the orbiter camera that looks into it.
 
 use std::fmt::Write;
 
 use super::vector::{Vector, add, cross, scale, turn, unit};
 
-/// Half the width of the room, its height, half its depth.
+/// Half the width, the height, and half the depth of the room.
 const ROOM: Vector = [1.3, 2.0, 1.2];
 
 struct Writer {
@@ -14,7 +14,7 @@ struct Writer {
 }
 
 impl Writer {
-    /// Adds a quad with its front along u × v; `repeat` counts its textures along both edges.
+    /// Adds a quad that faces u × v; `repeat` is the number of texture repeats along both edges.
     fn quad(&mut self, corner: Vector, u: Vector, v: Vector, repeat: [f64; 2]) {
         let points = [corner, add(corner, u), add(add(corner, u), v), add(corner, v)];
         for [x, y, z] in points {
@@ -38,7 +38,7 @@ impl Writer {
         let _ = writeln!(self.text, "o {object}\nusemtl {material}");
     }
 
-    /// Adds a box on the floor, turned about y.
+    /// Adds a box on the floor, rotated about y.
     fn block(&mut self, center: [f64; 2], half: Vector, turns: f64) {
         let (sin, cos) = turn(turns);
         let right = [cos, 0.0, -sin];
@@ -55,7 +55,7 @@ impl Writer {
     }
 }
 
-/// Floor, ceiling, three walls, three blocks, a lamp.
+/// Floor, ceiling, three walls, three blocks, and a light.
 pub(crate) fn obj() -> Vec<u8> {
     let [x, height, z] = ROOM;
     let (width, depth) = (2.0 * x, 2.0 * z);
@@ -121,7 +121,7 @@ Ke 9.0 8.4 7.4
     text.as_bytes().to_vec()
 }
 
-/// A camera that looks into the open front, from a little above and to the left.
+/// A camera that looks into the open front, from slightly above and to the left.
 pub(crate) fn orbiter() -> Vec<u8> {
     "c 0.0 0.95 0.0\np 0.05 0.02\nr 5.0 11.0\ns 4.6 2.0\nf 38.0 640.0 480.0\n".as_bytes().to_vec()
 }

@@ -6,7 +6,7 @@ use super::noise::{fractal, value};
 use super::surface::{Surface, between, icosahedron};
 use super::vector::{Vector, add, cross, dot, scale, smooth_step, subtract, turn, unit};
 
-/// A round lump with ridges that branch, of 81,920 triangles.
+/// A coral: a round lump with branching ridges and 81,920 triangles.
 pub(crate) fn coral() -> Surface {
     displaced_sphere(6, |direction| {
         let ridge = 1.0 - (2.0 * fractal(scale(direction, 2.6), 3, 0, 7) - 1.0).abs();
@@ -14,7 +14,7 @@ pub(crate) fn coral() -> Surface {
     })
 }
 
-/// A mountainous globe of 1,310,720 triangles.
+/// A mountainous globe with 1,310,720 triangles.
 pub(crate) fn million() -> Surface {
     displaced_sphere(8, |direction| {
         let height = fractal(scale(direction, 2.0), 8, 0, 3);
@@ -23,7 +23,7 @@ pub(crate) fn million() -> Surface {
     })
 }
 
-/// Three strands that wind about each other along a knot, of 36,864 triangles.
+/// Three strands twisted along a knot, with 36,864 triangles.
 pub(crate) fn rope() -> Surface {
     let mut whole = Surface::default();
     for strand in 0..3 {
@@ -41,12 +41,12 @@ pub(crate) fn rope() -> Surface {
     whole
 }
 
-/// A tube along a trefoil knot; its texture fits 24 times along and twice around.
+/// A tube along a trefoil knot; its texture repeats 24 times along it and twice around it.
 pub(crate) fn knot() -> Surface {
     Surface::grid(224, 24, [24.0, 2.0], |s, t| around(s, t, 0.24, trefoil))
 }
 
-/// A vase with an inside, turned about y, 1.6 high.
+/// A hollow vase, a surface of revolution about y, 1.6 high.
 pub(crate) fn vase() -> Surface {
     Surface::grid(64, 64, [4.0, 4.0], |s, t| {
         let [radius, height] = profile(t);
@@ -55,8 +55,8 @@ pub(crate) fn vase() -> Surface {
     })
 }
 
-/// Radius and height along the vase, from the middle of its foot over the lip to the middle of its inside: a
-/// Catmull–Rom spline.
+/// Radius and height along the profile of the vase, from the center of its foot over the lip to the center of its
+/// inside, as a Catmull–Rom spline.
 fn profile(t: f64) -> [f64; 2] {
     const KNOTS: [[f64; 2]; 16] = [
         [0.0, 0.0],
@@ -85,12 +85,12 @@ fn profile(t: f64) -> [f64; 2] {
         let [a, b, c, d] = [knot(0)[axis], knot(1)[axis], knot(2)[axis], knot(3)[axis]];
         b + 0.5 * x * (c - a + x * (2.0 * a - 5.0 * b + 4.0 * c - d + x * (3.0 * (b - c) + d - a)))
     };
-    // The ends are on the axis to the last bit.
+    // The ends must be exactly on the axis.
     let radius = if place == 0.0 || place == last as f64 { 0.0 } else { blend(0).max(0.0) };
     [radius, blend(1)]
 }
 
-/// The dual of the icosahedron: a pentagon about each of its vertices.
+/// The dual of the icosahedron: a pentagon around each of its vertices.
 pub(crate) fn dodecahedron() -> Surface {
     let (corners, triangles) = icosahedron();
     let center = |face: &[u32; 3]| {
@@ -102,7 +102,7 @@ pub(crate) fn dodecahedron() -> Surface {
     Surface { positions, faces, ..Surface::default() }
 }
 
-/// The triangles about a corner, in order: each shares its last edge with the next one's first.
+/// The triangles around a corner in order: each shares its last edge with the first edge of the next.
 fn pentagon(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
     let mut next = HashMap::new();
     for (index, triangle) in triangles.iter().enumerate() {
@@ -123,8 +123,7 @@ fn pentagon(corner: u32, triangles: &[[u32; 3]]) -> Vec<u32> {
     ring
 }
 
-/// An icosahedron whose edges were halved `times` over, each vertex at the distance that `radius` gives its
-/// direction.
+/// An icosahedron subdivided `times` times, with each vertex at the distance that `radius` gives for its direction.
 pub(crate) fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Surface {
     let (mut corners, mut triangles) = icosahedron();
     for _ in 0..times {
@@ -149,7 +148,7 @@ pub(crate) fn displaced_sphere(times: u32, radius: impl Fn(Vector) -> f64) -> Su
     }
 }
 
-/// A trefoil knot within about 1 of the origin, in the plane y = 0: twice around, three times through the hole.
+/// A trefoil knot within about 1 of the origin, winding in the plane y = 0: twice around, three times through the hole.
 fn trefoil(s: f64) -> Vector {
     let (sin2, cos2) = turn(2.0 * s);
     let (sin3, cos3) = turn(3.0 * s);
@@ -157,8 +156,8 @@ fn trefoil(s: f64) -> Vector {
     [radius * cos2, 0.36 * sin3, radius * sin2]
 }
 
-/// A point of a closed curve with two directions across it that come back after a turn: away from the circle
-/// about which the knot winds.
+/// A point on a closed curve and two directions across it that are the same after a full turn: away from the circle
+/// around which the knot winds.
 fn frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
     let center = curve(s);
     let tangent = unit(subtract(curve(s + 1e-4), curve(s - 1e-4)));
@@ -168,14 +167,14 @@ fn frame(s: f64, curve: impl Fn(f64) -> Vector) -> (Vector, Vector, Vector) {
     (center, normal, cross(tangent, normal))
 }
 
-/// A point of the tube of this radius about a closed curve.
+/// A point on the tube of this radius around a closed curve.
 fn around(s: f64, t: f64, radius: f64, curve: impl Fn(f64) -> Vector) -> Vector {
     let (center, normal, binormal) = frame(s, curve);
     let (sin, cos) = turn(t);
     add(center, add(scale(normal, radius * cos), scale(binormal, radius * sin)))
 }
 
-/// A grid that closes on itself both ways, without its second seam vertices.
+/// Closes a grid in both directions by merging its seam vertices.
 fn weld(grid: Surface, columns: u32, rows: u32) -> Surface {
     let welded = |vertex: u32| {
         let (column, row) = (vertex / (rows + 1), vertex % (rows + 1));

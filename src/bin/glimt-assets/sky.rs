@@ -1,4 +1,4 @@
-//! An evening sky, as an equirectangular map of radiance.
+//! An evening sky as an equirectangular radiance map.
 
 use super::noise::fractal;
 use super::vector::{Vector, add, dot, mix, scale, smooth_step, turn, unit};
@@ -6,7 +6,7 @@ use super::vector::{Vector, add, dot, mix, scale, smooth_step, turn, unit};
 const WIDTH: u32 = 256;
 const HEIGHT: u32 = 128;
 
-/// Radiance HDR without compression: noise has no runs.
+/// Uncompressed Radiance HDR, as noise has no runs.
 pub(crate) fn evening() -> Vec<u8> {
     let mut file =
         format!("#?RADIANCE\nSOFTWARE=glimt-assets\nFORMAT=32-bit_rle_rgbe\n\n-Y {HEIGHT} +X {WIDTH}\n")
@@ -17,7 +17,7 @@ pub(crate) fn evening() -> Vec<u8> {
     file
 }
 
-/// Direction of a pixel. The middle of the map is towards −z, its right quarter towards +x.
+/// Direction of a pixel. The center of the map is −z, its right quarter +x.
 fn direction(column: u32, row: u32) -> Vector {
     let (sin, cos) = turn((f64::from(column) + 0.5) / f64::from(WIDTH) - 0.5);
     let (across, y) = turn((f64::from(row) + 0.5) / f64::from(HEIGHT) * 0.5);
@@ -35,7 +35,7 @@ fn radiance(d: Vector) -> Vector {
     let height = 1.0 - (1.0 - d[1]).powi(4);
     let low = mix([0.62, 0.62, 0.66], [1.7, 1.05, 0.55], haze);
     let sky = mix(low, [0.09, 0.19, 0.46], height);
-    // Clouds lie on a plane far above, and thin out towards the horizon.
+    // Clouds are on a plane far above, and thin out toward the horizon.
     let reach = 1.0 / (d[1] + 0.12);
     let cover = fractal([d[0] * reach * 1.6 + 9.0, d[2] * reach * 1.6 + 5.0, 0.5], 5, 0, 23);
     let thick = smooth_step(0.50, 0.68, cover) * smooth_step(0.02, 0.2, d[1]);
@@ -46,7 +46,7 @@ fn radiance(d: Vector) -> Vector {
     add(clear, scale(add(glow, disc), 1.0 - 0.5 * thick))
 }
 
-/// Three mantissas and a shared exponent (Ward, *Real Pixels*, Graphics Gems II, 1991).
+/// RGBE encoding: three mantissas and a shared exponent (Ward, *Real Pixels*, Graphics Gems II, 1991).
 fn rgbe(color: Vector) -> [u8; 4] {
     let brightest = color[0].max(color[1]).max(color[2]);
     let (_, exponent) = libm::frexp(brightest);

@@ -1,5 +1,5 @@
-//! Parts of the stair hall of `scenes/stairs.toml`. Metres; treads and balusters stand at the origin and the scene places them,
-//! flights and rails lie in their places.
+//! Parts of the stair hall in `scenes/stairs.toml`. Units are meters. Treads and balusters are at the origin, and the
+//! scene places them; flights and rails are in their final positions.
 
 use super::parts::{ball, bar, block, hexahedron, join, moved, turned_body};
 use super::surface::Surface;
@@ -10,7 +10,7 @@ const RISE: f64 = 0.17;
 const GO: f64 = 0.28;
 const WIDTH: f64 = 1.1;
 
-/// The open corner where the first flight begins, and its corner at the landing.
+/// The open corner at the foot of the first flight, and its corner at the landing.
 const FOOT: Vector = [-1.9, 0.0, 1.14];
 const LANDING: Vector = [-1.9, 1.53, -1.1];
 /// End of the second flight.
@@ -20,7 +20,7 @@ const RIGHT_WALL: f64 = 3.0;
 const BACK_WALL: f64 = -2.2;
 const TREAD: f64 = 0.035;
 
-/// Each part and its file.
+/// All parts with their files.
 pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
     vec![
         ("stairs/tread.ply", tread()),
@@ -43,12 +43,12 @@ pub(crate) fn parts() -> Vec<(&'static str, Surface)> {
     ]
 }
 
-/// A board; its nosing looks towards +z, its end over the open side of the flight.
+/// A board whose nosing faces +z and whose end extends over the open side of the flight.
 fn tread() -> Surface {
     block([0.0, -TREAD, -GO], [WIDTH + 0.03, 0.0, 0.03], 0.008)
 }
 
-/// Steps up to the landing with the landing itself, closed down to the floor.
+/// The steps up to the landing and the landing itself, closed down to the floor.
 fn first_flight() -> Surface {
     let step = |index: u32| {
         let (front, top) = (FOOT[2] - f64::from(index) * GO, f64::from(index + 1) * RISE - TREAD);
@@ -58,7 +58,7 @@ fn first_flight() -> Surface {
     join((0..8).map(step).chain([landing]))
 }
 
-/// Steps from the landing to the gallery, with a sloping soffit.
+/// The steps from the landing to the gallery, with a sloping soffit.
 fn second_flight() -> Surface {
     let soffit = |x: f64| LANDING[1] - 0.14 + (x - LANDING[0]) * RISE / GO;
     join((0..9).map(|index| {
@@ -80,7 +80,7 @@ fn second_flight() -> Surface {
     }))
 }
 
-/// The floor at the top, with a moulding along its edge.
+/// The floor at the top, with a molding along its edge.
 fn gallery() -> Surface {
     let [x, y, z] = GALLERY;
     join([
@@ -99,7 +99,7 @@ fn upright_block(from: Vector, to: Vector) -> Surface {
     hexahedron([a, b, c, d, e, f, g, h])
 }
 
-/// A turned post of 1.05, its foot to be sunk into the tread.
+/// A turned post of height 1.05, whose foot is sunk into the tread.
 fn baluster() -> Surface {
     let outline = [
         [0.0, 0.0],
@@ -129,20 +129,20 @@ fn newel() -> Surface {
     ])
 }
 
-/// The handrail along the open side of a flight, above the nosings and a little inside.
+/// The handrail along the open side of a flight, above the nosings and slightly inside.
 fn rail(from: Vector, to: Vector) -> Surface {
     let above = if from[0] == to[0] { [-0.05, 1.0, 0.0] } else { [0.0, 1.0, -0.05] };
     bar(&[add(from, above), add(to, above)], 0.032, 12)
 }
 
-/// A bulb in the shape of a flame, 0.1 high.
+/// A flame-shaped bulb, 0.1 high.
 fn candle() -> Surface {
     let outline =
         [[0.0, 0.0], [0.012, 0.004], [0.02, 0.02], [0.022, 0.036], [0.016, 0.058], [0.007, 0.08], [0.0, 0.1]];
     turned_body(&outline, 8)
 }
 
-/// A bowl on a wall, open above, of some thickness.
+/// A thick-walled wall lamp, open at the top.
 fn bowl() -> Surface {
     let outer = [[0.0, -0.09], [0.05, -0.085], [0.09, -0.06], [0.12, -0.02], [0.135, 0.03], [0.135, 0.03]];
     let inner =
@@ -150,7 +150,7 @@ fn bowl() -> Surface {
     turned_body(&[outer, inner].concat(), 24)
 }
 
-/// A cone of cloth, open at both ends.
+/// A conical lampshade, open at both ends.
 fn shade() -> Surface {
     let outline = [
         [0.14, 0.0],
@@ -166,7 +166,7 @@ fn shade() -> Surface {
     turned_body(&outline, 24)
 }
 
-/// The foot of a lamp on a table.
+/// The foot of a table lamp.
 fn stand() -> Surface {
     let outline = [
         [0.0, 0.0],
@@ -184,7 +184,7 @@ fn stand() -> Surface {
     turned_body(&outline, 20)
 }
 
-/// A ring of five arms under a rod, without its bulbs.
+/// A chandelier: a ring of five arms under a rod, without bulbs.
 fn chandelier() -> Surface {
     let rod = bar(&[[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]], 0.012, 8);
     let hub =
@@ -205,7 +205,7 @@ fn chandelier() -> Surface {
     join([rod, hub].into_iter().chain((0..5).map(arm)))
 }
 
-/// A door of 0.9 by 2.05 with four panels, in its frame, before a wall that faces +z.
+/// A door of 0.9 by 2.05 with four panels, in its frame, on a wall that faces +z.
 fn door() -> Surface {
     let panel = |x: f64, y: f64, height: f64| block([x, y, 0.0], [x + 0.3, y + height, 0.035], 0.015);
     join([
@@ -220,7 +220,7 @@ fn door() -> Surface {
     ])
 }
 
-/// The frame of a picture of 1 by 1 before a wall that faces +z.
+/// A 1 by 1 picture frame on a wall that faces +z.
 fn frame() -> Surface {
     let (inside, outside) = (0.5, 0.57);
     join([

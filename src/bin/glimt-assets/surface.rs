@@ -1,10 +1,10 @@
-//! Polygons with the attributes of their vertices, and writers of mesh files.
+//! Polygon meshes with vertex attributes, and writers of mesh files.
 
 use std::fmt::Write;
 
 use super::vector::{Vector, cross, scale, subtract, unit};
 
-/// A surface. `normals` and `uvs` are empty or have one entry for each position.
+/// A polygon mesh. `normals` and `uvs` are empty or have one entry per position.
 #[derive(Default)]
 pub(crate) struct Surface {
     pub(crate) positions: Vec<Vector>,
@@ -13,12 +13,12 @@ pub(crate) struct Surface {
     pub(crate) faces: Vec<Vec<u32>>,
 }
 
-/// Step of the differences that give normals.
+/// Step of the finite differences for normals.
 const STEP: f64 = 1e-4;
 
 impl Surface {
     /// `columns` × `rows` quads over s and t in [0, 1], with normals and the texture coordinates (1 − s, t) times
-    /// `repeat`. Outside is along ∂t × ∂s.
+    /// `repeat`. The outside is along ∂t × ∂s.
     pub(crate) fn grid(
         columns: u32,
         rows: u32,
@@ -30,7 +30,7 @@ impl Surface {
             for row in 0..=rows {
                 let (s, t) = (f64::from(column) / f64::from(columns), f64::from(row) / f64::from(rows));
                 surface.positions.push(point(s, t));
-                // Stay away from the ends, at which the surface may close into a point.
+                // Avoid the ends, where the surface may converge to a point.
                 let inner = t.clamp(10.0 * STEP, 1.0 - 10.0 * STEP);
                 let across = subtract(point(s + STEP, inner), point(s - STEP, inner));
                 let along = subtract(point(s, inner + STEP), point(s, inner - STEP));
@@ -57,7 +57,7 @@ impl Surface {
         self.faces.iter().map(|face| face.len() - 2).sum()
     }
 
-    /// Writes binary PLY, least significant byte first; positions and triangles only.
+    /// Writes little-endian binary PLY with only positions and triangles.
     pub(crate) fn to_ply(&self) -> Vec<u8> {
         let mut file = format!(
             "ply\nformat binary_little_endian 1.0\ncomment made by glimt-assets\nelement vertex {}\nproperty float \
@@ -79,7 +79,7 @@ impl Surface {
         file
     }
 
-    /// Writes OBJ as text, polygons kept.
+    /// Writes OBJ, keeping polygons.
     pub(crate) fn to_obj(&self, title: &str) -> Vec<u8> {
         let mut file = format!("# {title}. Made by glimt-assets.\n");
         for position in &self.positions {
@@ -94,7 +94,7 @@ impl Surface {
         for face in &self.faces {
             file.push('f');
             for corner in face.iter().map(|corner| corner + 1) {
-                // Writing into a string cannot fail.
+                // Writing to a string cannot fail.
                 let _ = write!(file, " {corner}/{corner}/{corner}");
             }
             file.push('\n');
@@ -102,7 +102,7 @@ impl Surface {
         file.into_bytes()
     }
 
-    /// Writes OFF as text, polygons kept.
+    /// Writes OFF, keeping polygons.
     pub(crate) fn to_off(&self, title: &str) -> Vec<u8> {
         let mut file = format!("OFF\n# {title}. Made by glimt-assets.\n");
         let _ = writeln!(file, "{} {} 0", self.positions.len(), self.faces.len());
@@ -129,7 +129,7 @@ fn line(file: &mut String, keyword: &str, numbers: &[f64], digits: usize) {
     file.push('\n');
 }
 
-/// Twelve vertices of a regular icosahedron of radius 1 and its twenty faces.
+/// The twelve vertices and twenty faces of a regular icosahedron of radius 1.
 pub(crate) fn icosahedron() -> (Vec<Vector>, Vec<[u32; 3]>) {
     let golden = (1.0 + 5.0_f64.sqrt()) / 2.0;
     let mut corners = Vec::new();
@@ -164,7 +164,7 @@ pub(crate) fn icosahedron() -> (Vec<Vector>, Vec<[u32; 3]>) {
     (corners, faces)
 }
 
-/// The middle of two points of the unit sphere, on the sphere.
+/// The midpoint of two points on the unit sphere, projected onto the sphere.
 pub(crate) fn between(a: Vector, b: Vector) -> Vector {
     unit(scale(super::vector::add(a, b), 0.5))
 }

@@ -1,4 +1,4 @@
-//! Three numbers; sines and the like by `libm`, whose bits do not depend on the machine.
+//! Vectors as arrays; trigonometric functions come from the `libm` crate, whose bits do not depend on the machine.
 
 pub(crate) type Vector = [f64; 3];
 
@@ -22,24 +22,24 @@ pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Unit vector; the argument is not 0.
+/// Normalizes a nonzero vector.
 pub(crate) fn unit(a: Vector) -> Vector {
     scale(a, 1.0 / dot(a, a).sqrt())
 }
 
-/// Sine and cosine of so many turns.
+/// Sine and cosine of an angle in turns.
 pub(crate) fn turn(turns: f64) -> (f64, f64) {
     let angle = std::f64::consts::TAU * turns;
     (libm::sin(angle), libm::cos(angle))
 }
 
-/// 0 below `from`, 1 above `to`, smooth between.
+/// 0 below `from`, 1 above `to`, and smooth in between.
 pub(crate) fn smooth_step(from: f64, to: f64, at: f64) -> f64 {
     let t = ((at - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// `a` at 0, `b` at 1.
+/// Interpolates linearly from `a` at 0 to `b` at 1.
 pub(crate) fn mix(a: Vector, b: Vector, t: f64) -> Vector {
     add(scale(a, 1.0 - t), scale(b, t))
 }
