@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Validators that people have, on the schema and the scenes: Taplo by draft 4, check-jsonschema by both drafts.
+"""Runs common validators on the schema and the scenes: Taplo with draft 4, check-jsonschema with both drafts.
 
-Both have to take every bundled scene, and to find mistakes of tests/broken in the lines in which `glimt check --json` finds them.
-Needs `taplo` and `check-jsonschema` on the path (both are on PyPI) and the program:
+Both must accept every bundled scene, and must report mistakes in tests/broken on the lines on which `glimt check --json` reports them.
+Needs `taplo` and `check-jsonschema` on the path (both are on PyPI) and a built glimt:
 
     python3 .ci/editors.py target/release/glimt
 """
@@ -15,7 +15,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-# Files with this many mistakes that a schema can know have to be found, each in its line.
+# Minimum number of files in which Taplo must find a mistake on the right line.
 LEAST_FILES = 30
 
 
@@ -24,13 +24,13 @@ def run(*command):
 
 
 def mistakes(glimt, path):
-    """Lines of errors, by the program."""
+    """Lines on which glimt reports errors."""
     report = json.loads(run(glimt, "check", "--json", path).stdout)
     return {one["line"] for one in report["diagnostics"] if one["severity"] == "error" and one["line"]}
 
 
 def by_taplo(schema, path):
-    """Lines that Taplo underlines."""
+    """Lines on which Taplo reports errors."""
     said = run("taplo", "lint", "--colors", "never", "--schema", schema.as_uri(), path)
     lines = set()
     for line, _ in re.findall(r"[┌╭][^\n]*?\.toml:(\d+):(\d+)", said.stderr + said.stdout):
@@ -48,13 +48,13 @@ def main():
             drafts[draft].write_text(run(glimt, "schema", "--draft", draft).stdout)
         meta = run("check-jsonschema", "--check-metaschema", *drafts.values())
         if meta.returncode:
-            faults.append(f"a schema is none: {meta.stdout[:500]}")
+            faults.append(f"invalid schema: {meta.stdout[:500]}")
         scenes = sorted((ROOT / "scenes").glob("*.toml"))
         for draft, schema in drafts.items():
             said = run("check-jsonschema", "--schemafile", schema, *scenes)
             if said.returncode:
                 faults.append(f"check-jsonschema, draft {draft}: {said.stdout[:500]}")
-        # By the line at the head of each, from the folder of the scenes.
+        # Taplo finds the schema through the directive on the first line of each scene.
         said = run("taplo", "lint", "--colors", "never", *scenes)
         if said.returncode:
             faults.append(f"taplo: {said.stderr[:500]}")
@@ -67,7 +67,7 @@ def main():
             lines, _ = by_taplo(drafts["4"], path)
             kind = found if wrong <= lines else partly if wrong & lines else left
             kind.append((path.stem, sorted(wrong), sorted(lines)))
-        for name, all_of in [("all mistakes in their lines", found), ("some of them", partly), ("none", left)]:
+        for name, all_of in [("all mistakes on their lines", found), ("some of them", partly), ("none", left)]:
             print(f"Taplo finds {name}: {len(all_of)} files")
             for stem, wrong, lines in all_of:
                 print(f"    {stem:22} glimt {wrong}, Taplo {lines}")
@@ -76,9 +76,9 @@ def main():
             for path in sorted((ROOT / "tests" / "broken").glob("*.toml"))
             if run("check-jsonschema", "--schemafile", drafts["2020-12"], path).returncode
         ]
-        print(f"check-jsonschema refuses {len(rejected)} files")
+        print(f"check-jsonschema rejects {len(rejected)} files")
         if len(found) + len(partly) < LEAST_FILES:
-            faults.append(f"Taplo finds mistakes in {len(found) + len(partly)} files alone")
+            faults.append(f"Taplo finds mistakes in only {len(found) + len(partly)} files")
     print(f"{len(scenes)} scenes are valid" if not faults else "\n".join(faults))
     sys.exit(bool(faults))
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Checks the checks: each fault of the table below, put into the program, must make its test fail.
+"""Mutation testing with hand-written faults: each fault of the table below must make its test fail.
 
     python3 .ci/injected_errors.py [PROFILE [WORD]]      (default: dev)
 
-A copy of the sources under target/injected gets all faults at once, each behind its number; it is built once, and the test of
-each fault is run with that fault alone, after all of them without any. The sources themselves know nothing of it. WORD: only faults
-with it in their file or test.
+All faults are inserted at once into a copy of the sources under target/injected, each behind a switch, so that the copy is built only
+once. All tests must pass without a fault; then each test is run with only its own fault switched on. The sources themselves are not
+changed. WORD selects the faults whose file or test contains it.
 """
 
 import json
@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 COPY = ROOT / "target" / "injected"
 SWITCH = """
-/// Whether a fault is asked for, by its number in the table.
+/// Whether a fault is switched on, by its number in the table.
 #[inline]
 pub fn injected(fault: u32) -> bool {
     static ASKED: std::sync::LazyLock<Option<u32>> =
@@ -40,138 +40,138 @@ ROUGH_GLASS = "materials::rough::frosted::tests::"
 STRAIGHT = "closed_forms::straight::"
 TWO_SIDED = "closed_forms::two_sided::"
 
-# Fault, file, where the expression in ⟦⟧ is, what stands in its place, the test that must fail.
+# Fault, file, the code around the expression in ⟦⟧, its replacement, and the test that must fail.
 FAULTS = [
-    ("light behind bent normals", "integrators/transport/batch.rs", "let g = ⟦if g > 0.0 { g } else { 0.0 }⟧;", "g",
+    ("light from behind a perturbed normal", "integrators/transport/batch.rs", "let g = ⟦if g > 0.0 { g } else { 0.0 }⟧;", "g",
      "closed_forms::bumps::light_behind_a_bent_normal_is_none"),
-    ("sheets on glass that shine into air", "integrators/transport/walk.rs", "far = ⟦crossing.far⟧;",
+    ("a sheet on glass that transmits into air", "integrators/transport/walk.rs", "far = ⟦crossing.far⟧;",
      "path.medium", FROSTED + "light_through_a_sheet_on_glass_goes_on_in_the_glass"),
-    ("sheets before glass that shine into air", "integrators/transport/walk.rs",
+    ("a sheet in front of glass that transmits into air", "integrators/transport/walk.rs",
      "Interaction::Opaque(&vertex, OpaqueHit::Touching(touched), ⟦&far⟧)", "&path.medium",
      FROSTED + "light_through_a_sheet_on_glass_goes_on_in_the_glass"),
-    ("light that wins by a denser medium", "integrators/transport/interface.rs", "⟦(eta * eta).min(1.0)⟧", "1.0",
+    ("energy gained in a denser medium", "integrators/transport/interface.rs", "⟦(eta * eta).min(1.0)⟧", "1.0",
      FROSTED + "a_sheet_on_glass_gains_no_light"),
-    ("photons that no glass of an equal index asks for", "integrators/photons/mod.rs",
+    ("no photons for glass of equal index", "integrators/photons/mod.rs",
      "material.bsdf.has_delta() || ⟦material.bsdf.glass().is_some_and(is_passed)⟧", "false",
      FROSTED + "photons_pass_rough_glass_that_does_not_refract"),
     ("an EXR without its alpha", "assets/image/exr.rs", '"A" => layer.alpha = ⟦Some(index)⟧,', "None",
      "assets::image::tests::the_alpha_of_an_exr_is_read"),
-    ("tangents that do not turn with their texture", "materials/texture.rs",
+    ("tangents that ignore the texture's rotation", "materials/texture.rs",
      "let by = ⟦moved.vector_before(axis).as_vec2() / self.repeat⟧;", "axis.as_vec2() / self.repeat",
      "materials::normal_map::tests::slopes_turn_with_their_texture"),
-    ("facets without errors", "geometry/facets.rs", "let error = ⟦distance * size⟧;", "0.0",
+    ("triangles without error bounds", "geometry/facets.rs", "let error = ⟦distance * size⟧;", "0.0",
      "accel::facets_tests::what_is_decided_is_what_each_ray_finds_alone"),
     ("the other triangle of a quadrilateral", "geometry/facets.rs", "(between & ⟦if over < 0.0 { TRUE } else { 0 }⟧)",
      "TRUE", "accel::facets_tests::what_is_decided_is_what_each_ray_finds_alone"),
-    ("a nearer candidate forgotten", "geometry/facets.rs", "is_hit & ⟦(hits.t[i] < candidates.next[i])⟧;", "true",
+    ("a closer candidate lost", "geometry/facets.rs", "is_hit & ⟦(hits.t[i] < candidates.next[i])⟧;", "true",
      "accel::facets_tests::what_is_decided_is_what_each_ray_finds_alone"),
-    ("facets without margins", "geometry/facets.rs", "let margin = ⟦slender⟧ * folds.about(", "0.0",
+    ("triangles without margins", "geometry/facets.rs", "let margin = ⟦slender⟧ * folds.about(", "0.0",
      "accel::facets_tests::what_is_decided_is_what_each_ray_finds_alone"),
-    ("rays that start beyond the next wall of a mesh", "world/mesh_facet.rs",
+    ("rays that start behind an adjacent face", "world/mesh_facet.rs",
      "let is_beside_edge = ⟦is_near(u, ac, bound) | is_near(v, ab, bound) | is_near(w, ac - ab, bound)⟧;", "false",
      "closed_forms::robust::no_ray_leaves_a_closed_room_by_its_edges"),
-    ("starts in rows unlike those alone", "world/mesh_rows.rs", "for i in lanes(⟦folds.bits(&beside) & of⟧) {", "0",
+    ("packet origins that differ from single ones", "world/mesh_rows.rs", "for i in lanes(⟦folds.bits(&beside) & of⟧) {", "0",
      "world::mesh_rows::tests::surfaces_side_by_side_have_the_bits_that_each_has_alone"),
-    ("meshes that stay where they were made", "world/mesh_instance.rs", "let is_moved = ⟦transform != Transform::IDENTITY⟧;", "false",
+    ("meshes that ignore their transform", "world/mesh_instance.rs", "let is_moved = ⟦transform != Transform::IDENTITY⟧;", "false",
      "world::mesh_instance::tests::points_of_a_moved_mesh_are_between_its_corners"),
-    ("the other crossing of a round shape", "geometry/axial.rs", "[true, true] => ⟦(first == second).then_some(first)⟧,", "Some(first)",
+    ("the wrong intersection with a curved shape", "geometry/axial.rs", "[true, true] => ⟦(first == second).then_some(first)⟧,", "Some(first)",
      "geometry::cylinder::tests::a_hit_from_afar_is_at_the_crossing_that_counts"),
-    ("rows that say what they do not hold", "integrators/transport/packet.rs", "found |= if ⟦is_filled⟧ { of }", "true",
+    ("packets that claim surfaces they do not contain", "integrators/transport/packet.rs", "found |= if ⟦is_filled⟧ { of }", "true",
      "closed_forms::touching::a_drink_in_a_glass"),
-    ("closed glass that nobody enters", "integrators/transport/crossing.rs", "return (None, ⟦known.retained(is_told_by_record).entered(entered)⟧);",
+    ("closed glass that is never entered", "integrators/transport/crossing.rs", "return (None, ⟦known.retained(is_told_by_record).entered(entered)⟧);",
      "known.retained(is_told_by_record)", "closed_forms::glass::absorption_along_a_slab_and_a_ball"),
-    ("spans of the wrong lanes", "accel/wide_bvh/simd/loops.rs", "_mm512_mask_loadu_ps(other, ⟦of as u16⟧, row.as_ptr())", "(of >> 1) as u16",
+    ("ranges over the wrong lanes", "accel/wide_bvh/simd/loops.rs", "_mm512_mask_loadu_ps(other, ⟦of as u16⟧, row.as_ptr())", "(of >> 1) as u16",
      "accel::wide_bvh::simd::loops::tests::spans_and_reciprocals_have_the_same_bits_by_all_instructions"),
-    ("rays that start on a facet and meet it", "geometry/facets.rs", "let is_left_out = ⟦is_sure & ((rays.start[i] == number) | (except[i] == number))⟧;",
+    ("rays that hit the triangle they start on", "geometry/facets.rs", "let is_left_out = ⟦is_sure & ((rays.start[i] == number) | (except[i] == number))⟧;",
      "is_sure & (rays.start[i] == number)", "accel::facets_tests::what_is_decided_is_what_each_ray_finds_alone"),
-    ("a cosine by the normal that turns away from the viewer", "integrators/transport/batch.rs",
+    ("cosine with a normal that faces away from the viewer", "integrators/transport/batch.rs",
      "set_lane(&mut self.normal, i, ⟦normal⟧);", "shading.normal",
      MICROFACETS + "coarse_smooth_meshes_reflect_no_more_than_arrives"),
-    ("equal indices a boundary", "integrators/transport/walk.rs",
+    ("a boundary between equal indices", "integrators/transport/walk.rs",
      "near.glass() != far.glass() && ⟦ior(tile.world, near) != ior(tile.world, &far)⟧ {", "true",
      "closed_forms::touching::equal_indices_are_no_boundary_and_no_scattering"),
-    ("near sides of lamps that weaken nothing", "world/straight.rs",
+    ("an emitter's near side that attenuates nothing", "world/straight.rs",
      "if ⟦source == Source::Sheer(hit.object) && hit.shape.t >= ray.t_max - end⟧ {",
      "source == Source::Sheer(hit.object)", STRAIGHT + "lamps_that_are_half_there_shine_through_themselves"),
-    ("a texel in place of its neighbour", "materials/texture.rs", "[self.index(first, size), self.index(⟦first + 1⟧, size)]",
+    ("a texel in place of its neighbor", "materials/texture.rs", "[self.index(first, size), self.index(⟦first + 1⟧, size)]",
      "first", "materials::texture::tests::bilinear_look_ups_of_known_value"),
-    ("texels left of the first one rounded to it", "materials/texture.rs",
+    ("negative texel coordinates rounded toward zero", "materials/texture.rs",
      "towards_zero - ⟦i32::from(towards_zero as f32 > x)⟧", "0",
      "materials::texture::tests::bilinear_look_ups_of_known_value"),
-    ("a mirror's texture without its footprint", "materials/mod.rs",
+    ("a mirror texture without filtering", "materials/mod.rs",
      "Bsdf::Mirror(mirror) => ⟦mirror.textures().any(|texture| texture.mipmaps.is_some())⟧,", "false",
      "closed_forms::footprints::far_boards_are_grey_whatever_they_colour"),
-    ("normal maps that are not mirrored", "materials/texture.rs", "return [dpdu * ⟦sides.x⟧, dpdv * sides.y]",
+    ("normal maps that ignore mirroring", "materials/texture.rs", "return [dpdu * ⟦sides.x⟧, dpdv * sides.y]",
      "1.0", "materials::normal_map::tests::slopes_are_mirrored_with_their_texture"),
-    ("hard shadows that lobes do not have", "integrators/direct/unshadowed.rs",
+    ("lobe rays without hard shadows", "integrators/direct/unshadowed.rs",
      "⟦self.tile.world.left_on_segment(&segment, source, &mut rays.lookups)⟧", "Vec3::ONE",
      "closed_forms::hard::lobes_of_metal_see_lamps_by_the_same_ray_to_their_middle"),
-    ("bodies that are dark with a lamp in them", "world/dark.rs",
+    ("a solid with a light in it treated as unlit", "world/dark.rs",
      "closed.is_some_and(|bounds| ⟦!holds_lamp(bounds)⟧)", "!holds_lamp(bounds) || true",
      FROSTED + "only_closed_bodies_without_a_lamp_are_dark_within"),
-    ("albedos below the lobe's", "materials/lobe_albedo.rs", "terms[0] += ⟦missing.fold(0.0, f64::max)⟧;", "0.0",
+    ("albedo fit below the lobe's albedo", "materials/lobe_albedo.rs", "terms[0] += ⟦missing.fold(0.0, f64::max)⟧;", "0.0",
      "materials::lobe_albedo::tests::polynomials_are_those_of_the_quadrature_or_just_above"),
-    ("1 % of energy won at each bounce", "integrators/transport/scatter.rs", "let share = ⟦cosines[i] / densities[i]⟧;",
+    ("1 % of energy gained per bounce", "integrators/transport/scatter.rs", "let share = ⟦cosines[i] / densities[i]⟧;",
      "1.01 * cosines[i] / densities[i]", GLOBAL + "a_furnace_sums_its_bounces_to_the_depth_asked_for"),
-    ("the cosine dropped", "integrators/transport/scatter.rs", "let share = ⟦cosines[i] / densities[i]⟧;",
+    ("missing cosine", "integrators/transport/scatter.rs", "let share = ⟦cosines[i] / densities[i]⟧;",
      "1.0 / densities[i]", GLOBAL + "an_integrating_sphere_is_lit_everywhere_alike_by_what_bounces"),
-    ("roulette not divided by its chance", "integrators/transport/scatter.rs", "let factor = ⟦lane(&scattered.factors, i) / chance⟧;",
+    ("Russian roulette without reweighting", "integrators/transport/scatter.rs", "let factor = ⟦lane(&scattered.factors, i) / chance⟧;",
      "lane(&scattered.factors, i)", GLOBAL + "a_furnace_sums_its_bounces_to_the_depth_asked_for"),
-    ("roulette by what is shown", "integrators/transport/scatter.rs", "let chance = ⟦continuation.survival_probability(scattered.roulette_throughput[i])⟧;",
+    ("Russian roulette that depends on the AOV", "integrators/transport/scatter.rs", "let chance = ⟦continuation.survival_probability(scattered.roulette_throughput[i])⟧;",
      "continuation.survival_probability(scattered.factors[0][i])", GLOBAL + "the_parts_of_a_picture_by_paths_add_up_to_it"),
-    ("lamps that paths meet counted in full", "integrators/direct/mis.rs", "if ⟦!(pdf > 0.0)⟧ {",
+    ("emitters hit by paths without MIS weight", "integrators/direct/mis.rs", "if ⟦!(pdf > 0.0)⟧ {",
      "true", GLOBAL + "direct_light_by_paths_is_that_of_whitted"),
-    ("light samples counted in full", "integrators/direct/mis.rs",
+    ("light samples without MIS weight", "integrators/direct/mis.rs",
      "weights[i] = ⟦if start & 1 << i != 0 { weight } else { 1.0 }⟧;",
      "1.0", GLOBAL + "direct_light_by_paths_is_that_of_whitted"),
-    ("rays of sharp lobes counted in full", "integrators/direct/mis.rs",
+    ("lobe rays without MIS weight", "integrators/direct/mis.rs",
      "radiance * ⟦weight(self.light_pdf(ray, from_normal, (hit, normal)) / pdf)⟧", "1.0",
      GLOBAL + "a_sharp_highlight_of_a_lamp_has_little_noise"),
-    ("a lamp behind glass weighed as one in sight", "integrators/transport/ray.rs",
+    ("MIS weight for an emitter behind glass", "integrators/transport/ray.rs",
      "Self { pdf: ⟦0.0⟧, roulette_throughput: self.roulette_throughput * part",
      "self.pdf", GLOBAL + "light_behind_glass_is_found_by_paths_alone_and_counted_once"),
-    ("the background lights", "integrators/camera_paths.rs", "if ⟦path.state.only_specular_before⟧ {\n            let background",
+    ("a background that illuminates", "integrators/camera_paths.rs", "if ⟦path.state.only_specular_before⟧ {\n            let background",
      "true", GLOBAL + "the_background_lights_nothing_but_is_seen_by_mirrors"),
     ("one bounce too few", "integrators/transport/scatter.rs", "let continues = ⟦depth + 1 < max_depth⟧",
      "depth + 2 < max_depth", GLOBAL + "a_furnace_sums_its_bounces_to_the_depth_asked_for"),
-    ("glass reflects too much", "integrators/transport/walk.rs", "Decision::Choice).x < ⟦reflectance⟧\n",
+    ("glass that reflects too much", "integrators/transport/walk.rs", "Decision::Choice).x < ⟦reflectance⟧\n",
      "reflectance + 0.05", GLOBAL + "mirrors_and_glass_are_followed_as_by_whitted"),
-    ("a glossy density off by a factor", "materials/rough/phong/lobes.rs", "let glossy = ⟦(self.shininess + 1.0) * (0.5 * FRAC_1_PI)⟧ * gloss;",
+    ("a wrong glossy pdf", "materials/rough/phong/lobes.rs", "let glossy = ⟦(self.shininess + 1.0) * (0.5 * FRAC_1_PI)⟧ * gloss;",
      "(self.shininess + 2.0) * (0.5 * FRAC_1_PI)", "materials::rough::phong::lobes::tests::the_glossy_lobe_is_drawn_by_its_density_however_narrow"),
-    ("a pane that reflects as one side", "materials/pane.rs", "⟦2.0 * side / (1.0 + side)⟧", "side",
+    ("a pane with one reflecting side", "materials/pane.rs", "⟦2.0 * side / (1.0 + side)⟧", "side",
      STRAIGHT + "a_pane_before_a_lamp_by_angle"),
-    ("a veil that stops shadow rays", "materials/mod.rs", "through * there + ⟦Vec3::splat(1.0 - there)⟧", "Vec3::ZERO",
+    ("partial opacity that blocks shadow rays", "materials/mod.rs", "through * there + ⟦Vec3::splat(1.0 - there)⟧", "Vec3::ZERO",
      STRAIGHT + "shadows_are_as_deep_as_the_product_of_what_is_there"),
-    ("a lamp behind a pane weighed from the pane", "integrators/transport/walk.rs", "path.ray.origin = ⟦self.origin⟧;",
+    ("MIS weight measured from a pane", "integrators/transport/walk.rs", "path.ray.origin = ⟦self.origin⟧;",
      "path.ray.origin", STRAIGHT + "a_lamp_lights_through_panes"),
-    ("the back of a lamp weighed as its front", "lights/area/mod.rs", "Side::Back => ⟦LightHit { normal: -met.normal, ..*met }⟧",
+    ("an emitter's back weighted as its front", "lights/area/mod.rs", "Side::Back => ⟦LightHit { normal: -met.normal, ..*met }⟧",
      "*met", TWO_SIDED + "flat_lamps_light_both_sides_alike"),
-    ("textures turned the other way", "materials/texture.rs", "DVec2::new(⟦by.x * cos - by.y * sin⟧,",
+    ("textures rotated the wrong way", "materials/texture.rs", "DVec2::new(⟦by.x * cos - by.y * sin⟧,",
      "by.x * cos + by.y * sin", "materials::texture::tests::coordinates_are_repeated_then_turned_then_moved"),
     ("1 % too much of a lobe", "materials/rough/phong/lobes.rs", "1.0 / (⟦f64::from(self.shininess) + 1.0⟧)",
      "f64::from(self.shininess) * 0.99 + 1.0", "materials::rough::phong::lobes::tests::the_glossy_lobe_is_drawn_by_its_density_however_narrow"),
-    ("the wrong side of a lobe", "materials/rough/phong/lobes.rs", "let local = ⟦Vec3::new(sine * cos_phi, sine * sin_phi, cosine)⟧;",
+    ("a lobe sampled on the wrong side", "materials/rough/phong/lobes.rs", "let local = ⟦Vec3::new(sine * cos_phi, sine * sin_phi, cosine)⟧;",
      "Vec3::new(sine * cos_phi, sine * sin_phi, -cosine)", "materials::rough::phong::lobes::tests::both_lobes_together_are_drawn_by_their_density"),
-    ("the diffuse lobe chosen too often", "materials/rough/phong/lobes.rs", "let is_diffuse = ⟦lobe < self.diffuse_share()⟧;",
+    ("diffuse lobe sampled too often", "materials/rough/phong/lobes.rs", "let is_diffuse = ⟦lobe < self.diffuse_share()⟧;",
      "lobe < self.diffuse_share() * 1.05", "materials::rough::phong::lobes::tests::both_lobes_together_are_drawn_by_their_density"),
-    ("a lobe's peak without its normaliser", "materials/rough/phong/mod.rs", "self.specular * ⟦((self.shininess + 2.0) / (2.0 * PI))⟧",
+    ("a lobe without its normalization", "materials/rough/phong/mod.rs", "self.specular * ⟦((self.shininess + 2.0) / (2.0 * PI))⟧",
      "1.0", "materials::rough::phong::tests::the_lobe_of_known_value"),
-    ("a rectangle's density off by 1 %", "lights/area/quad.rs", ".map(|spherical| ⟦1.0 / spherical.solid_angle⟧)",
+    ("a rectangle's pdf off by 1 %", "lights/area/quad.rs", ".map(|spherical| ⟦1.0 / spherical.solid_angle⟧)",
      "1.01 / spherical.solid_angle", "lights::tests::the_density_of_a_sample_is_that_of_the_hit_which_its_ray_finds"),
-    ("a picked light's probability off by a tenth", "lights/tree/mod.rs", "if total > 0.0 { ⟦((self.0[child] - before) / total) as f32⟧ }",
+    ("a light's probability off by a tenth", "lights/tree/mod.rs", "if total > 0.0 { ⟦((self.0[child] - before) / total) as f32⟧ }",
      "1.1 * ((self.0[child] - before) / total) as f32", "lights::tree::tests::picks_have_their_probabilities_which_sum_to_one"),
-    ("lights below the horizon are picked", "lights/tree/node.rs", "let sum = ⟦straight + sin[i]⟧;",
+    ("lights sampled below the horizon", "lights/tree/node.rs", "let sum = ⟦straight + sin[i]⟧;",
      "1.0", "lights::tree::tests::lights_that_send_nothing_are_not_picked"),
-    ("bounds of lights taken for points", "lights/tree/node.rs", "else { beyond }) + ⟦sin[i]⟧;",
+    ("light bounds treated as points", "lights/tree/node.rs", "else { beyond }) + ⟦sin[i]⟧;",
      "0.0", "lights::tree::tests::spotlights_above_each_other_are_picked_from_between_them"),
-    ("paths weighed as if all lights were sampled", "integrators/direct/mis.rs",
+    ("path weights as if all lights were sampled", "integrators/direct/mis.rs",
      "* ⟦lights.samples_at(self.behavior.receivers, ray.origin, normal).of(number)⟧", "1.0",
      MANY + "a_sharp_highlight_of_a_lamp_that_is_cut_is_as_before"),
-    ("a kernel without its normaliser", "integrators/photons/map.rs", "⟦2.0 / (std::f32::consts::PI * (self.radius * self.radius))⟧",
+    ("a kernel without its normalization", "integrators/photons/map.rs", "⟦2.0 / (std::f32::consts::PI * (self.radius * self.radius))⟧",
      "1.0 / (std::f32::consts::PI * (self.radius * self.radius))", PHOTONS + "an_integrating_sphere_is_lit_everywhere_alike_by_photons"),
     ("a photon counted twice", "integrators/photons/gather.rs", "⟦indirect && row.after_gloss & 1 << i != 0⟧",
      "indirect", PHOTONS + "photons_and_paths_see_the_same_light_where_all_of_it_comes_by_glass"),
-    ("photons that were not looked up not made up for", "integrators/photons/gather.rs", 
+    ("skipped photon lookups without reweighting", "integrators/photons/gather.rs", 
      "sum += ⟦light * (coverage_factor(tile, (row, i), &look, photon, map.radius()) / chance)⟧;",
      "light * coverage_factor(tile, (row, i), &look, photon, map.radius())",
      PHOTONS + "photons_and_paths_see_the_same_light_where_all_of_it_comes_by_glass"),
@@ -179,148 +179,148 @@ FAULTS = [
      "emitted.flux * (1.01 * tracing.share)", CAUSTICS + "light_is_even_up_to_the_edges_of_a_floor"),
     ("3 % of a caustic lost", "integrators/photons/emit.rs", "throughput: ⟦emitted.flux * tracing.share⟧,",
      "emitted.flux * (0.97 * tracing.share)", CAUSTICS + "a_ring_throws_the_light_that_paths_find"),
-    ("kernels of the first radius in all passes", "integrators/photons/mod.rs", "(f64::from(radius) * ⟦shrunk⟧) as f32);", "1.0",
+    ("a kernel radius that does not shrink", "integrators/photons/mod.rs", "(f64::from(radius) * ⟦shrunk⟧) as f32);", "1.0",
      CAUSTICS + "light_is_even_around_a_box_that_stands_on_a_floor"),
-    ("radii without bounds", "integrators/photons/mod.rs", "Ok(⟦largest.min(radius * (wanted / (NEAR * step as f32)).sqrt())⟧)",
+    ("unbounded radii", "integrators/photons/mod.rs", "Ok(⟦largest.min(radius * (wanted / (NEAR * step as f32)).sqrt())⟧)",
      "radius * (wanted / (NEAR * step as f32)).sqrt()", "integrators::photons::tests::first_radius_is_bounded_by_the_scene"),
-    ("photons of the other side of a wall", "integrators/photons/occlusion.rs", "if ⟦!is_blocked(from, to)⟧ {", "true", CAUSTICS + "no_photons_come_round_the_foot_of_a_wall"),
-    ("orders wait for the photons", "pipeline/stages/photons.rs", "Err(RecvTimeoutError::Timeout) => ⟦tick()⟧,", "()",
+    ("photons through a wall", "integrators/photons/occlusion.rs", "if ⟦!is_blocked(from, to)⟧ {", "true", CAUSTICS + "no_photons_come_round_the_foot_of_a_wall"),
+    ("requests that wait for photons", "pipeline/stages/photons.rs", "Err(RecvTimeoutError::Timeout) => ⟦tick()⟧,", "()",
      "pipeline::tests::photons::orders_are_heard_while_the_first_photons_are_sent"),
-    ("the time is not heard while photons are sent", "pipeline/render/scheduler.rs",
+    ("a time limit ignored while photons are traced", "pipeline/render/scheduler.rs",
      "numbers.clone())?;\n            if ⟦self.is_over_time⟧ {", "false",
      "pipeline::tests::photons::time_that_ends_while_photons_are_sent_ends_the_render"),
-    ("a first picture without photons", "pipeline/render/scheduler.rs", "coarse.picture(⟦maps.as_ref()⟧, size", "None",
+    ("a first image without photons", "pipeline/render/scheduler.rs", "coarse.picture(⟦maps.as_ref()⟧, size", "None",
      "pipeline::tests::photons::a_picture_without_photons_comes_before_them_and_one_with_them_takes_its_place"),
-    ("maps are kept without end", "pipeline/stages/photons.rs", "let has_room = ⟦self.kept_bytes() + pass.memory_bytes() <= MOST_KEPT_BYTES⟧;",
+    ("unbounded photon map cache", "pipeline/stages/photons.rs", "let has_room = ⟦self.kept_bytes() + pass.memory_bytes() <= MOST_KEPT_BYTES⟧;",
      "true", "pipeline::tests::photons::maps_are_kept_while_there_is_room"),
-    ("nothing stays of a scene that is switched away from", "pipeline/engine/spares.rs", "first_with_room(spares, ⟦MOST_SPARE_BYTES⟧)", "0",
+    ("no cache for the previous scene", "pipeline/engine/spares.rs", "first_with_room(spares, ⟦MOST_SPARE_BYTES⟧)", "0",
      "pipeline::tests::switching::a_scene_that_is_switched_back_to_finds_its_trees_and_pictures"),
-    ("what scenes leave is kept without end", "pipeline/cache.rs", "⟦total <= most_bytes⟧", "true",
+    ("unbounded cache of previous scenes", "pipeline/cache.rs", "⟦total <= most_bytes⟧", "true",
      "pipeline::cache::tests::spares_stay_while_there_is_room_and_the_oldest_scene_goes_as_a_whole"),
-    ("meshes of glass by their files are not aimed at", "integrators/photons/mod.rs", "own.balls.extend(⟦object.ball()⟧);",
+    ("no photons aimed at glass from mesh files", "integrators/photons/mod.rs", "own.balls.extend(⟦object.ball()⟧);",
      "object.ball().filter(|_| object.mesh().is_none())", PHOTONS + "meshes_whose_files_say_that_they_are_of_glass_are_aimed_at"),
-    ("photons leave smooth meshes as light does", "integrators/photons/emit.rs",
+    ("photons without the adjoint correction", "integrators/photons/emit.rs",
      "let counts = ⟦row.photon_weight(i, -rays[i].ray.direction)⟧;", "1.0",
      PHOTONS + "smooth_meshes_throw_back_what_photons_bring_as_paths_see_it"),
-    ("flux not divided by the chance to go on", "integrators/photons/emit.rs", "ray.throughput /= ⟦chance⟧;",
+    ("photon roulette without reweighting", "integrators/photons/emit.rs", "ray.throughput /= ⟦chance⟧;",
      "1.0", PHOTONS + "what_is_stored_in_a_closed_room_is_the_power_and_how_often_photons_arrive_is_known"),
-    ("photons from the wrong side of a wall", "integrators/photons/map.rs",
+    ("photons that arrive from behind", "integrators/photons/map.rs",
      "near[i] &= if ⟦faces⟧ { TRUE } else { 0 };", "true",
      "integrators::photons::map::tests::kernel_sums_to_one_and_limits_depth"),
-    ("lamps behind glass met by paths too", "integrators/camera_paths.rs", "if ⟦self.is_found_elsewhere(path)⟧ {", "false",
+    ("emitters behind glass counted twice", "integrators/camera_paths.rs", "if ⟦self.is_found_elsewhere(path)⟧ {", "false",
      PHOTONS + "a_furnace_with_a_glowing_ball_in_glass_is_even"),
-    ("photons go one scattering too far", "integrators/photons/gather.rs", "max_depth.checked_sub(⟦depth + 1⟧)", "depth",
+    ("photons with one bounce too many", "integrators/photons/gather.rs", "max_depth.checked_sub(⟦depth + 1⟧)", "depth",
      PHOTONS + "photons_and_paths_see_the_same_light_where_all_of_it_comes_by_glass"),
-    ("picks in lobes weighed by what others do not know", "integrators/direct/light_tree.rs",
+    ("MIS weights that know the vertex's lobe", "integrators/direct/light_tree.rs",
      "row.weighed[i] = ⟦without.map_or(probability, |without| without.probability(light))⟧;", "probability",
      MANY + "a_sharp_highlight_of_a_lamp_that_is_cut_is_as_before"),
-    ("a ray of the pool stops another", "integrators/direct/shadow_rays.rs", ".traced &= !(1 << ⟦(ray % LANES)⟧);",
+    ("a pooled ray that occludes another", "integrators/direct/shadow_rays.rs", ".traced &= !(1 << ⟦(ray % LANES)⟧);",
      "((ray ^ 1) % LANES)", MANY + "picks_among_lights_of_every_kind_bring_what_all_of_them_do"),
-    ("a picture's density off by a tenth", "lights/area/textured_quad.rs",
+    ("an image light's pdf off by a tenth", "lights/area/textured_quad.rs",
      "let of_quad = ⟦self.quad.density(to_corner).unwrap_or(1.0 / by_area)⟧;",
      "1.1 * self.quad.density(to_corner).unwrap_or(1.0 / by_area)",
      "lights::shown_tests::the_density_of_a_picture_is_that_of_its_samples"),
-    ("a distribution without its π", "materials/microfacet.rs", "self.squared * self.squared * ⟦FRAC_1_PI⟧ / (product", "1.0",
+    ("a microfacet distribution without π", "materials/microfacet.rs", "self.squared * self.squared * ⟦FRAC_1_PI⟧ / (product", "1.0",
      METAL + "values_are_those_of_the_formulas_and_reciprocal"),
-    ("shadowing by the wrong side", "materials/microfacet.rs",
+    ("masking with the wrong side", "materials/microfacet.rs",
      "let value = distribution / (2.0 * ⟦(self.cosine * other.slope + other.cosine * self.slope)⟧);",
      "(self.cosine * self.slope + other.cosine * other.slope)", METAL + "values_are_those_of_the_formulas_and_reciprocal"),
-    ("a pdf of half vectors for one of directions", "materials/microfacet.rs",
+    ("half-vector pdf used for directions", "materials/microfacet.rs",
      "let density = distribution / (⟦2.0⟧ * (self.cosine + self.slope));", "0.5", PLASTIC + "samples_are_drawn_by_their_density"),
-    ("a pdf of metal off by a factor", "materials/microfacet.rs",
+    ("a wrong metal pdf", "materials/microfacet.rs",
      "let both = ⟦self.cosine * other.slope + other.cosine * self.slope⟧;",
      "self.cosine * other.slope", METAL + "samples_are_drawn_by_their_density"),
-    ("normals stretched along u by v", "materials/microfacet.rs", "let shrunk = Vec3::new(⟦along_u * normal.x⟧,", "along_v * normal.x",
+    ("normals stretched along the wrong axis", "materials/microfacet.rs", "let shrunk = Vec3::new(⟦along_u * normal.x⟧,", "along_v * normal.x",
      METAL + "samples_are_drawn_by_their_density"),
-    ("normals that are not visible", "materials/microfacet.rs", "let part = ⟦0.5 * (1.0 + view.z)⟧;", "1.0",
+    ("sampling of invisible normals", "materials/microfacet.rs", "let part = ⟦0.5 * (1.0 + view.z)⟧;", "1.0",
      METAL + "samples_are_drawn_by_their_density"),
     ("η and k swapped", "materials/rough/metal/mod.rs", "let exact = ⟦conductor(cosine, first, second)⟧;", "conductor(cosine, second, first)",
      METAL + "elements_have_their_colours"),
-    ("a coat's η upside down", "materials/rough/plastic/row.rs", "dielectric_outside(half.cosine(), ⟦self.ior[i]⟧)", "1.0 / self.ior[i]",
+    ("a coat's η inverted", "materials/rough/plastic/row.rs", "dielectric_outside(half.cosine(), ⟦self.ior[i]⟧)", "1.0 / self.ior[i]",
      PLASTIC + "values_are_those_of_the_formulas_and_reciprocal"),
-    ("a coat that light passes once", "materials/rough/plastic/row.rs", "if is_ahead { ⟦self.left[i] * left⟧ } else", "self.left[i]",
+    ("a coat that light passes only once", "materials/rough/plastic/row.rs", "if is_ahead { ⟦self.left[i] * left⟧ } else", "self.left[i]",
      PLASTIC + "white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has"),
-    ("what a coat returns inside is lost", "materials/lobe_albedo.rs", "diffuse / (Vec3::ONE - ⟦diffuse * returned⟧)", "Vec3::ZERO",
+    ("internal reflection of a coat lost", "materials/lobe_albedo.rs", "diffuse / (Vec3::ONE - ⟦diffuse * returned⟧)", "Vec3::ZERO",
      PLASTIC + "white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has"),
     ("an albedo off by 1 %", "materials/lobe_albedo.rs", "sum += ⟦area⟧ * reflectance(between) * left;", "1.01 * area",
      PLASTIC + "white_plastic_reflects_all_light_and_every_other_what_quadrature_of_f_has"),
-    ("a clear coat that takes nothing from the light", "materials/rough/principled/row.rs",
+    ("a clear coat that does not attenuate", "materials/rough/principled/row.rs",
      "if self.is_coated { ⟦self.through[i] * (1.0 - self.coat_albedo(i, ahead(cosine)))⟧ }", "1.0",
      PRINCIPLED + "values_are_those_of_the_formulas_and_reciprocal"),
-    ("a clear coat chosen too often", "materials/rough/principled/row.rs", "let alpha = if (choice < ⟦of_coat⟧) & !THROUGH {", "1.3 * of_coat",
+    ("clear coat sampled too often", "materials/rough/principled/row.rs", "let alpha = if (choice < ⟦of_coat⟧) & !THROUGH {", "1.3 * of_coat",
      PRINCIPLED + "samples_are_drawn_by_their_density"),
-    ("paths at a smooth coat not divided by their chance", "integrators/camera_paths.rs",
+    ("coat selection without reweighting", "integrators/camera_paths.rs",
      "let by_chance = if both { 1.0 } else { ⟦1.0 / (1.0 - fresnel)⟧ };", "1.0", MICROFACETS + "white_plastic_vanishes_in_a_furnace"),
-    ("a smooth coat throws too much", "integrators/photons/emit.rs", "specular * ⟦if chooses { 1.0 } else { fresnel }⟧", "1.0",
+    ("a smooth coat that reflects too many photons", "integrators/photons/emit.rs", "specular * ⟦if chooses { 1.0 } else { fresnel }⟧", "1.0",
      MICROFACETS + "photons_and_paths_see_the_same_light_of_smooth_coats_and_metals"),
-    ("the Jacobian of refraction dropped", "materials/rough/frosted/row.rs",
+    ("missing Jacobian of refraction", "materials/rough/frosted/row.rs",
      "transmittance(cosines, indices) / ⟦half.squared⟧;", "1.0", ROUGH_GLASS + "what_comes_through_is_what_the_formulas_say_and_reciprocal"),
-    ("the Jacobian of the wrong side", "materials/rough/frosted/row.rs", "let value = value * (⟦self.far[i] * self.far[i]⟧);",
+    ("Jacobian of the wrong side", "materials/rough/frosted/row.rs", "let value = value * (⟦self.far[i] * self.far[i]⟧);",
      "self.near[i] * self.near[i]", ROUGH_GLASS + "reflection_and_transmission_are_what_quadrature_of_f_has_and_never_more_than_all"),
-    ("η swapped in the transmission", "materials/rough/frosted/row.rs", "let indices = ⟦[self.near[i], self.far[i]]⟧;\n        let (half, sum)",
+    ("η swapped in transmission", "materials/rough/frosted/row.rs", "let indices = ⟦[self.near[i], self.far[i]]⟧;\n        let (half, sum)",
      "[self.far[i], self.near[i]]", ROUGH_GLASS + "what_comes_through_is_what_the_formulas_say_and_reciprocal"),
-    ("η swapped in the reflection", "materials/rough/frosted/row.rs",
+    ("η swapped in reflection", "materials/rough/frosted/row.rs",
      "let reflectance = dielectric_either(half.cosine(), ⟦self.far[i] / self.near[i]⟧);", "self.near[i] / self.far[i]",
      ROUGH_GLASS + "what_is_reflected_is_what_the_formulas_say_and_reciprocal"),
-    ("glass that is refracted by the wrong η", "materials/rough/frosted/row.rs", "⟦refracted_at(half, to_eye, eta)⟧ } else {",
+    ("refraction with an inverted η", "materials/rough/frosted/row.rs", "⟦refracted_at(half, to_eye, eta)⟧ } else {",
      "refracted_at(half, to_eye, 1.0 / eta)", ROUGH_GLASS + "samples_of_both_sides_are_drawn_by_their_density"),
-    ("G by the wrong side of glass", "materials/rough/frosted/row.rs", "let lit = ⟦if THROUGH { -normal } else { normal }⟧;", "normal",
+    ("masking on the wrong side of glass", "materials/rough/frosted/row.rs", "let lit = ⟦if THROUGH { -normal } else { normal }⟧;", "normal",
      ROUGH_GLASS + "what_comes_through_is_what_the_formulas_say_and_reciprocal"),
-    ("a vertex for both sides that goes on in its own medium", "integrators/transport/scatter.rs",
+    ("a two-sided vertex that keeps its medium", "integrators/transport/scatter.rs",
      "(&row.beyond, ⟦row.medium_beyond[i]⟧, -lane(&row.normal, i))", "row.medium[i]",
      FROSTED + "photons_and_paths_see_the_same_light_through_rough_glass"),
-    ("a share by the wrong slope", "materials/rough/frosted/row.rs", "light.cosine * ⟦(eye.cosine + eye.slope)⟧",
+    ("a masking share with the wrong Λ", "materials/rough/frosted/row.rs", "light.cosine * ⟦(eye.cosine + eye.slope)⟧",
      "(eye.cosine + light.slope)", ROUGH_GLASS + "one_vertex_for_both_sides_goes_on_as_two_do"),
-    ("edges of a box taken for its faces", "geometry/cuboid.rs", "⟦are_far.into_iter().filter(|&is_far| is_far).count() == 2⟧",
+    ("box edges treated as faces", "geometry/cuboid.rs", "⟦are_far.into_iter().filter(|&is_far| is_far).count() == 2⟧",
      "true", "world::isolated::tests::what_is_isolated_is_what_a_search_finds_nothing_at"),
-    ("both sides of glass go on", "materials/rough/frosted/row.rs", "if ⟦is_mirrored == THROUGH⟧ { useless }", "false",
+    ("paths that continue on both sides of glass", "materials/rough/frosted/row.rs", "if ⟦is_mirrored == THROUGH⟧ { useless }", "false",
      ROUGH_GLASS + "a_path_goes_on_at_exactly_one_side"),
-    ("Fresnel's reflectance of glass dropped", "materials/rough/frosted/row.rs",
+    ("missing Fresnel reflectance of glass", "materials/rough/frosted/row.rs",
      "return ⟦reflectance⟧ * eye.reflected", "1.0", ROUGH_GLASS + "samples_of_both_sides_are_drawn_by_their_density"),
-    ("a boundary that lets 1 % too much through", "materials/fresnel.rs", "⟦2.0⟧ * ((n_1 * n_2) * (cos_1 * cos_2)) * inverse",
+    ("a boundary that transmits 1 % too much", "materials/fresnel.rs", "⟦2.0⟧ * ((n_1 * n_2) * (cos_1 * cos_2)) * inverse",
      "2.02", ROUGH_GLASS + "reflection_and_transmission_are_what_quadrature_of_f_has_and_never_more_than_all"),
-    ("light that goes through by F in place of 1 − F", "materials/rough/principled/row.rs",
+    ("transmission with F in place of 1 − F", "materials/rough/principled/row.rs",
      "let left = Vec3::ONE - ⟦(facets + (Vec3::splat(grazing) - facets) * weight)⟧;", "(facets + (Vec3::splat(grazing) - facets) * (1.0 - weight))",
      PRINCIPLED + "what_goes_through_is_the_lobe_mirrored_to_the_other_side"),
-    ("a sheet whose light goes through too often", "materials/rough/principled/row.rs",
+    ("transmission sampled too often", "materials/rough/principled/row.rs",
      "LobeSet::All => ⟦1.0 - of_through⟧,", "1.0 - 1.3 * of_through", PRINCIPLED + "samples_of_both_sides_are_drawn_by_their_density"),
-    ("light from behind the wrong side", "integrators/transport/vertex.rs", "sides: ⟦self.sides.map(turned)⟧,",
+    ("transmitted light from the wrong side", "integrators/transport/vertex.rs", "sides: ⟦self.sides.map(turned)⟧,",
      "self.sides", FROSTED + "every_technique_finds_the_same_light_that_comes_through"),
-    ("the medium of the wrong side", "integrators/camera_paths.rs", "path, medium: ⟦far⟧, place, vertex: &vertex,", "&path.medium",
+    ("medium of the wrong side", "integrators/camera_paths.rs", "path, medium: ⟦far⟧, place, vertex: &vertex,", "&path.medium",
      FROSTED + "every_technique_finds_the_same_light_that_comes_through"),
-    ("the medium before a sheet behind it", "integrators/camera_paths.rs", "path, medium: ⟦far⟧, place, vertex, shading, bsdf: &bsdf", "&path.medium",
+    ("medium in front of a sheet used behind it", "integrators/camera_paths.rs", "path, medium: ⟦far⟧, place, vertex, shading, bsdf: &bsdf", "&path.medium",
      FROSTED + "light_through_a_sheet_on_glass_goes_on_in_the_glass"),
-    ("a camera that knows no bodies of parts", "world/inside.rs", "material.filter(|_| ⟦votes > 0⟧)", "false",
+    ("a camera unaware of assembled solids", "world/inside.rs", "material.filter(|_| ⟦votes > 0⟧)", "false",
      "closed_forms::bodies::a_camera_in_a_body_of_parts_is_in_its_glass"),
-    ("photons that know no bodies of parts", "integrators/photons/emit.rs", "let material = ⟦world.material_around(body, point, emitter())⟧?;", "None",
+    ("photons unaware of assembled solids", "integrators/photons/emit.rs", "let material = ⟦world.material_around(body, point, emitter())⟧?;", "None",
      "closed_forms::bodies::photons_of_a_lamp_in_glass_in_parts_start_in_it"),
-    ("of touching glasses the earlier one is rough", "integrators/transport/crossing.rs",
+    ("roughness of the earlier touching glass", "integrators/transport/crossing.rs",
      "let later = ⟦near.glass().max(far.glass())⟧?;", "near.glass().or(far.glass())",
      FROSTED + "of_touching_glasses_the_later_one_is_rough_or_smooth"),
-    ("photons that keep their basic flux", "integrators/photons/emit.rs", "            1.0 / ⟦(eta * eta)⟧\n", "1.0",
+    ("photons with unchanged basic flux", "integrators/photons/emit.rs", "            1.0 / ⟦(eta * eta)⟧\n", "1.0",
      FROSTED + "photons_scatter_at_rough_glass_to_both_sides"),
-    ("photons that do not go through", "integrators/photons/emit.rs", "if ⟦self.open_behind.used != 0⟧ {", "false",
+    ("photons that are not transmitted", "integrators/photons/emit.rs", "if ⟦self.open_behind.used != 0⟧ {", "false",
      FROSTED + "photons_scatter_at_rough_glass_to_both_sides"),
-    ("rays of rough lobes counted beside light samples", "integrators/direct/mis.rs",
+    ("rough lobe rays counted on top of light samples", "integrators/direct/mis.rs",
      "Self::Paths | Self::NarrowPaths => ⟦1.0 / count as f32⟧,", "0.0", MICROFACETS + "every_technique_finds_the_same_light_of_lamps"),
 ]
 
 
 def crate_of(room):
-    """The folder of the crate that has a room."""
+    """The folder of the crate that contains a module folder."""
     found = [crate for crate in (COPY / "crates").iterdir() if (crate / "src" / room).is_dir()]
     if len(found) != 1:
-        sys.exit(f"no crate, or more than one, has {room}")
+        sys.exit(f"no crate, or more than one, contains {room}")
     return found[0]
 
 
 def source(file):
-    """A file, named from its room on."""
+    """The path of a file, given relative to the src folder of its crate."""
     return crate_of(file.split("/")[0]) / "src" / file
 
 
 def copy_with_faults(faults_asked):
-    # What is no longer in the sources goes, what was built stays.
+    # Remove old sources, but keep the build.
     for entry in COPY.iterdir() if COPY.is_dir() else []:
         if entry.name != "target":
             shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
@@ -336,7 +336,7 @@ def copy_with_faults(faults_asked):
         path = source(file)
         head, right, tail = re.split("[⟦⟧]", place)
         if path.read_text().count(head + right + tail) != 1:
-            sys.exit(f"{faults[0][0]}: {file} does not hold `{place}` once")
+            sys.exit(f"{faults[0][0]}: {file} does not contain `{place}` exactly once")
         chosen = right
         for _, number, wrong in faults:
             chosen = f'if crate::injected({number}) {{ {wrong} }} else {{ {chosen} }}'
@@ -348,7 +348,7 @@ def copy_with_faults(faults_asked):
 def executables(profile):
     command = ["cargo", "test", "--profile", profile, "--workspace", "--lib", "--test", "suite", "--no-run",
                "--message-format=json"]
-    # A folder of its own: cargo takes the copy's packages for those of the sources.
+    # The copy needs its own target folder, as cargo would confuse its packages with the original ones.
     env = {**os.environ, "CARGO_TARGET_DIR": str(COPY / "target"), "RUSTFLAGS": os.environ.get("RUSTFLAGS", "")}
     built = subprocess.run(command, cwd=COPY, env=env, stdout=subprocess.PIPE, check=True)
     messages = [json.loads(line) for line in built.stdout.splitlines() if line.startswith(b"{")]
@@ -361,7 +361,7 @@ def passes(programs, test, fault=None):
     env = {**os.environ, "GLIMT_FAULT": "" if fault is None else str(fault)}
     run = subprocess.run([program, "--exact", test], cwd=COPY, env=env, capture_output=True, text=True)
     if "1 passed" not in run.stdout and "1 failed" not in run.stdout:
-        sys.exit(f"there is no test {test}\n{run.stdout}{run.stderr}")
+        sys.exit(f"no such test: {test}\n{run.stdout}{run.stderr}")
     return run.returncode == 0
 
 
@@ -372,13 +372,13 @@ def main():
     programs = executables(profile)
     for test in dict.fromkeys(row[4] for row in asked):
         if not passes(programs, test):
-            sys.exit(f"{test} fails without any fault")
+            sys.exit(f"{test} fails without a fault")
     missed = 0
     for number, (fault, _, _, _, test) in enumerate(asked):
         found = not passes(programs, test, number)
         missed += not found
         print(f"{'found ' if found else 'MISSED'}  {fault:45} {test}", flush=True)
-    sys.exit(f"{missed} faults are not found" if missed else 0)
+    sys.exit(f"{missed} faults were not detected" if missed else 0)
 
 
 main()

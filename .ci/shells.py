@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""bash, zsh and fish complete calls of glimt as a person types them, each in a pseudo-terminal.
+"""Tests completions of glimt in bash, zsh and fish by typing command lines in a pseudo-terminal.
 
-A stand-in for glimt writes down the words of the call that the shell makes once the line is complete; the completions come from the
-program. A shell that is not on the path is named and left out; with names of shells, those have to be there:
+A stand-in for glimt records the arguments with which the shell finally calls it; the completions come from the real program. Shells that
+are not installed are reported and skipped, unless they are named on the command line:
 
     python3 .ci/shells.py target/release/glimt
     python3 .ci/shells.py target/release/glimt bash zsh fish
@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 
-# A busy machine has this long for one line.
+# Seconds that a busy machine may take for one line.
 PATIENCE = 120
 PROMPT = "ready to type"
 SCENE = """[camera]
@@ -38,7 +38,7 @@ center = [0, 1, 0]
 radius = 0.5
 material = "wall"
 """
-# Keys, and the words of the call that they make; `\t` completes.
+# Typed keys, and the resulting arguments; `\t` completes.
 LINES = [
     ("glimt compl\t", ["completions"]),
     ("glimt ba\t", ["ball.toml"]),
@@ -52,7 +52,7 @@ LINES = [
     ("glimt ball.toml --set sphere.ball.mat\twi\t", ["ball.toml", "--set", "sphere.ball.material=window"]),
     ("glimt explain materials.metal.anis\t", ["explain", "materials.metal.anisotropy"]),
 ]
-# Names that a shell takes for more than names, by the keys that lead to them.
+# File names with special characters, by the keys that complete to them.
 NAMES = {
     "My": "My scene.toml",
     "X": "X$(touch HACKED).toml",
@@ -64,7 +64,7 @@ NAMES = {
 }
 LINES += [(f"glimt check {keys}\t", ["check", name]) for keys, name in NAMES.items()]
 LINES += [("glimt ball.toml --set sphere.ball.material=sp\t", ["ball.toml", "--set", "sphere.ball.material=sp ace"])]
-# Words that are quoted already, which the scripts for zsh and fish do not complete.
+# Quoted words, which the scripts for zsh and fish do not complete.
 QUOTED = [
     ("glimt check F\tin\t", ["check", "F older/in side.toml"]),
     ("glimt check My\\ s\t", ["check", "My scene.toml"]),
@@ -78,7 +78,7 @@ QUOTED = [
     ("glimt ball.toml --set=sphere.ball.material=\\$\t", ["ball.toml", "--set=sphere.ball.material=$(touch HACKED)"]),
     ("glimt ball.toml --set sphere.ball.material=\\`\t", ["ball.toml", "--set", "sphere.ball.material=`touch HACKED`"]),
 ]
-# Keys, and what the shell then lists.
+# Typed keys, and the words that the shell must list.
 LISTS = [
     ("glimt ball.toml --integrator \t\t", ["whitted", "path"]),
     ("glimt ball.toml --set render.integrator=\t\t", ["whitted", "path"]),
@@ -91,7 +91,7 @@ mv "$GLIMT_CALL.new" "$GLIMT_CALL"
 
 
 class Shell:
-    """A shell with the completions, at its prompt."""
+    """A shell with the completions loaded, at its prompt."""
 
     def __init__(self, name, folder):
         self.call = folder / "call"
@@ -100,7 +100,7 @@ class Shell:
         begin = {
             "bash": f"PS1='{PROMPT} '\nsource <(glimt completions bash)\n",
             "zsh": f"PS1='{PROMPT} '\nautoload -U compinit\ncompinit -u -d {home}/dump\nsource <(glimt completions zsh)\n",
-            # As a package does it: a file in a folder that zsh searches.
+            # As packages install it: a file in a folder of fpath.
             "zsh of a package": f"PS1='{PROMPT} '\nglimt completions zsh > {home}/_glimt\nfpath+=({home})\n"
             f"autoload -U compinit\ncompinit -u -d {home}/dump\n",
             "fish": f"function fish_prompt; echo '{PROMPT} '; end\nglimt completions fish | source\n",
@@ -124,16 +124,16 @@ class Shell:
         self.wait(lambda: PROMPT in self.screen, "its prompt")
 
     def wait(self, holds, what):
-        """Reads the screen until something holds."""
+        """Reads the screen until a condition holds."""
         deadline = time.monotonic() + PATIENCE
         while not holds():
             if time.monotonic() > deadline:
-                raise TimeoutError(f"{what} does not come; the screen has {self.screen[-400:]!r}")
+                raise TimeoutError(f"timed out waiting for {what}; the screen shows {self.screen[-400:]!r}")
             if select.select([self.end], [], [], 0.05)[0]:
                 try:
                     self.screen += os.read(self.end, 65536).decode(errors="replace")
                 except OSError:
-                    raise TimeoutError(f"{what} does not come; the shell has ended: {self.screen[-400:]!r}") from None
+                    raise TimeoutError(f"the shell exited before {what}: {self.screen[-400:]!r}") from None
 
     def type(self, keys):
         self.screen = ""
@@ -149,7 +149,7 @@ class Shell:
 
 
 def words_of(name, folder, keys):
-    """The words of the call that keys make."""
+    """The arguments of the call that typed keys make."""
     shell = Shell(name, folder)
     try:
         shell.call.unlink(missing_ok=True)
@@ -161,7 +161,7 @@ def words_of(name, folder, keys):
 
 
 def shows(name, folder, keys, wanted):
-    """Waits until the shell lists words after keys."""
+    """Waits until the shell lists words after typed keys."""
     shell = Shell(name, folder)
     try:
         shell.type(keys)
@@ -184,8 +184,8 @@ def main():
             (folder / other).write_text("")
         for shell in wanted or ["bash", "zsh", "zsh of a package", "fish"]:
             if not shutil.which(shell.split()[0]):
-                print(f"{shell}: not on this machine")
-                faults += [f"{shell} is not there"] if wanted else []
+                print(f"{shell}: not installed")
+                faults += [f"{shell} is not installed"] if wanted else []
                 continue
             before = len(faults)
             lines = LINES + (QUOTED if shell == "bash" else [])
@@ -196,9 +196,9 @@ def main():
                     found = str(error)
                 if (folder / "HACKED").exists():
                     (folder / "HACKED").unlink()
-                    found = f"{found}, and runs what a name holds"
+                    found = f"{found}, and executed code from a file name"
                 if found != expected:
-                    faults.append(f"{shell}: {keys!r} makes {found}, not {expected}")
+                    faults.append(f"{shell}: {keys!r} gives {found}, expected {expected}")
             for keys, listed in LISTS:
                 try:
                     shows(shell, folder, keys, listed)

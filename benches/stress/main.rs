@@ -43,7 +43,7 @@ const HEAD: &str = "# Scenes at the limits
 `cargo bench --bench stress` writes this table. A difference is the relative RMS error against the reference scene, for the row's worst
 image; a mean is the deviation of the image's mean from the expected value. Seconds include all stages except reading and writing, on one
 thread, for the row's images and for their references; rows with a ratio may take at most three times as long as the reference. No row
-has non-finite samples, crashes or hangs unless it says so.
+has non-finite samples, crashes or hangs except where noted.
 
 | case | images | measure | value | bound | s | reference, s | ratio | |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |

@@ -25,7 +25,7 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
         ("path, kd-tree", "integrator = \"path\"\naccel = \"kdtree\""),
         ("photons", PHOTONS),
         ("lens", "LENS"),
-        ("64 lamps", "LAMPS"),
+        ("64 lights", "LAMPS"),
     ];
     // Rounding at another position occasionally picks another light of the tree or another photon of a kernel, which
     // changes one sample of many. Scenes with lights therefore run only in the long variant, with more samples.

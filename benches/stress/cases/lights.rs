@@ -31,11 +31,11 @@ const POWERS: [(&str, &str); 6] = [
     ("sun", "[[light]]\ntype = \"directional\"\ndirection = [0, -1, -1]\nangle = 1\nirradiance = POWER\n"),
     ("sky", "[environment]\ncolor = POWER\n"),
     (
-        "quad lamp",
+        "quad light",
         "[materials.lamp]\nemission = POWER\n[[quad]]\ncorner = [-1, 2, -5]\nu = [2, 0, 0]\nv = [0, 0, 1]\nmaterial = \"lamp\"\n",
     ),
     (
-        "sphere lamp",
+        "sphere light",
         "[materials.lamp]\nemission = POWER\n[[sphere]]\ncenter = [1, 1, -5]\nradius = 0.3\nmaterial = \"lamp\"\n",
     ),
 ];
