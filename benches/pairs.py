@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Processor time of two glimt binaries on the same scenes, in turns, each with the settings of the scene.
+"""Compares the processor time of two glimt binaries on the same scenes, interleaved, with each scene's own settings.
 
     python3 benches/pairs.py BEFORE AFTER SCENE... [--pairs N] [-- OPTION...]
 
-Prints for each scene the median seconds of both, user and system, of whole processes; the median of the ratios of the pairs, the
-ratio of the least seconds, and whether the pictures have the same pixels; at the end the geometric mean of the medians. Scenes that
-take long get fewer pairs, three at least. Options after `--` go to both binaries.
+Prints for each scene the median processor seconds of both, as whole processes; the median ratio of the pairs, the ratio of the minima,
+and whether the images have the same pixels; at the end the geometric mean of the medians. Slow scenes get fewer pairs, but at least
+three. Options after `--` are passed to both binaries.
 """
 
 import argparse
@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 
-# Seconds of one binary on one scene after which it gets no more pairs.
+# Seconds of one binary on one scene after which no more pairs are run.
 BUDGET_SECONDS = 12
 
 
@@ -33,7 +33,7 @@ def seconds(binary, scene, picture, options):
 
 
 def content(picture):
-    """Bytes of a PPM but for its comments, which name the program."""
+    """The bytes of a PPM except its comments, which name the program."""
     with open(picture, "rb") as file:
         return [line for line in file if not line.startswith(b"#")]
 
@@ -47,7 +47,7 @@ def main():
     parser.add_argument("before")
     parser.add_argument("after")
     parser.add_argument("scenes", nargs="+", metavar="SCENE")
-    parser.add_argument("--pairs", type=int, default=9, metavar="N", help="most pairs of a scene")
+    parser.add_argument("--pairs", type=int, default=9, metavar="N", help="maximum number of pairs per scene")
     asked = parser.parse_args(arguments)
     binaries, ratios = (asked.before, asked.after), []
     with tempfile.TemporaryDirectory() as folder:

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Prints the processor time of all tests, and the dearest ones.
+"""Prints the processor time of all tests, and the most expensive ones.
 
     python3 tests/cost.py [PROFILE [COUNT]]      (default: dev, 10)
 
-Each test runs in a process of its own, one after the other; its processor time holds that of the programs it starts.
+Each test runs in its own process, one after the other; its processor time includes the programs that it starts.
 """
 
 import json

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""The mean of pictures whose samples go where the noise is, beside that of equal samples.
+"""Compares the mean of adaptively sampled images with uniformly sampled ones.
 
     python3 benches/adaptive/bias.py [SCENE...] [--error E | --time-share P] [--seeds N] [--side PIXELS] [--glimt BINARY]
 
-N pictures, each of a seed of its own, that stop by `error = E`, or by a budget of time: the part P of the seconds that 256 samples
-take. Their mean luminance is held against that of a quarter as many pictures with as many samples each as will make those as exact.
-Printed: the means apart in percent, the standard error of that, and the ratio of both. By itself: cornell and cornell_glass,
-E = 0.05, 200 seeds, 48 pixels along the longer side. In the environment of ../mitsuba, which is made where it is not there.
+Renders N images with different seeds that stop at `error = E`, or after the fraction P of the time that 256 samples take. Their mean
+luminance is compared with that of a quarter as many uniformly sampled images, with enough samples to be equally exact. Prints the
+difference of the means in percent, its standard error, and the ratio of both. Defaults: cornell and cornell_glass, E = 0.05, 200 seeds,
+48 pixels along the longer side. Runs in the environment of ../mitsuba, which is created if it does not exist.
 """
 
 import argparse
@@ -33,7 +33,7 @@ def arguments():
 
 
 def mean_of(asked, scene, folder, seed, options):
-    """The mean luminance of a picture, its mean number of samples, and the seconds of its render stage."""
+    """The mean luminance of an image, its mean number of samples, and the seconds of its render stage."""
     import mitsuba as mi
     import numpy as np
 

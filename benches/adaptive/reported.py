@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""The error that reports tell beside the true one, for each scene, integrator and number of samples.
+"""Compares the reported error with the true error, for each scene, integrator and number of samples.
 
     python3 benches/adaptive/reported.py [SCENE...] [--seeds N] [--side PIXELS] [--samples N,N] [--integrators A,B] [--glimt BINARY]
 
-Each scene is rendered by N seeds. The spread of these pictures is the true noise: the root mean square over the pixels of the standard
-deviation of their luminance, over its mean. Printed: the root mean square over the seeds of `image.error` as a part of that, with an
-interval of 95 % by the bootstrap over the seeds; then the same of the standard error of the mean luminance that the EXR files hold,
-beside the spread of the means. The last lines sum up: the median of all ratios, how many lie outside of 0.9 to 1.35 (and of these,
-those whose interval does not reach it), and the pooled ratio of the mean's standard error. By itself: all bundled scenes, both
-integrators, 16, 64 and 256 samples, 40 seeds, 64 × 64 pixels. In the environment of ../mitsuba, which is made where it is not there.
+Each scene is rendered with N seeds. The spread of these images is the true noise: the RMS over the pixels of the standard deviation of
+their luminance, over its mean. Prints the RMS over the seeds of `image.error` relative to the true noise, with a 95 % bootstrap
+interval over the seeds; then the same for the standard error of the mean luminance in the EXR files, relative to the spread of the means.
+The last lines summarize: the median of all ratios, how many are outside 0.9 to 1.35 (and how many of these have intervals that do not
+reach it), and the pooled ratio of the mean's standard error. Defaults: all bundled scenes, both integrators, 16, 64 and 256 samples,
+40 seeds, 64 × 64 pixels. Runs in the environment of ../mitsuba, which is created if it does not exist.
 """
 
 import argparse
@@ -40,14 +40,14 @@ def arguments():
 
 
 def mean_error(picture):
-    """The standard error of the mean luminance that an EXR file holds; none of pictures with photons."""
+    """The standard error of the mean luminance from an EXR file; None for images with photons."""
     head = picture.read_bytes()[:4096]
     at = head.find(MEAN_ERROR)
     return None if at < 0 else struct.unpack("<d", head[at + len(MEAN_ERROR) + 4 :][:8])[0]
 
 
 def rendered(asked, scene, integrator, samples, folder):
-    """Luminance by each seed, and what reports and files tell."""
+    """Luminance for each seed, and the values from reports and files."""
     import mitsuba as mi
     import numpy as np
 
@@ -66,11 +66,11 @@ def rendered(asked, scene, integrator, samples, folder):
 
 
 def row(asked, scene, integrator, samples, folder):
-    """Prints a row; gives its ratio, its interval and the squared ratio of the mean's error; none where there is no noise."""
+    """Prints a row; returns its ratio, its interval and the squared ratio of the mean's error, or None if there is no noise."""
     import numpy as np
 
     luminance, told, of_means = rendered(asked, scene, integrator, samples, folder)
-    # Squares sum up by seed, so that seeds can be drawn again.
+    # Sums of squares per seed, for the bootstrap.
     means = luminance.mean(axis=(1, 2))
 
     def ratio(seeds):
@@ -85,13 +85,13 @@ def row(asked, scene, integrator, samples, folder):
     random = np.random.default_rng(1)
 
     def drawn():
-        # A seed that is drawn twice counts once in the variance: drawn as a half of them, the spread is that of all.
+        # A seed that is drawn twice counts once in the variance, so the spread is computed from half of the draws.
         return ratio(random.choice(everyone, size=len(everyone) // 2, replace=False))
 
     low, high = np.quantile([drawn() for _ in range(RESAMPLES)], [0.025, 0.975])
     square = None
     if None not in of_means:
-        # A variance of n normal means, divided by their spread, is 1/(1 − 2/(n − 1)) times too large on average.
+        # The variance of n normal means divided by their spread is 1/(1 − 2/(n − 1)) times too large on average.
         square = np.mean(np.square(of_means)) / means.var(ddof=1) * (1 - 2 / (len(means) - 1))
     of_mean = "" if square is None else f"{np.sqrt(square):9.2f}"
     print(f"{scene.stem:16}{integrator:9}{samples:5}{found:8.2f}  {low:5.2f} to {high:5.2f}{of_mean}", flush=True)

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Samples where the noise is, beside the same number everywhere: seconds to the same relMSE.
+"""Compares adaptive sampling with uniform sampling: seconds to the same relMSE.
 
     python3 benches/adaptive/run.py [SCENE...] [--samples N] [--error E] [--seeds N] [--side PIXELS] [--glimt BINARY]
 
-Each scene is rendered with N samples everywhere, and in turns with `--time S`, for several parts S of the seconds that these took;
-the seconds at which it has the same relMSE are taken between two of them. With `--error E` it is rendered with that error asked for
-in place of a time, and the number of samples that is as good is looked for. A reference with many samples is rendered first. By
-itself: all bundled scenes, 256 samples, 3 seeds, 256 pixels along the longer side.
+Renders each scene with N samples everywhere, interleaved with `--time S` for several fractions S of the time that these took, and
+interpolates the time at which it has the same relMSE. With `--error E`, the scene is rendered with that requested error instead, and the
+equivalent number of samples is searched for. A reference with many samples is rendered first. Defaults: all bundled scenes, 256 samples,
+3 seeds, 256 pixels along the longer side.
 """
 
 import argparse
@@ -37,7 +37,7 @@ def arguments():
 
 
 class Render:
-    """Renders of one scene at one size, and what they are held against."""
+    """Renders of one scene at one size, and their references."""
 
     def __init__(self, glimt, scene, side, folder):
         with scene.open("rb") as file:
@@ -73,7 +73,7 @@ class Render:
 
 
 def log_between(x, low, high):
-    """The second number where the first is x, along the line through two points on log axes."""
+    """Log-log interpolation of the second number at x between two points."""
     (x0, y0), (x1, y1) = low, high
     if x0 == x1:
         return math.sqrt(y0 * y1)
@@ -84,7 +84,7 @@ PARTS = [0.3, 0.45, 0.65, 0.9, 1.1]
 
 
 def where_equal(fixed, runs):
-    """The part of the seconds, and the samples, at which these runs have the mean relMSE of the fixed ones."""
+    """The fraction of the time, and the samples, at which these runs have the mean relMSE of the uniform ones."""
     goal = statistics.fmean(run[1] for run in fixed)
     points = [[statistics.fmean(run[1] for run in runs[part]), *(statistics.median(run[k] for run in runs[part]) for k in (0, 2))] for part in PARTS]
     above = [k for k in range(len(PARTS) - 1) if points[k + 1][0] < goal]
@@ -93,8 +93,7 @@ def where_equal(fixed, runs):
 
 
 def in_time(render, samples, seeds):
-    """Medians of the seconds of both, the samples of both, their ratio, the relMSE that they share, and the standard error of the
-    ratio, by leaving out one seed after the other."""
+    """Medians of the seconds and samples of both, their ratio, the relMSE that they share, and the jackknife standard error of the ratio."""
     render.run("reference.exr", ["--error", 0, "--samples", REFERENCE_TIMES * samples, "--seed", 999])
     fixed, runs = [], {part: [] for part in PARTS}
     for seed in range(1, seeds + 1):
@@ -115,7 +114,7 @@ def in_time(render, samples, seeds):
 
 
 def compared(render, error, seeds):
-    """Medians of the seconds of both, the samples of both, their ratio, the relMSE that they share, and the error of the ratio."""
+    """Medians of the seconds and samples of both, their ratio, the relMSE that they share, and the error of the ratio."""
     _, samples = render.run("picture.exr", ["--error", error, "--samples", MOST])
     render.run("reference.exr", ["--error", 0, "--samples", min(MOST, max(1024, round(REFERENCE_TIMES * samples))), "--seed", 999])
     tried = {}
@@ -136,7 +135,7 @@ def compared(render, error, seeds):
         count = max(1, round(count * reached / goal))
     low, high = max(1, math.floor(count * 0.8)), math.ceil(count * 1.25)
     mean_of_fixed(low), mean_of_fixed(high)
-    # In turns, as the machine may change its pace.
+    # Interleave the runs, as the speed of the machine may change.
     ratios = []
     for seed in range(1, seeds + 1):
         own = render.adaptive(error, seed)[0]

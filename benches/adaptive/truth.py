@@ -1,16 +1,15 @@
 #!/usr/bin/env python3
-"""The noise that is left beside the error that was asked for.
+"""Compares the remaining noise with the requested error.
 
     python3 benches/adaptive/truth.py [SCENE...] [--error E] [--seeds N] [--side PIXELS] [--photons]
         [--integrator I] [--glimt BINARY]
 
-Each scene is rendered by N seeds with `error = E`. The spread of these pictures is the true noise of each tile: the root mean square
-standard deviation of its pixels' luminance, over the larger of its mean and 1 % of the picture's. Printed, as parts of E: the root mean
-square over all tiles, the same over those that needed more than 16 samples, and the largest tile; then the part of such tiles, the
-mean number of samples, the error that the report tells beside the true one of the whole picture, and the time to go that was shown
-when a quarter of the work was done, as a part of the true one (median of the seeds that took half a second or more). By itself: all
-bundled scenes, E = 0.02, 8 seeds, 192 pixels along the longer side. In the environment of ../mitsuba, which is made where it is not
-there.
+Each scene is rendered with N seeds and `error = E`. The spread of these images is the true noise of each tile: the RMS standard deviation
+of its pixels' luminance, over the larger of its mean and 1 % of the image's. Prints, relative to E: the RMS over all tiles, the RMS over
+the tiles that needed more than 16 samples, and the largest tile; then the fraction of such tiles, the mean number of samples, the
+reported error over the true error of the whole image, and the remaining time shown at a quarter of the work over the true one (median of
+the seeds that took half a second or more). Defaults: all bundled scenes, E = 0.02, 8 seeds, 192 pixels along the longer side. Runs in the
+environment of ../mitsuba, which is created if it does not exist.
 """
 
 import argparse
@@ -32,7 +31,7 @@ WEIGHTS = (0.2126, 0.7152, 0.0722)
 
 
 def within_environment(program):
-    """Start again where numpy and a reader of float files are."""
+    """Restarts in an environment with numpy and a reader of float images."""
     sys.path.insert(0, str(HERE.parent / "mitsuba"))
     import run
 
@@ -55,13 +54,13 @@ def arguments():
 
 
 def tiles(picture):
-    """The tiles of a picture, row after row."""
+    """The tiles of an image, row by row."""
     rows, columns = picture.shape[:2]
     return [picture[y : y + TILE, x : x + TILE] for y in range(0, rows, TILE) for x in range(0, columns, TILE)]
 
 
 def size_of(scene, side):
-    """Options for so many pixels along the longer side."""
+    """Options for a number of pixels along the longer side."""
     with scene.open("rb") as file:
         own = tomllib.load(file).get("render", {})
     width, height = own.get("width", 640), own.get("height", 480)
@@ -70,7 +69,7 @@ def size_of(scene, side):
 
 
 def rendered(asked, scene, folder):
-    """Luminance by each seed, samples of each pixel, and what the reports tell of the error and the samples."""
+    """Luminance for each seed, samples of each pixel, and the reported errors and samples."""
     import mitsuba as mi
     import numpy as np
 
@@ -95,7 +94,7 @@ def rendered(asked, scene, folder):
 
 
 def foretold(lines):
-    """The seconds to go that were told at a quarter of the render, as a part of those that it took from there on."""
+    """The remaining time shown at a quarter of the render, over the true remaining time."""
     events = [json.loads(line) for line in lines.splitlines()]
     events = [event for event in events if event["event"] == "progress"]
     at = next((event for event in events if event["fraction"] >= 0.25 and event["eta_seconds"] is not None), None)

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Processor seconds of a picture in 1, 2, 4, 8 parts, bytes of a part, seconds of the merge; computed from these: 10,000 parts.
+"""Measures renders in 1, 2, 4 and 8 parts: processor seconds, bytes of a part, seconds of the merge; extrapolates to 10,000 parts.
 
     python3 benches/farm/run.py [--program target/release/glimt] [--rounds 3] [--large] [SCENE ...]
 
-Processor seconds are those of the report's stages, so that other work on the machine counts little; each is the least of some rounds.
-`work` is `photons` and `render`, `set-up` what comes before, `write` the encoding of the part. `slowest` is the part with the most
-work over the mean. --large measures 2560 x 1600 pixels, 8 parts alone.
+Processor seconds are from the report's stages, so that other load on the machine matters little; each is the minimum of several rounds.
+`work` is `photons` and `render`, `set-up` is everything before, `write` is the encoding of the part. `slowest` is the part with the most
+work over the mean. --large measures only 2560 x 1600 pixels in 8 parts.
 
 The efficiency of N parts is the processor time of a single run over that of all parts and their merge:
-(set-up + work + write) / (N set-up + work + N write + merge), where the merge takes a part that grows with the bytes of the picture and
-one that grows with N. Work is divided without rest among tiles of 32 x 32 pixels, and with photons among blocks of 16 passes: if there
-are more parts than tiles, the others are empty; if there are more parts than blocks, several trace the photons of each block.
+(set-up + work + write) / (N set-up + work + N write + merge), where the merge has a term proportional to the bytes of the image and one
+proportional to N. Work is distributed evenly over tiles of 32 x 32 pixels, and with photons over blocks of 16 passes: if there are more
+parts than tiles, some are empty; if there are more parts than blocks, several parts trace the photons of each block.
 """
 
 import argparse
@@ -33,7 +33,7 @@ LARGE_SAMPLES = {"photons": ["--samples", "128", "--set", "photons.count=100000"
 
 
 def measured(command, folder):
-    """Runs a program; returns its processor seconds and its seconds."""
+    """Runs a program; returns its processor seconds and wall-clock seconds."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run(command, cwd=folder, check=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -50,7 +50,7 @@ def part(program, scene, options, index, count, folder):
     seconds = {stage["name"]: stage["processor_seconds"] for stage in report["stages"]}
     size = os.path.getsize(Path(folder) / (name if count > 1 else "one.exr"))
     work, write = seconds["photons"] + seconds["render"], seconds["write"]
-    # What no stage has: the start of the program, its report, its end.
+    # Everything outside the stages: start-up, report, exit.
     rest = total - sum(seconds.values())
     photons = report.get("photons") or {"seconds": 0.0, "passes": 0}
     tracing = photons["seconds"] / sum(stage["seconds"] for stage in report["stages"] if stage["name"] == "render")
@@ -60,7 +60,7 @@ def part(program, scene, options, index, count, folder):
 
 
 def least(rounds, measure):
-    """The least of each figure."""
+    """The minimum of each figure."""
     all_rounds = [measure() for _ in range(rounds)]
     return {name: min(figures[name] for figures in all_rounds) for name in all_rounds[0]}
 
@@ -77,7 +77,7 @@ def merged(program, count, rounds, folder):
     seconds = min(measured(command, folder) for _ in range(rounds))
     one = Path(folder) / "one.exr"
     same = not one.exists() or (Path(folder) / "merged.exr").read_bytes() == one.read_bytes()
-    assert same, "the merged picture is not that of a single run"
+    assert same, "the merged image differs from a single run a single run"
     return seconds
 
 
@@ -86,7 +86,7 @@ def mean(figures, name):
 
 
 def table(scene, options, arguments, counts, folder):
-    """Prints the table of one scene; returns what a computation needs."""
+    """Prints the table of one scene; returns the inputs of the extrapolation."""
     print(f"\n{scene.stem} {' '.join(options)}\n")
     print("| parts | work, s | to one run | set-up of a part, s | write, s | bytes of a part | merge, s | slowest |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
@@ -110,13 +110,13 @@ def table(scene, options, arguments, counts, folder):
 
 
 def foretell(single, last, opening):
-    """Prints the efficiency of up to 10,000 parts, for this picture and for one whose work is a night on two cores. With photons, the
+    """Prints the efficiency of up to 10,000 parts, for this image and for one whose work is a night on two cores. With photons, the
     longer one has more passes."""
     print("\n| parts | efficiency | with 16 hours of work |\n| --- | --- | --- |")
     for count in FORETOLD:
         def of(work):
             alone = single["setup"] + work + single["write"]
-            # A part that is nearly empty is written in no time; its set-up stays.
+            # A nearly empty part is written in no time, but its set-up remains.
             each = single["setup"] + last["write"] * last["count"] / max(count, last["count"])
             merge = last["merge"] + opening * count if count > 1 else 0.0
             again = max(1.0, count / (single["blocks"] * work / single["work"])) if single["blocks"] else 1.0
@@ -127,7 +127,7 @@ def foretell(single, last, opening):
 
 
 def opening_of(program, rounds, folder):
-    """Seconds of a merge for each part, by 64 that are nearly empty."""
+    """Merge seconds per part, measured with 64 nearly empty parts."""
     scene = str(ROOT / "scenes/cornell.toml")
     options = ["--width", "64", "--height", "64", "--samples", "1"]
     for count in (2, 64):

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Means of regions of the scenes of this folder, by glimt and by Mitsuba 3: how far they are apart, in standard errors and in percent.
+"""Compares the means of image regions between glimt and Mitsuba 3, in standard errors and in percent.
 
     python benches/materials/means.py BINARY [SCENE...] [--samples N] [--pictures N] [--side PIXELS]
 
-In an environment with mitsuba and numpy; the variant is llvm_ad_rgb where DRJIT_LIBLLVM_PATH is set, else scalar_rgb. A picture is
-cut into 4 x 3 regions; the errors are those of some pictures of each program, of seeds of their own.
+Runs in an environment with mitsuba and numpy; the variant is llvm_ad_rgb if DRJIT_LIBLLVM_PATH is set, otherwise scalar_rgb. An image
+is divided into 4 x 3 regions; the errors come from several images per program with different seeds.
 """
 
 import argparse
@@ -27,7 +27,7 @@ REGIONS = (3, 4)
 
 
 def regions(picture):
-    """Mean colours of the regions, row by row."""
+    """Mean colors of the regions, row by row."""
     rows = np.array_split(picture, REGIONS[0], axis=0)
     return np.array([part.mean(axis=(0, 1)) for row in rows for part in np.array_split(row, REGIONS[1], axis=1)])
 

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Why rough plastic is not that of Mitsuba 3: the diffuse part of `roughplastic` (nonlinear) beside two formulas, in f64.
+"""Explains why rough plastic differs from Mitsuba 3: the diffuse term of `roughplastic` (nonlinear) and two formulas, in f64.
 
     python benches/materials/plastic.py
 
-In an environment with mitsuba and numpy. With E and T what the coat reflects and lets through (scattered once, by quadrature over half
-vectors), and R what it reflects from within:
+Runs in an environment with mitsuba and numpy. E and T are what the coat reflects and transmits (single scattering, by quadrature over
+half vectors), and R is what it reflects from within:
 
 - glimt:   (1 - E(i))(1 - E(o)) kd / (pi eta^2 (1 - kd F)) with F = 1 - (1 - mean E)/eta^2, so that white reflects all light;
-- Mitsuba: T(i) T(o) kd / (pi eta^2 (1 - kd R)), which loses what a coat scatters twice. Its R is by a table; the last column solves
-  for the R that Mitsuba's red has, and checks it by green and blue.
+- Mitsuba: T(i) T(o) kd / (pi eta^2 (1 - kd R)), which loses light that the coat scatters twice. Its R comes from a table; the last
+  column solves for the R of Mitsuba's red, and checks it with green and blue.
 """
 
 import mitsuba as mi
@@ -29,7 +29,7 @@ def fresnel(cosine, eta):
 
 
 def albedos(cosine, alpha, eta, rings=1200, steps=96):
-    """What a boundary of microfacets reflects and lets through."""
+    """Reflection and transmission of a microfacet boundary."""
     y, turn = np.meshgrid((np.arange(rings) + 0.5) / rings, (np.arange(steps) + 0.5) / steps * 2 * np.pi, indexing="ij")
     slope = alpha * np.sqrt(1 / (1 - y) ** 2 - 1)
     half = np.stack([slope * np.cos(turn), slope * np.sin(turn), np.ones_like(turn)])

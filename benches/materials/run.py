@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Metals under a sky and rough glass before a lamp, by glimt and by Mitsuba: processor seconds x error of each, and the ratio.
+"""Compares metals under a sky and rough glass in front of a light between glimt and Mitsuba: processor seconds x error, and the ratio.
 
     python3 benches/materials/run.py [SCENE...] [--rounds N] [--seeds N] [--samples N] [--glimt BINARY]...
 
-It is ../rooms/run.py with the scenes of this folder: metals.toml and glass.toml, or those that are named.
+This is ../rooms/run.py with the scenes of this folder, metals.toml and glass.toml, or the given ones.
 """
 
 import os

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Seconds of trees on triangles that share a vertex, beside as many that lie apart.
+"""Measures tree construction over triangles that share a vertex, compared with separate ones.
 
     python3 benches/memory/fans.py [--program target/release/glimt] [--triangles N,N] [--rounds 3]
 
-A fan has one vertex in all of its triangles: no plane parts them there. A soup has as many triangles of the fan's size at random places.
-Printed: the seconds that the report tells of the tree (the least of some rounds, in turns) and fan over soup.
+All triangles of a fan share one vertex, where no plane separates them. A soup has the same number of triangles of the same size at random
+positions. Prints the reported seconds of the tree (the minimum of several interleaved rounds) and the ratio of fan to soup.
 """
 
 import argparse
@@ -36,7 +36,7 @@ material = "clay"
 
 
 def fan(count):
-    """A cone around the first vertex, wavy so that its triangles do not lie in one plane."""
+    """A cone around the first vertex, wavy so that its triangles are not coplanar."""
     def rim(i):
         angle = math.tau * i / count
         return math.cos(angle), math.sin(angle), 0.3 * math.sin(7 * angle)
@@ -46,7 +46,7 @@ def fan(count):
 
 
 def soup(count):
-    """Triangles of the fan's shape, each turned and moved at random within the same room."""
+    """Triangles of the fan's shape, each randomly rotated and moved within the same volume."""
     numbers = random.Random(1)
     vertices, faces = [], []
     width = math.tau / count

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Memory that previews take in large terminals: the most resident memory of the program, by kind of preview and size of the window.
+"""Measures the memory that previews take in large terminals: maximum resident memory, by kind of preview and window size.
 
     python3 benches/memory/previews.py [--program target/release/glimt]
 
-The terminal is a pseudo-terminal that answers at once and draws nothing. Half blocks are what the program takes without pixels.
+The terminal is a pseudo-terminal that answers at once and draws nothing. Half blocks show the memory without pixels.
 """
 
 import argparse
@@ -26,7 +26,7 @@ ANSWERS = [(b"\x1b[5n", b"\x1b[0n"), (b"\x1b[c", b"\x1b[?62;4;22c")]
 
 
 def most_memory(process):
-    """The most resident memory so far, in bytes; 0 once it has ended."""
+    """The maximum resident memory so far, in bytes; 0 after the process has ended."""
     lines = Path(f"/proc/{process.pid}/status").read_text().splitlines()
     return max((int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM")), default=0)
 
@@ -47,7 +47,7 @@ def watched(program, preview, window, folder):
             came = os.read(master, 1 << 16)
             sent += len(came)
             for question, answer in ANSWERS:
-                # What the tail holds was answered before.
+                # Queries in the tail were already answered.
                 for _ in range((tail + came).count(question) - tail.count(question)):
                     os.write(master, answer)
             tail = (tail + came)[-8:]

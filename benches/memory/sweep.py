@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""What happens when memory runs out: the program under limits of its address space, headless and in a pseudo-terminal.
+"""Runs the program under limits of its address space, headless and in a pseudo-terminal.
 
     python3 benches/memory/sweep.py [--program target/release/glimt] [--runs 200] [--csv FILE] [SCENE…]
 
-Every run has to end with exit code 0, 1 or 2 (127 where the loader itself has no room), with a sentence if the code is not 0, and a
-terminal has to be as it was before: keys echoed, lines edited, the shell's screen shown.
+Every run must end with exit code 0, 1 or 2 (127 if the loader itself has no memory) and a message if the code is not 0, and must restore
+the terminal: keys are echoed, lines can be edited, the shell's screen is shown.
 """
 
 import argparse
@@ -59,7 +59,7 @@ def in_terminal(program, scene, size, folder):
     while child.poll() is None and time.monotonic() - start < SECONDS:
         if select.select([master], [], [], 0.05)[0]:
             seen += os.read(master, 1 << 16)
-        # A picture, or an error that is shown: leave.
+        # An image or an error is shown: quit.
         if not asked and time.monotonic() - start > 2.5:
             os.write(master, b"q")
             asked = True

@@ -1,4 +1,4 @@
-"""Files that both renderers read, made from formulas: a mesh, textures, maps of the sky."""
+"""Generates the files that both renderers read: a mesh, textures, environment maps."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ SKY = (1024, 512)
 
 
 def directory(home):
-    """Where the files are; they are made where they are missing. The names of the sky's files end in the renderer's."""
+    """The folder of the files, which are generated if they do not exist. The names of the environment maps end in the renderer's."""
     folder = home / "assets"
     if not folder.exists():
         unfinished = home / "assets.unfinished"
@@ -42,7 +42,7 @@ def knot(file):
     at = lambda i, j: (i % along) * about + j % about
     corners = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j), at(i + 1, j + 1), at(i, j + 1)]
     triangles = np.stack(corners, axis=-1).reshape(-1, 3)
-    # Outwards, as the normals are.
+    # Facing outward, like the normals.
     a, b, c = (vertices[triangles[:, k], :3] for k in range(3))
     if np.sum(np.cross(b - a, c - a) * vertices[triangles[:, 0], 3:]) < 0:
         triangles = triangles[:, ::-1]
@@ -62,14 +62,14 @@ def write(file, values):
 
 
 def board(file):
-    """Squares of two colours, symmetric in both directions."""
+    """A checkerboard of two colors, symmetric in both directions."""
     y, x = np.mgrid[0:256, 0:256] // 32
     is_dark = (x + y) % 2 == 1
     write(file, np.where(is_dark[..., None], [70, 52, 40], [226, 214, 190]).astype(np.uint8))
 
 
 def marble(file):
-    """Waves of several lengths that fit into the picture."""
+    """Waves of several lengths that tile."""
     y, x = np.mgrid[0:512, 0:512] / 512 * 2 * np.pi
     bent = np.sin(3 * x + 2 * np.sin(2 * y)) + 0.5 * np.sin(7 * y + np.sin(5 * x)) + 0.25 * np.sin(19 * x + 13 * y)
     share = (0.5 + bent / 3.5)[..., None]
@@ -77,7 +77,7 @@ def marble(file):
 
 
 def radiance(direction):
-    """A sky with a hazy sun, and the ground's own glow below the horizon."""
+    """A sky with a hazy sun, and a glowing ground below the horizon."""
     sun = np.array([0.55, 0.5, 0.67])
     sun /= np.linalg.norm(sun)
     height = direction[..., 1:2]
@@ -89,8 +89,8 @@ def radiance(direction):
 
 
 def sky(for_mitsuba, for_glimt):
-    """One sky, told at the places where each renderer has its texels. Mitsuba's rows are from pole to pole, its first column is at
-    −z; glimt's texels have half of their width around them, the middle of its map is at −z."""
+    """One sky, sampled at the texels of each renderer. Mitsuba's rows run from pole to pole and its first column is at
+    −z; glimt's texels are centered in their cells, and the center of its map is at −z."""
     width, height = SKY
     for file, u, v in [
         (for_mitsuba, np.arange(width) / width, np.arange(height) / (height - 1)),

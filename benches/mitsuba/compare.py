@@ -22,11 +22,11 @@ HOME = Path(os.environ["GLIMT_MITSUBA_HOME"])
 ROOT = Path(__file__).resolve().parent.parent.parent
 THREADS = 2
 SAMPLES = 256
-# Mitsuba's direct light as it comes samples the light and the BSDF; told that the light is enough, it does half of the work.
+# By default, Mitsuba's direct integrator samples the light and the BSDF; with only light samples, it does half of the work.
 LIGHT_ALONE = {"emitter_samples": 1, "bsdf_samples": 0}
-# The noise at which glimt is told, in a row of its own, to give a tile no more samples.
+# The noise at which glimt stops sampling a tile, in an additional row.
 STOP = "3e-4"
-# Renders of a reference, of as many samples: of direct light, which is soon done, and of paths.
+# Number of renders for a reference: for direct light, which is quick, and for paths.
 DIRECT_REFERENCE, PATH_REFERENCE = (24, 1024), (16, 1024)
 
 
@@ -42,7 +42,7 @@ class Mitsuba:
         self.scene = mi.load_dict(scene.mitsuba(mi, assets.directory(HOME), options))
 
     def render(self, samples, seed):
-        """Seconds and the picture; the caller has rendered once before, which compiles."""
+        """Seconds and the image; the caller has rendered once before, which compiles the kernel."""
         start = time.perf_counter()
         image = mi.render(self.scene, spp=samples, seed=seed)
         dr.eval(image)
@@ -51,8 +51,8 @@ class Mitsuba:
 
 
 def reference(scene, renderer, render):
-    """The mean of many of a renderer's own pictures, kept in a file, also while they are not yet all: delete it when what the
-    renderer computes changes."""
+    """The mean of many images of one renderer, stored in a file, even while incomplete. Delete the file when the
+    renderer's results change."""
     count, samples = DIRECT_REFERENCE if scene.max_depth == 1 else PATH_REFERENCE
     key = hashlib.sha256(scene.toml(count, samples, assets.directory(HOME)).encode()).hexdigest()[:16]
     file = HOME / f"reference-{renderer}-{key}.npz"
@@ -68,7 +68,7 @@ def reference(scene, renderer, render):
 
 
 def glimt(binary, scene, samples, seed, options=()):
-    """Seconds of the stage `render`, and the picture."""
+    """Seconds of the stage `render`, and the image."""
     folder = HOME / "out"
     folder.mkdir(exist_ok=True)
     file, picture, report = folder / "scene.toml", folder / "picture.exr", folder / "report.json"
@@ -81,17 +81,17 @@ def glimt(binary, scene, samples, seed, options=()):
 
 
 def spread(pictures):
-    """The relMSE of one of some pictures to what a renderer computes, by how far they are apart: E|a - b|^2 is twice the variance."""
+    """The relMSE of a single image, estimated from the differences between images: E|a - b|^2 is twice the variance."""
     mean, variance = np.mean(pictures, axis=0), np.var(pictures, axis=0, ddof=1)
     return float(np.mean(variance / (mean**2 + 0.01)))
 
 
 def compare(scene, binaries, rounds, by_spread):
     """Print the rows of a scene."""
-    ways = {"Mitsuba": {}, "its light alone": LIGHT_ALONE} if scene.max_depth == 1 else {"Mitsuba": {}}
+    ways = {"Mitsuba": {}, "only light samples": LIGHT_ALONE} if scene.max_depth == 1 else {"Mitsuba": {}}
     loaded = {name: Mitsuba(scene, options) for name, options in ways.items()}
     by_glimt = lambda binary, *more: lambda samples, seed: glimt(binary, scene, samples, seed, more)
-    # Each is held to its own: Mitsuba lifts shadow rays off surfaces by a fixed epsilon, which moves the edges of shadows.
+    # Each renderer has its own reference: Mitsuba offsets shadow rays by a fixed epsilon, which moves the edges of shadows.
     own = glimts = None
     if not by_spread:
         own = reference(scene, "mitsuba", list(loaded.values())[-1].render)
@@ -123,7 +123,7 @@ def compare(scene, binaries, rounds, by_spread):
             print(f"{scene.name}: no anchor")
         elif abs(off) > 0.1:
             print(f"{scene.name}: no anchor, Mitsuba's relMSE is {off:+.0%} off {scene.anchor:.1e}")
-    # Brightness on the whole tells a lost or doubled part of the light, which noise hides pixel by pixel.
+    # The overall brightness reveals lost or doubled light, which noise hides in single pixels.
     if by_spread:
         own, glimts = np.mean(pictures[0], axis=0), np.mean(pictures[-2], axis=0)
     bias = np.mean(glimts) / np.mean(own) - 1
@@ -133,8 +133,8 @@ def compare(scene, binaries, rounds, by_spread):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("names", nargs="*", help="scenes whose name contains one of these")
-    parser.add_argument("--rounds", type=int, default=5, help="0: make the references alone")
-    by_spread = "errors by how far the rounds' pictures are apart, without references"
+    parser.add_argument("--rounds", type=int, default=5, help="0: only make the references")
+    by_spread = "errors from the differences between the rounds' images, without references are apart, without references"
     parser.add_argument("--spread", action="store_true", help=by_spread)
     parser.add_argument("--glimt", nargs="+", default=[ROOT / "target" / "release" / "glimt"])
     options = parser.parse_args()

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""glimt beside Mitsuba 3 (llvm, multijitter): seconds x relMSE of the same scenes, in one run.
+"""Compares glimt with Mitsuba 3 (llvm, multijitter): seconds x relMSE of the same scenes, interleaved.
 
     python3 benches/mitsuba/run.py [NAME...] [--rounds N] [--spread] [--glimt BINARY...]
 
-Errors are those to references, which take minutes to make and are kept; `--spread` takes the rounds' pictures alone.
+Errors are relative to references, which take minutes to make and are kept; `--spread` uses only the images of the rounds.
 
-Makes an environment of its own in target/mitsuba: Mitsuba by pip, and Debian's LLVM by `apt-get download` where
-DRJIT_LIBLLVM_PATH names none. glimt is target/release/glimt, which has to be built; several binaries are compared.
+Creates its own environment in target/mitsuba: Mitsuba from pip, and Debian's LLVM from `apt-get download` unless DRJIT_LIBLLVM_PATH is
+set. glimt is target/release/glimt, which must be built; several binaries are compared.
 """
 
 import os
@@ -20,7 +20,7 @@ LLVM_PACKAGE = "libllvm19"
 
 
 def python():
-    """The interpreter of the environment, with Mitsuba."""
+    """The Python interpreter of the environment with Mitsuba."""
     path = HOME / "env" / "bin" / "python"
     if not path.exists():
         subprocess.run([sys.executable, "-m", "venv", HOME / "env"], check=True)

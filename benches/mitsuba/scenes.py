@@ -1,4 +1,4 @@
-"""The scenes, described once and written for both renderers. Lengths in scene units, angles in degrees, radiance linear."""
+"""The scenes, described once and exported to both renderers. Lengths are in scene units, angles in degrees, radiance is linear."""
 
 from dataclasses import dataclass, field
 
@@ -9,7 +9,7 @@ SIZE = 256
 
 @dataclass
 class Scene:
-    """A camera, quads, boxes, spheres, meshes, lamps."""
+    """A camera, quads, boxes, spheres, meshes and lights."""
 
     name: str
     # Mitsuba's relMSE at 256 samples, by which the scene is known to be the one that earlier figures are of; None: there are none
@@ -74,10 +74,10 @@ class Scene:
         return "\n".join(lines) + "\n"
 
     def mitsuba(self, mi, assets, options):
-        """For Mitsuba; `options` holds what differs from the defaults of its integrator."""
+        """The scene for Mitsuba; `options` overrides the defaults of its integrator."""
         t = mi.ScalarTransform4f
         rgb = lambda value: {"type": "rgb", "value": list(value)}
-        # Its depth counts the edges of a path, of which the first is the eye's.
+        # Its depth counts path edges, including the one at the camera.
         integrator = {"type": "direct"} if self.max_depth == 1 else {"type": "path", "max_depth": self.max_depth + 1}
         lens = {"type": "perspective"}
         if self.aperture > 0:
@@ -113,7 +113,7 @@ class Scene:
                     return
             diffuse, emission = lobes(self.materials[material])
             if isinstance(diffuse, str):
-                # Its v = 0 is at the top row.
+                # Its v = 0 is the top row.
                 upright = t().scale([1, -1, 1])
                 reflectance = {"type": "bitmap", "filename": str(assets / diffuse), "to_uv": upright}
             else:
@@ -179,7 +179,7 @@ PAINTS = {"floor": (0.6, 0.6, 0.6), "red": (0.7, 0.2, 0.15), "blue": (0.2, 0.3, 
 FLOOR = ([-10, 0, 10], [20, 0, 0], [0, 0, -20], "floor")
 DEPTH = 8
 
-# A mirror ball and a glass ball under a small lamp: for photons.
+# A mirror ball and a glass ball under a small light, for photons.
 CAUSTIC = Scene(
     name="B caustic",
     anchor=None,
@@ -198,7 +198,7 @@ CAUSTIC = Scene(
 )
 
 SCENES = [
-    Scene(name="A1 quad lamp", anchor=1.2e-5, boxes=BLOCKS, **BOX),
+    Scene(name="A1 quad light", anchor=1.2e-5, boxes=BLOCKS, **BOX),
     Scene(
         name="D point",
         anchor=7.7e-7,

@@ -1,10 +1,10 @@
-"""The same by others: a model to a picture of 512 × 512 pixels, each run a new process.
+"""The same with other programs: from a model to an image of 512 × 512 pixels, each run in a new process.
 
     python3 -m venv others && others/bin/pip install f3d bpy
     others/bin/python benches/models/others.py MODEL [f3d] [blender]
 
-f3d rasterises; Blender renders by Cycles on the processor with 64 samples, without denoising. Both come from PyPI. `bpy` needs the
-version of Python that its wheel is for.
+f3d rasterizes; Blender renders with Cycles on the CPU with 64 samples, without denoising. Both are on PyPI. `bpy` needs the Python
+version of its wheel.
 """
 
 import subprocess
@@ -66,7 +66,7 @@ def main():
     model, names = sys.argv[1], sys.argv[2:] or ["f3d", "blender"]
     for name in names:
         runs = sorted(seconds({"f3d": F3D, "blender": BLENDER}[name], model) for _ in range(RUNS))
-        print(f"{name}: {runs[0]:.2f} {runs[len(runs) // 2]:.2f} {runs[-1]:.2f} s (least, median, most of {RUNS})")
+        print(f"{name}: {runs[0]:.2f} {runs[len(runs) // 2]:.2f} {runs[-1]:.2f} s (minimum, median, maximum of {RUNS})")
 
 
 main()

@@ -1,11 +1,11 @@
-"""See run.py, which starts this inside its environment.
+"""See run.py, which starts this in its environment.
 
-`caustic` and `box` are rendered with 1, 2, 4, … samples by several seeds: relMSE, its slope, seconds of the stages photons and
-render. In the caustic scene the pixels that see the balls are left out. Mitsuba's path tracer renders the same scene at 256
-samples; its error falls with one over the samples. `large` is the caustic scene at 1074 x 1051 with 30 scatterings, all of its pixels.
+`caustic` and `box` are rendered with 1, 2, 4, … samples and several seeds: relMSE, its slope, seconds of the stages photons and render.
+In the caustic scene, the pixels that show the balls are excluded. Mitsuba's path tracer renders the same scene with 256 samples; its
+error is inversely proportional to the samples. `large` is the caustic scene at 1074 x 1051 with 30 bounces and all of its pixels.
 
-References are two pictures by photons of a small radius, made once: (x - a)(x - b) of two that are independent has the mean of the
-squared error, whatever their noise. Paths, which are right on the mean, are what the mean is held to.
+References are two independent images a, b with photons of a small radius, made once: the expectation of (x - a)(x - b) is the squared
+error, whatever their noise. The mean is compared with path tracing, which is unbiased.
 """
 
 import argparse
@@ -36,7 +36,7 @@ GOAL = 1e-2
 
 
 class Subject:
-    """A scene, what of it counts, and its references."""
+    """A scene, the pixels that count, and its references."""
 
     def __init__(self, glimt, scene, size, reference_samples, masked, settings=()):
         self.glimt, self.scene, self.size, self.settings = glimt, scene, size, list(settings)
@@ -47,11 +47,11 @@ class Subject:
         self.mean = sum(self.pair) / 2
         self.used = np.ones(self.mean.shape[:2], dtype=bool)
         if masked:
-            # Mirror and glass have no albedo.
+            # Mirrors and glass have no albedo.
             self.used = self.render(1, 0, ["--view", "albedo"])[1].max(axis=2) > 0
 
     def render(self, samples, seed, options=(), sets=()):
-        """Seconds of the stages photons and render, and the picture."""
+        """Seconds of the stages photons and render, and the image."""
         file, picture, report = (self.folder / name for name in ("scene.toml", "picture.exr", "report.json"))
         by_photons = "--integrator" not in options
         text = self.scene.toml(samples, seed, "").replace('integrator = "path"', 'integrator = "whitted"')
@@ -66,24 +66,24 @@ class Subject:
         return sum(s["seconds"] for s in stages if s["name"] in ("photons", "render")), image.astype(np.float64)
 
     def kept(self, name, samples, seed, sets):
-        """A picture that is made once."""
+        """An image that is made once."""
         file = self.folder / f"{name}-{samples}.npy"
         if not file.exists():
             np.save(file, self.render(samples, seed, (), sets)[1])
         return np.load(file)
 
     def rel_mse(self, picture):
-        """The mean of the squared error over r^2 + 0.01, without the noise of the references."""
+        """Mean squared error over r^2 + 0.01, without the noise of the references."""
         a, b = self.pair
         squares = (picture - a) * (picture - b) / (self.mean**2 + 0.01)
         return float(squares[self.used].mean())
 
     def brightness(self, picture):
-        """The mean of what counts."""
+        """The mean of the pixels that count."""
         return float(picture[self.used].mean())
 
     def row(self, by, samples, seconds, errors, means, before=None):
-        """Print a row; the error."""
+        """Prints a row; returns the error."""
         error = statistics.mean(errors)
         slope = f"{math.log(error / before[1]) / math.log(samples / before[0]):+.2f}" if before else ""
         spread = statistics.stdev(means) / math.sqrt(len(means)) if len(means) > 1 else float("nan")
@@ -95,14 +95,14 @@ class Subject:
         return error
 
     def noted(self, by, samples, seed, options):
-        """A render, noted on stderr: the last ones take minutes each."""
+        """Renders, with a note on stderr, as the last renders take minutes."""
         seconds, picture = self.render(samples, seed, options)
         of = f"{self.rel_mse(picture):.3e} {self.brightness(picture):.5f}"
         print(f"{self.scene.name} {by} {samples} seed {seed}: {seconds:.2f} {of}", file=sys.stderr, flush=True)
         return seconds, picture
 
     def rows(self, by, counts, seeds, options=()):
-        """Rows of ever more samples."""
+        """Prints rows with increasing samples."""
         errors = {}
         for samples in counts:
             runs = [self.noted(by, samples, seed, options) for seed in range(seeds)]
@@ -114,7 +114,7 @@ class Subject:
 
 
 def mitsuba(subject, samples=256):
-    """Mitsuba's path tracer, and the seconds that it needs to the goal."""
+    """Prints Mitsuba's path tracer, and the seconds that it needs to reach the goal."""
     scene = mi.load_dict(subject.scene.mitsuba(mi, Path("."), {}))
     seconds, errors, means = [], [], []
     for seed in range(4):
@@ -132,7 +132,7 @@ def mitsuba(subject, samples=256):
 
 
 def last_slope(subject, errors):
-    """How the error falls over the last decade of passes, as nearly as there are rows."""
+    """The slope of the error over the last decade of passes, as far as rows exist."""
     last = max(errors)
     first = min(errors, key=lambda passes: abs(math.log(10 * passes / last)))
     if first < last:

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Photons beside paths and Mitsuba: error against passes and seconds, and the mean of the picture beside that of paths.
+"""Compares photons with paths and Mitsuba: error against passes and seconds, and the mean of the image against path tracing.
 
     python3 benches/photons/run.py [caustic] [box] [large] [--seeds N] [--most SAMPLES | --passes N,N,…] [--side PIXELS]
         [--glimt BINARY]
 
-In the environment of ../mitsuba, which is made where it is not there. See compare.py.
+Runs in the environment of ../mitsuba, which is created if it does not exist. See compare.py.
 """
 
 import os

@@ -1,15 +1,15 @@
-"""See run.py, which starts this inside its environment.
+"""See run.py, which starts this in its environment.
 
-Each round renders the scene by every program in turns, with two threads and a seed of its own for each picture.
+Each round renders the scene with every program, interleaved, with two threads and a different seed for each image.
 
-- seconds: user and system time of one picture. glimt's is that of the process, less that of a call that renders one pixel by one
-  path: what reading, trees and writing take. Mitsuba's is that of the render alone; a render before the first round compiles it.
-- us/path: microseconds of these for each sample of a pixel (a pass of photons counts as one).
-- error, of a round: the variance of luminance between its pictures, over the reference's square plus 0.01, the mean over pixels.
-  Of photons, which are off by more than noise: the mean square distance to the reference in its place, of Mitsuba's pictures as
-  well. That includes the reference's own noise.
-- ratio: seconds x error over Mitsuba's, of all rounds together, and the least and the greatest of the rounds.
-- mean: the mean luminance of all pictures, and how far it is from the reference's, with the standard error of that distance.
+- seconds: processor time of one image. For glimt, it is the time of the process minus a call that renders one pixel with one path, which
+  covers reading, acceleration structures and writing. For Mitsuba, it is only the render; a render before the first round compiles it.
+- us/path: microseconds per sample of a pixel (a pass of photons counts as one).
+- error of a round: the variance of luminance between its images, over the reference's square plus 0.01, averaged over the pixels.
+  Photons have errors other than noise, so the mean square distance from the reference is used instead, also for Mitsuba's images; it
+  includes the reference's own noise.
+- ratio: seconds x error over Mitsuba's, for all rounds together, and the smallest and largest of the rounds.
+- mean: the mean luminance of all images, and its difference from the reference's, with the standard error of the difference.
 """
 
 import argparse
@@ -36,7 +36,7 @@ HEADER = f"{'scene':14}{'by':24}{'samples':>8}{'seconds':>9}{'us/path':>9}{'erro
 
 @dataclass
 class Way:
-    """One program's way to render a scene, and what it gave."""
+    """One way to render a scene with one program, and its results."""
 
     name: str
     renderer: object
@@ -49,12 +49,12 @@ class Way:
         self.rounds.append([self.renderer.render(self.samples, seed) for seed in seeds])
 
     def seconds(self, number=None):
-        """Of one picture; the median of a round's, or of all."""
+        """Seconds of one image: the median of a round, or of all rounds."""
         chosen = self.rounds if number is None else [self.rounds[number]]
         return statistics.median(seconds for one in chosen for seconds, _ in one)
 
     def error(self, reference, by_reference, number=None):
-        """The mean of the rounds' errors, or that of one of them."""
+        """The mean of the rounds' errors, or the error of one round."""
         chosen = self.rounds if number is None else [self.rounds[number]]
         return statistics.mean(error([picture for _, picture in one], reference, by_reference) for one in chosen)
 
@@ -66,7 +66,7 @@ class Way:
 
 
 def error(pictures, reference, by_reference):
-    """By how far the pictures are from the reference, or from each other: half the mean square of a difference is the variance."""
+    """Error of the images, from the reference or from each other: half the mean square of a difference is the variance."""
     if by_reference:
         squares = np.mean([(picture - reference) ** 2 for picture in pictures], axis=0)
     else:
@@ -75,7 +75,7 @@ def error(pictures, reference, by_reference):
 
 
 def ways(scene, asked):
-    """Mitsuba first, then each binary by each integrator."""
+    """Mitsuba first, then each binary with each integrator."""
     found = [Way("Mitsuba path", Mitsuba(scene, asked.samples), asked.samples, is_mitsuba=True)]
     for binary in asked.glimt:
         name = Path(binary).name
@@ -108,7 +108,7 @@ def compare(scene, asked):
     """Print the rows of a scene."""
     every = ways(scene, asked)
     for number in range(asked.rounds):
-        # No two pictures of a scene have a seed in common.
+        # Every image of a scene has its own seed.
         first = 1 + number * asked.seeds
         for way in every:
             way.render(range(first, first + asked.seeds))
@@ -128,7 +128,7 @@ def at_least(least):
 
 
 def square(text):
-    """Mitsuba's sampler takes more samples than it is told to where they make no grid."""
+    """Mitsuba's sampler rounds the number of samples up unless they form a grid."""
     if math.isqrt(int(text)) ** 2 != int(text):
         raise argparse.ArgumentTypeError("a square, such as 16, 64, 256")
     return int(text)
@@ -137,14 +137,14 @@ def square(text):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+", type=Path, metavar="SCENE")
-    parser.add_argument("--photons", action="store_true", help="whitted with photons as well")
+    parser.add_argument("--photons", action="store_true", help="also whitted with photons")
     parser.add_argument("--rounds", type=at_least(1), default=5)
-    parser.add_argument("--seeds", type=at_least(2), default=2, help="pictures of each way in a round")
+    parser.add_argument("--seeds", type=at_least(2), default=2, help="images per round")
     parser.add_argument("--samples", type=square, default=64, help="of paths")
     parser.add_argument("--passes", type=at_least(1), default=64, help="of photons")
-    parser.add_argument("--side", type=at_least(1), default=256, help="pixels of the longer side, of a scene file")
-    parser.add_argument("--reference", type=at_least(1), default=8192, help="samples of a scene file's reference")
-    parser.add_argument("--glimt", action="append", help="the program; may be given several times")
+    parser.add_argument("--side", type=at_least(1), default=256, help="pixels along the longer side, for scene files")
+    parser.add_argument("--reference", type=at_least(1), default=8192, help="samples of the reference, for scene files")
+    parser.add_argument("--glimt", action="append", help="the program; may be repeated")
     asked = parser.parse_args()
     asked.glimt = asked.glimt or [ROOT / "target" / "release" / "glimt"]
     dr.set_thread_count(THREADS)

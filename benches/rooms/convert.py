@@ -1,19 +1,20 @@
-"""A scene file of glimt as Mitsuba's dictionary: diffuse, mirror, glass, panes, metal by `eta` and `k`, and plastic, lamps, textures, a sky, quads, boxes, spheres, disks,
-cylinders and meshes. What has no equal there, or is not written yet, ends the translation with its name."""
+"""Translates a scene file of glimt to Mitsuba's dictionary: diffuse, mirror, glass, panes, metal with `eta` and `k`, plastic, lights,
+textures, an environment, quads, boxes, spheres, disks, cylinders and meshes. Features without an equivalent, or not supported yet, end
+the translation with an error that names them."""
 
 import numpy as np
 
-# What Mitsuba calls glimt's names.
+# Mitsuba's names for glimt's.
 WRAP = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror"}
 FILTER = {"bilinear": "bilinear", "nearest": "nearest"}
 
 
 class Unknown(Exception):
-    """The scene uses what the translation does not know."""
+    """The scene uses a feature that the translation does not support."""
 
 
 def known(table, where, *keys):
-    """The table, if it has these keys alone."""
+    """The table, if it has only these keys."""
     more = sorted(set(table) - set(keys) - {"name"})
     if more:
         raise Unknown(f"{where}: {', '.join(more)}")
@@ -24,7 +25,7 @@ def color(value):
     """A number, three of them, or "#rrggbb", as linear light."""
     if isinstance(value, str):
         if not value.startswith("#"):
-            raise Unknown(f"the colour {value}")
+            raise Unknown(f"the color {value}")
         codes = np.array([int(value[at : at + 2], 16) for at in (1, 3, 5)]) / 255
         return [float(x) for x in np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4)]
     return [float(x) for x in (value if isinstance(value, list) else [value] * 3)]
@@ -39,7 +40,7 @@ def across(axis):
 
 
 def frame(x, y, z, origin):
-    """The matrix with these columns."""
+    """The matrix with the given columns."""
     matrix = np.eye(4)
     for column, vector in enumerate((x, y, z, origin)):
         matrix[:3, column] = vector
@@ -47,7 +48,7 @@ def frame(x, y, z, origin):
 
 
 class Conversion:
-    """One scene file, of which the paths are relative to `folder`; files for Mitsuba alone go to `made`."""
+    """A scene file whose paths are relative to `folder`; files for Mitsuba are written to `made`."""
 
     def __init__(self, mi, content, folder, size, made):
         known(content, "the scene", "render", "camera", "photons", "textures", "materials", "environment", "light", *SHAPES)
@@ -60,7 +61,7 @@ class Conversion:
         """The whole dictionary."""
         if any(color(self.render.get("background", 0))) and "environment" not in self.content:
             raise Unknown("[render] background, which lights nothing")
-        # Mitsuba's depth counts the edges of a path, of which the first is the eye's.
+        # Mitsuba's depth counts path edges, including the one at the camera.
         depth = self.render.get("max_depth", 8) + 1
         self.parts = {"type": "scene", "integrator": {"type": "path", "max_depth": depth}, "sensor": self.sensor()}
         for kind, add in SHAPES.items():
@@ -104,7 +105,7 @@ class Conversion:
         return {"type": "rgb", "value": color(value)}
 
     def texture(self, name):
-        """A picture; its v = 0 is at Mitsuba's top row."""
+        """An image texture; v = 0 is Mitsuba's top row."""
         table = known(self.content["textures"][name], f"[textures.{name}]", "file", "filter", "wrap", "repeat", "encoding")
         u, v = table.get("repeat", [1, 1])
         return {
@@ -117,11 +118,11 @@ class Conversion:
         }
 
     def material(self, name):
-        """What scatters, and what is emitted."""
+        """The BSDF, and the emission."""
         table = self.content["materials"][name]
         where = f"[materials.{name}]"
         kind = table.get("type", "phong")
-        # α of its microfacets.
+        # α of the microfacet distribution.
         alpha = table.get("roughness", {"plastic": 0.1, "metal": 0.2}.get(kind, 0.0)) ** 2
         rough = {"distribution": "ggx", "alpha": max(alpha, 1e-3)} if alpha > 0 else {}
         outside = {"int_ior": table.get("ior", 1.5), "ext_ior": 1.0}
@@ -209,7 +210,7 @@ class Conversion:
         if "material" not in table:
             raise Unknown(f"{key}: the materials of {table['file']}")
         file = self.folder / table["file"]
-        # Mitsuba lets the smoothed normal of a lamp decide which side shines, glimt that of the triangle.
+        # Mitsuba decides with an emitter's smooth normal which side emits, glimt with the triangle's normal.
         is_lamp = self.material(table["material"])[1] is not None
         scale = table.get("scale", 1)
         scale = scale if isinstance(scale, list) else [scale] * 3
@@ -225,7 +226,7 @@ class Conversion:
         self.add(key, shape, table)
 
     def placed(self, translation, turns, scale):
-        """Scaled, turned about x, then y, then z, and moved."""
+        """Scales, rotates about x, then y, then z, and translates."""
         matrix = self.t().translate(translation)
         for axis in (2, 1, 0):
             matrix = matrix @ self.t().rotate([float(x) for x in np.eye(3)[axis]], turns[axis])
@@ -245,14 +246,14 @@ class Conversion:
         factor = color(table.get("color", 1))
         if len(set(factor)) > 1:
             raise Unknown("[environment]: a factor with a hue")
-        # The middle of Mitsuba's map is at +z.
+        # The center of Mitsuba's map is at +z.
         to_world = self.t().rotate([0, 1, 0], table.get("rotate", 0) + 180)
         return {"type": "envmap", "filename": str(self.sky(table["file"])), "scale": factor[0], "to_world": to_world}
 
     def sky(self, name):
-        """The map at Mitsuba's texels: its rows are from pole to pole, where glimt's have half of their width around them.
+        """Resamples the map at Mitsuba's texels: its rows run from pole to pole, whereas glimt's texels are centered in their cells.
 
-        Finer, so that each of glimt's texels is one of Mitsuba's, and what lies between them is the same.
+        The resolution is higher, so that each of glimt's texels is one of Mitsuba's and the interpolation in between is the same.
         """
         given = np.array(self.mi.Bitmap(str(self.folder / name)).convert(self.mi.Bitmap.PixelFormat.RGB, self.mi.Struct.Type.Float32, False))
         height, width = given.shape[:2]

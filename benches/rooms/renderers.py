@@ -1,4 +1,4 @@
-"""The two programs: each gives the processor seconds of a picture, and its luminance."""
+"""The two programs: each returns the processor seconds of an image, and its luminance."""
 
 import resource
 import statistics
@@ -14,7 +14,7 @@ THREADS = 2
 
 
 def luminance(picture):
-    """Of linear Rec. 709."""
+    """Luminance of linear Rec. 709."""
     return picture.astype(np.float64) @ np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -43,12 +43,12 @@ class Glimt:
         call = [binary, scene.file, "--once", "-o", self.picture, "--progress", "none", "--threads", THREADS, *size]
         self.call = [str(word) for word in call]
         self.options = options
-        # One pixel by one path: everything but rendering.
+        # One pixel with one path: everything except rendering.
         one = ["--samples", "1", "--crop", "0,0,1,1", "--integrator", "path"]
         self.set_up = statistics.median(self.seconds(one) for _ in range(5))
 
     def seconds(self, options):
-        """User and system time of the process."""
+        """Processor time of the process."""
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         done = subprocess.run([*self.call, *options], capture_output=True, text=True)
         if done.returncode != 0:

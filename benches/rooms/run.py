@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Rooms as people make them, by glimt and by Mitsuba in turns: processor seconds x error of each, and the ratio.
+"""Compares glimt with Mitsuba on realistic scenes, interleaved: processor seconds x error, and the ratio.
 
     python3 benches/rooms/run.py SCENE... [--photons] [--rounds N] [--seeds N] [--samples N] [--passes N] [--side PIXELS]
         [--glimt BINARY]...
 
-A SCENE is a scene file, of which Mitsuba gets a translation and its own reference, or a folder with scene.toml, a reference
-ref.npy and mi_load.py, whose mi_dict(folder) gives the scene to Mitsuba.
+A SCENE is a scene file, which is translated for Mitsuba and gets its own reference, or a folder with scene.toml, a reference ref.npy, and
+mi_load.py, whose mi_dict(folder) returns the scene for Mitsuba.
 
-In the environment of ../mitsuba, which is made where it is not there. See compare.py.
+Runs in the environment of ../mitsuba, which is created if it does not exist. See compare.py.
 """
 
 import os

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Microseconds of processor time per path, stage by stage: where the time of a scene goes.
+"""Prints where the time of a scene goes: microseconds of processor time per path and stage.
 
     cargo build --profile profiling
     python3 benches/rooms/stages.py SCENE... [--glimt target/profiling/glimt] [--samples N] [--side PIXELS]
 
-Each scene is rendered once by `path` on one thread under `perf record` (Linux), and each sample of the profile counts to a stage: that
-of the innermost function which stands in STAGES, inlined ones included (by addr2line, hence the profile with line tables).
+Each scene is rendered once with `path` on one thread under `perf record` (Linux). Each profile sample counts for the stage of the
+innermost function in STAGES, including inlined ones (from addr2line, which needs the profile with line tables).
 """
 
 import argparse
@@ -17,22 +17,22 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 RATE = 2000  # samples a second
 
-# Words in the names of functions, from the innermost frame outwards; the first stage that has one of them counts.
+# Substrings of function names, searched from the innermost frame outward; the first stage with a match counts.
 STAGES = [
     ("glass", ["crossing", "contact", "isolated", "meeting", "touch_error", "specular", "near_shape", "encloses"]),
-    ("lamps: picks", ["pick_flat", "pick_by_cuts", "picks", "flat_shares", "go_to", "samples_at"]),
-    ("lamps: samples", ["sample_row", "sample_each", "sample_density", "inverse_densit"]),
-    ("shadow rays", ["occluded", "any_packet", "any_rows", "any_avx", "any_of_few", "single::any", "packet::any", "pool", "is_hit", "doubtful_hit", "add_seen"]),
+    ("lights: picks", ["pick_flat", "pick_by_cuts", "picks", "flat_shares", "go_to", "samples_at"]),
+    ("lights: samples", ["sample_row", "sample_each", "light_pdf", "inverse_densit"]),
+    ("shadow rays", ["occluded", "any_packet", "any_rows", "any_avx", "any_of_few", "single::any", "packet::any", "pool", "is_hit", "doubtful_hit", "add_unoccluded"]),
     ("closest hits", ["facets", "closest", "single::nearest", "packet::nearest", "intersect_at_start", "in_f64", "alone", "nearer", "packet::Closest", "merged::rays"]),
-    ("surfaces", ["fill_surfaces", "fill_others", "surface", "facet", "place", "set_bsdf", "packet::Meeting"]),
+    ("surfaces", ["fill_surfaces", "fill_others", "surface", "facet", "set_positions", "set_bsdf", "packet::Meeting"]),
     ("textures", ["lookup", "texture"]),
-    ("light of lamps", ["add_all", "add_pick", "Lighting", "Picking", "values", "response"]),
+    ("direct light", ["add_all", "add_pick", "SampleAllLights", "SampleLightTree", "values", "response"]),
     ("directions", ["scatter", "sample_diffuse", "lobes"]),
     ("random numbers", ["sampler", "scrambled", "pairs", "sobol"]),
     ("camera", ["camera"]),
     ("queues and film", ["render_tile", "wave", "queues", "film", "lit_queue", "lit_row", "memmove", "memcpy", "memset"]),
 ]
-# Not the render: reading, trees, writing.
+# Everything except the render: reading, acceleration structures, writing.
 SETUP = ["glimt_files", "glimt_scene", "build", "png", "deflate", "miniz", "blake3", "ld-linux", "dl_", "page", "clap"]
 
 
@@ -47,7 +47,7 @@ def symbols(program):
 
 
 def samples(profile, program):
-    """How often each place was met: an address of the program, or the name of another function."""
+    """Sample counts by location: an address of the program, or the name of another function."""
     known, found = symbols(program), collections.Counter()
     for line in run(["perf", "script", "-i", profile, "-F", "ip,sym,symoff", "--no-demangle"]).splitlines():
         parts = line.split()
@@ -58,7 +58,7 @@ def samples(profile, program):
 
 
 def frames(program, addresses):
-    """Names of the functions at each address, the innermost first."""
+    """Names of the functions at each address, innermost first."""
     command = ["addr2line", "-e", program, "-i", "-f", "-C", "-a", *(hex(address) for address in addresses)]
     names, own = {}, None
     lines = iter(run(command).splitlines())
@@ -71,7 +71,7 @@ def frames(program, addresses):
 
 
 def stage(names):
-    """The stage of a place, by its frames from the innermost outwards."""
+    """The stage of a location, from its frames, innermost first."""
     if any(word in name for name in names for word in SETUP):
         return "reading, trees, writing"
     for name in names:
@@ -107,7 +107,7 @@ def main():
     parser.add_argument("scenes", nargs="+", metavar="SCENE")
     parser.add_argument("--glimt", default=str(ROOT / "target/profiling/glimt"))
     parser.add_argument("--samples", type=int, default=64)
-    parser.add_argument("--side", type=int, default=128, help="pixels of a side of the picture")
+    parser.add_argument("--side", type=int, default=128, help="image width and height in pixels")
     asked = parser.parse_args()
     for scene in asked.scenes:
         measure(scene, asked)

@@ -1,4 +1,4 @@
-"""What is rendered: the scene for either program, its size, and the reference."""
+"""The scenes to render: for either program, with size and reference."""
 
 import hashlib
 import importlib.util
@@ -10,7 +10,7 @@ import numpy as np
 from convert import Conversion
 from renderers import luminance
 
-# Samples of one render of a reference, whose sums are added up.
+# Samples per render of a reference; the renders are averaged.
 CHUNK = 64
 
 
@@ -20,7 +20,7 @@ def subject(path, asked, home):
 
 
 class Folder:
-    """A folder that has the scene for both programs, and a reference."""
+    """A folder with the scene for both programs, and a reference."""
 
     def __init__(self, path):
         self.path, self.name, self.file = path, path.resolve().name, path / "scene.toml"
@@ -56,7 +56,7 @@ class File:
         return Conversion(mi, self.content, self.file.parent, (self.width, self.height), self.folder).scene()
 
     def reference(self, samples):
-        """The mean of many renders by Mitsuba, kept while neither the scene nor its files change."""
+        """The mean of many renders by Mitsuba, kept as long as the scene and its files do not change."""
         import mitsuba as mi
 
         file = self.folder / f"{self.name}-{self.fingerprint()}-{samples}.npy"
@@ -73,7 +73,7 @@ class File:
         return np.load(file)
 
     def fingerprint(self):
-        """Of the scene, the files that it names, and the size."""
+        """A hash of the scene, the files that it refers to, and the size."""
         digest = hashlib.sha256(self.file.read_bytes())
         tables = [*self.content.get("mesh", []), *self.content.get("textures", {}).values()]
         for table in [*tables, self.content.get("environment", {})]:

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""A moving picture of glimt beside an editor: save, see.
+"""Records an animation of glimt next to an editor: save, see.
 
     python3 benches/terminal/moving.py [-o FILE] [--glimt BINARY] [--frames FOLDER]
 
-By itself: assets/pictures/save.png, an animated PNG. The scene is the one that `glimt new` writes, at 16 samples a pixel. vim and glimt
-run in two panes of tmux; the script types into vim and takes both screens ten times a second. The times from a save on are those of the
-program; what stands still is cut to 1.6 s, a typed letter to 0.08 s. --frames writes each frame as a file too. Needs tmux, vim, Pillow,
-and the font DejaVu Sans Mono.
+The default output is assets/pictures/save.png, an animated PNG. The scene is the one that `glimt new` writes, with 16 samples per pixel.
+vim and glimt run in two panes of tmux; the script types into vim and captures both screens ten times per second. Times after a save are
+the program's own; still periods are cut to 1.6 s, a typed letter to 0.08 s. --frames also writes each frame as a file. Needs tmux, vim,
+Pillow, and the font DejaVu Sans Mono.
 """
 
 import argparse
@@ -20,14 +20,14 @@ from PIL import Image, ImageChops
 from screen import HEIGHT, PLAIN, ROOT, WIDTH, drawn
 
 EDITOR, PICTURE, ROWS = 48, 72, 26
-# What is typed into vim before each save, and what glimt must say then.
+# Keys typed into vim before each save, and the text that glimt must then show.
 EDITS = [
     ("/b5532e\rci\"seagreen\x1b", "done"),
     ("/0.9, 1.2\rci[0.9, 2.2, 0.9\x1b", "done"),
     ("?^radius\rcwraduis\x1b", "error"),
     ("u", "done"),
 ]
-# Seconds that a typed letter and a screen that does not change stand at most.
+# Maximum seconds for a typed letter and for an unchanged screen.
 TYPED, STILL = 0.08, 1.6
 
 
@@ -40,7 +40,7 @@ def arguments():
 
 
 class Stage:
-    """Two panes of a terminal, and what was seen of them."""
+    """Two terminal panes, and their recorded screens."""
 
     def __init__(self, folder, glimt):
         self.tmux = ["tmux", "-S", f"{folder}/socket", "-f", "/dev/null"]
@@ -57,13 +57,13 @@ class Stage:
         return subprocess.run([*self.tmux, *words], check=True, capture_output=True, text=True).stdout
 
     def take(self, most):
-        """Takes both screens, the editor's cursor, the time, and the seconds that they stand at most."""
+        """Captures both screens, the editor's cursor, the time, and the maximum duration."""
         screens = [self.call("capture-pane", "-e", "-N", "-p", "-t", pane) for pane in ("0.0", "0.1")]
         x, y = self.call("display-message", "-p", "-t", "0.0", "#{cursor_x} #{cursor_y}").split()
         self.taken.append((time.monotonic(), most, (screens, int(x), int(y))))
 
     def watch(self, seconds, word=None):
-        """Takes screens for this long, and on until glimt says the word."""
+        """Captures screens for a time, and then until glimt shows the text."""
         end = time.monotonic() + seconds
         while time.monotonic() < end or word and word not in self.call("capture-pane", "-p", "-t", "0.1"):
             self.take(STILL)
@@ -81,7 +81,7 @@ def play(folder, glimt):
     stage = Stage(folder, glimt)
     try:
         stage.watch(0.5, "done")
-        # The first screens are those of two programs that start.
+        # The first screens show the programs starting.
         del stage.taken[:-1]
         stage.watch(1)
         for edit, word in EDITS:
@@ -95,7 +95,7 @@ def play(folder, glimt):
 
 
 def frame(screens, x, y):
-    """Both panes side by side; the cell of the cursor in reverse."""
+    """Both panes side by side, with the cursor's cell in reverse."""
     panes = [drawn(text, columns, ROWS) for text, columns in zip(screens, (EDITOR, PICTURE))]
     place = (x * WIDTH, y * HEIGHT, (x + 1) * WIDTH, (y + 1) * HEIGHT)
     panes[0].paste(ImageChops.invert(panes[0].crop(place)), place)
@@ -107,7 +107,7 @@ def frame(screens, x, y):
 
 
 def told(taken):
-    """Frames that differ, each with the milliseconds that it stands."""
+    """Distinct frames, each with its duration in milliseconds."""
     frames, times = [], []
     for index, (at, most, seen) in enumerate(taken):
         image = frame(*seen)
@@ -125,7 +125,7 @@ def main():
     asked = arguments()
     with tempfile.TemporaryDirectory() as folder:
         frames, times = told(play(folder, asked.glimt))
-    # One palette for all: the colours of frames from first to last.
+    # One palette for all frames, from the first to the last.
     some = frames[:: max(1, len(frames) // 12)]
     strip = Image.new("RGB", (frames[0].width, frames[0].height * len(some)))
     for index, image in enumerate(some):

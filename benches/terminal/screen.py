@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""A picture of glimt at work: what it shows in a terminal of tmux, drawn as pixels.
+"""Draws a screenshot of glimt in a tmux terminal as an image.
 
     python3 benches/terminal/screen.py [SCENE] [--columns N] [--rows N] [--keys KEYS] [-o FILE] [--glimt BINARY]
 
-By itself: scenes/cornell_glass.toml, 120 by 36 cells, with photons (p), assets/pictures/screen.png. It waits until the picture is done, types
-the keys, and waits for what they bring. Needs tmux, Pillow, and the font DejaVu Sans Mono.
+Defaults: scenes/cornell_glass.toml, 120 by 36 cells, with photons (p), assets/pictures/screen.png. The script waits until the image is
+done, types the keys, and waits for the result. Needs tmux, Pillow, and the font DejaVu Sans Mono.
 """
 
 import argparse
@@ -19,11 +19,11 @@ from PIL import Image, ImageDraw, ImageFont
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 FONT = "/usr/share/fonts/truetype/dejavu/DejaVuSansMono.ttf"
-# Pixels of a cell.
+# Pixels per cell.
 WIDTH, HEIGHT = 9, 18
 PLAIN = ((204, 204, 204), (16, 18, 22))
 PALETTE = [(16, 18, 22), (222, 84, 84), (96, 190, 96), (214, 178, 74), (88, 138, 222), (188, 110, 200), (84, 186, 190), (204, 204, 204)]
-# Which quarters of a cell are ink: top left, top right, bottom left, bottom right.
+# The filled quarters of a cell: top left, top right, bottom left, bottom right.
 QUARTERS = dict(zip("▀▄█▌▐▘▝▖▗▚▞▛▜▙▟", ["1100", "0011", "1111", "1010", "0101", "1000", "0100", "0010", "0001", "1001", "0110", "1110", "1101", "1011", "0111"]))
 
 
@@ -39,7 +39,7 @@ def arguments():
 
 
 def shown(asked):
-    """The text of the terminal, with the sequences of its colours."""
+    """The text of the terminal, with color sequences."""
     with tempfile.TemporaryDirectory() as folder:
         tmux = ["tmux", "-S", f"{folder}/socket", "-f", "/dev/null"]
 
@@ -63,7 +63,7 @@ def shown(asked):
 
 
 def wait(call):
-    """Until the screen says that the picture is done, and stands still."""
+    """Waits until the screen shows that the image is done, and no longer changes."""
     before = None
     while "done" not in (now := call("capture-pane", "-p")) or now != before:
         before = now
@@ -71,7 +71,7 @@ def wait(call):
 
 
 def color(words):
-    """The colour that some numbers of a sequence name, and how many they are."""
+    """The color encoded by a sequence's numbers, and how many numbers it takes."""
     if words[1] == 2:
         return tuple(words[2:5]), 5
     index = words[2]
@@ -84,7 +84,7 @@ def color(words):
 
 
 def styled(text):
-    """Characters with their colours, which hold on from line to line."""
+    """Characters with their colors, which persist from line to line."""
     ink, paper, is_bold, is_turned = *PLAIN, False, False
     for piece in re.split(r"(\x1b\[[0-9;]*m)", text):
         if not piece.startswith("\x1b["):
