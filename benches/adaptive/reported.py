@@ -85,7 +85,7 @@ def row(asked, scene, integrator, samples, folder):
     random = np.random.default_rng(1)
 
     def drawn():
-        # A seed that is drawn twice counts once in the variance, so the spread is computed from half of the draws.
+        # Draw half of the seeds without replacement, as a seed drawn twice would distort the variance. The spread is the same.
         return ratio(random.choice(everyone, size=len(everyone) // 2, replace=False))
 
     low, high = np.quantile([drawn() for _ in range(RESAMPLES)], [0.025, 0.975])

@@ -73,7 +73,7 @@ impl AtHand {
         let (x, y) = (pixel(spot.x, width), pixel(spot.y, height));
         let color = canvas.and_then(|canvas| canvas.film.pixel(Quantity::Radiance, x, y));
         let middle = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-        let thing = self.thing(self.settings.from_middle(middle));
+        let thing = self.thing(self.settings.pixel_to_camera(middle));
         Picked { pixel: [x, y], thing, color: color.map(|color| color.to_array()) }
     }
 

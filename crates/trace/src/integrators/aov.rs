@@ -49,7 +49,7 @@ pub fn shade(
 /// Number of photons within the kernels around a vertex, in the photon pass of a sample.
 fn photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex<'_>) -> f32 {
     let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
-    let (_, _, sample) = tile.block.place(slot);
+    let (_, _, sample) = tile.block.sample_of(slot);
     let pass = maps.pass(sample);
     [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PlainFolds) as f32).iter().sum()
 }

@@ -70,8 +70,8 @@ pub fn trace(
         place: 0,
         counters,
     };
-    wavefront.begin_round();
-    wavefront.direct.begin_round(slots.len(), tile.pixel_spread > 0.0);
+    wavefront.begin_bounce();
+    wavefront.direct.begin_bounce(slots.len(), tile.pixel_spread > 0.0);
     // Trace and shade the camera rays, which are the first bounce.
     for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
         tile.camera_rows(start..slots.end, camera);
@@ -84,15 +84,15 @@ pub fn trace(
     // Light their vertices, and add the result to the accumulator.
     wavefront.light()?;
     wavefront.direct.flush_run(slots.start, &mut wavefront.accumulator);
-    wavefront.next_round(rays);
+    wavefront.next_bounce(rays);
     // Trace the remaining bounces.
     while !rays.is_empty() {
-        wavefront.direct.begin_round(rays.len(), tile.pixel_spread > 0.0);
+        wavefront.direct.begin_bounce(rays.len(), tile.pixel_spread > 0.0);
         if tile.behavior.scatters {
             // Find all hits first, so that each packet hits one object.
             tile.closest_hits(rays, hits)?;
             object_order.sort(hits);
-            for places in object_order.places().chunks(PACKET) {
+            for places in object_order.indices().chunks(PACKET) {
                 wavefront.shade_packet(PacketSource::Traced(rays, hits, places))?;
             }
         } else {
@@ -106,13 +106,13 @@ pub fn trace(
             |place| (slots[place].slot, slots[place].state.only_specular_before),
             &mut wavefront.accumulator,
         );
-        wavefront.next_round(rays);
+        wavefront.next_bounce(rays);
     }
     Ok(())
 }
 
 /// Traversal cost of a path's ray up to its hit.
-fn work(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
+fn traversal_cost(tile: &TileContext<'_>, path: &PathRay, hit: Option<Hit>) -> u32 {
     let t_max = hit.map_or(path.ray.t_max, |hit| hit.shape.t);
     tile.world.geometry.work(&Ray { t_max, ..path.ray })
 }
@@ -148,9 +148,9 @@ impl<'a> PathStepper<'a> for Wavefront<'a, '_> {
         self.crossing
     }
 
-    fn note_null(&mut self, path: &PathRay, next: Option<Hit>) {
+    fn record_pass(&mut self, path: &PathRay, next: Option<Hit>) {
         if self.accumulator.aov == LightAov::TraversalCost {
-            self.accumulator.add_work(path.slot, work(self.tile, path, next));
+            self.accumulator.add_traversal_cost(path.slot, traversal_cost(self.tile, path, next));
         }
     }
 
@@ -168,7 +168,7 @@ impl<'a> PathStepper<'a> for Wavefront<'a, '_> {
                 }
             }
             Interaction::Glass(vertex, hit, Interface { far, rough }) => {
-                if self.add_emission(path, vertex, OpaqueHit::Own(hit)) {
+                if self.add_emission(path, vertex, OpaqueHit::Direct(hit)) {
                     match rough {
                         Some(rough) => self.shade_rough_glass(path, vertex, rough, far),
                         None => self.shade_glass(path, vertex, far),
@@ -230,17 +230,17 @@ impl Wavefront<'_, '_> {
         Ok(())
     }
 
-    fn begin_round(&mut self) {
+    fn begin_bounce(&mut self) {
         let continuation = || Continuation::new(self.tile, self.depth, LobeSet::All);
         self.continuation = self.tile.behavior.scatters.then(continuation);
     }
 
     /// Starts the next bounce with the rays found in this one; the old queue is reused as its output.
-    fn next_round(&mut self, rays: &mut Vec<PathRay>) {
+    fn next_bounce(&mut self, rays: &mut Vec<PathRay>) {
         std::mem::swap(rays, self.next);
         self.next.clear();
         self.depth += 1;
-        self.begin_round();
+        self.begin_bounce();
     }
 
     /// Shades the hit of one ray of a packet. The path is large, so it is moved here only once.
@@ -265,10 +265,10 @@ impl Wavefront<'_, '_> {
     /// Intersects and shades a packet of rays.
     fn shade_packet(&mut self, rays: PacketSource<'_>) -> Result<(), Cancelled> {
         let tile = self.tile;
-        if (rays.place(0) as usize).is_multiple_of(POLL_INTERVAL) {
+        if (rays.queue_index(0) as usize).is_multiple_of(POLL_INTERVAL) {
             tile.token.check()?;
         }
-        let are_lit = self.depth < tile.settings.render.max_depth && self.accumulator.takes_reflected();
+        let are_lit = self.depth < tile.settings.render.max_depth && self.accumulator.accepts_reflected();
         let packet =
             tile.intersect(rays, self.accumulator.aov, are_lit, (self.direct.spare_batch(), self.surfaces));
         self.counters.texture_lookups += packet.lookups;
@@ -276,7 +276,7 @@ impl Wavefront<'_, '_> {
         if self.accumulator.aov == LightAov::TraversalCost {
             for lane in 0..rays.count() {
                 let path = packet.path(tile, &rays, lane);
-                self.accumulator.add_work(path.slot, work(tile, &path, packet.hit(lane)));
+                self.accumulator.add_traversal_cost(path.slot, traversal_cost(tile, &path, packet.hit(lane)));
             }
         }
         // Queue the plain vertices for direct lighting.
@@ -284,8 +284,8 @@ impl Wavefront<'_, '_> {
             self.direct.keep_spare();
             if tile.pixel_spread > 0.0 {
                 for (lane, hit) in lanes(packet.plain).filter_map(|lane| Some((lane, packet.hit(lane)?))) {
-                    let cone = packet.path(tile, &rays, lane).cone.after(hit.shape.t);
-                    self.direct.store_cone(rays.place(lane), cone);
+                    let cone = packet.path(tile, &rays, lane).cone.at_distance(hit.shape.t);
+                    self.direct.store_cone(rays.queue_index(lane), cone);
                 }
             }
         }
@@ -304,7 +304,7 @@ impl Wavefront<'_, '_> {
         }
         // Shade in path order, as the contributions to a sample are added in this order.
         for lane in lanes(wanted) {
-            self.place = rays.place(lane);
+            self.place = rays.queue_index(lane);
             self.shade(packet.path(tile, &rays, lane), (&packet, lane));
         }
         // Light the queued vertices while their data is in the cache.
@@ -411,10 +411,10 @@ impl Wavefront<'_, '_> {
     fn add_emission(&mut self, path: &PathRay, vertex: &Vertex<'_>, hit: OpaqueHit) -> bool {
         if vertex.emits() {
             let weight = match hit {
-                OpaqueHit::Own(hit) => self.tile.emitter_weight(path, &hit),
+                OpaqueHit::Direct(hit) => self.tile.emitter_weight(path, &hit),
                 OpaqueHit::Touching(hit) => self.tile.touching_emitter_weight(path, &hit),
             };
-            let radiance = vertex.emitted(path, self.counters);
+            let radiance = vertex.emitted_radiance(path, self.counters);
             self.add_emitted(path, radiance, weight);
         }
         self.may_scatter()
@@ -424,10 +424,10 @@ impl Wavefront<'_, '_> {
     fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, far: &Medium) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.tile.settings.render.ambient;
-        let takes_ambient = ambient != Vec3::ZERO && self.accumulator.takes_ambient(path);
+        let accepts_ambient = ambient != Vec3::ZERO && self.accumulator.accepts_ambient(path);
         // Look up only the textures that the image shows.
-        if !self.accumulator.takes_reflected() {
-            if takes_ambient {
+        if !self.accumulator.accepts_reflected() {
+            if accepts_ambient {
                 let reflectance = vertex.tinted(rough.ambient_at(at, lookups));
                 self.accumulator.add_ambient(path, path.throughput * ambient * reflectance);
             }
@@ -438,7 +438,7 @@ impl Wavefront<'_, '_> {
         if is_colored {
             vertex.tint(&mut bsdf);
         }
-        if takes_ambient {
+        if accepts_ambient {
             self.accumulator.add_ambient(path, path.throughput * ambient * bsdf.ambient());
         }
         if bsdf.is_black() {
@@ -468,7 +468,7 @@ impl Wavefront<'_, '_> {
     /// Queues the vertices of rough glass: one for each side, or a single one if light samples find nothing from one of
     /// the sides.
     fn shade_rough_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: GlassPoint, far: &Medium) {
-        if !self.accumulator.takes_reflected() {
+        if !self.accumulator.accepts_reflected() {
             return;
         }
         let (tile, place) = (self.tile, self.place);
@@ -489,9 +489,9 @@ impl Wavefront<'_, '_> {
             |medium: &Medium| medium.glass().is_some_and(|inside| tile.world.is_dark_body(inside.body));
         let dark = [near, far].map(|medium| has_shadows && is_dark(medium));
         // Photons land on both sides, so these need a vertex each.
-        let is_one = dark != [false; 2] && !tile.behavior.gathers && vertex.beyond().is_some();
+        let is_one = dark != [false; 2] && !tile.behavior.gathers && vertex.far_origin().is_some();
         let is_behind = is_one && dark == [true, false];
-        let sides = |vertex: &Vertex<'_>, is_dark: bool, medium| match vertex.beyond() {
+        let sides = |vertex: &Vertex<'_>, is_dark: bool, medium| match vertex.far_origin() {
             Some(beyond) if is_one => ShadingSides::TwoSides { is_dark, beyond, medium },
             Some(_) | None => ShadingSides::OneSide { is_dark },
         };

@@ -84,7 +84,7 @@ impl RenderSettings {
     /// Converts a position in pixels from the top left corner of the image to camera units: to the right and up from
     /// the center, in half image heights.
     #[inline(always)]
-    pub fn from_middle(&self, from_corner: DVec2) -> DVec2 {
+    pub fn pixel_to_camera(&self, from_corner: DVec2) -> DVec2 {
         let Render { width, height, .. } = self.render;
         let (half_width, half_height) = (0.5 * f64::from(width), 0.5 * f64::from(height));
         DVec2::new(from_corner.x - half_width, half_height - from_corner.y) * (1.0 / half_height)

@@ -67,7 +67,7 @@ pub struct LightSums {
 }
 
 impl LightSums {
-    pub const NOTHING: Self = Self {
+    pub const ZERO: Self = Self {
         light: [[0.0; LANES]; 3],
         total: [0.0; LANES],
         rays: LightRayCounts { shadow: 0, scattered: 0, lookups: 0 },
@@ -75,7 +75,7 @@ impl LightSums {
 
     /// The reflected light that results from the sums.
     #[inline(always)]
-    pub fn arrived(mut self, aov: LightAov) -> ReflectedLight {
+    pub fn into_reflected(mut self, aov: LightAov) -> ReflectedLight {
         if aov == LightAov::LitFraction {
             for i in 0..LANES {
                 let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
@@ -97,8 +97,8 @@ impl<const MIS: bool> Loops for SampleAllLights<'_, MIS> {
 
     #[inline(always)]
     fn run(self, folds: impl Folds) -> LightSums {
-        let mut sums = LightSums::NOTHING;
-        self.add_all(&mut sums, folds);
+        let mut sums = LightSums::ZERO;
+        self.sample_all(&mut sums, folds);
         sums
     }
 }
@@ -106,7 +106,7 @@ impl<const MIS: bool> Loops for SampleAllLights<'_, MIS> {
 impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Adds the reflected light of all lights.
     #[inline(always)]
-    fn add_all(&self, sums: &mut LightSums, folds: impl Folds) {
+    fn sample_all(&self, sums: &mut LightSums, folds: impl Folds) {
         let render = &self.tile.settings.render;
         let takes = |light: &Light| !self.only_infinite || light.is_beyond();
         let mut sampler = None;
@@ -135,7 +135,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     Some(_) | None => [[0.0; LANES]; 2],
                 };
                 let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
-                let (mut values, active, response) = self.values(&samples, 1.0 / count as f32, folds);
+                let (mut values, active, response) = self.contributions(&samples, 1.0 / count as f32, folds);
                 // Multiply by the emission texture.
                 if let Some(pattern) = light.emission_texture() {
                     values = self.textured(pattern, &samples, active, values);
@@ -230,7 +230,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             pending.active |= active;
             add_where(active, values, &mut pending.light);
         } else {
-            let traced = active & !self.row.hidden(&samples.directions, folds);
+            let traced = active & !self.row.below_horizon(&samples.directions, folds);
             let (rays, ends) = self.shadow_rays(samples, traced);
             self.add_unoccluded((&rays, &ends, traced), &samples.sources, values, sums, folds);
         }
@@ -264,7 +264,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             set_lane(&mut direction, i, ray.direction);
             ends[i] = ray.t_max;
         }
-        let traced = pending.active & !self.row.hidden(&direction, folds);
+        let traced = pending.active & !self.row.below_horizon(&direction, folds);
         for i in 0..LANES {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
@@ -285,7 +285,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     ) {
         sums.rays.shadow += u64::from(traced.count_ones());
         if self.aov == LightAov::TraversalCost {
-            return add_work(self.tile, rays, ends, traced, &mut sums.light);
+            return add_traversal_cost(self.tile, rays, ends, traced, &mut sums.light);
         }
         if self.tile.world.has_passable() {
             return self.add_attenuated((rays, ends, traced), sources, values, sums);
@@ -317,7 +317,12 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// The unoccluded contribution of each sample, the mask of nonzero ones, and the response of its vertex.
     #[inline(always)]
-    pub fn values(&self, samples: &LightRow, share: f32, folds: impl Folds) -> (Lanes3, u32, Response) {
+    pub fn contributions(
+        &self,
+        samples: &LightRow,
+        share: f32,
+        folds: impl Folds,
+    ) -> (Lanes3, u32, Response) {
         let response = self.row.response(&samples.directions, folds);
         let Response { bsdf: BsdfValues { f, .. }, cosines } = &response;
         let mut arriving = samples.weights;
@@ -360,7 +365,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 /// Adds the traversal cost of the rays in `traced`, up to their ends.
 #[cold]
 #[inline(never)]
-pub fn add_work(tile: &TileContext<'_>, rays: &RayRows, ends: &Ends, traced: u32, sums: &mut Lanes3) {
+pub fn add_traversal_cost(
+    tile: &TileContext<'_>,
+    rays: &RayRows,
+    ends: &Ends,
+    traced: u32,
+    sums: &mut Lanes3,
+) {
     for i in lanes(traced) {
         let work = tile.world.geometry.work(&Ray { t_max: ends[i], ..rays.ray(i) });
         let sum = lane(sums, i) + Vec3::splat(work as f32);

@@ -45,7 +45,7 @@ impl<const MIS: bool> Loops for SampleLightTree<'_, MIS> {
     fn run(self, folds: impl Folds) -> LightSums {
         let Self { lighting, selection, number, pool } = self;
         let sampler = lighting.row.sampler(lighting.tile);
-        let mut sums = LightSums::NOTHING;
+        let mut sums = LightSums::ZERO;
         // Sample all infinite lights, if the tree excludes them.
         if selection.leaves_beyond {
             sums = folds.call(SampleAllLights { only_infinite: true, ..lighting });
@@ -59,7 +59,7 @@ impl<const MIS: bool> Loops for SampleLightTree<'_, MIS> {
             let picks = lighting.picks(selection, &sampler, first..(first + PICK_BLOCK).min(samples));
             for (k, pick) in (first * each..).zip(&picks) {
                 let mut sink = PickSink { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
-                lighting.add_pick(pick, &sampler, (k, samples * each), &mut sink, folds);
+                lighting.sample_pick(pick, &sampler, (k, samples * each), &mut sink, folds);
             }
         }
         sums
@@ -76,7 +76,7 @@ struct PickSink<'a> {
 }
 
 impl LightPicks {
-    const NOTHING: Self = Self { lights: [0; LANES], shares: [0.0; LANES], weighed: [0.0; LANES] };
+    const EMPTY: Self = Self { lights: [0; LANES], shares: [0.0; LANES], weighed: [0.0; LANES] };
 
     /// Replaces probabilities with the reciprocals of expected sample counts, or 0 for a probability of 0.
     #[inline(always)]
@@ -138,7 +138,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             }
         }
         // Pick lights with these numbers.
-        let mut picks = vec![LightPicks::NOTHING; numbers.len()];
+        let mut picks = vec![LightPicks::EMPTY; numbers.len()];
         if tree.is_flat() {
             self.pick_flat(tree, &numbers, &mut picks);
         } else {
@@ -222,7 +222,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Samples one picked light per vertex and adds its light, or queues its shadow rays.
     #[inline(always)]
-    fn add_pick(
+    fn sample_pick(
         &self,
         pick: &LightPicks,
         sampler: &SamplerRow<LANES>,
@@ -244,7 +244,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             inverse[i] *= pick.weighed[i];
         }
         // Compute the unoccluded contributions.
-        let (mut values, active, response) = self.values(&samples, 1.0, folds);
+        let (mut values, active, response) = self.contributions(&samples, 1.0, folds);
         let active = active & used;
         if MIS {
             // Each group of picks has its own pdf, and all requested BSDF samples compete with every group.
@@ -264,11 +264,11 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             // Nothing is traced, so there is no traversal cost.
             Shadows::Off if self.aov == LightAov::TraversalCost => return,
             Shadows::Off => return add_where(active, &values, &mut sums.light),
-            Shadows::Hard => self.aim_at_middles(&mut samples, &lights, active),
+            Shadows::Hard => self.aim_at_centers(&mut samples, &lights, active),
             Shadows::Soft => {}
         }
         // Trace the shadow rays, or queue them with others to the same lights.
-        let traced = active & !row.hidden(&samples.directions, folds);
+        let traced = active & !row.below_horizon(&samples.directions, folds);
         let (rays, ends) = self.shadow_rays(&samples, traced);
         match pool {
             Some(pool) if self.aov != LightAov::TraversalCost => {
@@ -286,7 +286,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     }
 
     /// Aims rays at the centers of lights that have one.
-    fn aim_at_middles(&self, samples: &mut LightRow, lights: &[u32; LANES], active: u32) {
+    fn aim_at_centers(&self, samples: &mut LightRow, lights: &[u32; LANES], active: u32) {
         for i in lanes(active) {
             let Some((middle, source)) = self.tile.world.lights.get(lights[i]).middle() else { continue };
             let direction = match middle {

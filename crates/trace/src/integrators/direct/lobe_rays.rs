@@ -1,6 +1,6 @@
 //! Rays in narrow lobes, which find lights in addition to light samples.
 
-use super::all_lights::{ReflectedLight, add_work};
+use super::all_lights::{ReflectedLight, add_traversal_cost};
 use super::unshadowed::UnshadowedLobeRay;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
@@ -45,19 +45,19 @@ impl Loops for LobeRays<'_> {
             if row.bsdf.sends_rays() {
                 [choices, _] = sampler.pairs(&row.path, Decision::Lobe, repetition, count);
             }
-            let directions = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u, folds);
-            let Response { bsdf, cosines } = row.response(&directions, folds);
-            let pdfs = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &directions, &bsdf, folds);
-            let [_, narrow] = row.bsdf.parts(&directions, &bsdf, folds);
+            let wi = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u, folds);
+            let Response { bsdf, cosines } = row.response(&wi, folds);
+            let pdfs = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &wi, &bsdf, folds);
+            let [_, narrow] = row.bsdf.parts(&wi, &bsdf, folds);
             // Select the rays above the horizon.
-            let mut sent = sharp & !row.hidden(&directions, folds);
+            let mut sent = sharp & !row.below_horizon(&wi, folds);
             let mut ends = [-1.0; LANES];
             for i in 0..LANES {
                 let bit = 1 << i;
                 sent &= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) { !0 } else { !bit };
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
-            let rays = RayRows::of(row.from, directions).leaving(row.starts(&directions));
+            let rays = RayRows::of(row.from, wi).leaving(row.starts(&wi));
             arrived.rays.scattered += u64::from(sent.count_ones());
             // Without soft shadows, add the light of every emitter along the rays, whatever is in front of it.
             if tile.settings.render.shadows != Shadows::Soft {
@@ -78,7 +78,7 @@ impl Loops for LobeRays<'_> {
                 for i in lanes(sent) {
                     ends[i] = hits.get(i).map_or(f32::INFINITY, |hit| hit.t);
                 }
-                add_work(tile, &rays, &ends, sent, &mut arrived.light);
+                add_traversal_cost(tile, &rays, &ends, sent, &mut arrived.light);
                 continue;
             }
             // Add the light that the rays find.

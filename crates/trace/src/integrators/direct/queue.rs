@@ -81,7 +81,7 @@ impl DirectLightQueue {
     }
 
     /// Begins a bounce with `paths` paths, with or without ray cones.
-    pub fn begin_round(&mut self, paths: usize, has_cones: bool) {
+    pub fn begin_bounce(&mut self, paths: usize, has_cones: bool) {
         self.clear();
         self.cones.clear();
         self.cones.resize(if has_cones { paths } else { 0 }, Cone::default());
@@ -228,7 +228,8 @@ impl DirectLightQueue {
                         .instructions()
                         .run(LiftOrigins { geometry: &tile.world.geometry, row });
                 }
-                let request = BatchRequest { number, used: row.used & shown(row, aov), shares_with_paths };
+                let request =
+                    BatchRequest { number, used: row.used & shown_vertices(row, aov), shares_with_paths };
                 let sums = self.sample_lights(request, tile, aov, group.len() as u32);
                 group.push(sums);
                 if self.pool.is_full() {
@@ -240,7 +241,8 @@ impl DirectLightQueue {
             // Add light from lobe rays and photons, and store the result.
             for (number, sums) in (first..end).zip(group.drain(..)) {
                 let row = &self.rows[number];
-                let request = BatchRequest { number, used: row.used & shown(row, aov), shares_with_paths };
+                let request =
+                    BatchRequest { number, used: row.used & shown_vertices(row, aov), shares_with_paths };
                 let mut arrived = self.add_lobe_rays(request, tile, aov, sums);
                 if let Some(gathered) = gather(row) {
                     add_where(row.used, &gathered, &mut arrived.light);
@@ -286,7 +288,7 @@ impl DirectLightQueue {
 
     /// The media of a packet's vertices. `None` if all are in air.
     fn media_of(&self, row: &VertexBatch) -> Option<&Media> {
-        (!self.media.are_air() && row.is_inside()).then_some(&self.media)
+        (!self.media.are_air() && row.is_in_glass()).then_some(&self.media)
     }
 
     /// Samples lights at a packet; shadow rays to picked lights are pooled under index `number`.
@@ -298,7 +300,7 @@ impl DirectLightQueue {
         number: u32,
     ) -> LightSums {
         if request.used == 0 {
-            return LightSums::NOTHING;
+            return LightSums::ZERO;
         }
         let mut pool = std::mem::take(&mut self.pool);
         let row = &self.rows[request.number];
@@ -331,7 +333,7 @@ impl DirectLightQueue {
         sums: LightSums,
     ) -> ReflectedLight {
         let row = &self.rows[request.number];
-        let arrived = sums.arrived(aov);
+        let arrived = sums.into_reflected(aov);
         match self.competing_technique(request, tile, aov) {
             CompetingTechnique::Lobes(sharp) => {
                 let media = self.media_of(row);
@@ -351,7 +353,7 @@ impl DirectLightQueue {
             LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(arrived),
             LightAov::TraversalCost => *arrived,
         };
-        match row.run() {
+        match row.consecutive_start() {
             Some(first) => {
                 let own = &mut self.arrived[first as usize..][..LANES];
                 for (i, own) in own.iter_mut().enumerate() {
@@ -368,7 +370,7 @@ impl DirectLightQueue {
 }
 
 /// Mask of vertices whose direct light the view shows, if there may be any.
-fn shown(row: &VertexBatch, aov: LightAov) -> u32 {
+fn shown_vertices(row: &VertexBatch, aov: LightAov) -> u32 {
     if row.is_dark {
         return 0;
     }

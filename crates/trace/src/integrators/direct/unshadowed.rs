@@ -71,7 +71,7 @@ impl UnshadowedLobeRay<'_> {
             Some((Middle::Towards(direction), source)) => (Ray::new(self.ray.origin, direction), source),
             None => (self.ray, Source::Nothing),
         };
-        if self.row.hides(self.lane, segment.direction) {
+        if self.row.is_below_horizon(self.lane, segment.direction) {
             return Vec3::ZERO;
         }
         rays.shadow += 1;

@@ -5,7 +5,7 @@
 use arrayvec::ArrayVec;
 
 use super::kernel::weight_over;
-use super::map::{GatherPoint, LEAST_COSINE, REACH};
+use super::map::{GatherPoint, MIN_COSINE, REACH};
 use crate::geometry::local_form::{Extent, Ground, Piece};
 use crate::geometry::{Aabb, LocalForm, Shape, ShapeHit};
 use crate::materials::{Material, Rough};
@@ -43,7 +43,7 @@ const FAR: f64 = 1.05;
 const WIDE: f64 = 2.0;
 
 /// Minimum coverage for the closed form; below it, rounding errors matter.
-const LEAST_PART: f64 = 1e-3;
+const MIN_COVERAGE: f64 = 1e-3;
 
 /// Capacities for triangles of a mesh near a kernel, pieces of its plane, and walls.
 const TRIANGLES: usize = 32;
@@ -55,11 +55,11 @@ pub fn kernel_coverage(world: &World, look: &GatherPoint, radius: f32) -> Kernel
     let mut around = KernelNeighborhood::new(look, radius);
     let mut is_crowded = false;
     let bounds = look.kernel_box(radius);
-    let is_told = world.geometry.around(&bounds, |id, object| match object {
+    let is_exact = world.geometry.around(&bounds, |id, object| match object {
         Object::Shape(shape) => around.add_shape(shape, || receives(material(world, id, 0))),
         Object::Mesh(mesh) => around.add_mesh((world, id), mesh, &bounds, &mut is_crowded),
     });
-    match around.part().filter(|_| is_told) {
+    match around.coverage().filter(|_| is_exact) {
         Some(part) => KernelCoverage::Fraction(part as f32),
         None if is_crowded => KernelCoverage::Crowded,
         None => KernelCoverage::Clipped,
@@ -126,29 +126,29 @@ impl KernelNeighborhood {
 
     /// Projects a vector onto the plane, in radii.
     #[inline]
-    fn along(&self, vector: DVec3) -> DVec2 {
+    fn project(&self, vector: DVec3) -> DVec2 {
         DVec2::new(self.tangents[0].dot(vector), self.tangents[1].dot(vector))
     }
 
     /// The corners of a piece relative to the center, projected onto the plane, in radii.
-    fn flat(&self, piece: &Piece) -> ArrayVec<DVec2, 4> {
-        piece.iter().map(|&corner| self.along(corner - self.point)).collect()
+    fn project_piece(&self, piece: &Piece) -> ArrayVec<DVec2, 4> {
+        piece.iter().map(|&corner| self.project(corner - self.point)).collect()
     }
 
     /// Computes the kernel's weight over the pieces; `None` if a wall separates them or they overlap.
-    fn part(&self) -> Option<f64> {
+    fn coverage(&self) -> Option<f64> {
         if !self.walls.is_empty() && self.whole > 0 {
             return None;
         }
         let mut part = f64::from(self.whole);
         for piece in &self.pieces {
-            let corners = self.flat(piece);
+            let corners = self.project_piece(piece);
             if !self.walls.iter().all(|wall| wall.is_beyond(&corners)) {
                 return None;
             }
             part += weight_over(&corners);
         }
-        (LEAST_PART..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
+        (MIN_COVERAGE..=1.0 + FLAT).contains(&part).then_some(part.min(1.0))
     }
 
     /// Adds a shape; returns whether the coverage still has a closed form.
@@ -186,13 +186,13 @@ impl KernelNeighborhood {
         let mut near: ArrayVec<u32, TRIANGLES> = ArrayVec::new();
         // Trees visit some triangles twice, and others that are only close. Skip both, or the result would depend on
         // the tree.
-        let is_told = mesh.around(bounds, |triangle| {
+        let is_exact = mesh.around(bounds, |triangle| {
             let is_known = near.contains(&triangle);
             is_known
                 || !Aabb::around_f64(mesh.world_corners(triangle)).meets(bounds)
                 || near.try_push(triangle).is_ok()
         });
-        if !is_told {
+        if !is_exact {
             *is_crowded = true;
             return false;
         }
@@ -220,11 +220,11 @@ impl KernelNeighborhood {
         let heights = piece.iter().map(|&corner| self.normal.dot(corner - self.point));
         let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
         let (reach, rises) = (f64::from(REACH) * self.radius, high > FLAT * self.radius);
-        let is_steep = cosine * cosine <= f64::from(LEAST_COSINE * LEAST_COSINE) * size;
+        let is_steep = cosine * cosine <= f64::from(MIN_COSINE * MIN_COSINE) * size;
         if high < -reach
             || low > reach
             || !rises && (is_steep || !receives())
-            || !meets_disc(&self.flat(piece))
+            || !meets_disc(&self.project_piece(piece))
         {
             return true;
         }
@@ -233,7 +233,7 @@ impl KernelNeighborhood {
 
     /// Adds a wall, given its plane's normal and signed distance from the center.
     fn add_wall(&mut self, normal: DVec3, distance: f64) -> bool {
-        let along = self.along(normal) * (self.radius * distance.signum());
+        let along = self.project(normal) * (self.radius * distance.signum());
         let length = along.length();
         let wall = Wall { normal: along / length, distance: distance.abs() / (length * self.radius) };
         normal.dot(self.normal).abs() < UPRIGHT && wall.distance > FLAT && self.walls.try_push(wall).is_ok()
@@ -261,11 +261,11 @@ mod tests {
     use crate::math::Vec3;
 
     /// Coverage of an upward-facing kernel of radius 0.1 at (x, 0, z) among shapes.
-    fn told(x: f32, z: f32, shapes: &[Shape]) -> Option<f64> {
+    fn coverage_at(x: f32, z: f32, shapes: &[Shape]) -> Option<f64> {
         let look = GatherPoint { point: Vec3::new(x, 0.0, z), normal: Vec3::Y, most_depth: 1 };
         let mut around = KernelNeighborhood::new(&look, 0.1);
-        let are_told = shapes.iter().all(|shape| around.add_shape(shape, || true));
-        around.part().filter(|_| are_told)
+        let is_exact = shapes.iter().all(|shape| around.add_shape(shape, || true));
+        around.coverage().filter(|_| is_exact)
     }
 
     fn quad(corner: DVec3, u: DVec3, v: DVec3) -> Shape {
@@ -279,25 +279,31 @@ mod tests {
         let wall = quad(DVec3::ZERO, DVec3::Y, DVec3::Z);
         let back = quad(DVec3::ZERO, DVec3::X, DVec3::Y);
         let near = |told: Option<f64>, exact: f64| told.is_some_and(|told| (told - exact).abs() < 1e-5);
-        assert_eq!(told(0.5, 0.5, &[floor, wall]), Some(1.0));
-        assert!(near(told(1.0, 0.5, &[floor]), 0.5), "{:?}", told(1.0, 0.5, &[floor]));
-        assert!(near(told(1.0, 0.5, &[floor, other]), 1.0));
-        assert!(near(told(0.05, 0.5, &[floor, wall]), 1.0 - told(-0.05, 0.5, &[floor]).expect("flat")));
+        assert_eq!(coverage_at(0.5, 0.5, &[floor, wall]), Some(1.0));
+        assert!(near(coverage_at(1.0, 0.5, &[floor]), 0.5), "{:?}", coverage_at(1.0, 0.5, &[floor]));
+        assert!(near(coverage_at(1.0, 0.5, &[floor, other]), 1.0));
         assert!(near(
-            told(0.0005, 0.0005, &[floor, wall, back]),
-            told(0.0005, 0.0005, &[floor]).expect("flat")
+            coverage_at(0.05, 0.5, &[floor, wall]),
+            1.0 - coverage_at(-0.05, 0.5, &[floor]).expect("flat")
+        ));
+        assert!(near(
+            coverage_at(0.0005, 0.0005, &[floor, wall, back]),
+            coverage_at(0.0005, 0.0005, &[floor]).expect("flat")
         ));
         // A wall between two pieces, a box on the floor, a sheet above it, a ball resting on it.
-        assert_eq!(told(0.95, 0.5, &[floor, other, quad(DVec3::X, DVec3::Y, DVec3::Z)]), None);
+        assert_eq!(coverage_at(0.95, 0.5, &[floor, other, quad(DVec3::X, DVec3::Y, DVec3::Z)]), None);
         let cuboid = Shape::Box(Cuboid::new(DVec3::new(0.5, 0.1, 0.5), DVec3::splat(0.2), DVec3::ZERO));
-        assert_eq!(told(0.35, 0.5, &[floor, cuboid]), None);
-        assert_eq!(told(0.25, 0.5, &[floor, cuboid]), Some(1.0));
+        assert_eq!(coverage_at(0.35, 0.5, &[floor, cuboid]), None);
+        assert_eq!(coverage_at(0.25, 0.5, &[floor, cuboid]), Some(1.0));
         let sheet = quad(DVec3::new(0.4, 0.01, 0.4), DVec3::Z * 0.2, DVec3::X * 0.2);
-        assert_eq!(told(0.35, 0.5, &[floor, sheet]), None);
+        assert_eq!(coverage_at(0.35, 0.5, &[floor, sheet]), None);
         let ball = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, radius, 0.5), radius });
-        assert_eq!(told(0.45, 0.5, &[floor, ball(0.1)]), None);
+        assert_eq!(coverage_at(0.45, 0.5, &[floor, ball(0.1)]), None);
         // Kernels on large and small balls.
         let under = |radius: f64| Shape::Sphere(Sphere { center: DVec3::new(0.5, -radius, 0.5), radius });
-        assert_eq!((told(0.5, 0.5, &[under(1.0)]), told(0.5, 0.5, &[under(0.15)])), (Some(1.0), None));
+        assert_eq!(
+            (coverage_at(0.5, 0.5, &[under(1.0)]), coverage_at(0.5, 0.5, &[under(0.15)])),
+            (Some(1.0), None)
+        );
     }
 }

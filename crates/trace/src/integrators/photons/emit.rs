@@ -86,7 +86,7 @@ impl PhotonTracing<'_> {
         };
         // Emit the photons, then trace them bounce by bounce.
         let mut rays = Vec::new();
-        wavefront.start(count, &mut rays);
+        wavefront.emit(count, &mut rays);
         let (mut row, mut surfaces) = (VertexBatch::EMPTY, SurfaceRow::EMPTY);
         while !rays.is_empty() {
             for packet in rays.chunks(PACKET) {
@@ -107,7 +107,7 @@ impl PhotonTracing<'_> {
 
     /// The ray of a photon from an infinite light, moved back past transmissive infinite planes in front of its start.
     /// `None` if an opaque surface blocks it.
-    fn past_planes(&self, ray: Ray) -> Option<Ray> {
+    fn skip_planes(&self, ray: Ray) -> Option<Ray> {
         let world = self.tile.world;
         let mut start = ray.origin;
         for _ in 0..MAX_HIDDEN {
@@ -166,7 +166,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
         &mut self.crossing
     }
 
-    fn note_null(&mut self, _: &PathRay, _: Option<Hit>) {}
+    fn record_pass(&mut self, _: &PathRay, _: Option<Hit>) {}
 
     #[inline(always)]
     fn interact(&mut self, path: &PathRay, reached: Interaction<'_, 'a>, has_passed: bool) {
@@ -181,7 +181,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
             // Light samples find direct light.
             Interaction::Glass(..) if self.depth == 0 && !has_passed => {}
             Interaction::Glass(vertex, _, Interface { far, rough: Some(rough) }) => {
-                self.leave_photon(path, vertex, RoughBsdf::GlassReflection(rough), (far, Some(1.0)));
+                self.store_and_scatter(path, vertex, RoughBsdf::GlassReflection(rough), (far, Some(1.0)));
             }
             Interaction::Nothing | Interaction::Hidden => {}
         }
@@ -215,7 +215,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
 
 impl PhotonWavefront<'_> {
     /// Emits the photons.
-    fn start(&mut self, count: u32, rays: &mut Vec<PathRay>) {
+    fn emit(&mut self, count: u32, rays: &mut Vec<PathRay>) {
         let tracing = self.tracing;
         let tile = tracing.tile;
         let has_planes = tile.world.geometry.has_unbounded();
@@ -226,7 +226,7 @@ impl PhotonWavefront<'_> {
                 let Some(emitted) = tracing.emission.emit(numbers) else { continue };
                 let past_planes = is_beyond(&emitted) && has_planes;
                 let ray = emitted.ray();
-                let Some(ray) = (if past_planes { tracing.past_planes(ray) } else { Some(ray) }) else {
+                let Some(ray) = (if past_planes { tracing.skip_planes(ray) } else { Some(ray) }) else {
                     continue;
                 };
                 let offset = begin as usize + i;
@@ -338,12 +338,12 @@ impl PhotonWavefront<'_> {
         let mut bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
         vertex.tint(&mut bsdf);
         if !bsdf.is_black() {
-            self.leave_photon(path, vertex, bsdf, (far, scattered));
+            self.store_and_scatter(path, vertex, bsdf, (far, scattered));
         }
     }
 
     /// [`PhotonWavefront::shade_rough`] with a known BSDF.
-    fn leave_photon(
+    fn store_and_scatter(
         &mut self,
         path: &PathRay,
         vertex: &Vertex<'_>,
@@ -518,7 +518,7 @@ impl Loops for EmissionNumbers<'_> {
     #[inline(always)]
     fn run(self, _: impl Folds) -> Self::Done {
         let slots = std::array::from_fn(|i| self.first + i as u32);
-        let (xs, ys, samples) = self.tile.block.places_of(&slots);
+        let (xs, ys, samples) = self.tile.block.samples_of(&slots);
         let sampler = SamplerRow::new(self.tile.settings.render.seed, &xs, &ys, &samples);
         let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET], decision, 0, 1);
         let (light, aim) = (pairs(Decision::Lamp), pairs(Decision::Aim));
@@ -547,7 +547,7 @@ impl Loops for RouletteNumbers<'_> {
         for (i, ray) in self.rays.iter().enumerate().take(PACKET) {
             (slots[i], paths[i]) = (ray.slot, ray.path);
         }
-        let (xs, ys, samples) = self.tile.block.places_of(&slots);
+        let (xs, ys, samples) = self.tile.block.samples_of(&slots);
         let sampler = SamplerRow::new(self.tile.settings.render.seed, &xs, &ys, &samples);
         let [risks, _] = sampler.pairs(&paths, Decision::Roulette, 0, 1);
         risks

@@ -50,7 +50,7 @@ impl Loops for GatherPhotons<'_> {
         let PathClasses { caustic, indirect, .. } = aov.path_classes();
         let narrow = row.bsdf.narrow_lobes();
         for i in lanes(row.used) {
-            let (_, _, sample) = tile.block.place(row.slot[i]);
+            let (_, _, sample) = tile.block.sample_of(row.slot[i]);
             let pass = maps.pass(sample);
             let only_specular_before = row.only_specular_before & 1 << i != 0;
             let (point, normal) = row.surface_of(i);

@@ -63,7 +63,7 @@ pub struct PhotonMap {
 }
 
 /// Minimum cosine between the normals of surfaces within one kernel.
-pub(super) const LEAST_COSINE: f32 = 0.7;
+pub(super) const MIN_COSINE: f32 = 0.7;
 
 /// Maximum distance of photons from the tangent plane, in radii.
 pub(super) const REACH: f32 = 0.3;
@@ -360,9 +360,8 @@ impl PhotonMap {
             let cosine = own[0][i] * normal.x + own[1][i] * normal.y + own[2][i] * normal.z;
             let squared = own[0][i] * own[0][i] + own[1][i] * own[1][i] + own[2][i] * own[2][i];
             let arriving = from[0][i] * normal.x + from[1][i] * normal.y + from[2][i] * normal.z;
-            let faces = (cosine > 0.0)
-                & (cosine * cosine > (LEAST_COSINE * LEAST_COSINE) * squared)
-                & (arriving > 0.0);
+            let faces =
+                (cosine > 0.0) & (cosine * cosine > (MIN_COSINE * MIN_COSINE) * squared) & (arriving > 0.0);
             near[i] &= if faces { TRUE } else { 0 };
             // A tilted surface has more photons per area of the tangent plane.
             weights[i] *= cosine / squared.sqrt();
@@ -485,7 +484,7 @@ mod tests {
                         let above = way.dot(normal);
                         let is_near = way.length_squared() - above * above < radius * radius;
                         let is_flat = above.abs() < REACH * radius;
-                        is_near && is_flat && photon.normal.dot(normal) > LEAST_COSINE
+                        is_near && is_flat && photon.normal.dot(normal) > MIN_COSINE
                     };
                     let mut expected: Vec<_> =
                         photons.iter().filter(near).map(|photon| photon.point.to_array()).collect();

@@ -65,7 +65,7 @@ pub use map::{Photon, PhotonMap};
 const CHUNK: u32 = 2048;
 
 /// α, the fraction of a pass's photons that the shrinking kernel keeps.
-const KEPT: f64 = 2.0 / 3.0;
+const ALPHA: f64 = 2.0 / 3.0;
 
 /// Median number of photons that the first pass's kernels should contain, for caustic and bounced photons.
 const WANTED: [f32; 2] = [12.0, 8.0];
@@ -298,7 +298,7 @@ struct StoredPhotons {
 
 /// Kernel radius of a pass relative to the first pass: r²ᵢ₊₁ = r²ᵢ·(i + α)/(i + 1).
 fn radius_factor(pass: u32) -> f64 {
-    (1..=pass).map(f64::from).map(|i| (i + KEPT) / (i + 1.0)).product::<f64>().sqrt()
+    (1..=pass).map(f64::from).map(|i| (i + ALPHA) / (i + 1.0)).product::<f64>().sqrt()
 }
 
 /// A radius within which the median photon has `wanted` neighbors; `size` is the radius of the scene's bounding sphere.

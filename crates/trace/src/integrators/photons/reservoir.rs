@@ -79,17 +79,17 @@ mod tests {
 
     #[test]
     fn items_are_chosen_in_proportion_to_weight() {
-        const THINGS: usize = 5;
+        const ITEMS: usize = 5;
         let mut next = unit(5);
-        let mut weights = [[0.0; LANES]; THINGS];
+        let mut weights = [[0.0; LANES]; ITEMS];
         weights.as_flattened_mut().iter_mut().for_each(|weight| *weight = (next() * 3.0 - 1.0).max(0.0));
         weights[1][3] = 9.0;
         let total: f32 = weights.as_flattened().iter().sum();
-        let mut counts = [[0_u32; LANES]; THINGS];
+        let mut counts = [[0_u32; LANES]; ITEMS];
         const DRAWS: u32 = 400_000;
         for _ in 0..DRAWS {
             let mut choices = LaneReservoirs::new(next());
-            (0..THINGS).for_each(|number| choices.offer(number as u32, &weights[number]));
+            (0..ITEMS).for_each(|number| choices.offer(number as u32, &weights[number]));
             let (number, lane) = choices.chosen(next()).expect("some weights are positive");
             counts[number as usize][lane] += 1;
         }

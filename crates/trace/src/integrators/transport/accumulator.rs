@@ -27,7 +27,7 @@ pub struct Accumulator<'a> {
 impl Accumulator<'_> {
     /// Adds emission or ambient light.
     pub fn add(&mut self, slot: u32, part: LocalTerm, radiance: Vec3) {
-        let parts = self.parts();
+        let parts = self.components();
         let is_taken = match part {
             LocalTerm::Emitted => parts.emitted,
             LocalTerm::Ambient => parts.ambient,
@@ -48,12 +48,12 @@ impl Accumulator<'_> {
     }
 
     /// Adds the traversal cost of a ray.
-    pub fn add_work(&mut self, slot: u32, count: u32) {
+    pub fn add_traversal_cost(&mut self, slot: u32, count: u32) {
         self.radiance[slot as usize] += Vec3::splat(count as f32);
     }
 
     /// The radiance components that are accumulated.
-    fn parts(&self) -> Components {
+    fn components(&self) -> Components {
         match self.aov {
             LightAov::Radiance(parts) => parts,
             LightAov::LitFraction | LightAov::TraversalCost => Components::NONE,
@@ -61,7 +61,7 @@ impl Accumulator<'_> {
     }
 
     /// Whether any reflected light is accumulated.
-    pub fn takes_reflected(&self) -> bool {
+    pub fn accepts_reflected(&self) -> bool {
         match self.aov {
             LightAov::Radiance(parts) => parts.has_reflected(),
             LightAov::LitFraction | LightAov::TraversalCost => true,
@@ -70,8 +70,8 @@ impl Accumulator<'_> {
 
     /// Whether the ambient term of a surface that a path hits is accumulated. After a diffuse or glossy surface, it
     /// counts as light which that surface reflects.
-    pub fn takes_ambient(&self, path: &PathRay) -> bool {
-        let parts = self.parts();
+    pub fn accepts_ambient(&self, path: &PathRay) -> bool {
+        let parts = self.components();
         if path.state.only_specular_before {
             parts.ambient
         } else {
@@ -84,7 +84,7 @@ impl Accumulator<'_> {
     pub fn add_ambient(&mut self, path: &PathRay, radiance: Vec3) {
         if path.state.only_specular_before {
             self.add(path.slot, LocalTerm::Ambient, radiance);
-        } else if self.takes_ambient(path) {
+        } else if self.accepts_ambient(path) {
             self.add_direct(path.slot, radiance, false);
         }
     }

@@ -107,7 +107,7 @@ impl VertexBatch {
         for i in 0..LANES {
             is_run &= slots[i] == slots[0] + i as u32;
         }
-        let (xs, ys, samples) = if is_run { block.places(slots[0]) } else { block.places_of(slots) };
+        let (xs, ys, samples) = if is_run { block.samples_from(slots[0]) } else { block.samples_of(slots) };
         SamplerRow::new(tile.settings.render.seed, &xs, &ys, &samples)
     }
 
@@ -228,8 +228,8 @@ impl VertexBatch {
         set_lane(&mut self.smooth_normal, i, shading.smooth_normal);
         self.shading_normal_cosine[i] = shading.shading_normal_cosine.unwrap_or(UNPERTURBED);
         // Set the BSDF.
-        let directions = Place { normal, to_eye: vertex.wo, tangent: vertex.tangent() };
-        self.bsdf.put(i, bsdf, aov.lobes(), &directions);
+        let frame = Place { normal, to_eye: vertex.wo, tangent: vertex.tangent() };
+        self.bsdf.put(i, bsdf, aov.lobes(), &frame);
         // Copy the state of the path.
         (self.roulette_throughput[i], self.medium[i]) = (path.state.roulette_throughput, medium);
         set_lane(&mut self.throughput, i, path.throughput);
@@ -244,30 +244,30 @@ impl VertexBatch {
         self.medium_beyond[i] = medium;
     }
 
-    /// Evaluates the BSDFs and cosines for light from these directions.
+    /// Evaluates the BSDFs and cosines for light from the directions `wi`.
     #[inline(always)]
-    pub fn response(&self, directions: &Lanes3, folds: impl Folds) -> Response {
+    pub fn response(&self, wi: &Lanes3, folds: impl Folds) -> Response {
         let mut cosines = [0.0; LANES];
         for i in 0..LANES {
-            cosines[i] = lane(&self.normal, i).dot(lane(directions, i));
+            cosines[i] = lane(&self.normal, i).dot(lane(wi, i));
         }
         if self.is_perturbed {
             for i in 0..LANES {
-                let smooth = lane(&self.smooth_normal, i).dot(lane(directions, i));
+                let smooth = lane(&self.smooth_normal, i).dot(lane(wi, i));
                 cosines[i] *= terminator(cosines[i], smooth, self.shading_normal_cosine[i]);
             }
         }
-        Response { bsdf: self.bsdf.f(directions, folds), cosines }
+        Response { bsdf: self.bsdf.f(wi, folds), cosines }
     }
 
-    /// Shadow-terminator factors for light from these directions, on the viewer's side where `sides` is 1 and on the
+    /// Shadow-terminator factors for light from the directions `wi`, on the viewer's side where `sides` is 1 and on the
     /// other side where it is −1. Not above 0 if no light arrives.
     #[inline(always)]
-    pub fn terminator_factors(&self, directions: &Lanes3, sides: &Lanes) -> Lanes {
+    pub fn terminator_factors(&self, wi: &Lanes3, sides: &Lanes) -> Lanes {
         let mut left = [1.0; LANES];
         if self.is_perturbed {
             for i in 0..LANES {
-                let direction = lane(directions, i) * sides[i];
+                let direction = lane(wi, i) * sides[i];
                 let cosine = lane(&self.normal, i).dot(direction);
                 let smooth = lane(&self.smooth_normal, i).dot(direction);
                 left[i] = terminator(cosine, smooth, self.shading_normal_cosine[i]);
@@ -276,9 +276,9 @@ impl VertexBatch {
         left
     }
 
-    /// [`Ray::start`] of rays from the vertices in these directions; rays that go behind their facet have none.
+    /// [`Ray::start`] of rays from the vertices in the directions `wi`; rays that go behind their facet have none.
     #[inline(always)]
-    pub fn starts(&self, directions: &Lanes3) -> [u32; LANES] {
+    pub fn starts(&self, wi: &Lanes3) -> [u32; LANES] {
         // Vertices on shapes are not on triangles.
         if self.start.iter().fold(!0, |all, start| all & start) == Ray::NO_TRIANGLE {
             return self.start;
@@ -288,7 +288,7 @@ impl VertexBatch {
         for i in 0..LANES {
             let (facet, normal) = (lane(&self.facet, i), lane(&self.normal, i));
             let choose = |facet: f32, normal: f32| if apart[i] != 0 { facet } else { normal };
-            let Vec3 { x, y, z } = lane(directions, i);
+            let Vec3 { x, y, z } = lane(wi, i);
             let height =
                 choose(facet.x, normal.x) * x + choose(facet.y, normal.y) * y + choose(facet.z, normal.z) * z;
             starts[i] = if height > 0.0 { starts[i] } else { Ray::NO_TRIANGLE };
@@ -303,7 +303,7 @@ impl VertexBatch {
     }
 
     /// Whether a direction is below the horizon of a vertex.
-    pub fn hides(&self, i: usize, direction: Vec3) -> bool {
+    pub fn is_below_horizon(&self, i: usize, direction: Vec3) -> bool {
         self.has_horizon & 1 << i != 0 && !(lane(&self.horizon, i).dot(direction) > 0.0)
     }
 
@@ -345,7 +345,7 @@ impl VertexBatch {
 
     /// The first queue index, if every lane has a vertex and the indices are consecutive; otherwise `None`.
     #[inline(always)]
-    pub fn run(&self) -> Option<u32> {
+    pub fn consecutive_start(&self) -> Option<u32> {
         let mut is_run = self.used == ALL;
         for i in 0..LANES {
             is_run &= self.place[i] == self.place[0].wrapping_add(i as u32);
@@ -354,17 +354,17 @@ impl VertexBatch {
     }
 
     /// Whether any vertex is in glass.
-    pub fn is_inside(&self) -> bool {
+    pub fn is_in_glass(&self) -> bool {
         lanes(self.used).any(|i| self.medium[i] != 0)
     }
 
     /// Mask of vertices whose direction is below their horizon.
     #[inline(always)]
-    pub fn hidden(&self, directions: &Lanes3, folds: impl Folds) -> u32 {
+    pub fn below_horizon(&self, wi: &Lanes3, folds: impl Folds) -> u32 {
         let mut hidden = [0; LANES];
         if self.has_horizon != 0 {
             for i in 0..LANES {
-                let cosine = lane(&self.horizon, i).dot(lane(directions, i));
+                let cosine = lane(&self.horizon, i).dot(lane(wi, i));
                 hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
             }
         }

@@ -83,7 +83,7 @@ impl TileContext<'_> {
     fn camera_row(&self, first: u32) -> CameraRow {
         let paths = [CAMERA_PATH; PACKET];
         let (settings, camera) = (self.settings, &self.world.camera);
-        let (xs, ys, samples) = self.block.places(first);
+        let (xs, ys, samples) = self.block.samples_from(first);
         let sampler = SamplerRow::new(settings.render.seed, &xs, &ys, &samples);
         // Sample positions in the pixels.
         let mut in_pixel = sampler.pairs(&paths, Decision::Pixel, 0, 1);
@@ -95,7 +95,7 @@ impl TileContext<'_> {
         for lane in 0..PACKET {
             let corner = DVec2::new(f64::from(xs[lane]), f64::from(ys[lane])) + DVec2::splat(0.5);
             let place = corner + DVec2::new(f64::from(in_pixel[0][lane]), f64::from(in_pixel[1][lane]));
-            let place = settings.from_middle(place);
+            let place = settings.pixel_to_camera(place);
             (places[0][lane], places[1][lane]) = (place.x, place.y);
         }
         // Generate rays through them, from points on the lens if it has an aperture.
@@ -161,15 +161,15 @@ mod tests {
         for samples in [3..4, 0..5, 100..116, 7..40] {
             let block = SampleBlock { pixels: tile.into(), samples };
             for first in [0, 1, 2, 15, 33] {
-                let (xs, ys, samples) = block.places(first);
+                let (xs, ys, samples) = block.samples_from(first);
                 for lane in 0..PACKET {
-                    let place = block.place(first + lane as u32);
+                    let place = block.sample_of(first + lane as u32);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + {lane}");
                 }
                 let slots = std::array::from_fn(|lane| first + 7 * lane as u32);
-                let (xs, ys, samples) = block.places_of(&slots);
+                let (xs, ys, samples) = block.samples_of(&slots);
                 for lane in 0..PACKET {
-                    let place = block.place(slots[lane]);
+                    let place = block.sample_of(slots[lane]);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + 7 * {lane}");
                 }
             }

@@ -26,14 +26,14 @@ pub enum SpecularEvent {
 impl Cone {
     /// The beam at a distance along the ray.
     #[inline(always)]
-    pub fn after(self, distance: f32) -> Self {
+    pub fn at_distance(self, distance: f32) -> Self {
         Self { width: self.width + self.spread * distance, ..self }
     }
 
     /// The beam after a specular bounce at a surface with this mean curvature, > 0 if the surface bulges toward the
     /// camera, in the paraxial approximation. `cosine` is the cosine of the angle of incidence.
     pub fn after_specular(self, event: SpecularEvent, curvature: f32, cosine: f32) -> Self {
-        let turn = curvature * self.width / cosine.abs().max(LEAST_COSINE);
+        let turn = curvature * self.width / cosine.abs().max(MIN_COSINE);
         let spread = match event {
             SpecularEvent::Reflected => self.spread + 2.0 * turn,
             SpecularEvent::Refracted(eta) => (self.spread + turn) / eta - turn,
@@ -50,7 +50,7 @@ impl Cone {
 }
 
 /// Lower bound on the cosine, which limits the effect of curvature at grazing angles.
-const LEAST_COSINE: f32 = 0.1;
+const MIN_COSINE: f32 = 0.1;
 
 #[cfg(test)]
 mod tests {
@@ -63,12 +63,15 @@ mod tests {
         // A concave mirror of radius 3 focuses at distance 3/2; a convex mirror of radius 2 has a virtual focus at
         // distance 1.
         let concave = PARALLEL.after_specular(SpecularEvent::Reflected, -1.0 / 3.0, 1.0);
-        assert!(concave.after(1.5).width.abs() < 1e-8);
+        assert!(concave.at_distance(1.5).width.abs() < 1e-8);
         let convex = PARALLEL.after_specular(SpecularEvent::Reflected, 0.5, 1.0);
-        assert!(convex.after(-1.0).width.abs() < 1e-8 && (convex.after(1.0).width - 0.04).abs() < 1e-8);
+        assert!(
+            convex.at_distance(-1.0).width.abs() < 1e-8
+                && (convex.at_distance(1.0).width - 0.04).abs() < 1e-8
+        );
         // A surface of radius 2 into glass of index 1.5 focuses at nR/(n − 1).
         let glass = PARALLEL.after_specular(SpecularEvent::Refracted(1.5), 0.5, 1.0);
-        assert!(glass.after(6.0).width.abs() < 1e-7);
+        assert!(glass.at_distance(6.0).width.abs() < 1e-7);
     }
 
     #[test]

@@ -44,7 +44,7 @@ impl PacketSource<'_> {
 
     /// Queue index of a lane's path; arbitrary for a lane without a path.
     #[inline(always)]
-    pub fn place(&self, lane: usize) -> u32 {
+    pub fn queue_index(&self, lane: usize) -> u32 {
         match self {
             Self::Camera(_, _, _, first) | Self::Paths(_, first) => first + lane as u32,
             Self::Traced(_, _, places) => places.get(lane).copied().unwrap_or(0),
@@ -250,7 +250,7 @@ impl Loops for PacketIntersection<'_> {
         let front =
             if plain.all == 0 { 0 } else { self.row.set_positions(&rays, rows, self.surface, lifts, folds) };
         // Compute the other surfaces, and the environment for rays that leave the scene.
-        let found = tile.fill_others(self.surface, rows, (&hits, &object), any & !plain.all, folds);
+        let found = tile.fill_other_surfaces(self.surface, rows, (&hits, &object), any & !plain.all, folds);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
@@ -365,7 +365,7 @@ fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitRows, [u32; PACKET])
 impl TileContext<'_> {
     /// Stores the surfaces of non-plain hits in the surface packet; returns the mask of those stored.
     #[inline(always)]
-    fn fill_others(
+    fn fill_other_surfaces(
         &self,
         surface: &mut SurfaceRow,
         rows: &RayRows,
@@ -524,7 +524,7 @@ impl VertexBatch {
             }
         }
         for i in 0..PACKET {
-            self.place[i] = paths.place(i);
+            self.place[i] = paths.queue_index(i);
         }
         folds.bits(&front)
     }

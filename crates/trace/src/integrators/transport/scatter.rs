@@ -79,7 +79,7 @@ pub struct Scattered {
     /// Mask of paths that continue.
     alive: u32,
     /// Unit directions.
-    directions: Lanes3,
+    wi: Lanes3,
     /// [`Ray::start`] of the rays.
     starts: [u32; LANES],
     /// Mask of paths that continue on the other side of their surface.
@@ -87,7 +87,7 @@ pub struct Scattered {
     /// Mask of vertices with a narrow lobe.
     narrow: u32,
     /// Pdfs of the directions in sr⁻¹.
-    densities: Lanes,
+    pdfs: Lanes,
     /// Factors on the throughputs.
     factors: Lanes3,
     /// New values of [`PathState::roulette_throughput`].
@@ -110,22 +110,20 @@ impl SampleBsdf<'_> {
                 (&row.beyond, row.medium_beyond[i], -lane(&row.normal, i))
             };
             let mut path = PathRay {
-                ray: Ray::new(lane(from, i), lane(&scattered.directions, i)).leaving(scattered.starts[i]),
+                ray: Ray::new(lane(from, i), lane(&scattered.wi, i)).leaving(scattered.starts[i]),
                 throughput: lane(&row.throughput, i) * lane(&scattered.factors, i),
                 slot: row.slot[i],
                 path: row.path[i],
                 medium: media.get(medium),
                 state: PathState {
-                    pdf: scattered.densities[i],
+                    pdf: scattered.pdfs[i],
                     normal,
                     roulette_throughput: scattered.roulette_throughput[i],
                     only_specular_before: false,
                     one_diffuse_before: row.only_specular_before & 1 << i != 0,
                     is_after_gloss: scattered.narrow & 1 << i != 0,
                 },
-                cone: cones
-                    .get(row.place[i] as usize)
-                    .map_or(Cone::default(), of_lobe(scattered.densities[i])),
+                cone: cones.get(row.place[i] as usize).map_or(Cone::default(), of_lobe(scattered.pdfs[i])),
             };
             path.path = path.next_path(SCATTERED);
             path
@@ -172,45 +170,45 @@ impl SampleBsdf<'_> {
     #[inline(always)]
     fn sample_one_side(&self, lobe: &Lanes, u: &[Lanes; 2], folds: impl Folds) -> Scattered {
         let Self { row, continuation, .. } = *self;
-        let directions = row.bsdf.sample(continuation.lobes, &row.normal, lobe, u, folds);
+        let wi = row.bsdf.sample(continuation.lobes, &row.normal, lobe, u, folds);
         // Evaluate the BSDF and the pdf.
-        let Response { bsdf, cosines } = row.response(&directions, folds);
-        let densities = row.bsdf.pdf(continuation.lobes, &row.normal, &directions, &bsdf, folds);
+        let Response { bsdf, cosines } = row.response(&wi, folds);
+        let pdfs = row.bsdf.pdf(continuation.lobes, &row.normal, &wi, &bsdf, folds);
         let grey = row.bsdf.grey(&bsdf);
         let mut roulette_throughput = [0.0; LANES];
         let f = match continuation.lobes {
             LobeSet::All => bsdf.f,
-            LobeSet::Narrow => row.bsdf.parts(&directions, &bsdf, folds)[1],
+            LobeSet::Narrow => row.bsdf.parts(&wi, &bsdf, folds)[1],
         };
         let mut factors = f;
         let mut alive = 0_u32;
         for i in 0..LANES {
-            let share = cosines[i] / densities[i];
+            let share = cosines[i] / pdfs[i];
             roulette_throughput[i] = row.roulette_throughput[i] * grey[i] * share;
             let factor = lane(&f, i) * share;
             set_lane(&mut factors, i, factor);
             let brings = (factor.x > 0.0) | (factor.y > 0.0) | (factor.z > 0.0);
             let bit = 1 << i;
-            alive |= if (cosines[i] > 0.0) & (densities[i] > 0.0) & brings { bit } else { 0 };
+            alive |= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) & brings { bit } else { 0 };
         }
         // Drop directions below the horizon.
-        alive &= !row.hidden(&directions, folds);
-        let starts = row.starts(&directions);
+        alive &= !row.below_horizon(&wi, folds);
+        let starts = row.starts(&wi);
         let narrow = row.bsdf.narrow_lobes();
-        Scattered { alive, directions, starts, beyond: 0, narrow, densities, factors, roulette_throughput }
+        Scattered { alive, wi, starts, beyond: 0, narrow, pdfs, factors, roulette_throughput }
     }
 
     /// Uses directions that were sampled on both sides of the surfaces.
     #[inline(always)]
     fn sample_both_sides(&self, samples: &SideSamples, folds: impl Folds) -> Scattered {
         let row = self.row;
-        let SideSamples { directions, densities, shares, shown, beyond } = samples;
+        let SideSamples { directions: wi, densities: pdfs, shares, shown, beyond } = samples;
         // Apply the terminator factors of perturbed normals, on the side of each direction.
         let mut sides = [1.0; LANES];
         for i in 0..LANES {
             sides[i] = if beyond[i] == 0 { 1.0 } else { -1.0 };
         }
-        let left = row.terminator_factors(directions, &sides);
+        let left = row.terminator_factors(wi, &sides);
         let (mut factors, mut roulette_throughput) = ([[0.0; LANES]; 3], [0.0; LANES]);
         let mut alive = 0_u32;
         for i in 0..LANES {
@@ -218,22 +216,22 @@ impl SampleBsdf<'_> {
             roulette_throughput[i] = row.roulette_throughput[i] * share;
             let factor = share * shown[i];
             set_lane(&mut factors, i, Vec3::splat(factor));
-            alive |= if (densities[i] > 0.0) & (factor > 0.0) { 1 << i } else { 0 };
+            alive |= if (pdfs[i] > 0.0) & (factor > 0.0) { 1 << i } else { 0 };
         }
         // Drop directions behind the facets. Rays whose origins are known on both sides do not start on a triangle.
         let mut hidden = [0; LANES];
         for i in 0..LANES {
-            let cosine = lane(&row.horizon, i).dot(lane(directions, i)) * sides[i];
+            let cosine = lane(&row.horizon, i).dot(lane(wi, i)) * sides[i];
             hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
         }
         alive &= !(folds.bits(&hidden) & row.has_horizon);
         Scattered {
             alive,
-            directions: *directions,
+            wi: *wi,
             starts: [Ray::NO_TRIANGLE; LANES],
             beyond: folds.bits(beyond),
             narrow: row.bsdf.narrow_lobes(),
-            densities: *densities,
+            pdfs: *pdfs,
             factors,
             roulette_throughput,
         }

@@ -55,7 +55,7 @@ impl ObjectOrder {
     }
 
     /// The grouped queue indices.
-    pub fn places(&self) -> &[u32] {
+    pub fn indices(&self) -> &[u32] {
         &self.places
     }
 }
@@ -72,9 +72,9 @@ mod tests {
         let mut object_order = ObjectOrder::default();
         for _ in 0..2 {
             object_order.sort(&hits);
-            assert_eq!(object_order.places(), [2, 6, 0, 3, 7, 4, 1, 5]);
+            assert_eq!(object_order.indices(), [2, 6, 0, 3, 7, 4, 1, 5]);
         }
         object_order.sort(&[]);
-        assert!(object_order.places().is_empty());
+        assert!(object_order.indices().is_empty());
     }
 }

@@ -62,7 +62,7 @@ impl<'a> TileContext<'a> {
 
     /// The sampler of a slot.
     pub fn sampler(&self, slot: u32) -> PixelSampler {
-        let (x, y, sample) = self.block.place(slot);
+        let (x, y, sample) = self.block.sample_of(slot);
         PixelSampler::new(self.settings.render.seed, x, y, sample)
     }
 }
@@ -83,7 +83,7 @@ impl SampleBlock {
     }
 
     /// Column, row and sample index of a slot.
-    pub fn place(&self, slot: u32) -> (u32, u32, u32) {
+    pub fn sample_of(&self, slot: u32) -> (u32, u32, u32) {
         let samples = self.samples.len() as u32;
         let (pixel, sample) = (slot / samples, slot % samples);
         let (x, y) = self.pixels.place(pixel);
@@ -92,7 +92,7 @@ impl SampleBlock {
 
     /// Columns, rows and sample indices of slots; arbitrary for a slot without a sample.
     #[inline(always)]
-    pub fn places_of(&self, slots: &[u32; PACKET]) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
+    pub fn samples_of(&self, slots: &[u32; PACKET]) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
         let Pixels { rect, part } = self.pixels;
         let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(rect.width));
@@ -118,9 +118,9 @@ impl SampleBlock {
 
     /// Columns, rows and sample indices of the slots from `first` on, even past the last one.
     #[inline(always)]
-    pub fn places(&self, first: u32) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
+    pub fn samples_from(&self, first: u32) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
-        let (mut x, mut y, mut sample) = self.place(first);
+        let (mut x, mut y, mut sample) = self.sample_of(first);
         if self.samples.end - sample >= PACKET as u32 {
             for lane in 0..PACKET {
                 samples[lane] = sample + lane as u32;
@@ -128,7 +128,7 @@ impl SampleBlock {
             return ([x; PACKET], [y; PACKET], samples);
         }
         if self.pixels.part != Part::All {
-            return self.places_of(&array::from_fn(|lane| first + lane as u32));
+            return self.samples_of(&array::from_fn(|lane| first + lane as u32));
         }
         let rect = self.pixels.rect;
         for lane in 0..PACKET {

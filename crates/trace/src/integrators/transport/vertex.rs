@@ -47,7 +47,7 @@ pub struct Vertex<'a> {
 impl<'a> Vertex<'a> {
     /// The vertex at a hit.
     pub fn new(tile: &TileContext<'a>, path: &PathRay, hit: &Hit) -> Self {
-        Self::on(tile, path, hit, tile.world.geometry.surface(&path.ray, hit))
+        Self::with_surface(tile, path, hit, tile.world.geometry.surface(&path.ray, hit))
     }
 
     /// The vertex at a hit, computing only what its material needs.
@@ -56,7 +56,7 @@ impl<'a> Vertex<'a> {
     }
 
     /// The vertex at a hit whose surface is already computed.
-    pub fn on(tile: &TileContext<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
+    pub fn with_surface(tile: &TileContext<'a>, path: &PathRay, hit: &Hit, surface: SurfacePoint) -> Self {
         Self::at_surface(tile, path, tile.world.material_index(hit), surface, hit, hit.shape.t)
     }
 
@@ -93,7 +93,7 @@ impl<'a> Vertex<'a> {
         // Determine the path's side.
         let wo = -path.ray.direction;
         let side = if surface.normal.dot(wo) < 0.0 { -1.0 } else { 1.0 };
-        let cone = path.cone.after(distance);
+        let cone = path.cone.at_distance(distance);
         // Compute what ray cones need, if they are used.
         let has_beam = tile.pixel_spread > 0.0;
         let footprint = |tangents| match has_beam && tile.world.is_mipmapped(index) {
@@ -128,7 +128,7 @@ impl<'a> Vertex<'a> {
 
     /// The radiance emitted toward the path. If light samples compete with the path, textures are looked up at the
     /// point without filtering, as light samples do.
-    pub fn emitted(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
+    pub fn emitted_radiance(&self, path: &PathRay, counters: &mut RayCounters) -> Vec3 {
         let is_shared = path.state.pdf > 0.0;
         let at = self.lookup_point(is_shared);
         self.material.emission.at(&at, self.normal.dot(self.wo), &mut counters.texture_lookups)
@@ -229,7 +229,7 @@ impl<'a> Vertex<'a> {
     }
 
     /// Origin for rays on the far side, if origins are known on both sides.
-    pub fn beyond(&self) -> Option<Vec3> {
+    pub fn far_origin(&self) -> Option<Vec3> {
         self.sides.map(|sides| sides.beyond)
     }
 

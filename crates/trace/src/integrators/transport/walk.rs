@@ -50,7 +50,7 @@ pub trait PathStepper<'a> {
     fn crossing(&mut self) -> &mut CrossingMemory;
 
     /// Records that the path passed a surface; `next` is the next hit behind it.
-    fn note_null(&mut self, path: &PathRay, next: Option<Hit>);
+    fn record_pass(&mut self, path: &PathRay, next: Option<Hit>);
 
     /// Handles the interaction that ends a walk. The path's ray is the arriving one, in the medium before the surface,
     /// with absorption already in its throughput. `has_passed` says whether the walk passed any surface inside glass.
@@ -116,7 +116,7 @@ impl Segment {
 #[derive(Clone, Copy, Debug)]
 pub enum OpaqueHit {
     /// The ray hits the surface itself.
-    Own(Hit),
+    Direct(Hit),
     /// The surface is coincident with glass that the ray hits.
     Touching(Hit),
 }
@@ -134,7 +134,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
     while hidden < MAX_HIDDEN {
         let has_passed = hidden > 0;
         let mut vertex = match surface.take() {
-            Some(surface) => Vertex::on(tile, path, &hit, surface),
+            Some(surface) => Vertex::with_surface(tile, path, &hit, surface),
             None => Vertex::for_shading(tile, path, &hit),
         };
         // Stop at an opaque surface, or pass it as a null interaction.
@@ -148,12 +148,12 @@ pub fn walk<'a, W: PathStepper<'a>>(
                         *path = past_surface(*path, &vertex, part);
                         match tile.world.geometry.closest(&path.ray) {
                             Some(next) => {
-                                stepper.note_null(path, Some(next));
+                                stepper.record_pass(path, Some(next));
                                 hit = next;
                                 continue;
                             }
                             None => {
-                                stepper.note_null(path, None);
+                                stepper.record_pass(path, None);
                                 path.ray.origin = way.origin;
                                 return stepper.interact(path, Interaction::Nothing, has_passed);
                             }
@@ -179,7 +179,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
             let hit = way.straighten(path, hit);
             return stepper.interact(
                 path,
-                Interaction::Opaque(&vertex, OpaqueHit::Own(hit), &far),
+                Interaction::Opaque(&vertex, OpaqueHit::Direct(hit), &far),
                 has_passed,
             );
         }
@@ -205,7 +205,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
         if near.glass() != far.glass() && ior(tile.world, near) != ior(tile.world, &far) {
             vertex.set_sides(sides);
             let rough = if tile.world.has_rough_glass() {
-                rough(stepper, path, (&vertex, &hit), (sides, &far))
+                rough_boundary(stepper, path, (&vertex, &hit), (sides, &far))
             } else {
                 None
             };
@@ -219,10 +219,10 @@ pub fn walk<'a, W: PathStepper<'a>>(
         // Otherwise pass the surface.
         (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
         path.state = path.state.hidden_from_lights();
-        path.cone = path.cone.after(hit.shape.t);
+        path.cone = path.cone.at_distance(hit.shape.t);
         (way, hidden) = (Segment::DIRECT, hidden + 1);
         let next = tile.world.geometry.closest(&path.ray);
-        stepper.note_null(path, next);
+        stepper.record_pass(path, next);
         match next {
             Some(next) => hit = next,
             None => return stepper.interact(path, Interaction::Nothing, true),
@@ -234,7 +234,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
 /// The rough surface between two media with different indices of refraction. `None` if it is smooth.
 #[cold]
 #[inline(never)]
-fn rough<'a, W: PathStepper<'a>>(
+fn rough_boundary<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
     (vertex, hit): (&Vertex<'a>, &Hit),
@@ -269,7 +269,7 @@ fn null_interaction<'a, W: PathStepper<'a>>(
             let mut whole = *path;
             let hit = way.straighten(&mut whole, hit);
             whole.medium = stepper.tile().without_open_glass(whole.medium);
-            stepper.hit_pane(&whole, vertex, OpaqueHit::Own(hit), pane)
+            stepper.hit_pane(&whole, vertex, OpaqueHit::Direct(hit), pane)
         }
         Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => NullInteraction::Opaque,
     }
