@@ -298,7 +298,7 @@ impl Wavefront<'_, '_> {
         let mut wanted = packet.any & !packet.plain;
         match rays {
             PacketSource::Camera(row, first, ..) => {
-                self.add_visible_emission(&row.rays, first, &packet, (plain, beyond))
+                self.add_visible_emission(&row.rays, first, &packet, (plain, beyond));
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => wanted |= plain | beyond,
         }

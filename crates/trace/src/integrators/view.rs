@@ -30,7 +30,7 @@ choice! {
         Emission = "emission",
         /// Light that reaches the first diffuse or glossy surface from other such surfaces.
         Indirect = "indirect",
-        /// Light that reaches it only through mirrors and glass.
+        /// Light that reaches the first diffuse or glossy surface only through mirrors and glass.
         Caustic = "caustic",
         /// Number of photons of one pass within the kernel at each point, if photons are on.
         Photons = "photons",

@@ -280,7 +280,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 pool.push(*row_number, (rays, ends, traced), &samples.sources, &values, &places);
             }
             Some(_) | None => {
-                self.add_unoccluded((&rays, &ends, traced), &samples.sources, &values, sums, folds)
+                self.add_unoccluded((&rays, &ends, traced), &samples.sources, &values, sums, folds);
             }
         }
     }

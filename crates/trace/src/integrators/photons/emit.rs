@@ -176,7 +176,7 @@ impl<'a> PathStepper<'a> for PhotonWavefront<'a> {
                 self.shade_surface(path, vertex, (far, lacks_photons));
             }
             Interaction::Glass(vertex, _, Interface { far, rough: None }) => {
-                self.shade_glass(path, vertex, far)
+                self.shade_glass(path, vertex, far);
             }
             // Light samples find direct light.
             Interaction::Glass(..) if self.depth == 0 && !has_passed => {}
