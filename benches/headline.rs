@@ -17,7 +17,7 @@ use nix::sys::time::TimeValLike;
 const RUNS: usize = 3;
 
 /// A row of the table: title, scene, goal and options.
-struct Row {
+struct HeadlineRow {
     name: &'static str,
     goal: &'static str,
     scene: String,
@@ -32,13 +32,13 @@ fn main() -> Result<(), Box<dyn error::Error>> {
     fs::write(path("small.off"), ball(198, 200, 1.1))?;
     fs::write(path("largest.off"), ball(922, 923, 0.0))?;
     let rows = [
-        Row {
+        HeadlineRow {
             name: "950,000 triangles, 10 samples, 10 shadow rays",
             goal: "< 1.5 s wall clock",
             scene: meshes(10, 10, &["large.off", "small.off"]),
             options: &[],
         },
-        Row {
+        HeadlineRow {
             name: "Cornell box, 10 samples, 5 shadow rays",
             goal: "< 0.5 s of processor time",
             scene: fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell.toml"))?.replace(
@@ -47,13 +47,13 @@ fn main() -> Result<(), Box<dyn error::Error>> {
             ),
             options: &[],
         },
-        Row {
+        HeadlineRow {
             name: "1.7 million triangles, 1 sample",
             goal: "building < 0.5 s, rendering < 0.1 s",
             scene: meshes(1, 1, &["largest.off"]),
             options: &[],
         },
-        Row {
+        HeadlineRow {
             name: "the same with the k-d tree",
             goal: "",
             scene: meshes(1, 1, &["largest.off"]),

@@ -39,12 +39,12 @@ fn main() -> Result<(), Box<dyn error::Error>> {
         for count in counts.into_iter().filter(|count| is_asked(count, &counts)) {
             fs::write(folder.path().join("scene.toml"), scene(integrator, count.parse()?))?;
             render(folder.path(), &["--samples", "128", "--seed", "1", "-o", "reference.exr"])?;
-            let Measured { lights, seconds, rays, relmse } = measured(folder.path(), 4)?;
+            let RenderFigures { lights, seconds, rays, relmse } = fastest_render(folder.path(), 4)?;
             let to_goal = seconds * relmse / GOAL;
-            let (mut samples, mut enough) = (1, measured(folder.path(), 1)?);
+            let (mut samples, mut enough) = (1, fastest_render(folder.path(), 1)?);
             while enough.relmse > GOAL && samples < MOST_SAMPLES {
                 samples += 1;
-                enough = measured(folder.path(), samples)?;
+                enough = fastest_render(folder.path(), samples)?;
             }
             let waited = enough.lights + enough.seconds;
             println!(
@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn error::Error>> {
 }
 
 /// Measurements of a render.
-struct Measured {
+struct RenderFigures {
     /// Seconds of the stage lights.
     lights: f64,
     /// Seconds of the stage render.
@@ -67,7 +67,7 @@ struct Measured {
 }
 
 /// The fastest of several renders.
-fn measured(folder: &Path, samples: u32) -> Result<Measured, Box<dyn error::Error>> {
+fn fastest_render(folder: &Path, samples: u32) -> Result<RenderFigures, Box<dyn error::Error>> {
     let mut best: Option<[f64; 3]> = None;
     for _ in 0..RUNS {
         let figures = render(folder, &["--samples", &samples.to_string(), "-o", "picture.exr"])?;
@@ -76,7 +76,7 @@ fn measured(folder: &Path, samples: u32) -> Result<Measured, Box<dyn error::Erro
         }
     }
     let [lights, seconds, rays] = best.ok_or("no render")?;
-    Ok(Measured { lights, seconds, rays, relmse: error_of(folder)? })
+    Ok(RenderFigures { lights, seconds, rays, relmse: error_of(folder)? })
 }
 
 /// Renders once; returns the seconds of the stages lights and render, and the number of shadow rays.

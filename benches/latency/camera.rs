@@ -4,9 +4,9 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::terminal::{Cells, Terminal};
+use super::terminal::{Cells, TimedTerminal};
 use super::{COLUMNS, PAUSE, ROUNDS, ROWS, figures};
-use crate::Outcome;
+use crate::BenchResult;
 
 /// How long a key is held.
 const HELD: Duration = Duration::from_secs(2);
@@ -14,10 +14,10 @@ const HELD: Duration = Duration::from_secs(2);
 const REPEAT: Duration = Duration::from_millis(33);
 
 /// Measures one scene and returns a line of figures.
-pub fn row(folder: &Path, scene: &Path) -> Outcome<String> {
+pub fn row(folder: &Path, scene: &Path) -> BenchResult<String> {
     let path = scene.to_str().ok_or("a file name is not valid UTF-8")?;
     let arguments = [path, "--samples", "100000", "-o", "out.png"];
-    let mut terminal = Terminal::open(folder, &arguments, COLUMNS, ROWS)?;
+    let mut terminal = TimedTerminal::open(folder, &arguments, COLUMNS, ROWS)?;
     terminal.wait("a picture", |screen| screen.contents().contains('▀'))?;
     thread::sleep(2 * PAUSE);
     let mut times = Vec::new();
@@ -32,7 +32,7 @@ pub fn row(folder: &Path, scene: &Path) -> Outcome<String> {
 
 /// Holds a camera key with keyboard repeat, back and forth. Refined images of the same camera arrive only after the
 /// next press, so each burst of bytes is the image of another camera position.
-fn held(terminal: &mut Terminal) -> Outcome<f64> {
+fn held(terminal: &mut TimedTerminal) -> BenchResult<f64> {
     terminal.cells();
     let begin = Instant::now();
     let mut presses = 0;

@@ -7,13 +7,13 @@ use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
 use glimt::pipeline::settings::Overrides;
 use glimt::pipeline::{Handle, start};
 
-use super::Outcome;
+use super::BenchResult;
 
 const LIMIT: Duration = Duration::from_secs(20);
 
 /// Measures cancellations after 0, 1, 2, … 60 ms, at first with nothing loaded: while the worker reads the scene,
 /// builds its acceleration structures, and traces the first image and passes; then late in the render.
-pub fn times(scene: &Path) -> Outcome<Vec<Duration>> {
+pub fn times(scene: &Path) -> BenchResult<Vec<Duration>> {
     let mut times = Vec::new();
     for step in 0..12 {
         let worker = start(0)?;
@@ -31,7 +31,7 @@ pub fn times(scene: &Path) -> Outcome<Vec<Duration>> {
     Ok(times)
 }
 
-fn cancel(worker: &Handle, scene: &Path, generation: &mut u64, after: Duration) -> Outcome<Duration> {
+fn cancel(worker: &Handle, scene: &Path, generation: &mut u64, after: Duration) -> BenchResult<Duration> {
     std::thread::sleep(after);
     let begin = Instant::now();
     send(worker, scene, generation);

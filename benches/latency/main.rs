@@ -21,10 +21,10 @@ use std::error::Error;
 use std::fs;
 use std::time::{Duration, Instant};
 
-use scenes::{Copies, SCENES, Scene};
-use terminal::{Cells, Terminal};
+use scenes::{EditedScene, SCENES, SceneCopies};
+use terminal::{Cells, TimedTerminal};
 
-type Outcome<T> = Result<T, Box<dyn Error>>;
+type BenchResult<T> = Result<T, Box<dyn Error>>;
 
 const COLUMNS: u16 = 120;
 const ROWS: u16 = 40;
@@ -33,15 +33,15 @@ const ROUNDS: usize = 7;
 /// Pause after a save in which nothing else runs.
 const PAUSE: Duration = Duration::from_millis(300);
 
-fn main() -> Outcome<()> {
+fn main() -> BenchResult<()> {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|one| !one.starts_with('-')).collect();
     let modes = ["settled", "busy", "cancel", "camera"];
     let all_modes = !arguments.iter().any(|one| modes.contains(&one.as_str()));
     let all_scenes = !arguments.iter().any(|one| !modes.contains(&one.as_str()));
     let is_wanted = |mode: &str| all_modes || arguments.iter().any(|one| one == mode);
-    let mut copies = Copies::new()?;
+    let mut copies = SceneCopies::new()?;
     let scenes = SCENES.iter().filter(|scene| all_scenes || arguments.iter().any(|one| one == scene.name));
-    let scenes: Vec<&Scene> = scenes.collect();
+    let scenes: Vec<&EditedScene> = scenes.collect();
     for mode in [Mode::Settled, Mode::Busy] {
         if is_wanted(mode.name()) {
             println!("{}: from a save or a key to the first changed cell, ms, median (maximum)", mode.name());
@@ -99,12 +99,12 @@ impl Mode {
 }
 
 /// Measures one scene with every edit and every key.
-fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
+fn row(copies: &mut SceneCopies, scene: &EditedScene, mode: Mode) -> BenchResult<()> {
     let path = copies.scene(scene);
     let path = path.to_str().ok_or("a file name is not valid UTF-8")?;
     let samples = if mode == Mode::Settled { "2" } else { "100000" };
     let arguments = [path, "--samples", samples, "-o", "out.png"];
-    let mut terminal = Terminal::open(copies.folder(), &arguments, COLUMNS, ROWS)?;
+    let mut terminal = TimedTerminal::open(copies.folder(), &arguments, COLUMNS, ROWS)?;
     terminal.wait("a picture", |screen| screen.contents().contains('▀'))?;
     // Wait until the files are old enough that their modification times identify them.
     std::thread::sleep(Duration::from_millis(2500));
@@ -146,7 +146,7 @@ fn row(copies: &mut Copies, scene: &Scene, mode: Mode) -> Outcome<()> {
 }
 
 /// Waits for the image before an edit or a key press.
-fn ready(terminal: &mut Terminal, mode: Mode) -> Outcome<Cells> {
+fn ready(terminal: &mut TimedTerminal, mode: Mode) -> BenchResult<Cells> {
     if mode == Mode::Settled {
         terminal.wait("the end of the render", |screen| {
             screen.contents().lines().next().is_some_and(|line| line.contains("done"))

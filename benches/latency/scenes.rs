@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::Outcome;
+use super::BenchResult;
 
 /// A bundled scene with edits: the kind, the text to replace and its replacement. `{}` is replaced with a number
 /// between 0.1 and 1 that differs each time. An edit without `{}` darkens the texture file of this name.
-pub struct Scene {
+pub struct EditedScene {
     pub name: &'static str,
     pub edits: &'static [Edit],
     pub keys: &'static [&'static str],
@@ -16,15 +16,15 @@ pub struct Scene {
 /// The kind of an edit, the text to replace, and its replacement.
 pub type Edit = (&'static str, &'static str, &'static str);
 
-impl Scene {
+impl EditedScene {
     /// The camera edit, which is always the second one.
     pub fn camera(&self) -> Edit {
         self.edits[1]
     }
 }
 
-pub const SCENES: &[Scene] = &[
-    Scene {
+pub const SCENES: &[EditedScene] = &[
+    EditedScene {
         name: "cornell",
         edits: &[
             ("material", "red = { diffuse = [0.63,", "red = { diffuse = [{},"),
@@ -34,7 +34,7 @@ pub const SCENES: &[Scene] = &[
         ],
         keys: &["s", "v"],
     },
-    Scene {
+    EditedScene {
         name: "cornell_glass",
         edits: &[
             ("material", "red = { diffuse = [0.63,", "red = { diffuse = [{},"),
@@ -44,7 +44,7 @@ pub const SCENES: &[Scene] = &[
         ],
         keys: &["s", "v"],
     },
-    Scene {
+    EditedScene {
         name: "textures",
         edits: &[
             ("material", "normal_map = \"bumps\"", "normal_map = \"bumps\"\nnormal_strength = {}"),
@@ -55,7 +55,7 @@ pub const SCENES: &[Scene] = &[
         ],
         keys: &["s", "v"],
     },
-    Scene {
+    EditedScene {
         name: "dof",
         edits: &[
             ("material", "lime = { diffuse = [0.5,", "lime = { diffuse = [{},"),
@@ -65,7 +65,7 @@ pub const SCENES: &[Scene] = &[
         ],
         keys: &["s", "v", "d"],
     },
-    Scene {
+    EditedScene {
         name: "mesh",
         edits: &[
             ("material", "coral = { diffuse = [0.74,", "coral = { diffuse = [{},"),
@@ -75,7 +75,7 @@ pub const SCENES: &[Scene] = &[
         ],
         keys: &["s", "v"],
     },
-    Scene {
+    EditedScene {
         name: "million",
         edits: &[
             ("material", "diffuse = [0.58,", "diffuse = [{},"),
@@ -85,7 +85,7 @@ pub const SCENES: &[Scene] = &[
         ],
         keys: &["s", "v"],
     },
-    Scene {
+    EditedScene {
         name: "photons",
         edits: &[
             ("material", "red = { diffuse = [0.63,", "red = { diffuse = [{},"),
@@ -95,7 +95,7 @@ pub const SCENES: &[Scene] = &[
         ],
         keys: &["p", "v"],
     },
-    Scene {
+    EditedScene {
         name: "water",
         edits: &[
             ("material", "table = { diffuse = [0.62,", "table = { diffuse = [{},"),
@@ -108,15 +108,15 @@ pub const SCENES: &[Scene] = &[
 ];
 
 /// Copies of scenes and assets, to be edited.
-pub struct Copies {
+pub struct SceneCopies {
     folder: tempfile::TempDir,
     /// Number of edits so far.
     edits: u32,
 }
 
-impl Copies {
+impl SceneCopies {
     /// Copies all scenes and assets, and generates the large mesh.
-    pub fn new() -> Outcome<Self> {
+    pub fn new() -> BenchResult<Self> {
         let folder = tempfile::tempdir()?;
         let project = Path::new(env!("CARGO_MANIFEST_DIR"));
         for name in ["scenes", "assets", "assets/textures", "assets/stairs", "assets/furniture"] {
@@ -141,7 +141,7 @@ impl Copies {
     }
 
     /// All bundled scenes, by name.
-    pub fn all(&self) -> Outcome<Vec<PathBuf>> {
+    pub fn all(&self) -> BenchResult<Vec<PathBuf>> {
         let entries = fs::read_dir(self.folder.path().join("scenes"))?.collect::<Result<Vec<_>, _>>()?;
         let mut paths: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
         paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
@@ -149,12 +149,12 @@ impl Copies {
         Ok(paths)
     }
 
-    pub fn scene(&self, scene: &Scene) -> PathBuf {
+    pub fn scene(&self, scene: &EditedScene) -> PathBuf {
         self.folder.path().join("scenes").join(scene.name).with_extension("toml")
     }
 
     /// Returns the file that an edit changes, and its new content.
-    pub fn edit(&mut self, scene: &Scene, (_, from, to): Edit) -> Outcome<(PathBuf, Vec<u8>)> {
+    pub fn edit(&mut self, scene: &EditedScene, (_, from, to): Edit) -> BenchResult<(PathBuf, Vec<u8>)> {
         self.edits += 1;
         let number = 0.1 + f64::from(self.edits) * 0.377 % 0.9;
         let of_project = |name: &Path| Path::new(env!("CARGO_MANIFEST_DIR")).join(name);

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 
-use super::Outcome;
+use super::BenchResult;
 
 /// Maximum time to wait for anything.
 const LIMIT: Duration = Duration::from_secs(20);
@@ -19,7 +19,7 @@ const LIMIT: Duration = Duration::from_secs(20);
 type Chunk = (Instant, Vec<u8>);
 
 /// The program in a truecolor pseudo-terminal.
-pub struct Terminal {
+pub struct TimedTerminal {
     // Keeps the terminal open.
     _master: Box<dyn MasterPty + Send>,
     child: Box<dyn Child + Send + Sync>,
@@ -31,9 +31,9 @@ pub struct Terminal {
 /// The colors of every image cell; `None` for text.
 pub type Cells = Vec<Option<[[u8; 3]; 2]>>;
 
-impl Terminal {
+impl TimedTerminal {
     /// Starts the program in a folder.
-    pub fn open(folder: &Path, arguments: &[&str], columns: u16, rows: u16) -> Outcome<Self> {
+    pub fn open(folder: &Path, arguments: &[&str], columns: u16, rows: u16) -> BenchResult<Self> {
         let size = PtySize { rows, cols: columns, pixel_width: 0, pixel_height: 0 };
         let pair = native_pty_system().openpty(size)?;
         let program = std::env::var("GLIMT").unwrap_or(env!("CARGO_BIN_EXE_glimt").to_owned());
@@ -55,12 +55,12 @@ impl Terminal {
     }
 
     /// Types characters.
-    pub fn press(&self, keys: &str) -> Outcome<()> {
+    pub fn press(&self, keys: &str) -> BenchResult<()> {
         Ok(lock(&self.keys).write_all(keys.as_bytes())?)
     }
 
     /// Waits until the screen satisfies `holds`.
-    pub fn wait(&mut self, what: &str, holds: impl Fn(&vt100::Screen) -> bool) -> Outcome<()> {
+    pub fn wait(&mut self, what: &str, holds: impl Fn(&vt100::Screen) -> bool) -> BenchResult<()> {
         let deadline = Instant::now() + LIMIT;
         loop {
             self.catch_up();
@@ -84,7 +84,7 @@ impl Terminal {
 
     /// Time at which the image first satisfies `differs`; the search begins after `pause` and continues until it is
     /// found.
-    pub fn when(&mut self, pause: Duration, differs: impl Fn(&Cells) -> bool) -> Outcome<Instant> {
+    pub fn when(&mut self, pause: Duration, differs: impl Fn(&Cells) -> bool) -> BenchResult<Instant> {
         let deadline = Instant::now() + LIMIT;
         thread::sleep(pause);
         while Instant::now() < deadline {
@@ -127,7 +127,7 @@ impl Terminal {
     }
 }
 
-impl Drop for Terminal {
+impl Drop for TimedTerminal {
     fn drop(&mut self) {
         // The measurement is complete; failing to stop the program does not matter.
         let _ = self.child.kill();

@@ -97,7 +97,7 @@ pub struct Embree {
 }
 
 /// A mesh in an Embree scene with the robust flag.
-pub struct Scene<'a> {
+pub struct EmbreeScene<'a> {
     embree: &'a Embree,
     _mesh: &'a TriangleMesh,
     device: Handle,
@@ -145,7 +145,7 @@ impl Embree {
         quality: Quality,
         threads: usize,
         isa: &str,
-    ) -> Scene<'a> {
+    ) -> EmbreeScene<'a> {
         MEMORY_BYTES.store(0, Ordering::Relaxed);
         let options =
             CString::new(format!("threads={threads},isa={isa}")).expect("the options contain no NUL byte");
@@ -212,12 +212,12 @@ impl Embree {
                 scene, geometry,
             );
             self.function::<unsafe extern "C" fn(Handle)>("rtcReleaseGeometry")(geometry);
-            Scene { embree: self, _mesh: mesh, device, scene, memory_bytes: 0 }
+            EmbreeScene { embree: self, _mesh: mesh, device, scene, memory_bytes: 0 }
         }
     }
 }
 
-impl Scene<'_> {
+impl EmbreeScene<'_> {
     /// Builds the acceleration structure; this call is timed as the build.
     pub fn commit(&mut self) {
         // SAFETY: the scene is alive.
@@ -307,7 +307,7 @@ fn query(ray: &Ray) -> RayHit {
     }
 }
 
-impl Drop for Scene<'_> {
+impl Drop for EmbreeScene<'_> {
     fn drop(&mut self) {
         // SAFETY: `build` created both, and each is released once.
         unsafe {

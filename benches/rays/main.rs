@@ -24,7 +24,7 @@ mod meshes;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use embree::{Embree, Scene};
+use embree::{Embree, EmbreeScene};
 use glimt::accel::wide_bvh::{Instructions, Quality};
 use glimt::accel::{KdTree, PACKET, WideBvh, ends};
 use glimt::control::CancelToken;
@@ -39,7 +39,7 @@ const RUNS: usize = 7;
 const CHUNK: usize = 1 << 15;
 
 #[derive(Default)]
-struct Asked {
+struct BenchOptions {
     embree: Option<PathBuf>,
     instructions: Option<Instructions>,
     isa: Option<String>,
@@ -53,57 +53,57 @@ struct Asked {
 }
 
 fn main() {
-    let asked = asked();
-    let embree = asked.embree.as_deref().map(|path| {
+    let options = options();
+    let embree = options.embree.as_deref().map(|path| {
         Embree::load(path).unwrap_or_else(|error| {
             println!("{}: {error}", path.display());
             std::process::exit(2)
         })
     });
-    for file in &asked.files {
+    for file in &options.files {
         if file == "ball" {
-            measure("ball 1M", &meshes::rippled_ball(708), embree.as_ref(), &asked);
+            measure("ball 1M", &meshes::rippled_ball(708), embree.as_ref(), &options);
             continue;
         }
         match meshes::load(Path::new(file)) {
-            Ok(mesh) => measure(file.rsplit('/').next().unwrap_or(file), &mesh, embree.as_ref(), &asked),
+            Ok(mesh) => measure(file.rsplit('/').next().unwrap_or(file), &mesh, embree.as_ref(), &options),
             Err(error) => println!("{file}: {error}"),
         }
     }
-    if asked.files.is_empty() {
+    if options.files.is_empty() {
         for (name, rings) in [("ball 10k", 71), ("ball 100k", 224), ("ball 1M", 708), ("ball 10M", 2237)] {
-            measure(name, &meshes::rippled_ball(rings), embree.as_ref(), &asked);
+            measure(name, &meshes::rippled_ball(rings), embree.as_ref(), &options);
         }
     }
 }
 
-fn asked() -> Asked {
-    let mut asked = Asked::default();
+fn options() -> BenchOptions {
+    let mut options = BenchOptions::default();
     let mut rays = None;
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
-            "--embree" => asked.embree = arguments.next().map(PathBuf::from),
+            "--embree" => options.embree = arguments.next().map(PathBuf::from),
             "--instructions" => {
                 let name = arguments.next().unwrap_or_default();
-                asked.instructions =
+                options.instructions =
                     Instructions::ALL.into_iter().find(|own| format!("{own:?}").eq_ignore_ascii_case(&name));
             }
-            "--high" => asked.high = true,
-            "--build" => asked.build_only = true,
+            "--high" => options.high = true,
+            "--build" => options.build_only = true,
             "--closest" | "--any" => {
-                asked.timed.extend(arguments.next().map(|file| (PathBuf::from(file), argument == "--any")));
+                options.timed.extend(arguments.next().map(|file| (PathBuf::from(file), argument == "--any")));
             }
             "--rays" => rays = arguments.next().map(PathBuf::from),
             "--hits" | "--occluded" => {
-                asked.given.extend(rays.take().zip(arguments.next().map(PathBuf::from)));
+                options.given.extend(rays.take().zip(arguments.next().map(PathBuf::from)));
             }
-            "--embree-isa" => asked.isa = arguments.next(),
-            other if !other.starts_with("--") => asked.files.push(other.to_owned()),
+            "--embree-isa" => options.isa = arguments.next(),
+            other if !other.starts_with("--") => options.files.push(other.to_owned()),
             _ => {}
         }
     }
-    asked
+    options
 }
 
 fn seconds(run: impl FnOnce()) -> f64 {
@@ -112,10 +112,10 @@ fn seconds(run: impl FnOnce()) -> f64 {
     begin.elapsed().as_secs_f64()
 }
 
-fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Asked) {
+fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, options: &BenchOptions) {
     let count = mesh.triangles.len() as u32;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let quality = if asked.high { Quality::High } else { Quality::Medium };
+    let quality = if options.high { Quality::High } else { Quality::Medium };
     let build = || {
         let corners = |id| mesh.corners(id);
         WideBvh::build_with(quality, count, corners, &CancelToken::new()).expect("the token is not cancelled")
@@ -123,16 +123,16 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
     let (mut own_build, mut peer_build) = (f64::INFINITY, f64::INFINITY);
     let mut tree = None;
     let mut scene = None;
-    for _ in 0..if asked.build_only { 25 } else { 5 } {
+    for _ in 0..if options.build_only { 25 } else { 5 } {
         drop(tree.take());
         own_build = own_build.min(seconds(|| tree = Some(build())));
         if let Some(embree) = embree {
             drop(scene.take());
             let mut new = embree.build(
                 mesh,
-                if asked.high { embree::Quality::High } else { embree::Quality::Medium },
+                if options.high { embree::Quality::High } else { embree::Quality::Medium },
                 threads,
-                asked.isa.as_deref().unwrap_or("avx2"),
+                options.isa.as_deref().unwrap_or("avx2"),
             );
             peer_build = peer_build.min(seconds(|| new.commit()));
             scene = Some(new);
@@ -149,16 +149,16 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
     );
     let (nodes, packs) = tree.expected_visits();
     println!("  a random line visits {nodes:.2} nodes and {packs:.2} packs");
-    if asked.build_only {
+    if options.build_only {
         return;
     }
     let rays = meshes::rays(&tree, mesh);
-    if asked.instructions.is_none() {
+    if options.instructions.is_none() {
         kd_tree(mesh, &rays);
     }
     for instructions in Instructions::ALL {
         if instructions.available() != instructions
-            || asked.instructions.is_some_and(|only| only != instructions)
+            || options.instructions.is_some_and(|only| only != instructions)
         {
             continue;
         }
@@ -169,13 +169,13 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
         any("shadow", &tree, scene.as_ref(), &rays.shadow);
         packets(&tree, scene.as_ref(), &rays);
         all_threads(&tree, &rays, threads);
-        for (file, any_hit) in &asked.timed {
+        for (file, any_hit) in &options.timed {
             match meshes::ray_file(file) {
                 Ok(rays) => timed(&tree, scene.as_ref(), &rays, *any_hit),
                 Err(error) => println!("  {}: {error}", file.display()),
             }
         }
-        for (rays, answers) in &asked.given {
+        for (rays, answers) in &options.given {
             if let Err(error) = compare::compare(&tree, mesh, rays, answers) {
                 println!("  {}: {error}", rays.display());
             }
@@ -185,7 +185,7 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, asked: &Ask
 
 /// Times the rays of a file on one thread: one by one, and sixteen at a time in file order. For Embree, the fastest way
 /// counts.
-fn timed(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray], any_hit: bool) {
+fn timed(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray], any_hit: bool) {
     let seconds = |rate: f64| rays.len() as f64 / 1e6 / rate;
     let mut single = |rays: &[Ray]| match any_hit {
         true => rays.iter().filter(|ray| tree.any(ray, None)).count(),
@@ -211,7 +211,7 @@ fn timed(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray], any_hit: bool)
         let mut plain = |rays: &[Ray]| scene.closest16(rays, false);
         let mut coherent = |rays: &[Ray]| scene.closest16(rays, true);
         // Packets only find closest hits.
-        let ways: &mut [Way<'_>] = &mut [&mut single, &mut plain, &mut coherent];
+        let ways: &mut [TraceFn<'_>] = &mut [&mut single, &mut plain, &mut coherent];
         let count = if any_hit { 1 } else { ways.len() };
         ways[..count].iter_mut().map(|way| rates(rays, [*way])[0]).fold(0.0, f64::max)
     });
@@ -288,7 +288,7 @@ fn line(name: &str, unit: &str, own: f64, peer: Option<f64>) {
     }
 }
 
-fn closest(name: &str, tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray]) {
+fn closest(name: &str, tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray]) {
     let mut own = |rays: &[Ray]| rays.iter().filter(|ray| tree.closest(ray).is_some()).count();
     match scene {
         None => line(name, "Mrays/s", rates(rays, [&mut own])[0], None),
@@ -300,7 +300,7 @@ fn closest(name: &str, tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray]) 
     }
 }
 
-fn any(name: &str, tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray]) {
+fn any(name: &str, tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray]) {
     let mut own = |rays: &[Ray]| rays.iter().filter(|ray| tree.any(ray, None)).count();
     match scene {
         None => line(name, "Mrays/s", rates(rays, [&mut own])[0], None),
@@ -313,7 +313,7 @@ fn any(name: &str, tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &[Ray]) {
 }
 
 /// Prints the rates for sixteen rays at a time, for Embree with and without the coherent flag.
-fn packets(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &meshes::Rays) {
+fn packets(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &meshes::Rays) {
     let mut closest = |rays: &[Ray]| {
         let mut found = 0;
         let mut hits = [None; PACKET];
@@ -342,10 +342,10 @@ fn packets(tree: &WideBvh, scene: Option<&Scene<'_>>, rays: &meshes::Rays) {
 }
 
 /// A function that traces rays and counts hits.
-type Way<'a> = &'a mut dyn FnMut(&[Ray]) -> usize;
+type TraceFn<'a> = &'a mut dyn FnMut(&[Ray]) -> usize;
 
 /// Millions of rays per second for each function; the fastest run of every chunk counts.
-fn rates<const N: usize>(rays: &[Ray], mut ways: [Way<'_>; N]) -> [f64; N] {
+fn rates<const N: usize>(rays: &[Ray], mut ways: [TraceFn<'_>; N]) -> [f64; N] {
     let mut total = [0.0; N];
     for chunk in rays.chunks(CHUNK) {
         let mut best = [f64::INFINITY; N];

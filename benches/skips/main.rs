@@ -18,8 +18,8 @@ mod run;
 
 use std::process::{Command, ExitCode};
 
-use pairs::Pair;
-use row::Picture;
+use pairs::FeaturePair;
+use row::SceneFiles;
 
 /// Maximum deviation of a ratio from 1.
 const BOUND: f64 = 0.01;
@@ -32,13 +32,13 @@ fn main() -> ExitCode {
     let rounds = asked.iter().find_map(|word| word.strip_prefix("rounds=")?.parse().ok()).unwrap_or(41);
     let words: Vec<&String> = asked.iter().filter(|word| !word.starts_with("rounds=")).collect();
     let is_asked =
-        |pair: &Pair| words.is_empty() || words.iter().any(|word| pair.name.contains(word.as_str()));
+        |pair: &FeaturePair| words.is_empty() || words.iter().any(|word| pair.name.contains(word.as_str()));
     println!("| unused feature | s without, minimum | s, ratio with | ± | instructions | bits | report |");
     println!("| --- | --- | --- | --- | --- | --- | --- |");
     let mut faulty = false;
     for pair in pairs::pairs(SIZE).iter().filter(|pair| is_asked(pair)) {
         match ratios(pair, rounds) {
-            Ok(Paired { seconds, ratio, error, is_same, said }) => {
+            Ok(PairResult { seconds, ratio, error, is_same, said }) => {
                 let of_instructions = instructions(&pair.off).zip(instructions(&pair.on));
                 let of_instructions = of_instructions.map(|(off, on)| on / off);
                 let judged = of_instructions.unwrap_or(ratio);
@@ -60,7 +60,7 @@ fn main() -> ExitCode {
 }
 
 /// Results for a pair.
-struct Paired {
+struct PairResult {
     /// Minimum seconds without the feature.
     seconds: f64,
     /// Median ratio over all rounds.
@@ -73,7 +73,7 @@ struct Paired {
 }
 
 /// Runs the rounds; the order within a round alternates.
-fn ratios(pair: &Pair, rounds: usize) -> Result<Paired, String> {
+fn ratios(pair: &FeaturePair, rounds: usize) -> Result<PairResult, String> {
     let (mut ratios, mut seconds, mut is_same, mut said) = (Vec::new(), f64::INFINITY, true, String::new());
     for round in 0..rounds.max(1) {
         let (off, on) = if round % 2 == 0 {
@@ -93,11 +93,11 @@ fn ratios(pair: &Pair, rounds: usize) -> Result<Paired, String> {
     // The quartiles of a normal distribution are 1.35 standard deviations apart, and its median has 1.25 times the
     // error of its mean.
     let error = 1.25 / 1.35 * (at(3) - at(1)) / (ratios.len() as f64).sqrt();
-    Ok(Paired { seconds, ratio: at(2), error, is_same, said })
+    Ok(PairResult { seconds, ratio: at(2), error, is_same, said })
 }
 
 /// Millions of instructions for a smaller image, counted by valgrind. `None` if valgrind is not installed or fails.
-fn instructions(picture: &Picture) -> Option<f64> {
+fn instructions(picture: &SceneFiles) -> Option<f64> {
     let folder = tempfile::tempdir().ok()?;
     let mut program = Command::new("valgrind");
     program.args(["--tool=callgrind", "--callgrind-out-file=/dev/null", env!("CARGO_BIN_EXE_glimt")]);

@@ -1,12 +1,12 @@
 //! Scenes with and without a feature that they do not use.
 
-use super::row::Picture;
+use super::row::SceneFiles;
 
 /// An image without and with a feature that the scene does not use.
-pub(crate) struct Pair {
+pub(crate) struct FeaturePair {
     pub(crate) name: &'static str,
-    pub(crate) off: Picture,
-    pub(crate) on: Picture,
+    pub(crate) off: SceneFiles,
+    pub(crate) on: SceneFiles,
     /// A stage that must be skipped with `on`, and part of the reason in the report.
     pub(crate) skipped: Option<(&'static str, &'static str)>,
 }
@@ -48,28 +48,28 @@ const LAMP: &str = "[materials.lamp]\nemission = 5\n[[quad]]\ncorner = [-0.5, 3,
 const PICTURE: &str = "P3 2 2 255 90 120 200 20 30 40 255 250 200 70 70 80";
 
 /// All pairs, for images of this size.
-pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<Pair> {
+pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<FeaturePair> {
     let scene = |render: &str, camera: &str, ball: &str, rest: &str| {
         let size = [("WIDTH", width), ("HEIGHT", height), ("SAMPLES", samples)];
         let sized =
             size.iter().fold(ROOM.to_owned(), |text, (key, value)| text.replace(key, &value.to_string()));
         let filled = sized.replace("RENDER", render).replace("CAMERA", camera).replace("BALL", ball);
-        Picture::new(filled + rest).with("a.ppm", PICTURE.to_owned())
+        SceneFiles::new(filled + rest).with("a.ppm", PICTURE.to_owned())
     };
     let plain = || scene("", "", "", POINT);
     let lit = || scene("", "", "", LAMP);
     let path = || scene("integrator = \"path\"", "", "", LAMP);
     let with = |rest: &str| scene("", "", "", &(POINT.to_owned() + rest));
     let lens = |options| scene("", "aperture = 0.1", "", POINT).by(options);
-    let pair = |name, off, on| Pair { name, off, on, skipped: None };
+    let pair = |name, off, on| FeaturePair { name, off, on, skipped: None };
     let texture = "[textures.t]\nfile = \"a.ppm\"\n";
     let unused = "[textures.t]\nfile = \"a.ppm\"\nfilter = \"mipmap\"\n[materials.unused]\ndiffuse = { texture = \"t\" }\nnormal_map = \"t\"\n";
     vec![
-        Pair {
+        FeaturePair {
             skipped: Some(("photons", "path needs none")),
             ..pair("photons, with path", path(), path().by("--photons on"))
         },
-        Pair {
+        FeaturePair {
             skipped: Some(("photons", "max_depth")),
             ..pair(
                 "photons, direct light only",
@@ -77,7 +77,7 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<Pair> {
                 scene("max_depth = 1", "", "", POINT).by("--photons on"),
             )
         },
-        Pair {
+        FeaturePair {
             skipped: Some(("photons", "does not enable")),
             ..pair(
                 "photons that are not enabled",
@@ -90,11 +90,11 @@ pub(crate) fn pairs([width, height, samples]: [u32; 3]) -> Vec<Pair> {
         pair("soft shadows of point lights", plain().by("--shadows hard"), plain().by("--shadows soft")),
         pair("shadow samples of point lights", plain(), scene("shadow_samples = 8", "", "", POINT)),
         pair("shadows, with path", path().by("--shadows off"), path().by("--shadows soft")),
-        Pair {
+        FeaturePair {
             skipped: Some(("textures", "names a texture")),
             ..pair("a texture that nothing uses", plain(), with(texture))
         },
-        Pair {
+        FeaturePair {
             skipped: Some(("textures", "names a texture")),
             ..pair("a textured material that no shape uses", plain(), with(unused))
         },

@@ -15,18 +15,19 @@ mod run;
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use row::{Extent, Figure, Row};
+use row::{CaseSet, RowMeasure, StressRow};
 
 /// Number of renders of a timed row.
 const ROUNDS: u32 = 3;
 
 fn main() -> ExitCode {
     let asked: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
-    let is_asked = |row: &Row| asked.is_empty() || asked.iter().any(|word| row.name.contains(word.as_str()));
+    let is_asked =
+        |row: &StressRow| asked.is_empty() || asked.iter().any(|word| row.name.contains(word.as_str()));
     let mut table = HEAD.to_owned();
     print!("{HEAD}");
     let mut faulty = 0;
-    for row in cases::rows(Extent::Long).iter().filter(|row| is_asked(row)) {
+    for row in cases::rows(CaseSet::Long).iter().filter(|row| is_asked(row)) {
         let line = line(row, &mut faulty);
         print!("{line}");
         table += &line;
@@ -49,10 +50,10 @@ has non-finite samples, crashes or hangs except where noted.
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 ";
 
-fn line(row: &Row, faulty: &mut u32) -> String {
+fn line(row: &StressRow, faulty: &mut u32) -> String {
     let kind = match row.figure {
-        Figure::Difference(_) => "difference",
-        Figure::Mean(_) => "mean",
+        RowMeasure::Difference(_) => "difference",
+        RowMeasure::Mean(_) => "mean",
     };
     let rounds = if row.is_timed { ROUNDS } else { 1 };
     let start = format!("| {} | {} | {kind} |", row.name, row.pairs.len());

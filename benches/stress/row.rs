@@ -2,14 +2,14 @@
 
 /// A scene file and the files that it refers to.
 #[derive(Clone)]
-pub(crate) struct Picture {
+pub(crate) struct SceneFiles {
     pub(crate) scene: String,
     pub(crate) files: Vec<(&'static str, String)>,
     /// Command-line options.
     pub(crate) options: &'static str,
 }
 
-impl Picture {
+impl SceneFiles {
     pub(crate) fn new(scene: String) -> Self {
         Self { scene, files: Vec::new(), options: "" }
     }
@@ -27,7 +27,7 @@ impl Picture {
 
 /// How a row is measured.
 #[derive(Clone, Copy)]
-pub(crate) enum Figure {
+pub(crate) enum RowMeasure {
     /// √(Σ(t·a − b)²/Σb²) of the image a and the reference b, for a given t.
     Difference(f64),
     /// Relative deviation of the image's mean from the expected value.
@@ -35,24 +35,29 @@ pub(crate) enum Figure {
 }
 
 /// A row of the table: images with their references; the worst one counts.
-pub(crate) struct Row {
+pub(crate) struct StressRow {
     pub(crate) name: String,
-    pub(crate) pairs: Vec<(Picture, Picture)>,
-    pub(crate) figure: Figure,
+    pub(crate) pairs: Vec<(SceneFiles, SceneFiles)>,
+    pub(crate) figure: RowMeasure,
     pub(crate) bound: f64,
     /// Whether the case is as much work as its reference, so that it may take at most three times as long.
     pub(crate) is_timed: bool,
 }
 
-impl Row {
+impl StressRow {
     /// A row of images that must match their references.
-    pub(crate) fn alike(name: impl Into<String>, pairs: Vec<(Picture, Picture)>, bound: f64) -> Self {
-        Self { name: name.into(), pairs, figure: Figure::Difference(1.0), bound, is_timed: false }
+    pub(crate) fn alike(name: impl Into<String>, pairs: Vec<(SceneFiles, SceneFiles)>, bound: f64) -> Self {
+        Self { name: name.into(), pairs, figure: RowMeasure::Difference(1.0), bound, is_timed: false }
     }
 
     /// A row for an image whose mean is known.
-    pub(crate) fn mean(name: impl Into<String>, pair: (Picture, Picture), mean: f64, bound: f64) -> Self {
-        Self { name: name.into(), pairs: vec![pair], figure: Figure::Mean(mean), bound, is_timed: false }
+    pub(crate) fn mean(
+        name: impl Into<String>,
+        pair: (SceneFiles, SceneFiles),
+        mean: f64,
+        bound: f64,
+    ) -> Self {
+        Self { name: name.into(), pairs: vec![pair], figure: RowMeasure::Mean(mean), bound, is_timed: false }
     }
 
     /// Also compares the time with the reference, which is as much work.
@@ -63,7 +68,7 @@ impl Row {
 
 /// Which cases to run.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Extent {
+pub(crate) enum CaseSet {
     /// The cases that run with the tests.
     Short,
     /// All cases.

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use super::row::{Figure, Picture, Row};
+use super::row::{RowMeasure, SceneFiles, StressRow};
 
 /// Time limit of a render, after which it counts as hung.
 const LONGEST: Duration = Duration::from_secs(120);
@@ -25,7 +25,7 @@ pub(crate) struct Rendered {
 }
 
 /// Results of a row.
-pub(crate) struct Measured {
+pub(crate) struct RowResult {
     /// The worst figure.
     pub(crate) figure: f64,
     pub(crate) non_finite: u64,
@@ -33,14 +33,14 @@ pub(crate) struct Measured {
     pub(crate) seconds: [f64; 2],
 }
 
-impl Measured {
+impl RowResult {
     /// Whether the images are within their bound, regardless of time.
-    pub(crate) fn is_right(&self, row: &Row) -> bool {
+    pub(crate) fn is_right(&self, row: &StressRow) -> bool {
         self.figure <= row.bound && self.non_finite == 0
     }
 
     /// Faults of the row.
-    pub(crate) fn faults(&self, row: &Row) -> Vec<&'static str> {
+    pub(crate) fn faults(&self, row: &StressRow) -> Vec<&'static str> {
         let slower = self.seconds[0] / self.seconds[1];
         let faults = [
             (!(self.figure <= row.bound), "exceeds its bound"),
@@ -55,9 +55,9 @@ impl Measured {
 ///
 /// # Errors
 /// The program failed, crashed or took too long.
-pub(crate) fn measure(row: &Row, rounds: u32) -> Result<Measured, String> {
-    let mut measured = Measured { figure: 0.0, non_finite: 0, seconds: [0.0; 2] };
-    let mut last: Option<(&Picture, Rendered)> = None;
+pub(crate) fn measure(row: &StressRow, rounds: u32) -> Result<RowResult, String> {
+    let mut measured = RowResult { figure: 0.0, non_finite: 0, seconds: [0.0; 2] };
+    let mut last: Option<(&SceneFiles, Rendered)> = None;
     for (case, twin) in &row.pairs {
         let mut case_of = render(case)?;
         let mut twin_of = match last.take() {
@@ -81,13 +81,13 @@ pub(crate) fn measure(row: &Row, rounds: u32) -> Result<Measured, String> {
     Ok(measured)
 }
 
-fn figure(figure: Figure, case: &[f32], twin: &[f32]) -> Result<f64, String> {
+fn figure(figure: RowMeasure, case: &[f32], twin: &[f32]) -> Result<f64, String> {
     Ok(match figure {
-        Figure::Mean(right) => {
+        RowMeasure::Mean(right) => {
             let mean = case.iter().map(|&x| f64::from(x)).sum::<f64>() / case.len() as f64;
             (mean / right - 1.0).abs()
         }
-        Figure::Difference(times) => {
+        RowMeasure::Difference(times) => {
             if case.len() != twin.len() {
                 return Err("the images have different sizes".to_owned());
             }
@@ -102,7 +102,7 @@ fn figure(figure: Figure, case: &[f32], twin: &[f32]) -> Result<f64, String> {
 ///
 /// # Errors
 /// The program failed, crashed or took too long.
-pub(crate) fn render(picture: &Picture) -> Result<Rendered, String> {
+pub(crate) fn render(picture: &SceneFiles) -> Result<Rendered, String> {
     let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
     render_in(folder.path(), picture)
 }
@@ -113,7 +113,7 @@ pub(crate) fn render(picture: &Picture) -> Result<Rendered, String> {
 /// The files cannot be written.
 pub(crate) fn call(
     folder: &Path,
-    picture: &Picture,
+    picture: &SceneFiles,
     mut program: Command,
 ) -> Result<Command, std::io::Error> {
     fs::write(folder.join("scene.toml"), &picture.scene)?;
@@ -125,7 +125,7 @@ pub(crate) fn call(
     Ok(program)
 }
 
-fn render_in(folder: &Path, picture: &Picture) -> Result<Rendered, String> {
+fn render_in(folder: &Path, picture: &SceneFiles) -> Result<Rendered, String> {
     let said = |error: std::io::Error| error.to_string();
     let mut command = call(folder, picture, Command::new(env!("CARGO_BIN_EXE_glimt"))).map_err(said)?;
     let errors = fs::File::create(folder.join("said")).map_err(said)?;

@@ -29,7 +29,7 @@ const GROUND: [u8; 3] = [0; 3];
 const INK_OF_ASCII: [u8; 95] = [0, 21, 16, 61, 52, 45, 58, 8, 28, 28, 24, 27, 11, 7, 7, 27, 61, 38, 44, 46, 49, 48, 58, 36, 62, 58, 14, 17, 29, 28, 29, 31, 66, 54, 68, 40, 60, 53, 43, 53, 59, 43, 39, 57, 35, 68, 68, 58, 52, 63, 62, 49, 38, 55, 47, 67, 50, 39, 48, 35, 27, 35, 17, 17, 6, 48, 54, 32, 54, 48, 37, 60, 47, 34, 36, 47, 32, 54, 40, 45, 54, 54, 26, 38, 36, 40, 34, 47, 36, 42, 36, 39, 30, 38, 15];
 
 /// A way to show an image, for glimt and chafa.
-struct Mode {
+struct DisplayMode {
     name: &'static str,
     preview: PreviewChoice,
     depth: ColorDepth,
@@ -44,7 +44,7 @@ const STIPPLED_HALVES: &str = "vhalf+stipple+solid+space";
 const STIPPLED_QUADRANTS: &str = "quad+half+stipple+solid+space";
 const STIPPLED_SEXTANTS: &str = "sextant+quad+half+stipple+solid+space";
 
-const MODES: [Mode; 16] = [
+const MODES: [DisplayMode; 16] = [
     mode("half blocks, 24 bits", PreviewChoice::HalfBlock, ColorDepth::TrueColor, HALVES, "full"),
     mode("quadrants, 24 bits", PreviewChoice::Quadrant, ColorDepth::TrueColor, QUADRANTS, "full"),
     mode("sextants, 24 bits", PreviewChoice::Sextant, ColorDepth::TrueColor, SEXTANTS, "full"),
@@ -69,8 +69,8 @@ const fn mode(
     depth: ColorDepth,
     symbols: &'static str,
     colors: &'static str,
-) -> Mode {
-    Mode { name, preview, depth, symbols, colors }
+) -> DisplayMode {
+    DisplayMode { name, preview, depth, symbols, colors }
 }
 
 /// Prints a table for images of the bundled scenes.
@@ -109,8 +109,8 @@ fn errors(
     let place = place(&shown(&picture, PreviewChoice::HalfBlock, ColorDepth::TrueColor, WINDOW));
     let Some(buffer) = draw(&picture, place)? else { return Ok(None) };
     let area = if buffer.area == WINDOW { place } else { buffer.area };
-    let seen = Plane::of_cells(&buffer, area);
-    let truth = Plane::of_picture(&picture, seen.width, seen.height);
+    let seen = LinearImage::of_cells(&buffer, area);
+    let truth = LinearImage::of_picture(&picture, seen.width, seen.height);
     Ok(Some([seen.error(&truth), seen.blurred().error(&truth.blurred())]))
 }
 
@@ -126,7 +126,12 @@ fn place(buffer: &Buffer) -> Rect {
 }
 
 /// The image drawn by chafa in these cells. `None` without chafa, or if it lacks such characters.
-fn chafa(file: &Path, area: Rect, mode: &Mode, dither: &str) -> Result<Option<Buffer>, Box<dyn Error>> {
+fn chafa(
+    file: &Path,
+    area: Rect,
+    mode: &DisplayMode,
+    dither: &str,
+) -> Result<Option<Buffer>, Box<dyn Error>> {
     if mode.symbols.is_empty() {
         return Ok(None);
     }
@@ -177,13 +182,13 @@ fn copy(from: &vt100::Cell, to: &mut Cell) {
 }
 
 /// An image in linear light.
-struct Plane {
+struct LinearImage {
     width: usize,
     height: usize,
     pixels: Vec<Vec3>,
 }
 
-impl Plane {
+impl LinearImage {
     fn of_cells(buffer: &Buffer, area: Rect) -> Self {
         let (width, height) = (usize::from(area.width) * CELL.0, usize::from(area.height) * CELL.1);
         let pixel = |i: usize| {

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::thread;
 use std::time::Duration;
 
-use crate::watched::{COLUMNS, Line, ROWS, Watched};
+use crate::watched::{COLUMNS, Connection, ROWS, WatchedTerminal};
 
 /// Percentages of the render at which the screen is examined, and the maximum difference in codes of 255.
 const LOOKS: [(u32, f64); 3] = [(10, 1.5), (25, 0.8), (50, 0.5)];
@@ -50,7 +50,7 @@ pub(crate) fn print() -> Result<(), Box<dyn Error>> {
 
 /// Renders once, and reports the difference between the screen and its final state during the render.
 fn follow(command: &[&str], folder: &Path) -> Result<String, Box<dyn Error>> {
-    let terminal = Watched::open(command, folder, Line::NONE)?;
+    let terminal = WatchedTerminal::open(command, folder, Connection::NONE)?;
     let begin = std::time::Instant::now();
     let mut screens = Vec::new();
     for (percent, _) in LOOKS {

@@ -28,8 +28,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
 
-use crate::others::{Plain, chafa};
-use crate::sequence::Shot;
+use crate::others::{PlainRatatui, chafa};
+use crate::sequence::RecordedPreview;
 
 /// Columns and rows of the window; the image is a little smaller.
 const WINDOWS: [(u16, u16); 3] = [(80, 24), (120, 40), (200, 60)];
@@ -131,7 +131,7 @@ fn replay(edit: &Edit, columns: u16, rows: u16) -> Result<(), Box<dyn Error>> {
 struct Window {
     area: Rect,
     painter: Painter,
-    plain: Plain,
+    plain: PlainRatatui,
     /// Image on the screen.
     last: Option<Picture>,
 }
@@ -139,11 +139,16 @@ struct Window {
 impl Window {
     fn new(columns: u16, rows: u16) -> Self {
         let area = Rect::new(0, 0, columns, rows);
-        Self { area, painter: Painter::new(ColorDepth::TrueColor), plain: Plain::new(area), last: None }
+        Self {
+            area,
+            painter: Painter::new(ColorDepth::TrueColor),
+            plain: PlainRatatui::new(area),
+            last: None,
+        }
     }
 
     /// Shows the previews of one render; only those worth drawing are drawn.
-    fn show(&mut self, shots: &[Shot]) -> Result<String, Box<dyn Error>> {
+    fn show(&mut self, shots: &[RecordedPreview]) -> Result<String, Box<dyn Error>> {
         let (Some(first), Some(last)) = (shots.first(), shots.last()) else {
             return Err("no preview".into());
         };
@@ -226,7 +231,7 @@ impl Window {
     }
 
     fn others(&self, picture: &Picture) -> Result<(usize, Option<usize>), Box<dyn Error>> {
-        Ok((Plain::new(self.area).draw(&self.cells(picture).0), chafa(picture)?))
+        Ok((PlainRatatui::new(self.area).draw(&self.cells(picture).0), chafa(picture)?))
     }
 
     fn aim(&mut self, picture: &Picture, fidelity: Fidelity) -> usize {

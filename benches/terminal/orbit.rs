@@ -5,7 +5,7 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::watched::{Line, Watched};
+use crate::watched::{Connection, WatchedTerminal};
 
 /// Key repeat interval. The key is held for `BEFORE`, then for `HELD` while the connection is measured.
 const REPEAT: Duration = Duration::from_millis(33);
@@ -33,19 +33,19 @@ fn orbit(scene: &str) -> Result<(f64, usize), Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let scene = scene.to_str().ok_or("a file name is not valid UTF-8")?;
     let command = [&*program, scene, "--samples", "100000", "-o", "out.png"];
-    let terminal = Watched::open(&command, folder.path(), Line::THIN)?;
+    let terminal = WatchedTerminal::open(&command, folder.path(), Connection::SLOW)?;
     terminal.wait("a picture", |far| far.percent().is_some())?;
     thread::sleep(BEFORE);
     hold(&terminal, BEFORE)?;
     let before = terminal.far().came;
     hold(&terminal, HELD)?;
     let far = terminal.far();
-    let most = Line::THIN.bytes_per_second * HELD.as_secs_f64();
+    let most = Connection::SLOW.bytes_per_second * HELD.as_secs_f64();
     Ok(((far.came - before) as f64 / most, far.most_unanswered))
 }
 
 /// Alternately holds two opposite orbit keys, with keyboard repeat.
-fn hold(terminal: &Watched, time: Duration) -> Result<(), Box<dyn Error>> {
+fn hold(terminal: &WatchedTerminal, time: Duration) -> Result<(), Box<dyn Error>> {
     let begin = Instant::now();
     let mut presses = 0;
     while begin.elapsed() < time {

@@ -12,9 +12,9 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 /// A writer that counts bytes.
-struct Counter(Rc<Cell<usize>>);
+struct ByteCounter(Rc<Cell<usize>>);
 
-impl Write for Counter {
+impl Write for ByteCounter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.0.set(self.0.get() + bytes.len());
         Ok(bytes.len())
@@ -26,17 +26,17 @@ impl Write for Counter {
 }
 
 /// Plain ratatui on crossterm.
-pub(crate) struct Plain {
-    backend: CrosstermBackend<Counter>,
+pub(crate) struct PlainRatatui {
+    backend: CrosstermBackend<ByteCounter>,
     sent: Rc<Cell<usize>>,
     shown: Buffer,
 }
 
-impl Plain {
+impl PlainRatatui {
     pub(crate) fn new(area: Rect) -> Self {
         crossterm::style::force_color_output(true);
         let sent = Rc::new(Cell::new(0));
-        let backend = CrosstermBackend::new(Counter(Rc::clone(&sent)));
+        let backend = CrosstermBackend::new(ByteCounter(Rc::clone(&sent)));
         Self { backend, sent, shown: Buffer::empty(area) }
     }
 

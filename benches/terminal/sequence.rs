@@ -11,7 +11,7 @@ use glimt::pipeline::protocol::{Command, Event, PreviewSize, Request, Writing};
 use glimt::pipeline::settings::Overrides;
 
 /// A preview of an unfinished or final image.
-pub(crate) struct Shot {
+pub(crate) struct RecordedPreview {
     /// Seconds since the request.
     pub(crate) seconds: f64,
     /// Mean samples per pixel; 0 for the coarse first image.
@@ -26,7 +26,7 @@ pub(crate) fn render(
     generation: u64,
     scene: &Path,
     size: PreviewSize,
-) -> Result<Vec<Shot>, Box<dyn Error>> {
+) -> Result<Vec<RecordedPreview>, Box<dyn Error>> {
     let request = Request {
         generation,
         scene: scene.to_owned(),
@@ -38,7 +38,7 @@ pub(crate) fn render(
     };
     let start = Instant::now();
     handle.send(Command::Render(Box::new(request)));
-    let (mut shots, mut samples) = (Vec::<Shot>::new(), 0.0);
+    let (mut shots, mut samples) = (Vec::<RecordedPreview>::new(), 0.0);
     for event in &handle.events {
         match event {
             Event::Progress { progress, .. } => {
@@ -49,7 +49,7 @@ pub(crate) fn render(
                 if let Some(latest) = latest {
                     let seconds = start.elapsed().as_secs_f64();
                     let picture = latest.picture.as_ref().clone();
-                    shots.push(Shot { seconds, samples, picture, is_final: false });
+                    shots.push(RecordedPreview { seconds, samples, picture, is_final: false });
                 }
             }
             Event::Done { .. } => break,

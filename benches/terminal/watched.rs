@@ -25,21 +25,21 @@ const ANSWERS: [(&[u8], &[u8]); 3] =
 
 /// A connection to the terminal.
 #[derive(Clone, Copy)]
-pub(crate) struct Line {
+pub(crate) struct Connection {
     pub(crate) bytes_per_second: f64,
     /// One-way delay.
     pub(crate) delay: Duration,
 }
 
-impl Line {
+impl Connection {
     /// The connection to a terminal on the same machine.
     pub(crate) const NONE: Self = Self { bytes_per_second: f64::INFINITY, delay: Duration::ZERO };
     /// 1 Mbit/s with a round-trip time of 150 ms.
-    pub(crate) const THIN: Self = Self { bytes_per_second: 125e3, delay: Duration::from_millis(75) };
+    pub(crate) const SLOW: Self = Self { bytes_per_second: 125e3, delay: Duration::from_millis(75) };
 }
 
 /// Byte counts and screen at the far end.
-pub(crate) struct Far {
+pub(crate) struct FarEnd {
     pub(crate) cells: vt100::Parser,
     pub(crate) pixels: PixelScreen,
     /// Number of bytes that have arrived.
@@ -50,7 +50,7 @@ pub(crate) struct Far {
     pub(crate) most_unanswered: usize,
 }
 
-impl Far {
+impl FarEnd {
     /// The colors of the subdivisions of the image's cells, or of its pixels.
     pub(crate) fn seen(&self) -> Vec<[u8; 3]> {
         if let Some(picture) = self.pixels.shown() {
@@ -89,17 +89,17 @@ fn parts(cell: &vt100::Cell) -> [[u8; 3]; 24] {
 }
 
 /// A terminal that runs the program.
-pub(crate) struct Watched {
+pub(crate) struct WatchedTerminal {
     // Keeps the terminal open.
     _master: Box<dyn MasterPty + Send>,
     child: Box<dyn Child + Send + Sync>,
     keys: Arc<Mutex<Box<dyn Write + Send>>>,
-    far: Arc<Mutex<Far>>,
+    far: Arc<Mutex<FarEnd>>,
 }
 
-impl Watched {
+impl WatchedTerminal {
     /// Starts a command in a folder.
-    pub(crate) fn open(command: &[&str], folder: &Path, line: Line) -> Result<Self, Box<dyn Error>> {
+    pub(crate) fn open(command: &[&str], folder: &Path, line: Connection) -> Result<Self, Box<dyn Error>> {
         let size =
             PtySize { rows: ROWS, cols: COLUMNS, pixel_width: COLUMNS * CELL.0, pixel_height: ROWS * CELL.1 };
         let pair = native_pty_system().openpty(size)?;
@@ -114,7 +114,7 @@ impl Watched {
         let child = pair.slave.spawn_command(builder)?;
         let keys = Arc::new(Mutex::new(pair.master.take_writer()?));
         let side = |length| NonZeroU16::new(length).ok_or("the terminal has no cells");
-        let far = Arc::new(Mutex::new(Far {
+        let far = Arc::new(Mutex::new(FarEnd {
             cells: vt100::Parser::new(side(ROWS)?, side(COLUMNS)?, 0),
             pixels: PixelScreen::default(),
             came: 0,
@@ -132,12 +132,12 @@ impl Watched {
     }
 
     /// The state at the far end.
-    pub(crate) fn far(&self) -> MutexGuard<'_, Far> {
+    pub(crate) fn far(&self) -> MutexGuard<'_, FarEnd> {
         lock(&self.far)
     }
 
     /// Waits until the far end satisfies `holds`.
-    pub(crate) fn wait(&self, what: &str, holds: impl Fn(&Far) -> bool) -> Result<(), Box<dyn Error>> {
+    pub(crate) fn wait(&self, what: &str, holds: impl Fn(&FarEnd) -> bool) -> Result<(), Box<dyn Error>> {
         let deadline = Instant::now() + LIMIT;
         while !holds(&self.far()) {
             if Instant::now() > deadline {
@@ -150,7 +150,7 @@ impl Watched {
     }
 }
 
-impl Drop for Watched {
+impl Drop for WatchedTerminal {
     fn drop(&mut self) {
         // The measurement is complete; failing to stop the program does not matter.
         let _ = self.child.kill();
@@ -168,9 +168,9 @@ type Due = (Instant, Vec<u8>);
 /// Simulates the connection: carries output to the far end, and answers back.
 fn carry(
     mut output: Box<dyn Read + Send>,
-    far: Arc<Mutex<Far>>,
+    far: Arc<Mutex<FarEnd>>,
     keys: Arc<Mutex<Box<dyn Write + Send>>>,
-    line: Line,
+    line: Connection,
 ) {
     let ((down, arriving), (up, rising)) = (channel::<Due>(), channel::<(Instant, usize, &'static [u8])>());
     let at_end = far.clone();
@@ -206,7 +206,7 @@ fn carry(
 
 fn arrive(
     arriving: &Receiver<Due>,
-    far: &Mutex<Far>,
+    far: &Mutex<FarEnd>,
     up: &Sender<(Instant, usize, &'static [u8])>,
     delay: Duration,
 ) {

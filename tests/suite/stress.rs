@@ -14,17 +14,17 @@ mod row;
 #[allow(dead_code, reason = "times are for the benchmark")]
 mod run;
 
-use row::Extent;
+use row::CaseSet;
 
 #[test]
 fn the_ends_of_what_scenes_may_be_look_as_their_plain_twins() {
-    let rows = cases::rows(Extent::Short);
+    let rows = cases::rows(CaseSet::Short);
     assert!(rows.len() > 60, "{} rows", rows.len());
     let mut wrong = Vec::new();
     for row in rows {
         match run::measure(&row, 1) {
             Ok(measured) if measured.is_right(&row) => {}
-            Ok(run::Measured { figure, non_finite, .. }) => {
+            Ok(run::RowResult { figure, non_finite, .. }) => {
                 wrong.push(format!(
                     "{}: {figure:e}, more than {:e}, or not finite: {non_finite}",
                     row.name, row.bound

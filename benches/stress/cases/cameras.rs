@@ -1,16 +1,16 @@
 //! Lenses, fields of view, cameras inside and on objects, images of extreme shape.
 
-use super::{CAMERA, Extent, Picture, Row, furnace, head, signs};
+use super::{CAMERA, CaseSet, SceneFiles, StressRow, furnace, head, signs};
 
 /// A white surface: under uniform light of radiance 1, its radiance is 1.
 const WHITE: &str =
     "[materials.w]\ndiffuse = 1\n[[sphere]]\ncenter = [0, 0, -5]\nradius = 1\nmaterial = \"w\"\n";
 
-pub(super) fn rows(_: Extent) -> Vec<Row> {
+pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
     let mut rows = Vec::new();
     let plain = signs("", CAMERA, "");
     rows.push(
-        Row::alike(
+        StressRow::alike(
             "an aperture of 0, as without a lens",
             vec![(signs("", &with("aperture = 0\nfocus = 3"), ""), plain.clone())],
             0.0,
@@ -18,7 +18,7 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
         .timed(),
     );
     rows.push(
-        Row::alike(
+        StressRow::alike(
             "an aperture of 1e-12, as without a lens",
             vec![(signs("", &with("aperture = 1e-12"), ""), plain.clone())],
             1e-3,
@@ -27,22 +27,30 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
     );
     let white = |camera: &str| (furnace(64, camera, WHITE), furnace(64, CAMERA, WHITE));
     rows.push(
-        Row::mean("an aperture of the scene's size, a white ball", white(&with("aperture = 8")), 1.0, 1e-2)
-            .timed(),
+        StressRow::mean(
+            "an aperture of the scene's size, a white ball",
+            white(&with("aperture = 8")),
+            1.0,
+            1e-2,
+        )
+        .timed(),
     );
     rows.push(
-        Row::mean("a field of view of 179°, a white ball", white(&with("fov = 179")), 1.0, 1e-2).timed(),
+        StressRow::mean("a field of view of 179°, a white ball", white(&with("fov = 179")), 1.0, 1e-2)
+            .timed(),
     );
     rows.extend([1e-3, 179.0].map(angle_of_view));
     for (name, place) in [("glass of ior 1", "1"), ("glass of ior 1.000001", "1.000001")] {
         let ball = around_the_camera(place);
         let pairs = vec![(signs("", CAMERA, &ball), plain.clone())];
-        rows.push(Row::alike(format!("a camera in {name}, as in air"), pairs, 1e-3));
+        rows.push(StressRow::alike(format!("a camera in {name}, as in air"), pairs, 1e-3));
         let white = (furnace(64, CAMERA, &ball), furnace(64, CAMERA, &around_the_camera("1.5")));
-        rows.push(Row::mean(format!("a camera in {name} under uniform light"), white, 1.0, 1e-3).timed());
+        rows.push(
+            StressRow::mean(format!("a camera in {name} under uniform light"), white, 1.0, 1e-3).timed(),
+        );
     }
     let inside = (furnace(64, CAMERA, &around_the_camera("1.5")), furnace(64, CAMERA, WHITE));
-    rows.push(Row::mean("a camera in glass of ior 1.5 under uniform light", inside, 1.0, 1e-3));
+    rows.push(StressRow::mean("a camera in glass of ior 1.5 under uniform light", inside, 1.0, 1e-3));
     let black = "[materials.k]\ndiffuse = 0\n";
     for (name, thing) in [
         ("sphere", "[[sphere]]\ncenter = [0, 0, 1]\nradius = 1"),
@@ -59,7 +67,7 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
             let camera = format!("[camera]\nposition = [0, 0, {z:?}]\nlook_at = [0, 0, -5]\n");
             signs("", &camera, &format!("{black}{thing}\nmaterial = \"k\"\n"))
         };
-        rows.push(Row::alike(
+        rows.push(StressRow::alike(
             format!("a camera on a {name}, as without"),
             vec![(picture(0.0), plain.clone())],
             0.0,
@@ -67,7 +75,7 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
         // The cost of an invisible object is not what is tested, so compare with a camera as far in front of it as
         // single precision allows.
         let beside = vec![(picture(0.0), picture(-2_f64.powi(-20)))];
-        rows.push(Row::alike(format!("a camera on a {name}, as in front of it"), beside, 1e-3).timed());
+        rows.push(StressRow::alike(format!("a camera on a {name}, as in front of it"), beside, 1e-3).timed());
     }
     rows.extend(images());
     rows
@@ -84,7 +92,7 @@ fn around_the_camera(ior: &str) -> String {
 }
 
 /// A wall at distance d has height 2 d tan(fov / 2) in the image: compare with a field of view of 40°.
-fn angle_of_view(fov: f64) -> Row {
+fn angle_of_view(fov: f64) -> StressRow {
     let distance = |fov: f64| 1.0 / (0.5 * fov.to_radians()).tan();
     let picture = |fov: f64| {
         let camera =
@@ -104,25 +112,25 @@ b = [-0.3, -0.8, 0]
 c = [-0.7, 0.9, 0]
 material = "blue"
 "#;
-        Picture::new(head(64, "") + &camera + wall)
+        SceneFiles::new(head(64, "") + &camera + wall)
     };
     let name = format!("a wall with a field of view of {fov}°, as with 40°");
-    Row::alike(name, vec![(picture(fov), picture(40.0))], 1e-3).timed()
+    StressRow::alike(name, vec![(picture(fov), picture(40.0))], 1e-3).timed()
 }
 
 /// A sphere of reflectance ρ around the camera and a point light of intensity I: every pixel has the radiance ρ I / (π
 /// R²), here 1.
-fn images() -> Vec<Row> {
+fn images() -> Vec<StressRow> {
     let around =
         "[materials.w]\ndiffuse = 0.5\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 5\nmaterial = \"w\"\n";
     let light = format!("[[light]]\nposition = [0, 0, 0]\nintensity = {:?}\n", 50.0 * std::f64::consts::PI);
     let sized = |width: u32, height: u32, samples: u32| {
         let render = format!("[render]\nwidth = {width}\nheight = {height}\nsamples = {samples}\n");
-        Picture::new(render + CAMERA + around + &light)
+        SceneFiles::new(render + CAMERA + around + &light)
     };
     let row = |(width, height, samples)| {
         let name = format!("an image of {width} × {height}, {samples} samples, as 256 × 256");
-        Row::mean(name, (sized(width, height, samples), sized(256, 256, 1)), 1.0, 1e-5).timed()
+        StressRow::mean(name, (sized(width, height, samples), sized(256, 256, 1)), 1.0, 1e-5).timed()
     };
     [(1, 1, 65_536), (65_536, 1, 1), (1, 65_536, 1)].map(row).into()
 }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use super::super::frame::Frame;
-use super::{Extent, Picture, Row};
+use super::{CaseSet, SceneFiles, StressRow};
 
 /// Bound on the difference of moved images.
 const MOVED: f64 = 1e-3;
@@ -12,11 +12,11 @@ const MOVED: f64 = 1e-3;
 /// Samples per pixel.
 const SAMPLES: u32 = 4;
 
-pub(super) fn rows(extent: Extent) -> Vec<Row> {
+pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
     let mut rows = Vec::new();
     let (steps, distances): (Vec<i32>, &[f64]) = match extent {
-        Extent::Short => (vec![-30, -7, 30], &[1e8]),
-        Extent::Long => ((-30..=30).filter(|k| *k != 0).collect(), &[1e2, 1e4, 1e6, 1e8]),
+        CaseSet::Short => (vec![-30, -7, 30], &[1e8]),
+        CaseSet::Long => ((-30..=30).filter(|k| *k != 0).collect(), &[1e2, 1e4, 1e6, 1e8]),
     };
     let settings = [
         ("whitted, bvh", "accel = \"bvh\""),
@@ -29,19 +29,19 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
     ];
     // Rounding at another position occasionally picks another light of the tree or another photon of a kernel, which
     // changes one sample of many. Scenes with lights therefore run only in the long variant, with more samples.
-    let settings = settings.iter().filter(|(_, setting)| extent == Extent::Long || *setting != "LAMPS");
+    let settings = settings.iter().filter(|(_, setting)| extent == CaseSet::Long || *setting != "LAMPS");
     for &(name, setting) in settings {
         let is_picking = setting == PHOTONS || setting == "LAMPS";
-        let moved_samples = if is_picking && extent == Extent::Long { 16 * SAMPLES } else { SAMPLES };
+        let moved_samples = if is_picking && extent == CaseSet::Long { 16 * SAMPLES } else { SAMPLES };
         let twins = |frames: Vec<Frame>, samples| {
             let scene = move |frame: Frame| everything(frame, setting, samples);
             frames.into_iter().map(move |frame| (scene(frame), scene(Frame::PLAIN)))
         };
         let scaled = twins(steps.iter().map(|&k| Frame::scaled(k)).collect(), SAMPLES);
-        rows.push(Row::alike(format!("everything × 2^−30 … 2^30, {name}"), scaled.collect(), 0.0));
+        rows.push(StressRow::alike(format!("everything × 2^−30 … 2^30, {name}"), scaled.collect(), 0.0));
         for &sizes in distances {
             let moved = twins(vec![Frame::moved(sizes)], moved_samples).collect();
-            rows.push(Row::alike(format!("everything moved by {sizes:e} sizes, {name}"), moved, MOVED));
+            rows.push(StressRow::alike(format!("everything moved by {sizes:e} sizes, {name}"), moved, MOVED));
         }
     }
     rows.extend(of_shapes(extent));
@@ -54,8 +54,8 @@ pub(super) fn rows(extent: Extent) -> Vec<Row> {
 const PHOTONS: &str = "PHOTONS";
 
 /// Every shape with every material and both acceleration structures, far away; in the long variant also scaled.
-fn of_shapes(extent: Extent) -> Vec<Row> {
-    let trees: &[&str] = if extent == Extent::Short { &["bvh"] } else { &["bvh", "kdtree"] };
+fn of_shapes(extent: CaseSet) -> Vec<StressRow> {
+    let trees: &[&str] = if extent == CaseSet::Short { &["bvh"] } else { &["bvh", "kdtree"] };
     let one = |shape: &str| {
         // A plane cannot be a light, and has one texture tile per unit of length at every scale.
         let materials = MATERIALS.iter().filter(|name| shape != "plane" || !["lamp", "tiles"].contains(name));
@@ -73,14 +73,14 @@ fn of_shapes(extent: Extent) -> Vec<Row> {
     };
     let mut rows = Vec::new();
     for shape in SHAPES {
-        rows.push(Row::alike(
+        rows.push(StressRow::alike(
             format!("a {shape} with every material, moved by 1e8 sizes"),
             pairs(shape, Frame::moved(1e8)),
             MOVED,
         ));
-        if extent == Extent::Long {
+        if extent == CaseSet::Long {
             let scaled = [-30, -11, 7, 30].into_iter().flat_map(|k| pairs(shape, Frame::scaled(k)));
-            rows.push(Row::alike(
+            rows.push(StressRow::alike(
                 format!("a {shape} with every material, × 2^−30 … 2^30"),
                 scaled.collect(),
                 0.0,
@@ -91,8 +91,8 @@ fn of_shapes(extent: Extent) -> Vec<Row> {
 }
 
 /// Every light on its own.
-fn of_lights(extent: Extent) -> Vec<Row> {
-    let integrators: &[&str] = if extent == Extent::Short { &["whitted"] } else { &["whitted", "path"] };
+fn of_lights(extent: CaseSet) -> Vec<StressRow> {
+    let integrators: &[&str] = if extent == CaseSet::Short { &["whitted"] } else { &["whitted", "path"] };
     let picture = |frame, light: &str, integrator: &str| {
         let scene = around(frame, &shape_of("sphere", frame, "gloss")) + &lights_of(frame, &[light]);
         with_files(&(super::head(4, &format!("integrator = \"{integrator}\"")) + &camera(frame, "") + &scene))
@@ -105,15 +105,15 @@ fn of_lights(extent: Extent) -> Vec<Row> {
         let moved = pairs(&[Frame::moved(1e8)]);
         let scaled = pairs(&[Frame::scaled(-30), Frame::scaled(30)]);
         [
-            Row::alike(format!("light: {light}, moved by 1e8 sizes"), moved, MOVED),
-            Row::alike(format!("light: {light}, × 2^−30 and 2^30"), scaled, 0.0),
+            StressRow::alike(format!("light: {light}, moved by 1e8 sizes"), moved, MOVED),
+            StressRow::alike(format!("light: {light}, × 2^−30 and 2^30"), scaled, 0.0),
         ]
     });
     rows.collect()
 }
 
 /// A mesh whose file has its vertices 1e8 scene sizes from the origin.
-fn georeferenced(ending: &'static str) -> Row {
+fn georeferenced(ending: &'static str) -> StressRow {
     let name = match ending {
         "obj" => "far.obj",
         "off" => "far.off",
@@ -126,7 +126,7 @@ fn georeferenced(ending: &'static str) -> Row {
         with_files(&scene).with(name, ball(ending, frame, [0.0, 0.0, -5.0], 0.75))
     };
     let pairs = vec![(picture(Frame::moved(1e8)), picture(Frame::PLAIN))];
-    Row::alike(format!("vertices of a .{ending} 1e8 sizes away"), pairs, MOVED)
+    StressRow::alike(format!("vertices of a .{ending} 1e8 sizes away"), pairs, MOVED)
 }
 
 const SHAPES: [&str; 10] =
@@ -238,7 +238,7 @@ fn lights_of(frame: Frame, lights: &[&str]) -> String {
 }
 
 /// All shapes next to each other, some of them emissive, and lights.
-fn everything(frame: Frame, setting: &str, samples: u32) -> Picture {
+fn everything(frame: Frame, setting: &str, samples: u32) -> SceneFiles {
     let (render, more) = match setting {
         "LENS" => ("", format!("aperture = {}\nfocus = {}", frame.length(0.0625), frame.length(5.0))),
         PHOTONS | "LAMPS" => ("", String::new()),
@@ -268,10 +268,10 @@ fn everything(frame: Frame, setting: &str, samples: u32) -> Picture {
 }
 
 /// A scene with the files that it refers to.
-fn with_files(scene: &str) -> Picture {
+fn with_files(scene: &str) -> SceneFiles {
     let tiles = "P3 4 3 255 90 120 200 20 30 40 255 250 200 70 70 80 60 80 90 0 0 0 9 9 9 200 90 60 30 20 10 8 9 7 6 5 4 1 2 3";
     let ball = ball("obj", Frame::PLAIN, [0.0; 3], 1.0);
-    Picture::new(scene.to_owned()).with("tiles.ppm", tiles.to_owned()).with("ball.obj", ball)
+    SceneFiles::new(scene.to_owned()).with("tiles.ppm", tiles.to_owned()).with("ball.obj", ball)
 }
 
 /// A faceted ball as the text of a mesh file.

@@ -3,15 +3,15 @@
 use std::fmt::Write as _;
 
 use super::frames::mesh;
-use super::{CAMERA, Extent, Picture, Row, head};
+use super::{CAMERA, CaseSet, SceneFiles, StressRow, head};
 
-pub(super) fn rows(extent: Extent) -> Vec<Row> {
+pub(super) fn rows(extent: CaseSet) -> Vec<StressRow> {
     let mut rows = vec![slivers(), coplanar("[[quad]]"), coplanar("mesh"), needles("bvh"), needles("kdtree")];
-    let counts: &[u32] = if extent == Extent::Short { &[1000] } else { &[1000, 1_000_000] };
+    let counts: &[u32] = if extent == CaseSet::Short { &[1000] } else { &[1000, 1_000_000] };
     for &count in counts {
         rows.push(overlapping(count, "bvh"));
         rows.push(nested(count.min(MOST_NESTED), "bvh"));
-        if extent == Extent::Long {
+        if extent == CaseSet::Long {
             rows.push(nested(count.min(MOST_NESTED), "kdtree"));
         }
     }
@@ -24,12 +24,12 @@ const MOST_NESTED: u32 = 1_000_000;
 
 const LAMP: &str = "[[light]]\nposition = [1, 2, 0]\nintensity = 9\n";
 
-fn of_mesh(text: String, render: &str) -> Picture {
+fn of_mesh(text: String, render: &str) -> SceneFiles {
     let scene = head(16, render)
         + CAMERA
         + "[materials]\nm = { diffuse = 0.6 }\n[[mesh]]\nfile = \"a.obj\"\nmaterial = \"m\"\nsmooth = false\n"
         + LAMP;
-    Picture::new(scene).with("a.obj", text)
+    SceneFiles::new(scene).with("a.obj", text)
 }
 
 fn point(x: f64, y: f64, z: f64) -> String {
@@ -38,7 +38,7 @@ fn point(x: f64, y: f64, z: f64) -> String {
 
 /// A wall of 2 × 1024 triangles: slivers of full height with an aspect ratio of 1 : 10⁴ · 2⁻¹⁰, compared with 32 × 32
 /// squares.
-fn slivers() -> Row {
+fn slivers() -> StressRow {
     let wall = |columns: usize, lines: usize| {
         let at = |column: usize, line: usize| {
             point(8.0 * column as f64 / columns as f64 - 4.0, 6.0 * line as f64 / lines as f64 - 3.0, -5.0)
@@ -52,11 +52,11 @@ fn slivers() -> Row {
         of_mesh(mesh("obj", &points, &faces.collect::<Vec<_>>()), "")
     };
     let pairs = vec![(wall(16_384, 1), wall(128, 128))];
-    Row::alike("a wall of 32,768 slivers, each 1 : 12,000", pairs, 1e-3).timed()
+    StressRow::alike("a wall of 32,768 slivers, each 1 : 12,000", pairs, 1e-3).timed()
 }
 
 /// Sixteen coplanar surfaces of one material, compared with a single one.
-fn coplanar(kind: &str) -> Row {
+fn coplanar(kind: &str) -> StressRow {
     let layers = |count: usize| match kind {
         "mesh" => {
             let points = [(-4.0, -3.0), (4.0, -3.0), (4.0, 3.0), (-4.0, 3.0)].map(|(x, y)| point(x, y, -5.0));
@@ -64,19 +64,19 @@ fn coplanar(kind: &str) -> Row {
         }
         _ => {
             let layer = "[[quad]]\ncorner = [-4, -3, -5]\nu = [8, 0, 0]\nv = [0, 6, 0]\nmaterial = \"m\"\n";
-            Picture::new(
+            SceneFiles::new(
                 head(16, "") + CAMERA + "[materials]\nm = { diffuse = 0.6 }\n" + LAMP + &layer.repeat(count),
             )
         }
     };
     let what = if kind == "mesh" { "of a mesh" } else { "of quads" };
-    Row::alike(format!("16 layers {what} in one plane, as one"), vec![(layers(16), layers(1))], 0.0)
+    StressRow::alike(format!("16 layers {what} in one plane, as one"), vec![(layers(16), layers(1))], 0.0)
 }
 
 /// Needles across the scene, as long as the scene and a thousandth as thick, in one acceleration structure compared
 /// with the other.
-fn needles(accel: &str) -> Row {
-    let mut random = Random(5);
+fn needles(accel: &str) -> StressRow {
+    let mut random = RandomNumbers(5);
     let (mut points, mut faces) = (Vec::new(), Vec::new());
     for number in 0..20_000 {
         let mut inside = || [random.signed() * 3.0, random.signed() * 2.0, random.signed() * 2.0 - 6.0];
@@ -87,13 +87,17 @@ fn needles(accel: &str) -> Row {
     let text = mesh("obj", &points, &faces);
     let by = |accel: &str| of_mesh(text.clone(), &format!("accel = \"{accel}\""));
     let other = if accel == "bvh" { "kdtree" } else { "bvh" };
-    Row::alike(format!("20,000 needles 1 : 1000, {accel} as {other}"), vec![(by(accel), by(other))], 0.0)
+    StressRow::alike(
+        format!("20,000 needles 1 : 1000, {accel} as {other}"),
+        vec![(by(accel), by(other))],
+        0.0,
+    )
 }
 
 /// Spheres at pseudo-random positions, compared with spheres so small that hardly any overlap.
-fn overlapping(count: u32, accel: &str) -> Row {
+fn overlapping(count: u32, accel: &str) -> StressRow {
     let spheres = |radius: f64, accel: &str| {
-        let mut random = Random(9);
+        let mut random = RandomNumbers(9);
         let mut scene =
             head(1, &format!("accel = \"{accel}\"")) + CAMERA + "[materials]\nm = { diffuse = 0.6 }\n" + LAMP;
         for _ in 0..count {
@@ -103,14 +107,14 @@ fn overlapping(count: u32, accel: &str) -> Row {
                 "[[sphere]]\ncenter = [{x:.6}, {y:.6}, {z:.6}]\nradius = {radius:?}\nmaterial = \"m\"\n"
             );
         }
-        Picture::new(scene)
+        SceneFiles::new(scene)
     };
     // Twice the mean distance: every point is inside about 30 spheres.
     let spacing = (8.0 * 6.0 * 6.0 / f64::from(count)).cbrt();
     let (wide, narrow) = (2.0 * spacing, 0.25 * spacing);
-    Row {
-        figure: super::super::row::Figure::Difference(0.0),
-        ..Row::alike(
+    StressRow {
+        figure: super::super::row::RowMeasure::Difference(0.0),
+        ..StressRow::alike(
             format!("{count} overlapping spheres, as separate ones"),
             vec![(spheres(wide, accel), spheres(narrow, accel))],
             1.0,
@@ -120,7 +124,7 @@ fn overlapping(count: u32, accel: &str) -> Row {
 }
 
 /// Concentric spheres, compared with only the outermost.
-fn nested(count: u32, accel: &str) -> Row {
+fn nested(count: u32, accel: &str) -> StressRow {
     let spheres = |count: u32| {
         let (width, height) = if count > 10_000 { (4, 3) } else { (64, 48) };
         let render = head(1, &format!("accel = \"{accel}\""));
@@ -141,14 +145,14 @@ fn nested(count: u32, accel: &str) -> Row {
         scene[..end].to_owned()
     };
     let all = spheres(count);
-    let pairs = vec![(Picture::new(all.clone()), Picture::new(outermost(all)))];
-    Row::alike(format!("{count} nested spheres, {accel}, as the outermost"), pairs, 0.0)
+    let pairs = vec![(SceneFiles::new(all.clone()), SceneFiles::new(outermost(all)))];
+    StressRow::alike(format!("{count} nested spheres, {accel}, as the outermost"), pairs, 0.0)
 }
 
 /// A small random number generator.
-struct Random(u64);
+struct RandomNumbers(u64);
 
-impl Random {
+impl RandomNumbers {
     /// A number in [−1, 1).
     fn signed(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

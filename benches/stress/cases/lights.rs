@@ -2,17 +2,17 @@
 
 use std::f64::consts::PI;
 
-use super::super::row::Figure;
-use super::{CAMERA, Extent, Picture, Row, head};
+use super::super::row::RowMeasure;
+use super::{CAMERA, CaseSet, SceneFiles, StressRow, head};
 
-pub(super) fn rows(_: Extent) -> Vec<Row> {
+pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
     let mut rows = vec![tiny("sphere"), tiny("quad"), tiny("disk"), vast()];
     for (name, light) in POWERS {
         for times in [1e-9, 1e9] {
             rows.push(
-                Row {
-                    figure: Figure::Difference(1.0 / times),
-                    ..Row::alike(
+                StressRow {
+                    figure: RowMeasure::Difference(1.0 / times),
+                    ..StressRow::alike(
                         format!("{name} with {times:e} times the power"),
                         vec![(powered(light, times), powered(light, 1.0))],
                         1e-6,
@@ -55,13 +55,13 @@ radius = 0.6
 material = "floor"
 "#;
 
-fn powered(light: &str, power: f64) -> Picture {
-    Picture::new(head(64, "") + CAMERA + THINGS + &light.replace("POWER", &format!("{power:?}")))
+fn powered(light: &str, power: f64) -> SceneFiles {
+    SceneFiles::new(head(64, "") + CAMERA + THINGS + &light.replace("POWER", &format!("{power:?}")))
 }
 
 /// A light of size 1e-9 above the scene, compared with a point light of its intensity, radiance × projected area. The
 /// lit area is directly below, so that the cosine of a flat light is nearly one.
-fn tiny(kind: &str) -> Row {
+fn tiny(kind: &str) -> StressRow {
     let size = 1e-9;
     // The radiance must stay finite.
     let (radiance, area) = (1e16, if kind == "quad" { size * size } else { PI * size * size });
@@ -76,15 +76,16 @@ fn tiny(kind: &str) -> Row {
     };
     let receiver = "[materials.floor]\ndiffuse = 0.6\n[[quad]]\ncorner = [-0.04, 0, -4.96]\nu = [0.08, 0, 0]\nv = [0, 0, -0.08]\nmaterial = \"floor\"\n";
     let camera = "[camera]\nposition = [0, 1, -4.9]\nlook_at = [0, 0, -5]\nfov = 3\n";
-    let picture = |light: String| Picture::new(head(64, "") + camera + receiver + &light);
+    let picture = |light: String| SceneFiles::new(head(64, "") + camera + receiver + &light);
     let case = picture(format!("[materials.lamp]\ndiffuse = 0\nemission = {radiance:?}\n{lamp}"));
     let twin = picture(format!("[[light]]\nposition = [0, 2, -5]\nintensity = {:?}\n", radiance * area));
-    Row::alike(format!("a {kind} light of size 1e-9, as a point light"), vec![(case, twin)], 1e-3).timed()
+    StressRow::alike(format!("a {kind} light of size 1e-9, as a point light"), vec![(case, twin)], 1e-3)
+        .timed()
 }
 
 /// Under a quad of size 2e9, light arrives from the whole hemisphere: E = πL, and a floor of reflectance 0.6 has
 /// radiance 0.6 L.
-fn vast() -> Row {
+fn vast() -> StressRow {
     let picture = |size: f64| {
         let lamp = format!(
             "[materials.lamp]\ndiffuse = 0\nemission = 1\n[[quad]]\ncorner = [{:?}, 2, {:?}]\nu = [{size:?}, 0, 0]\nv = [0, 0, {size:?}]\nmaterial = \"lamp\"\n",
@@ -93,7 +94,7 @@ fn vast() -> Row {
         );
         let floor = "[materials.floor]\ndiffuse = 0.6\n[[quad]]\ncorner = [-9, -1, 9]\nu = [18, 0, 0]\nv = [0, 0, -18]\nmaterial = \"floor\"\n";
         let camera = "[camera]\nposition = [0, 0, 0]\nlook_at = [0, -1, -1]\n";
-        Picture::new(head(64, "") + camera + floor + &lamp)
+        SceneFiles::new(head(64, "") + camera + floor + &lamp)
     };
-    Row::mean("a floor under a quad light of size 2e9", (picture(2e9), picture(2e3)), 0.6, 1e-2).timed()
+    StressRow::mean("a floor under a quad light of size 2e9", (picture(2e9), picture(2e3)), 0.6, 1e-2).timed()
 }

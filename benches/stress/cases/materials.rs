@@ -1,8 +1,8 @@
 //! Glass with weak or strong refraction, wide and narrow highlights.
 
-use super::{CAMERA, Extent, Picture, Row, furnace, head, signs};
+use super::{CAMERA, CaseSet, SceneFiles, StressRow, furnace, head, signs};
 
-pub(super) fn rows(_: Extent) -> Vec<Row> {
+pub(super) fn rows(_: CaseSet) -> Vec<StressRow> {
     let ball = |ior: &str| {
         format!(
             "[materials.g]\ntype = \"glass\"\nior = {ior}\n[[sphere]]\ncenter = [0, 0, -4]\nradius = 1\nmaterial = \"g\"\n"
@@ -11,11 +11,11 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
     let clear = |ior: &str| (signs("", CAMERA, &ball(ior)), signs("", CAMERA, ""));
     let white = |ior: &str| (furnace(64, CAMERA, &ball(ior)), furnace(64, CAMERA, &ball("1.5")));
     vec![
-        Row::alike("a ball of ior 1, as without it", vec![clear("1")], 1e-3),
-        Row::alike("a ball of ior 1.000001, as without it", vec![clear("1.000001")], 1e-3),
-        Row::mean("a ball of ior 3 under uniform light", white("3"), 1.0, 1e-3).timed(),
-        Row::mean("a ball of ior 1 under uniform light", white("1"), 1.0, 1e-3).timed(),
-        Row::mean("a ball of ior 1.000001 under uniform light", white("1.000001"), 1.0, 1e-3).timed(),
+        StressRow::alike("a ball of ior 1, as without it", vec![clear("1")], 1e-3),
+        StressRow::alike("a ball of ior 1.000001, as without it", vec![clear("1.000001")], 1e-3),
+        StressRow::mean("a ball of ior 3 under uniform light", white("3"), 1.0, 1e-3).timed(),
+        StressRow::mean("a ball of ior 1 under uniform light", white("1"), 1.0, 1e-3).timed(),
+        StressRow::mean("a ball of ior 1.000001 under uniform light", white("1.000001"), 1.0, 1e-3).timed(),
         wide_highlight(),
         narrow_highlight("whitted"),
         narrow_highlight("path"),
@@ -24,31 +24,31 @@ pub(super) fn rows(_: Extent) -> Vec<Row> {
 
 /// The exponent 0 gives 2/2π everywhere on the side of the reflected ray; compared with a diffuse surface, under a
 /// light at the camera.
-fn wide_highlight() -> Row {
+fn wide_highlight() -> StressRow {
     let picture = |material: &str| {
         let floor = format!(
             "[materials.m]\n{material}\n[[quad]]\ncorner = [-3, -3, -5]\nu = [6, 0, 0]\nv = [0, 6, 0]\nmaterial = \"m\"\n"
         );
-        Picture::new(head(64, "") + CAMERA + &floor + "[[light]]\nposition = [0, 0, 0]\nintensity = 9\n")
+        SceneFiles::new(head(64, "") + CAMERA + &floor + "[[light]]\nposition = [0, 0, 0]\nintensity = 9\n")
     };
     let pair = (picture("diffuse = 0\nspecular = 0.6\nshininess = 0"), picture("diffuse = 0.6"));
-    Row::alike("a highlight with exponent 0, as diffuse", vec![pair], 1e-5).timed()
+    StressRow::alike("a highlight with exponent 0, as diffuse", vec![pair], 1e-5).timed()
 }
 
 /// The exponent 1e5 reflects light within 0.3°; compared with a mirror, under uniform light. The factor is the cosine,
 /// here nearly 1.
-fn narrow_highlight(integrator: &str) -> Row {
+fn narrow_highlight(integrator: &str) -> StressRow {
     let picture = |material: &str| {
         let wall = format!(
             "[materials.m]\n{material}\n[[quad]]\ncorner = [-3, -3, -5]\nu = [6, 0, 0]\nv = [0, 6, 0]\nmaterial = \"m\"\n"
         );
         let render = head(64, &format!("integrator = \"{integrator}\""));
-        Picture::new(render + CAMERA + "fov = 2\n[environment]\ncolor = 1\n" + &wall)
+        SceneFiles::new(render + CAMERA + "fov = 2\n[environment]\ncolor = 1\n" + &wall)
     };
     let pair = (
         picture("diffuse = 0\nspecular = 0.9\nshininess = 1e5"),
         picture("type = \"mirror\"\nreflectance = 0.9"),
     );
-    Row::mean(format!("a highlight with exponent 1e5 with {integrator}, as a mirror"), pair, 0.9, 1e-3)
+    StressRow::mean(format!("a highlight with exponent 1e5 with {integrator}, as a mirror"), pair, 0.9, 1e-3)
         .timed()
 }

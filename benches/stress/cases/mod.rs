@@ -6,10 +6,10 @@ mod geometry;
 mod lights;
 mod materials;
 
-use super::row::{Extent, Picture, Row};
+use super::row::{CaseSet, SceneFiles, StressRow};
 
 /// All rows of the table.
-pub(crate) fn rows(extent: Extent) -> Vec<Row> {
+pub(crate) fn rows(extent: CaseSet) -> Vec<StressRow> {
     let groups = [frames::rows, geometry::rows, lights::rows, materials::rows, cameras::rows];
     groups.into_iter().flat_map(|group| group(extent)).collect()
 }
@@ -45,13 +45,13 @@ material = "blue"
 "#;
 
 /// The emissive objects, path-traced, with keys of `[render]` and other elements.
-fn signs(more: &str, camera: &str, rest: &str) -> Picture {
+fn signs(more: &str, camera: &str, rest: &str) -> SceneFiles {
     let render = head(16, &format!("integrator = \"path\"\nbackground = [0.3, 0.4, 0.5]\n{more}"));
-    Picture::new(format!("{render}{camera}{SIGNS}{rest}"))
+    SceneFiles::new(format!("{render}{camera}{SIGNS}{rest}"))
 }
 
 /// A white furnace, path-traced: every pixel has the radiance 1 unless light is lost.
-fn furnace(samples: u32, camera: &str, rest: &str) -> Picture {
+fn furnace(samples: u32, camera: &str, rest: &str) -> SceneFiles {
     let render = head(samples, "integrator = \"path\"\nmax_depth = 64");
-    Picture::new(format!("{render}{camera}[environment]\ncolor = [1, 1, 1]\n{rest}"))
+    SceneFiles::new(format!("{render}{camera}[environment]\ncolor = [1, 1, 1]\n{rest}"))
 }

@@ -24,7 +24,7 @@ const USAGE: &str =
     "usage: glimt-assets [million | figure]   (run in the repository root; writes to assets/)";
 
 /// Path below `assets/` and content of a file.
-type Asset = (&'static str, Vec<u8>);
+type AssetFile = (&'static str, Vec<u8>);
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -54,7 +54,7 @@ fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// All files stored in the repository.
-fn stored() -> Vec<Asset> {
+fn stored() -> Vec<AssetFile> {
     let single = vec![
         ("coral.ply", shapes::coral().to_ply()),
         ("rope.ply", shapes::rope().to_ply()),

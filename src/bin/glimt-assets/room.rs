@@ -7,13 +7,13 @@ use super::vector::{Vector, add, cross, scale, turn, unit};
 /// Half the width, the height, and half the depth of the room.
 const ROOM: Vector = [1.3, 2.0, 1.2];
 
-struct Writer {
+struct ObjWriter {
     text: String,
     vertices: u32,
     quads: u32,
 }
 
-impl Writer {
+impl ObjWriter {
     /// Adds a quad that faces u × v; `repeat` is the number of texture repeats along both edges.
     fn quad(&mut self, corner: Vector, u: Vector, v: Vector, repeat: [f64; 2]) {
         let points = [corner, add(corner, u), add(add(corner, u), v), add(corner, v)];
@@ -60,7 +60,7 @@ pub(crate) fn obj() -> Vec<u8> {
     let [x, height, z] = ROOM;
     let (width, depth) = (2.0 * x, 2.0 * z);
     let text = "# A room that is open to the front. Made by glimt-assets.\nmtllib room.mtl\n".to_owned();
-    let mut room = Writer { text, vertices: 0, quads: 0 };
+    let mut room = ObjWriter { text, vertices: 0, quads: 0 };
     room.material("floor", "planks");
     room.quad([-x, 0.0, z], [width, 0.0, 0.0], [0.0, 0.0, -depth], [2.0, 2.0]);
     room.material("ceiling", "plaster");

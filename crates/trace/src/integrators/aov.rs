@@ -1,7 +1,7 @@
 //! AOVs of the first hit. All except depth are display values in [0, 1], not radiance.
 
 use super::photons::{GatherPoint, PhotonMaps};
-use super::transport::scratch::Scratch;
+use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::transport::vertex::Vertex;
 use super::{FirstHit, RayCounters};
@@ -14,7 +14,7 @@ use crate::math::{DVec2, Vec3};
 pub fn shade(
     (tile, maps): (&TileContext<'_>, Option<&PhotonMaps>),
     quantity: FirstHit,
-    scratch: &mut Scratch,
+    scratch: &mut TraceBuffers,
     radiance: &mut [Vec3],
     counters: &mut RayCounters,
 ) -> Result<(), Cancelled> {

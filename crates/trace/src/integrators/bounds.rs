@@ -1,6 +1,6 @@
 //! Overlay of the acceleration structures' bounding boxes, drawn as lines.
 
-use super::transport::scratch::Scratch;
+use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use crate::control::Cancelled;
 use crate::geometry::{Aabb, Ray};
@@ -35,7 +35,11 @@ struct BoxEdge {
 }
 
 /// Draws a line wherever a camera ray in the queue passes close to the edge of a box.
-pub fn draw(tile: &TileContext<'_>, scratch: &mut Scratch, radiance: &mut [Vec3]) -> Result<(), Cancelled> {
+pub fn draw(
+    tile: &TileContext<'_>,
+    scratch: &mut TraceBuffers,
+    radiance: &mut [Vec3],
+) -> Result<(), Cancelled> {
     let render = &tile.settings.render;
     let spread = tile.world.camera.pixel_spread(render.height);
     let brightness = exp2(-render.exposure);

@@ -18,11 +18,11 @@ use super::transport::batch::VertexBatch;
 use super::transport::camera::CAMERA_ROWS;
 use super::transport::crossing::CrossingMemory;
 use super::transport::interface::{FresnelSplit, fresnel_split, reflected, through_sheet};
-use super::transport::medium::Medium;
+use super::transport::interiors::InteriorList;
 use super::transport::packet::{PacketHits, PacketSource};
 use super::transport::ray::PathRay;
 use super::transport::scatter::Continuation;
-use super::transport::scratch::Scratch;
+use super::transport::scratch::TraceBuffers;
 use super::transport::tile::TileContext;
 use super::transport::vertex::{ShadingVertex, Vertex};
 use super::transport::walk::{Interaction, Interface, NullInteraction, OpaqueHit, PathStepper, walk};
@@ -55,7 +55,7 @@ pub fn trace(
     mut negative: impl FnMut(u32, u32),
 ) -> Result<(), Cancelled> {
     let ThreadMemory { scratch, direct } = memory;
-    let Scratch { rays, next, surfaces, crossing, camera, hits, object_order } = scratch;
+    let TraceBuffers { rays, next, surfaces, crossing, camera, hits, object_order } = scratch;
     next.clear();
     let mut wavefront = Wavefront {
         depth: 0,
@@ -421,7 +421,7 @@ impl Wavefront<'_, '_> {
     }
 
     /// Shades a non-specular surface; `far` is the medium behind it.
-    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, far: &Medium) {
+    fn shade_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: &Rough, far: &InteriorList) {
         let (at, lookups) = (&vertex.texture_point, &mut self.counters.texture_lookups);
         let ambient = self.tile.settings.render.ambient;
         let accepts_ambient = ambient != Vec3::ZERO && self.accumulator.accepts_ambient(path);
@@ -449,62 +449,69 @@ impl Wavefront<'_, '_> {
 
     /// Queues the vertices of a non-specular surface for direct lighting; `far` is the medium behind it.
     #[inline(always)]
-    fn queue_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: &Medium) {
+    fn queue_rough(&mut self, path: &PathRay, vertex: &Vertex<'_>, bsdf: &RoughBsdf, far: &InteriorList) {
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
         let aov = self.measure_of(path);
-        let lit = ShadingVertex { path, medium: &path.medium, place, vertex, shading, bsdf };
+        let lit = ShadingVertex { path, interiors: &path.interiors, place, vertex, shading, bsdf };
         self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         // Transmitted light has its own vertex, except for the lit fraction, which is measured on the viewer's side.
         if let Some((bsdf, shading)) = behind.filter(|_| aov != LightAov::LitFraction) {
-            let throughput = path.throughput * through_sheet(tile.world, &path.medium, far);
+            let throughput = path.throughput * through_sheet(tile.world, &path.interiors, far);
             let (path, vertex) = (&PathRay { throughput, ..*path }, &vertex.behind());
-            let lit = ShadingVertex { path, medium: far, place, vertex, shading, bsdf: &bsdf };
+            let lit = ShadingVertex { path, interiors: far, place, vertex, shading, bsdf: &bsdf };
             self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         }
     }
 
     /// Queues the vertices of rough glass: one for each side, or a single one if light samples find nothing from one of
     /// the sides.
-    fn shade_rough_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, rough: GlassPoint, far: &Medium) {
+    fn shade_rough_glass(
+        &mut self,
+        path: &PathRay,
+        vertex: &Vertex<'_>,
+        rough: GlassPoint,
+        far: &InteriorList,
+    ) {
         if !self.accumulator.accepts_reflected() {
             return;
         }
         let (tile, place) = (self.tile, self.place);
         let shading = vertex.shading(self.counters);
         let aov = self.measure_of(path);
-        let near = &path.medium;
+        let near = &path.interiors;
         let reflection = RoughBsdf::GlassReflection(rough);
         let transmission = RoughBsdf::GlassTransmission(rough);
         // The lit fraction is measured on the viewer's side. Blocked light counts too, so a dark side is sampled like
         // any other.
         if aov == LightAov::LitFraction {
-            let lit = ShadingVertex { path, medium: near, place, vertex, shading, bsdf: &reflection };
+            let lit = ShadingVertex { path, interiors: near, place, vertex, shading, bsdf: &reflection };
             return self.direct.push(tile, &lit, aov, ShadingSides::OneSide { is_dark: false });
         }
         // Without shadows, lights shine into any solid.
         let has_shadows = tile.settings.render.shadows != Shadows::Off;
-        let is_dark =
-            |medium: &Medium| medium.glass().is_some_and(|inside| tile.world.is_dark_body(inside.body));
-        let dark = [near, far].map(|medium| has_shadows && is_dark(medium));
+        let is_dark = |interiors: &InteriorList| {
+            interiors.glass().is_some_and(|inside| tile.world.is_dark_body(inside.body))
+        };
+        let dark = [near, far].map(|interiors| has_shadows && is_dark(interiors));
         // Photons land on both sides, so these need a vertex each.
         let is_one = dark != [false; 2] && !tile.behavior.gathers && vertex.far_origin().is_some();
         let is_behind = is_one && dark == [true, false];
-        let sides = |vertex: &Vertex<'_>, is_dark: bool, medium| match vertex.far_origin() {
-            Some(beyond) if is_one => ShadingSides::TwoSides { is_dark, beyond, medium },
+        let sides = |vertex: &Vertex<'_>, is_dark: bool, interiors| match vertex.far_origin() {
+            Some(beyond) if is_one => ShadingSides::TwoSides { is_dark, beyond, interiors },
             Some(_) | None => ShadingSides::OneSide { is_dark },
         };
         // Queue the viewer's side, unless the other side's vertex represents both.
         let behind = (!is_one || is_behind).then(|| (vertex.behind(), shading.behind()));
         if !is_behind {
-            let lit = ShadingVertex { path, medium: near, place, vertex, shading, bsdf: &reflection };
+            let lit = ShadingVertex { path, interiors: near, place, vertex, shading, bsdf: &reflection };
             self.direct.push(tile, &lit, aov, sides(vertex, dark[0], far));
         }
         // Queue the other side.
         if let Some((vertex, shading)) = behind {
             let lit =
-                ShadingVertex { path, medium: far, place, vertex: &vertex, shading, bsdf: &transmission };
+                ShadingVertex { path, interiors: far, place, vertex: &vertex, shading, bsdf: &transmission };
             self.direct.push(tile, &lit, aov, sides(&vertex, dark[1], near));
         }
     }
@@ -523,7 +530,7 @@ impl Wavefront<'_, '_> {
 
     /// Splits a path at a smooth coat, or chooses between coat and base with the coat's Fresnel reflectance as
     /// probability.
-    fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, far: &Medium) {
+    fn shade_coated(&mut self, path: &PathRay, vertex: &Vertex<'_>, coated: &Coated, far: &InteriorList) {
         let shading = vertex.shading(self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
         let weaker = fresnel.min(1.0 - fresnel) * path.throughput.abs().max_element();
@@ -547,7 +554,7 @@ impl Wavefront<'_, '_> {
         }
     }
 
-    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &Medium) {
+    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &InteriorList) {
         let shading = vertex.shading(self.counters);
         let FresnelSplit { reflectance, refracted } =
             fresnel_split(self.tile.world, path, vertex, &shading, far);

@@ -3,13 +3,13 @@
 use std::cell::RefCell;
 
 use super::direct::queue::DirectLightQueue;
-use super::transport::scratch::Scratch;
+use super::transport::scratch::TraceBuffers;
 
 /// Buffers that all batches of a thread share.
 #[derive(Default)]
 pub struct ThreadMemory {
     /// Queues of rays and hits.
-    pub scratch: Scratch,
+    pub scratch: TraceBuffers,
     /// Vertices of the current bounce that await direct lighting.
     pub direct: DirectLightQueue,
 }

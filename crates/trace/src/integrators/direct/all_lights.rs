@@ -4,7 +4,7 @@ use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
 use crate::geometry::rows::{Ends, RayRows, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
-use crate::integrators::transport::medium::{Media, absorption};
+use crate::integrators::transport::interiors::{InteriorLists, absorption};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::lights::{EmissionTexture, Light, LightRow, Middle, Source, SourceRow};
@@ -26,7 +26,7 @@ pub struct SampleAllLights<'a, const MIS: bool> {
     /// The competing technique; unused without MIS.
     pub competing: CompetingTechnique,
     /// Media of the vertices. `None` if all are in air.
-    pub media: Option<&'a Media>,
+    pub interior_lists: Option<&'a InteriorLists>,
     /// Whether to sample only infinite lights.
     pub only_infinite: bool,
 }
@@ -171,12 +171,17 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Multiplies values by the transmittance of the vertices' media up to the samples.
     #[cold]
     #[inline(never)]
-    fn attenuate_by_glass(&self, media: &Media, samples: &LightRow, mut values: Lanes3) -> Lanes3 {
+    fn attenuate_by_glass(
+        &self,
+        interior_lists: &InteriorLists,
+        samples: &LightRow,
+        mut values: Lanes3,
+    ) -> Lanes3 {
         for i in lanes(self.used) {
             let way = lane(&samples.targets, i) - lane(&self.row.from, i);
             let is_beyond = samples.beyond & 1 << i != 0;
             let distance = if is_beyond { f32::MAX } else { way.length() };
-            let left = absorption(self.tile.world, &media.get(self.row.medium[i]), distance);
+            let left = absorption(self.tile.world, &interior_lists.get(self.row.interiors[i]), distance);
             let value = lane(&values, i) * left;
             set_lane(&mut values, i, value);
         }
@@ -339,8 +344,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             let brings = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
             active[i] = if brings { TRUE } else { 0 };
         }
-        if let Some(media) = self.media.filter(|_| self.aov != LightAov::LitFraction) {
-            values = self.attenuate_by_glass(media, samples, values);
+        if let Some(interior_lists) = self.interior_lists.filter(|_| self.aov != LightAov::LitFraction) {
+            values = self.attenuate_by_glass(interior_lists, samples, values);
         }
         (values, folds.bits(&active) & self.used, response)
     }

@@ -4,7 +4,7 @@ use super::all_lights::{ReflectedLight, add_traversal_cost};
 use super::unshadowed::UnshadowedLobeRay;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
-use crate::integrators::transport::medium::{Media, absorption};
+use crate::integrators::transport::interiors::{InteriorLists, absorption};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::materials::bsdf::LobeSet;
@@ -22,7 +22,7 @@ pub struct LobeRays<'a> {
     pub sharp: u32,
     pub aov: LightAov,
     /// Media of the vertices. `None` if all are in air.
-    pub media: Option<&'a Media>,
+    pub interior_lists: Option<&'a InteriorLists>,
     /// The reflected light to add to.
     pub arrived: ReflectedLight,
 }
@@ -32,11 +32,13 @@ impl Loops for LobeRays<'_> {
 
     #[inline(always)]
     fn run(self, folds: impl Folds) -> ReflectedLight {
-        let Self { tile, row, sharp, aov, media, mut arrived } = self;
+        let Self { tile, row, sharp, aov, interior_lists, mut arrived } = self;
         let count = tile.settings.render.shadow_samples;
         let sampler = row.sampler(tile);
         let transmittance = |i: usize, distance: f32| {
-            media.map_or(Vec3::ONE, |media| absorption(tile.world, &media.get(row.medium[i]), distance))
+            interior_lists.map_or(Vec3::ONE, |interior_lists| {
+                absorption(tile.world, &interior_lists.get(row.interiors[i]), distance)
+            })
         };
         for repetition in 0..count {
             // Sample a direction in each lobe.

@@ -12,8 +12,8 @@ use crate::geometry::Ray;
 use crate::geometry::rows::{RayRows, lanes, traced};
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
-use crate::integrators::transport::cone::Cone;
-use crate::integrators::transport::medium::{Media, Medium};
+use crate::integrators::transport::cone::RayCone;
+use crate::integrators::transport::interiors::{InteriorList, InteriorLists};
 use crate::integrators::transport::ray::PathRay;
 use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
 use crate::integrators::transport::tile::TileContext;
@@ -39,11 +39,11 @@ pub struct DirectLightQueue {
     /// Direct light at the vertices of each path of this bounce.
     arrived: Vec<Vec3>,
     /// Media of the vertices.
-    media: Media,
+    interior_lists: InteriorLists,
     /// Shadow rays of several packets.
     pool: ShadowRayQueue,
     /// Ray cones at the vertices of this bounce's paths, if they are used.
-    cones: Vec<Cone>,
+    cones: Vec<RayCone>,
 }
 
 /// The sides that a vertex represents. No light sample is visible from a dark side.
@@ -61,7 +61,7 @@ pub enum ShadingSides<'m> {
         /// Ray origin on the other side.
         beyond: Vec3,
         /// The medium on the other side.
-        medium: &'m Medium,
+        interiors: &'m InteriorList,
     },
 }
 
@@ -84,14 +84,14 @@ impl DirectLightQueue {
     pub fn begin_bounce(&mut self, paths: usize, has_cones: bool) {
         self.clear();
         self.cones.clear();
-        self.cones.resize(if has_cones { paths } else { 0 }, Cone::default());
+        self.cones.resize(if has_cones { paths } else { 0 }, RayCone::default());
         self.arrived.clear();
         self.arrived.resize(paths, Vec3::ZERO);
-        self.media.clear();
+        self.interior_lists.clear();
     }
 
     /// Stores the ray cone at a path's vertex.
-    pub fn store_cone(&mut self, place: u32, cone: Cone) {
+    pub fn store_cone(&mut self, place: u32, cone: RayCone) {
         if let Some(own) = self.cones.get_mut(place as usize) {
             *own = cone;
         }
@@ -154,17 +154,17 @@ impl DirectLightQueue {
         sides: ShadingSides<'_>,
     ) {
         self.store_cone(lit.place, lit.vertex.cone);
-        let medium = self.media.number(lit.medium);
+        let interiors = self.interior_lists.number(lit.interiors);
         let (row, lane) = match sides {
             ShadingSides::OneSide { is_dark } => self.open_row(lit.bsdf.kind(), (is_dark, false)),
-            ShadingSides::TwoSides { is_dark, beyond, medium } => {
-                let medium = self.media.number(medium);
+            ShadingSides::TwoSides { is_dark, beyond, interiors } => {
+                let interiors = self.interior_lists.number(interiors);
                 let (row, lane) = self.open_row(lit.bsdf.kind(), (is_dark, true));
-                row.put_beyond(lane, beyond, medium);
+                row.put_beyond(lane, beyond, interiors);
                 (row, lane)
             }
         };
-        row.put(lane, tile, lit, aov, medium);
+        row.put(lane, tile, lit, aov, interiors);
     }
 
     /// A packet for this kind of BSDF with a free lane, dark or not and two-sided or not.
@@ -254,7 +254,7 @@ impl DirectLightQueue {
             for row in &self.rows[first..end] {
                 if let Some(continuation) = of_row(row) {
                     SampleBsdf { tile, row, used: row.used, continuation }.scatter(
-                        &self.media,
+                        &self.interior_lists,
                         &self.cones,
                         next,
                     );
@@ -287,8 +287,8 @@ impl DirectLightQueue {
     }
 
     /// The media of a packet's vertices. `None` if all are in air.
-    fn media_of(&self, row: &VertexBatch) -> Option<&Media> {
-        (!self.media.are_air() && row.is_in_glass()).then_some(&self.media)
+    fn interiors_of(&self, row: &VertexBatch) -> Option<&InteriorLists> {
+        (!self.interior_lists.are_air() && row.is_in_glass()).then_some(&self.interior_lists)
     }
 
     /// Samples lights at a packet; shadow rays to picked lights are pooled under index `number`.
@@ -304,11 +304,20 @@ impl DirectLightQueue {
         }
         let mut pool = std::mem::take(&mut self.pool);
         let row = &self.rows[request.number];
-        let (competing, media) = (self.competing_technique(request, tile, aov), self.media_of(row));
+        let (competing, interior_lists) =
+            (self.competing_technique(request, tile, aov), self.interiors_of(row));
         let (instructions, used) = (tile.world.geometry.instructions(), request.used);
-        let plain = SampleAllLights::<false> { tile, row, used, aov, competing, media, only_infinite: false };
+        let plain = SampleAllLights::<false> {
+            tile,
+            row,
+            used,
+            aov,
+            competing,
+            interior_lists,
+            only_infinite: false,
+        };
         let weighed =
-            SampleAllLights::<true> { tile, row, used, aov, competing, media, only_infinite: false };
+            SampleAllLights::<true> { tile, row, used, aov, competing, interior_lists, only_infinite: false };
         use CompetingTechnique::{Lobes, NarrowPaths, Nothing, Paths};
         let sums = match (competing, tile.world.lights.selection(tile.behavior.receivers)) {
             (Nothing, None) => instructions.run(plain),
@@ -336,8 +345,8 @@ impl DirectLightQueue {
         let arrived = sums.into_reflected(aov);
         match self.competing_technique(request, tile, aov) {
             CompetingTechnique::Lobes(sharp) => {
-                let media = self.media_of(row);
-                let lobes = LobeRays { tile, row, sharp, aov, media, arrived };
+                let interior_lists = self.interiors_of(row);
+                let lobes = LobeRays { tile, row, sharp, aov, interior_lists, arrived };
                 tile.world.geometry.instructions().run(lobes)
             }
             CompetingTechnique::Nothing | CompetingTechnique::Paths | CompetingTechnique::NarrowPaths => {

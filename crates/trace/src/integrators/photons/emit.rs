@@ -13,10 +13,10 @@ use crate::geometry::rows::lanes;
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::transport::batch::{ALL, UNPERTURBED, VertexBatch};
-use crate::integrators::transport::cone::Cone;
+use crate::integrators::transport::cone::RayCone;
 use crate::integrators::transport::crossing::CrossingMemory;
 use crate::integrators::transport::interface::{FresnelSplit, fresnel_split, reflected, through_sheet};
-use crate::integrators::transport::medium::{Inside, Media, Medium, ior};
+use crate::integrators::transport::interiors::{Interior, InteriorList, InteriorLists, ior};
 use crate::integrators::transport::packet::PacketSource;
 use crate::integrators::transport::ray::{PathRay, PathState};
 use crate::integrators::transport::scatter::{Continuation, SampleBsdf};
@@ -45,7 +45,7 @@ pub struct PhotonTracing<'a> {
     /// Emission of the lights.
     pub emission: &'a PhotonSource,
     /// The closed glass shapes that may contain lights, with their materials.
-    pub glasses: &'a [Inside],
+    pub glasses: &'a [Interior],
     /// Other glass solids that may contain lights.
     pub bodies: &'a [BodyInParts],
     /// Reciprocal of the number of photons.
@@ -79,7 +79,7 @@ impl PhotonTracing<'_> {
             next: Vec::new(),
             open: VertexBatch::EMPTY,
             open_behind: VertexBatch::EMPTY,
-            media: Media::default(),
+            interior_lists: InteriorLists::default(),
             crossing: CrossingMemory::default(),
             stored: PhotonChunk::default(),
             counters: RayCounters::default(),
@@ -95,7 +95,7 @@ impl PhotonTracing<'_> {
             }
             // Scatter the single vertices, and apply Russian roulette.
             wavefront.scatter_open();
-            wavefront.media.clear();
+            wavefront.interior_lists.clear();
             wavefront.russian_roulette();
             std::mem::swap(&mut rays, &mut wavefront.next);
             wavefront.next.clear();
@@ -126,15 +126,20 @@ impl PhotonTracing<'_> {
     }
 
     /// The medium at the start of a photon.
-    fn medium_at(&self, point: Vec3, emitted: &Emitted) -> Medium {
+    fn interiors_at(&self, point: Vec3, emitted: &Emitted) -> InteriorList {
         let world = self.tile.world;
         let emitter = || Some(world.lights.get(emitted.light).as_area()?.object);
-        let around = |glass: &&Inside| world.encloses(glass.body, point);
+        let around = |glass: &&Interior| world.encloses(glass.body, point);
         let in_parts = self.bodies.iter().filter(|_| !is_beyond(emitted)).filter_map(|body| {
             let material = world.material_around(body, point, emitter())?;
-            Some(Inside { body: body.body, material })
+            Some(Interior { body: body.body, material })
         });
-        self.glasses.iter().filter(around).copied().chain(in_parts).fold(Medium::default(), Medium::entered)
+        self.glasses
+            .iter()
+            .filter(around)
+            .copied()
+            .chain(in_parts)
+            .fold(InteriorList::default(), InteriorList::entered)
     }
 }
 
@@ -151,7 +156,7 @@ struct PhotonWavefront<'a> {
     /// Packet that collects vertices of transmitted photons.
     open_behind: VertexBatch,
     /// Media at single vertices.
-    media: Media,
+    interior_lists: InteriorLists,
     crossing: CrossingMemory,
     stored: PhotonChunk,
     counters: RayCounters,
@@ -235,9 +240,9 @@ impl PhotonWavefront<'_> {
                     throughput: emitted.flux * tracing.share,
                     slot: offset as u32,
                     path: CAMERA_PATH + 1,
-                    medium: tracing.medium_at(ray.origin, &emitted),
+                    interiors: tracing.interiors_at(ray.origin, &emitted),
                     state: PathState::CAMERA,
-                    cone: Cone::default(),
+                    cone: RayCone::default(),
                 };
                 self.references[offset] = flux(tile.world, &path);
                 rays.push(path);
@@ -285,7 +290,12 @@ impl PhotonWavefront<'_> {
         kept.push(photon);
     }
 
-    fn shade_surface(&mut self, path: &PathRay, vertex: &Vertex<'_>, (far, lacks_photons): (&Medium, bool)) {
+    fn shade_surface(
+        &mut self,
+        path: &PathRay,
+        vertex: &Vertex<'_>,
+        (far, lacks_photons): (&InteriorList, bool),
+    ) {
         match &vertex.material.bsdf {
             // Light samples find direct light.
             Bsdf::Rough(_) if lacks_photons => {}
@@ -309,7 +319,7 @@ impl PhotonWavefront<'_> {
         path: &PathRay,
         vertex: &Vertex<'_>,
         coated: &Coated,
-        (far, lacks_photons): (&Medium, bool),
+        (far, lacks_photons): (&InteriorList, bool),
     ) {
         let shading = vertex.shading(&mut self.counters);
         let fresnel = vertex.coat_reflectance(coated, &shading);
@@ -333,7 +343,7 @@ impl PhotonWavefront<'_> {
         path: &PathRay,
         vertex: &Vertex<'_>,
         rough: &Rough,
-        (far, scattered): (&Medium, Option<f32>),
+        (far, scattered): (&InteriorList, Option<f32>),
     ) {
         let mut bsdf = rough.at(&vertex.texture_point, &mut self.counters.texture_lookups);
         vertex.tint(&mut bsdf);
@@ -348,7 +358,7 @@ impl PhotonWavefront<'_> {
         path: &PathRay,
         vertex: &Vertex<'_>,
         bsdf: RoughBsdf,
-        (far, scattered): (&Medium, Option<f32>),
+        (far, scattered): (&InteriorList, Option<f32>),
     ) {
         let tile = self.tracing.tile;
         // Store the photon, which also represents those that passed the surface as a null interaction.
@@ -362,38 +372,38 @@ impl PhotonWavefront<'_> {
         // Queue it for scattering.
         let shading = vertex.shading(&mut self.counters);
         let behind = bsdf.behind().map(|bsdf| (bsdf, shading.behind()));
-        let medium = self.media.number(&path.medium);
+        let interiors = self.interior_lists.number(&path.interiors);
         if self.open.used == ALL || self.open.bsdf.kind() != bsdf.kind() {
             self.scatter_open();
             self.open.bsdf.prepare(bsdf.kind());
         }
         let i = self.open.used.trailing_ones() as usize;
-        let lit = ShadingVertex { path, medium: &path.medium, place: 0, vertex, shading, bsdf: &bsdf };
-        self.open.put(i, tile, &lit, LightAov::ALL, medium);
+        let lit = ShadingVertex { path, interiors: &path.interiors, place: 0, vertex, shading, bsdf: &bsdf };
+        self.open.put(i, tile, &lit, LightAov::ALL, interiors);
         let counts = self.open.photon_weight(i, vertex.wo) * by_chance;
         set_lane(&mut self.open.throughput, i, path.throughput * counts);
         // Queue transmission, where the medium behind the surface changes its basic flux.
         let Some((bsdf, shading)) = behind else { return };
         let part = if vertex.material.bsdf.glass().is_some() {
-            let eta = ior(tile.world, far) / ior(tile.world, &path.medium);
+            let eta = ior(tile.world, far) / ior(tile.world, &path.interiors);
             1.0 / (eta * eta)
         } else {
             // Seen from a camera path, this is transmission from the other side.
-            through_sheet(tile.world, far, &path.medium)
+            through_sheet(tile.world, far, &path.interiors)
         };
-        let medium = self.media.number(far);
+        let interiors = self.interior_lists.number(far);
         if self.open_behind.used == ALL || self.open_behind.bsdf.kind() != bsdf.kind() {
             self.scatter_open();
             self.open_behind.bsdf.prepare(bsdf.kind());
         }
         let i = self.open_behind.used.trailing_ones() as usize;
         let lit =
-            ShadingVertex { path, medium: far, place: 0, vertex: &vertex.behind(), shading, bsdf: &bsdf };
-        self.open_behind.put(i, tile, &lit, LightAov::ALL, medium);
+            ShadingVertex { path, interiors: far, place: 0, vertex: &vertex.behind(), shading, bsdf: &bsdf };
+        self.open_behind.put(i, tile, &lit, LightAov::ALL, interiors);
         set_lane(&mut self.open_behind.throughput, i, path.throughput * (counts * part));
     }
 
-    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &Medium) {
+    fn shade_glass(&mut self, path: &PathRay, vertex: &Vertex<'_>, far: &InteriorList) {
         if !self.may_scatter() {
             return;
         }
@@ -402,7 +412,7 @@ impl PhotonWavefront<'_> {
         let FresnelSplit { reflectance, refracted } = fresnel_split(tile.world, path, vertex, &shading, far);
         match refracted {
             Some(mut ray) if !tile.chooses_reflection(path, reflectance) => {
-                let eta = ior(tile.world, far) / ior(tile.world, &path.medium);
+                let eta = ior(tile.world, far) / ior(tile.world, &path.interiors);
                 ray.throughput *= 1.0 / (eta * eta);
                 self.push(path, vertex, (shading.normal, eta), ray);
             }
@@ -458,7 +468,7 @@ impl PhotonWavefront<'_> {
         let continuation = Continuation { continues: true, uses_roulette: false, lobes: LobeSet::All };
         let used = row.used;
         SampleBsdf { tile: self.tracing.tile, row, used, continuation }.scatter(
-            &self.media,
+            &self.interior_lists,
             &[],
             &mut self.next,
         );
@@ -495,7 +505,7 @@ impl PhotonWavefront<'_> {
 
 /// Largest component of a photon's flux in W, which unlike basic flux does not depend on the medium.
 fn flux(world: &World, path: &PathRay) -> f32 {
-    let index = ior(world, &path.medium);
+    let index = ior(world, &path.interiors);
     path.throughput.max_element() * index * index
 }
 

@@ -51,7 +51,7 @@ use crate::film::Rect;
 use crate::geometry::{Aabb, ShapeHit};
 use crate::integrators::behavior::PathBehavior;
 use crate::integrators::settings::{PhotonSettings, RenderSettings};
-use crate::integrators::transport::medium::Inside;
+use crate::integrators::transport::interiors::Interior;
 use crate::integrators::transport::tile::{SampleBlock, TileContext};
 use crate::lights::{Ball, PhotonSource};
 use crate::materials::{Glass, Material};
@@ -242,8 +242,8 @@ impl Photons {
         let settings =
             RenderSettings { render: Render { shadows: Shadows::Soft, ..settings.render }, ..*settings };
         let material = |object| world.material_index(&Hit { shape: ShapeHit::at(0.0), object }) as u32;
-        let inside = |&body: &u32| Inside { body, material: material(body) };
-        let glasses: &[Inside] = &self.glasses.iter().map(inside).collect::<Vec<_>>();
+        let inside = |&body: &u32| Interior { body, material: material(body) };
+        let glasses: &[Interior] = &self.glasses.iter().map(inside).collect::<Vec<_>>();
         let behavior = PathBehavior::of(&settings, false);
         let done = AtomicU64::new(0);
         let chunk = |first: u32| {

@@ -59,7 +59,7 @@ pub struct VertexBatch {
     /// [`PathState::roulette_throughput`](super::ray::PathState::roulette_throughput) of the paths.
     pub roulette_throughput: Lanes,
     /// Indices of the glass around the vertices.
-    pub medium: [u32; LANES],
+    pub interiors: [u32; LANES],
     /// Whether any vertex has a perturbed normal.
     pub is_perturbed: bool,
     /// Whether no light sample is visible from any of the vertices.
@@ -69,7 +69,7 @@ pub struct VertexBatch {
     /// Ray origins on the other side and indices of the glass around them, if `has_two_sides`.
     pub beyond: Lanes3,
     /// [`VertexBatch::beyond`].
-    pub medium_beyond: [u32; LANES],
+    pub interiors_beyond: [u32; LANES],
 }
 
 /// Marks a vertex whose two normals are equal, in place of their cosine.
@@ -135,12 +135,12 @@ impl VertexBatch {
         path: [0; LANES],
         place: [0; LANES],
         roulette_throughput: [0.0; LANES],
-        medium: [0; LANES],
+        interiors: [0; LANES],
         is_perturbed: false,
         is_dark: false,
         has_two_sides: false,
         beyond: [[0.0; LANES]; 3],
-        medium_beyond: [0; LANES],
+        interiors_beyond: [0; LANES],
     };
 
     /// Empties the packet; normals count as unperturbed.
@@ -183,7 +183,8 @@ impl VertexBatch {
         }
         self.bsdf.copy(i, &other.bsdf, from);
         self.shading_normal_cosine[i] = other.shading_normal_cosine[from];
-        (self.roulette_throughput[i], self.medium[i]) = (other.roulette_throughput[from], other.medium[from]);
+        (self.roulette_throughput[i], self.interiors[i]) =
+            (other.roulette_throughput[from], other.interiors[from]);
         (self.slot[i], self.path[i], self.place[i]) = (other.slot[from], other.path[from], other.place[from]);
         self.start[i] = other.start[from];
         self.is_perturbed |= other.is_perturbed;
@@ -203,7 +204,7 @@ impl VertexBatch {
         tile: &TileContext<'_>,
         lit: &ShadingVertex<'_>,
         aov: LightAov,
-        medium: u32,
+        interiors: u32,
     ) {
         let ShadingVertex { path, place, vertex, shading, bsdf, .. } = lit;
         // Set the origin of shadow rays.
@@ -231,7 +232,7 @@ impl VertexBatch {
         let frame = Place { normal, to_eye: vertex.wo, tangent: vertex.tangent() };
         self.bsdf.put(i, bsdf, aov.lobes(), &frame);
         // Copy the state of the path.
-        (self.roulette_throughput[i], self.medium[i]) = (path.state.roulette_throughput, medium);
+        (self.roulette_throughput[i], self.interiors[i]) = (path.state.roulette_throughput, interiors);
         set_lane(&mut self.throughput, i, path.throughput);
         (self.slot[i], self.path[i], self.place[i]) = (path.slot, path.path, *place);
         self.is_perturbed |= shading.shading_normal_cosine.is_some();
@@ -239,9 +240,9 @@ impl VertexBatch {
     }
 
     /// Stores the other side of a vertex: its ray origin, and the index of the glass around it.
-    pub fn put_beyond(&mut self, i: usize, beyond: Vec3, medium: u32) {
+    pub fn put_beyond(&mut self, i: usize, beyond: Vec3, interiors: u32) {
         set_lane(&mut self.beyond, i, beyond);
-        self.medium_beyond[i] = medium;
+        self.interiors_beyond[i] = interiors;
     }
 
     /// Evaluates the BSDFs and cosines for light from the directions `wi`.
@@ -355,7 +356,7 @@ impl VertexBatch {
 
     /// Whether any vertex is in glass.
     pub fn is_in_glass(&self) -> bool {
-        lanes(self.used).any(|i| self.medium[i] != 0)
+        lanes(self.used).any(|i| self.interiors[i] != 0)
     }
 
     /// Mask of vertices whose direction is below their horizon.

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::cone::Cone;
-use super::medium::{Inside, Medium};
+use super::cone::RayCone;
+use super::interiors::{Interior, InteriorList};
 use super::ray::{PathRay, PathState};
 use super::tile::TileContext;
 use crate::geometry::Ray;
@@ -62,19 +62,22 @@ impl TileContext<'_> {
     /// The path that begins with a camera ray.
     #[inline(always)]
     pub fn camera_path(&self, ray: Ray, slot: u32) -> PathRay {
-        let medium =
-            if self.world.is_eye_in_air() { Medium::default() } else { self.camera_medium(ray.origin) };
+        let interiors = if self.world.is_eye_in_air() {
+            InteriorList::default()
+        } else {
+            self.camera_interiors(ray.origin)
+        };
         let state = PathState::CAMERA;
-        let cone = Cone { width: 0.0, spread: self.pixel_spread };
-        PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, medium, state, cone }
+        let cone = RayCone { width: 0.0, spread: self.pixel_spread };
+        PathRay { ray, throughput: Vec3::ONE, slot, path: CAMERA_PATH + 1, interiors, state, cone }
     }
 
     /// The glass around a point on the lens.
     #[cold]
     #[inline(never)]
-    fn camera_medium(&self, point: Vec3) -> Medium {
-        let around = self.world.glass_around(point).map(|(body, material)| Inside { body, material });
-        around.fold(Medium::default(), Medium::entered)
+    fn camera_interiors(&self, point: Vec3) -> InteriorList {
+        let around = self.world.glass_around(point).map(|(body, material)| Interior { body, material });
+        around.fold(InteriorList::default(), InteriorList::entered)
     }
 
     /// The rays of the sixteen slots from `first` on, even past the last one. Must be called inside a kernel that is

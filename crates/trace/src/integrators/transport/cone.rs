@@ -4,7 +4,7 @@
 
 /// A beam around a ray. A negative width means that the beam is past its focus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cone {
+pub struct RayCone {
     /// Width at the origin of the ray.
     pub width: f32,
     /// Increase of the width per unit of distance.
@@ -23,7 +23,7 @@ pub enum SpecularEvent {
     Refracted(f32),
 }
 
-impl Cone {
+impl RayCone {
     /// The beam at a distance along the ray.
     #[inline(always)]
     pub fn at_distance(self, distance: f32) -> Self {
@@ -56,7 +56,7 @@ const MIN_COSINE: f32 = 0.1;
 mod tests {
     use super::*;
 
-    const PARALLEL: Cone = Cone { width: 0.02, spread: 0.0 };
+    const PARALLEL: RayCone = RayCone { width: 0.02, spread: 0.0 };
 
     #[test]
     fn curved_surfaces_focus_beams() {
@@ -76,7 +76,7 @@ mod tests {
 
     #[test]
     fn flat_surfaces_change_beams_only_by_snells_law() {
-        let spreading = Cone { width: 0.1, spread: 0.3 };
+        let spreading = RayCone { width: 0.1, spread: 0.3 };
         assert_eq!(spreading.after_specular(SpecularEvent::Reflected, 0.0, 0.3), spreading);
         assert!(
             (spreading.after_specular(SpecularEvent::Refracted(1.5), 0.0, 1.0).spread - 0.2).abs() < 1e-7
@@ -87,6 +87,6 @@ mod tests {
     fn wider_lobes_spread_beams_more() {
         let (wide, narrow) = (PARALLEL.scattered(0.3), PARALLEL.scattered(1000.0));
         assert!(wide.spread > 10.0 * narrow.spread && narrow.spread > 0.0 && wide.spread <= 0.2);
-        assert_eq!(Cone { spread: -0.5, ..PARALLEL }.scattered(1000.0).spread, 0.5);
+        assert_eq!(RayCone { spread: -0.5, ..PARALLEL }.scattered(1000.0).spread, 0.5);
     }
 }

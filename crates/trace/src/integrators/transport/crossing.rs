@@ -1,7 +1,7 @@
 //! Crossing of coincident surfaces at glass: all surfaces that touch at a hit are crossed at once, from one medium to
 //! another.
 
-use super::medium::{Inside, Medium};
+use super::interiors::{Interior, InteriorList};
 use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::Vertex;
@@ -13,9 +13,9 @@ pub struct Crossing {
     pub sides: Sides,
     /// The medium that the ray traveled through, and the medium on the near side. `None` if both are the ray's recorded
     /// medium.
-    pub before: Option<[Medium; 2]>,
+    pub before: Option<[InteriorList; 2]>,
     /// The medium on the far side.
-    pub far: Medium,
+    pub far: InteriorList,
     /// The hit on a coincident opaque surface, along the ray between the two origins.
     pub opaque: Option<Hit>,
 }
@@ -51,7 +51,7 @@ impl TileContext<'_> {
         let lead = hit.shape.t * f32::EPSILON * path.ray.direction.dot(vertex.normal).abs();
         let meeting = Meeting { hit, surface: &vertex.surface, normal: vertex.normal, lead };
         let sides = self.world.contact(&meeting, around, |near| found.push(near));
-        let (before, far) = self.crossing_media(&path.medium, found);
+        let (before, far) = self.crossing_interiors(&path.interiors, found);
         let opaque = found.iter().filter_map(|near| self.opaque(near));
         let opaque = opaque.min_by(|a, b| a.shape.t.total_cmp(&b.shape.t).then(a.object.cmp(&b.object)));
         Crossing { sides, before, far, opaque }
@@ -62,14 +62,18 @@ impl TileContext<'_> {
     /// disagrees. Open solids count only if they are entered or left here, so that a ray and its reverse agree, as the
     /// path of the ray around other open solids is unknown. The first medium of the pair absorbed light on the way
     /// here; the pair is `None` if both are as recorded.
-    fn crossing_media(&self, known: &Medium, found: &[Near]) -> (Option<[Medium; 2]>, Medium) {
-        let is_told_by_record = |glass: Inside| !self.world.is_closed(glass.body);
+    fn crossing_interiors(
+        &self,
+        known: &InteriorList,
+        found: &[Near],
+    ) -> (Option<[InteriorList; 2]>, InteriorList) {
+        let is_told_by_record = |glass: Interior| !self.world.is_closed(glass.body);
         // With only closed shapes, most hits find at most the shape that they enter.
         if !self.world.has_open_glass() {
             match *found {
                 [] => return (None, known.retained(is_told_by_record)),
                 [Near::Around { object, material }] => {
-                    let entered = Inside { body: object, material };
+                    let entered = Interior { body: object, material };
                     return (None, known.retained(is_told_by_record).entered(entered));
                 }
                 [Near::Surface { .. }] | [_, _, ..] => {}
@@ -81,14 +85,14 @@ impl TileContext<'_> {
         let crossed = |as_front: bool| {
             found.iter().filter_map(move |thing| match *thing {
                 Near::Surface { hit, material, is_front } if is_front == as_front => {
-                    let glass = Inside { body: self.world.body(hit.object), material };
+                    let glass = Interior { body: self.world.body(hit.object), material };
                     self.world.is_glass(material).then_some(glass)
                 }
                 Near::Surface { .. } | Near::Around { .. } => None,
             })
         };
         let around = found.iter().filter_map(|thing| match *thing {
-            Near::Around { object, material } => Some(Inside { body: object, material }),
+            Near::Around { object, material } => Some(Interior { body: object, material }),
             Near::Surface { .. } => None,
         });
         // Leave the solids whose back faces are here.
@@ -104,7 +108,7 @@ impl TileContext<'_> {
             }
         }
         // Enter the solids whose front faces are here, and those that enclose the point.
-        let far = crossed(true).chain(around).fold(far, Medium::entered);
+        let far = crossed(true).chain(around).fold(far, InteriorList::entered);
         (Some([arrived, near]), far)
     }
 
@@ -112,7 +116,7 @@ impl TileContext<'_> {
     pub fn boundary(
         &self,
         hit: &Hit,
-        [near, far]: [&Medium; 2],
+        [near, far]: [&InteriorList; 2],
         memory: &CrossingMemory,
     ) -> Option<Boundary> {
         let later = near.glass().max(far.glass())?;
@@ -132,11 +136,11 @@ impl TileContext<'_> {
     }
 
     /// A medium without its open solids.
-    pub fn without_open_glass(&self, medium: Medium) -> Medium {
+    pub fn without_open_glass(&self, interiors: InteriorList) -> InteriorList {
         if self.world.has_open_glass() {
-            return medium.retained(|glass| !self.world.is_open(glass.body));
+            return interiors.retained(|glass| !self.world.is_open(glass.body));
         }
-        medium
+        interiors
     }
 
     fn opaque(&self, thing: &Near) -> Option<Hit> {

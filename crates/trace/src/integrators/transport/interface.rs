@@ -1,7 +1,7 @@
 //! Specular reflection and refraction.
 
 use super::cone::SpecularEvent;
-use super::medium::{Medium, ior};
+use super::interiors::{InteriorList, ior};
 use super::ray::PathRay;
 use super::vertex::{Shading, Vertex};
 use crate::materials::fresnel::{dielectric, refract};
@@ -39,7 +39,7 @@ pub fn reflected(path: &PathRay, vertex: &Vertex<'_>, shading: &Shading, reflect
 /// The fraction of basic radiance L/n² that passes an infinitely thin diffusing sheet between two media. Light that
 /// enters the denser medium spreads over fewer directions, and would otherwise gain energy; in the other direction its
 /// radiance is unchanged (Veach, *Robust Monte Carlo Methods for Light Transport Simulation*, 1997, section 5.2).
-pub fn through_sheet(world: &World, near: &Medium, far: &Medium) -> f32 {
+pub fn through_sheet(world: &World, near: &InteriorList, far: &InteriorList) -> f32 {
     let eta = ior(world, far) / ior(world, near);
     (eta * eta).min(1.0)
 }
@@ -58,15 +58,15 @@ pub fn fresnel_split(
     path: &PathRay,
     vertex: &Vertex<'_>,
     shading: &Shading,
-    far: &Medium,
+    far: &InteriorList,
 ) -> FresnelSplit {
-    let eta = ior(world, far) / ior(world, &path.medium);
+    let eta = ior(world, far) / ior(world, &path.interiors);
     let (reflectance, direction) = refract_at(vertex, shading, path.ray.direction, eta);
     // Paths carry basic radiance, L/n², which refraction does not change.
     let refracted = direction.map(|direction| PathRay {
         ray: vertex.spawn_ray(direction),
         path: path.next_path(REFRACTED),
-        medium: *far,
+        interiors: *far,
         state: path.state.after_specular(1.0),
         cone: vertex.cone_after(SpecularEvent::Refracted(eta)),
         ..*path

@@ -1,7 +1,7 @@
 //! Transport: rays of a tile, their hits, and packets of sixteen vertices. It depends on the world, but not on
 //! integrators or photons.
 //!
-//! - `tile`: the context shared by all rays of a tile; `ray`, `cone`, `medium`: a path's ray, its ray cone, and the
+//! - `tile`: the context shared by all rays of a tile; `ray`, `cone`, `interiors`: a path's ray, its ray cone, and the
 //!   glass around it.
 //! - `camera`: camera rays; `trace`, `packet`: intersection, and packets of plain surfaces.
 //! - `walk`, `crossing`: null interactions and glass boundaries up to the next scattering surface; `vertex`: that
@@ -16,7 +16,7 @@ pub mod camera;
 pub mod cone;
 pub mod crossing;
 pub mod interface;
-pub mod medium;
+pub mod interiors;
 pub mod packet;
 pub mod ray;
 pub mod scatter;

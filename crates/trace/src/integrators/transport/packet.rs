@@ -233,7 +233,7 @@ impl Loops for PacketIntersection<'_> {
             PacketSource::Paths(..) | PacketSource::Traced(..) => {
                 for lane in 0..PACKET {
                     let Some(path) = rays.queued_path(lane) else { break };
-                    in_air &= if path.medium.is_air() { !0 } else { !(1 << lane) };
+                    in_air &= if path.interiors.is_air() { !0 } else { !(1 << lane) };
                     only_specular_before &= if path.state.only_specular_before { !0 } else { !(1 << lane) };
                     after_gloss |= u32::from(path.state.is_after_gloss) << lane;
                 }
@@ -489,7 +489,7 @@ impl VertexBatch {
     ) -> u32 {
         // Place the vertices on the facets, on the viewer's side.
         let mut front = [0; PACKET];
-        self.medium = [0; PACKET];
+        self.interiors = [0; PACKET];
         for i in 0..PACKET {
             let (normal, direction) = (lane(&surface.normal, i), lane(&rays.direction, i));
             let cosine = normal.dot(direction);

@@ -1,7 +1,7 @@
 //! A path's ray, and the path state that weights the light the ray finds.
 
-use super::cone::Cone;
-use super::medium::Medium;
+use super::cone::RayCone;
+use super::interiors::InteriorList;
 use crate::geometry::Ray;
 use crate::integrators::view::PathClasses;
 use crate::math::Vec3;
@@ -17,12 +17,12 @@ pub struct PathRay {
     pub slot: u32,
     /// Number that distinguishes the paths of one sample.
     pub path: u32,
-    /// The glass around the ray.
-    pub medium: Medium,
+    /// The glass solids around the ray.
+    pub interiors: InteriorList,
     /// Summary of the path before this ray.
     pub state: PathState,
     /// The ray cone, for texture filtering.
-    pub cone: Cone,
+    pub cone: RayCone,
 }
 
 /// Summary of a path's earlier vertices, which determines how the light that it finds is weighted.
@@ -102,9 +102,9 @@ mod tests {
             throughput: Vec3::ONE,
             slot: 0,
             path,
-            medium: Medium::default(),
+            interiors: InteriorList::default(),
             state: PathState::CAMERA,
-            cone: Cone::default(),
+            cone: RayCone::default(),
         }
     }
 

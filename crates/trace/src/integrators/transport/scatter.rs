@@ -1,9 +1,9 @@
 //! BSDF sampling at diffuse and glossy surfaces, sixteen at a time, and Russian roulette.
 
 use super::batch::{Response, VertexBatch};
-use super::cone::Cone;
+use super::cone::RayCone;
 use super::interface::SCATTERED;
-use super::medium::Media;
+use super::interiors::InteriorLists;
 use super::ray::{PathRay, PathState};
 use super::tile::TileContext;
 use crate::geometry::Ray;
@@ -95,26 +95,26 @@ pub struct Scattered {
 }
 
 impl SampleBsdf<'_> {
-    /// Adds the rays of the next bounce to `next`. `media` are the media of the vertices; `cones` are the ray cones at
+    /// Adds the rays of the next bounce to `next`. `interior_lists` are the media of the vertices; `cones` are the ray cones at
     /// the vertices by queue index, or empty.
-    pub fn scatter(self, media: &Media, cones: &[Cone], next: &mut Vec<PathRay>) {
+    pub fn scatter(self, interior_lists: &InteriorLists, cones: &[RayCone], next: &mut Vec<PathRay>) {
         // Sample all vertices of the packet.
         let row = self.row;
         let scattered = self.tile.world.geometry.instructions().run(self);
-        let of_lobe = |pdf: f32| move |cone: &Cone| cone.scattered(pdf);
+        let of_lobe = |pdf: f32| move |cone: &RayCone| cone.scattered(pdf);
         // Queue the paths that continue.
         next.extend(lanes(scattered.alive).map(|i| {
-            let (from, medium, normal) = if scattered.beyond & 1 << i == 0 {
-                (&row.from, row.medium[i], lane(&row.normal, i))
+            let (from, interiors, normal) = if scattered.beyond & 1 << i == 0 {
+                (&row.from, row.interiors[i], lane(&row.normal, i))
             } else {
-                (&row.beyond, row.medium_beyond[i], -lane(&row.normal, i))
+                (&row.beyond, row.interiors_beyond[i], -lane(&row.normal, i))
             };
             let mut path = PathRay {
                 ray: Ray::new(lane(from, i), lane(&scattered.wi, i)).leaving(scattered.starts[i]),
                 throughput: lane(&row.throughput, i) * lane(&scattered.factors, i),
                 slot: row.slot[i],
                 path: row.path[i],
-                medium: media.get(medium),
+                interiors: interior_lists.get(interiors),
                 state: PathState {
                     pdf: scattered.pdfs[i],
                     normal,
@@ -123,7 +123,7 @@ impl SampleBsdf<'_> {
                     one_diffuse_before: row.only_specular_before & 1 << i != 0,
                     is_after_gloss: scattered.narrow & 1 << i != 0,
                 },
-                cone: cones.get(row.place[i] as usize).map_or(Cone::default(), of_lobe(scattered.pdfs[i])),
+                cone: cones.get(row.place[i] as usize).map_or(RayCone::default(), of_lobe(scattered.pdfs[i])),
             };
             path.path = path.next_path(SCATTERED);
             path

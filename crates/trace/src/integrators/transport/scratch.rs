@@ -8,7 +8,7 @@ use crate::world::Hit;
 
 /// Buffers that all batches of a thread reuse.
 #[derive(Default)]
-pub struct Scratch {
+pub struct TraceBuffers {
     /// Rays of this bounce; for first-hit AOVs, camera rays.
     pub rays: Vec<PathRay>,
     /// Rays of the next bounce.

@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::cone::{Cone, SpecularEvent};
-use super::medium::Medium;
+use super::cone::{RayCone, SpecularEvent};
+use super::interiors::InteriorList;
 use super::ray::PathRay;
 use super::tile::TileContext;
 use crate::geometry::ray::offset_origin;
@@ -37,7 +37,7 @@ pub struct Vertex<'a> {
     /// Point for texture lookups.
     pub texture_point: TexturePoint,
     /// The ray cone of the path at the surface.
-    pub cone: Cone,
+    pub cone: RayCone,
     /// Vertex color, which multiplies the material's color. `None` if it has none.
     pub color: Option<Vec3>,
     /// Mean curvature, > 0 if the surface bulges toward the viewer; computed only for specular surfaces.
@@ -198,7 +198,7 @@ impl<'a> Vertex<'a> {
     }
 
     /// The ray cone after specular reflection or refraction.
-    pub fn cone_after(&self, event: SpecularEvent) -> Cone {
+    pub fn cone_after(&self, event: SpecularEvent) -> RayCone {
         self.cone.after_specular(event, self.curvature, self.wo.dot(self.normal))
     }
 
@@ -328,7 +328,7 @@ pub struct ShadingVertex<'a> {
     /// The path that arrived at the vertex.
     pub path: &'a PathRay,
     /// The medium on the lit side.
-    pub medium: &'a Medium,
+    pub interiors: &'a InteriorList,
     /// Index of the path in the bounce's queue.
     pub place: u32,
     /// The vertex.

@@ -6,7 +6,7 @@
 
 use super::crossing::{Crossing, CrossingMemory};
 use super::interface::PASSED;
-use super::medium::{Medium, absorption, ior};
+use super::interiors::{InteriorList, absorption, ior};
 use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::Vertex;
@@ -23,7 +23,7 @@ pub const MAX_HIDDEN: usize = 64;
 /// The interaction at which a walk ends.
 pub enum Interaction<'v, 'a> {
     /// An opaque surface, and the medium behind it.
-    Opaque(&'v Vertex<'a>, OpaqueHit, &'v Medium),
+    Opaque(&'v Vertex<'a>, OpaqueHit, &'v InteriorList),
     /// A boundary between media, at a hit on glass.
     Glass(&'v Vertex<'a>, Hit, Interface<'v>),
     /// The ray leaves the scene.
@@ -36,7 +36,7 @@ pub enum Interaction<'v, 'a> {
 #[derive(Clone, Copy)]
 pub struct Interface<'v> {
     /// The medium on the far side.
-    pub far: &'v Medium,
+    pub far: &'v InteriorList,
     /// The rough surface of the boundary. `None` if it is smooth.
     pub rough: Option<GlassPoint>,
 }
@@ -139,7 +139,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
         };
         // Stop at an opaque surface, or pass it as a null interaction.
         if vertex.material.bsdf.glass().is_none() {
-            path.throughput *= absorption(tile.world, &path.medium, hit.shape.t);
+            path.throughput *= absorption(tile.world, &path.interiors, hit.shape.t);
             if vertex.material.lets_pass() {
                 match null_interaction(stepper, path, &vertex, (way, hit)) {
                     NullInteraction::Passed(_) if way.count == MOST_STRAIGHT => return,
@@ -164,14 +164,14 @@ pub fn walk<'a, W: PathStepper<'a>>(
                 }
             }
             if tile.world.has_open_glass() {
-                path.medium = tile.without_open_glass(path.medium);
+                path.interiors = tile.without_open_glass(path.interiors);
             }
-            let mut far = path.medium;
+            let mut far = path.interiors;
             if vertex.material.bsdf.lets_through() && tile.world.has_glass() {
                 // Light may arrive from glass that touches the surface.
                 let crossing = tile.crossing(path, &vertex, &hit, stepper.crossing());
                 if let Some([_, near]) = crossing.before {
-                    path.medium = near;
+                    path.interiors = near;
                 }
                 far = crossing.far;
                 vertex.set_sides(crossing.sides);
@@ -185,10 +185,10 @@ pub fn walk<'a, W: PathStepper<'a>>(
         }
         // At glass, find all coincident surfaces.
         let Crossing { sides, before, far, opaque } = tile.crossing(path, &vertex, &hit, stepper.crossing());
-        let arrived = before.as_ref().map_or(&path.medium, |[arrived, _]| arrived);
+        let arrived = before.as_ref().map_or(&path.interiors, |[arrived, _]| arrived);
         path.throughput *= absorption(tile.world, arrived, hit.shape.t);
         if let Some([_, near]) = before {
-            path.medium = near;
+            path.interiors = near;
         }
         if let Some(touching) = opaque {
             let vertex = Vertex::touching(tile, path, (sides, &touching), hit.shape.t);
@@ -201,7 +201,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
             path.path = path.next_path(PASSED);
         }
         // Stop at a boundary between media with different indices of refraction.
-        let near = &path.medium;
+        let near = &path.interiors;
         if near.glass() != far.glass() && ior(tile.world, near) != ior(tile.world, &far) {
             vertex.set_sides(sides);
             let rough = if tile.world.has_rough_glass() {
@@ -217,7 +217,7 @@ pub fn walk<'a, W: PathStepper<'a>>(
             );
         }
         // Otherwise pass the surface.
-        (path.medium, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
+        (path.interiors, path.ray) = (far, Ray::new(sides.beyond, path.ray.direction));
         path.state = path.state.hidden_from_lights();
         path.cone = path.cone.at_distance(hit.shape.t);
         (way, hidden) = (Segment::DIRECT, hidden + 1);
@@ -238,12 +238,12 @@ fn rough_boundary<'a, W: PathStepper<'a>>(
     stepper: &mut W,
     path: &PathRay,
     (vertex, hit): (&Vertex<'a>, &Hit),
-    (sides, far): (Sides, &Medium),
+    (sides, far): (Sides, &InteriorList),
 ) -> Option<GlassPoint> {
     let tile = stepper.tile();
-    let media = [&path.medium, far];
-    let indices = media.map(|medium| ior(tile.world, medium));
-    let boundary = tile.boundary(hit, media, stepper.crossing())?;
+    let interior_lists = [&path.interiors, far];
+    let indices = interior_lists.map(|interiors| ior(tile.world, interiors));
+    let boundary = tile.boundary(hit, interior_lists, stepper.crossing())?;
     let glass = tile.world.materials[boundary.material as usize].bsdf.glass()?;
     let touching = boundary.hit.filter(|_| glass.roughness.texture().is_some());
     let touching = touching.map(|other| Vertex::touching(tile, path, (sides, &other), hit.shape.t));
@@ -268,7 +268,7 @@ fn null_interaction<'a, W: PathStepper<'a>>(
         Bsdf::Pane(pane) => {
             let mut whole = *path;
             let hit = way.straighten(&mut whole, hit);
-            whole.medium = stepper.tile().without_open_glass(whole.medium);
+            whole.interiors = stepper.tile().without_open_glass(whole.interiors);
             stepper.hit_pane(&whole, vertex, OpaqueHit::Direct(hit), pane)
         }
         Bsdf::Rough(_) | Bsdf::Mirror(_) | Bsdf::Glass(_) | Bsdf::Coated(_) => NullInteraction::Opaque,

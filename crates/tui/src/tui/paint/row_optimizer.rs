@@ -2,7 +2,7 @@
 //!
 //! A cell can be left as it is or be drawn: by one of four glyphs, with the pen as it is or with one or both of its
 //! colours changed. What that costs depends on the pen and on where the cursor was left, so that the best way
-//! to a cell is kept for each of a few pens (a beam search of the Viterbi algorithm), and the cheapest end is traced back.
+//! to a cell is kept for each of a few pens (the Viterbi algorithm as a beam search), and the cheapest end is traced back.
 
 use super::candidates::{Candidates, candidates};
 use super::cost_model::CostModel;

@@ -1,4 +1,4 @@
-//! The nested glass solids around a ray, and the medium that results from them.
+//! The list of nested glass solids around a ray, which determines its medium.
 
 use crate::materials::Glass;
 use crate::math::Vec3;
@@ -6,7 +6,7 @@ use crate::world::World;
 
 /// A glass solid around a ray. The parts of one solid may have different materials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Inside {
+pub struct Interior {
     /// Index of the solid, in file order.
     pub body: u32,
     /// Material of the surface through which the ray entered.
@@ -16,15 +16,15 @@ pub struct Inside {
 /// The glass solids around a ray, in file order. The last one has priority and determines the medium. If the list is
 /// full, the first ones are dropped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Medium {
-    inside: [Inside; 4],
+pub struct InteriorList {
+    inside: [Interior; 4],
     /// Number of recorded solids. It takes a whole word because copying a word of which one byte was just written
     /// stalls.
     count: u32,
 }
 
-impl Medium {
-    fn known(&self) -> &[Inside] {
+impl InteriorList {
+    fn known(&self) -> &[Interior] {
         &self.inside[..self.count as usize]
     }
 
@@ -34,12 +34,12 @@ impl Medium {
     }
 
     /// The glass that determines the medium.
-    pub fn glass(&self) -> Option<Inside> {
+    pub fn glass(&self) -> Option<Interior> {
         self.known().last().copied()
     }
 
     /// The list after entering a solid.
-    pub fn entered(mut self, glass: Inside) -> Self {
+    pub fn entered(mut self, glass: Interior) -> Self {
         if self.count as usize == self.inside.len() {
             if glass < self.inside[0] {
                 return self;
@@ -59,7 +59,7 @@ impl Medium {
 
     /// The list after leaving a solid. `None` if the ray was not recorded as inside it. A surface made of several
     /// glasses may be entered through one and left through another; then the solid's last entry is removed.
-    pub fn left(self, glass: Inside) -> Option<Self> {
+    pub fn left(self, glass: Interior) -> Option<Self> {
         let same = self.known().iter().rposition(|&own| own == glass);
         same.or_else(|| self.known().iter().rposition(|own| own.body == glass.body))
             .map(|place| self.without(place))
@@ -68,12 +68,12 @@ impl Medium {
     fn without(mut self, place: usize) -> Self {
         self.inside[place..self.count as usize].rotate_left(1);
         self.count -= 1;
-        self.inside[self.count as usize] = Inside::default();
+        self.inside[self.count as usize] = Interior::default();
         self
     }
 
     /// Keeps only the solids for which `holds` is true.
-    pub fn retained(self, holds: impl Fn(Inside) -> bool) -> Self {
+    pub fn retained(self, holds: impl Fn(Interior) -> bool) -> Self {
         let mut left = Self::default();
         for &glass in self.known() {
             if holds(glass) {
@@ -85,53 +85,53 @@ impl Medium {
     }
 }
 
-/// Media of vertices, by index. Index 0 is air.
+/// Interior lists of vertices, by index. Index 0 is air.
 #[derive(Debug, Default)]
-pub struct Media {
-    /// Media with glass, from index 1 on.
-    inside: Vec<Medium>,
+pub struct InteriorLists {
+    /// Lists with glass, from index 1 on.
+    inside: Vec<InteriorList>,
 }
 
-impl Media {
-    /// Removes all media.
+impl InteriorLists {
+    /// Removes all lists.
     pub fn clear(&mut self) {
         self.inside.clear();
     }
 
-    /// Whether all media are air.
+    /// Whether all lists are empty.
     pub fn are_air(&self) -> bool {
         self.inside.is_empty()
     }
 
-    /// Stores a medium and returns its index.
-    pub fn number(&mut self, medium: &Medium) -> u32 {
-        if medium.is_air() {
+    /// Stores a list and returns its index.
+    pub fn number(&mut self, interiors: &InteriorList) -> u32 {
+        if interiors.is_air() {
             return 0;
         }
-        self.inside.push(*medium);
+        self.inside.push(*interiors);
         self.inside.len() as u32
     }
 
-    /// The medium with an index.
+    /// The list with an index.
     #[inline]
-    pub fn get(&self, number: u32) -> Medium {
-        (number as usize).checked_sub(1).map_or(Medium::default(), |index| self.inside[index])
+    pub fn get(&self, number: u32) -> InteriorList {
+        (number as usize).checked_sub(1).map_or(InteriorList::default(), |index| self.inside[index])
     }
 }
 
-/// Transmittance of the medium over a distance.
+/// Transmittance of a ray's medium over a distance.
 #[inline]
-pub fn absorption(world: &World, medium: &Medium, distance: f32) -> Vec3 {
-    let glass = medium.glass().and_then(|inside| glass_of(world, inside));
+pub fn absorption(world: &World, interiors: &InteriorList, distance: f32) -> Vec3 {
+    let glass = interiors.glass().and_then(|inside| glass_of(world, inside));
     glass.map_or(Vec3::ONE, |glass| glass.transmittance(distance))
 }
 
-/// Index of refraction of a medium.
-pub fn ior(world: &World, medium: &Medium) -> f32 {
-    medium.glass().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
+/// Index of refraction of a ray's medium.
+pub fn ior(world: &World, interiors: &InteriorList) -> f32 {
+    interiors.glass().and_then(|inside| glass_of(world, inside)).map_or(1.0, |glass| glass.ior)
 }
 
-fn glass_of(world: &World, inside: Inside) -> Option<&Glass> {
+fn glass_of(world: &World, inside: Interior) -> Option<&Glass> {
     world.materials[inside.material as usize].bsdf.glass()
 }
 
@@ -139,14 +139,14 @@ fn glass_of(world: &World, inside: Inside) -> Option<&Glass> {
 mod tests {
     use super::*;
 
-    const fn part(body: u32, material: u32) -> Inside {
-        Inside { body, material }
+    const fn part(body: u32, material: u32) -> Interior {
+        Interior { body, material }
     }
 
     #[test]
     fn last_solid_has_priority() {
         let (seven, nine) = (part(7, 0), part(9, 1));
-        let air = Medium::default();
+        let air = InteriorList::default();
         for in_both in [air.entered(seven).entered(nine), air.entered(nine).entered(seven)] {
             assert_eq!(in_both.glass(), Some(nine));
             assert_eq!(in_both.left(seven), Some(air.entered(nine)));
@@ -155,31 +155,34 @@ mod tests {
         }
         assert_eq!(air.left(part(3, 0)), None);
         for deep in [
-            (0..6).fold(air, |medium, object| medium.entered(part(object, 0))),
-            (0..6).rev().fold(air, |medium, object| medium.entered(part(object, 0))),
+            (0..6).fold(air, |interiors, object| interiors.entered(part(object, 0))),
+            (0..6).rev().fold(air, |interiors, object| interiors.entered(part(object, 0))),
         ] {
             assert_eq!(deep.glass(), Some(part(5, 0)));
             assert_eq!(deep.left(part(0, 0)), None);
-            assert_eq!(deep.left(part(5, 0)).and_then(|medium| medium.glass()), Some(part(4, 0)));
+            assert_eq!(deep.left(part(5, 0)).and_then(|interiors| interiors.glass()), Some(part(4, 0)));
         }
     }
 
     #[test]
     fn parts_of_a_solid_differ_by_material() {
-        let both = Medium::default().entered(part(1, 0)).entered(part(1, 5));
-        assert_eq!(both.left(part(1, 0)), Some(Medium::default().entered(part(1, 5))));
+        let both = InteriorList::default().entered(part(1, 0)).entered(part(1, 5));
+        assert_eq!(both.left(part(1, 0)), Some(InteriorList::default().entered(part(1, 5))));
         // Enter through material 0, leave through material 2.
-        assert_eq!(Medium::default().entered(part(1, 0)).left(part(1, 2)), Some(Medium::default()));
+        assert_eq!(
+            InteriorList::default().entered(part(1, 0)).left(part(1, 2)),
+            Some(InteriorList::default())
+        );
         // Enter one solid twice.
-        let twice = Medium::default().entered(part(1, 0)).entered(part(1, 0));
-        assert_eq!(twice.left(part(1, 0)), Some(Medium::default().entered(part(1, 0))));
+        let twice = InteriorList::default().entered(part(1, 0)).entered(part(1, 0));
+        assert_eq!(twice.left(part(1, 0)), Some(InteriorList::default().entered(part(1, 0))));
     }
 
     #[test]
     fn retained_keeps_order() {
-        let both = Medium::default().entered(part(3, 0)).entered(part(1, 5)).entered(part(2, 0));
-        let odd = Medium::default().entered(part(1, 5)).entered(part(3, 0));
+        let both = InteriorList::default().entered(part(3, 0)).entered(part(1, 5)).entered(part(2, 0));
+        let odd = InteriorList::default().entered(part(1, 5)).entered(part(3, 0));
         assert_eq!(both.retained(|glass| glass.body != 2), odd);
-        assert_eq!(both.retained(|_| false), Medium::default());
+        assert_eq!(both.retained(|_| false), InteriorList::default());
     }
 }
