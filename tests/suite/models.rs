@@ -124,8 +124,8 @@ fn statements_of_mtl_that_would_spoil_the_picture_are_not_taken_by_the_letter() 
     };
     let (plain, quiet) = said("Kd 0.8 0.8 0.8\n");
     assert!(!quiet.contains("warning"), "{quiet}");
-    let opaque = "a.mtl: \"m\" and 1 more: `Tr 1` without `d` counts as opaque; write `d 0` for what is not to be seen";
-    let dull = "a.mtl: \"m\" and 1 more: `Ks` without `Ns` above 0 makes no highlight";
+    let opaque = "`Tr 1` without `d` counts as opaque; write `d 0` for what is not to be seen (1 more)";
+    let dull = "a.mtl:3: `Ks` without `Ns` above 0 makes no highlight (1 more)";
     for (mtl, words) in [
         ("Tr 1.000000\n", Some(opaque)),
         ("Tr 1\nd 1\n", None),

@@ -90,7 +90,8 @@ impl<'a> Halving<'a> {
             let columns = Covered::new(x, self.width, self.of.width);
             match to {
                 TexelData::FloatAlpha(texels) => {
-                    let texel = |x: u32, y: u32| self.of.weighted(y as usize * self.of.width as usize + x as usize);
+                    let texel =
+                        |x: u32, y: u32| self.of.weighted(y as usize * self.of.width as usize + x as usize);
                     texels.push(rows.mean(|y| columns.mean(|x| texel(x, y))));
                 }
                 TexelData::Float(texels) => texels.push(rows.mean(|y| columns.mean(|x| self.of.get(x, y)))),

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::textures::{
-    Cutoff, FILE_NUMBER, TextureSource, coverage, file_color_use, file_opacity_use, file_source, material_source,
+    Cutoff, FILE_NUMBER, TextureSource, coverage, file_color_use, file_opacity_use, file_source,
+    material_source,
 };
 use super::{Image, Images};
 use crate::assets::{FileMaterial, FileTexture, PhysicalMaterial};
@@ -15,8 +16,7 @@ use crate::materials::{
 };
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{
-    self, ColorSource, FresnelSource, MaterialKind, NumberSource, PixelNumber, Scene, TextureRole,
-    TextureUse,
+    self, ColorSource, FresnelSource, MaterialKind, NumberSource, PixelNumber, Scene, TextureRole, TextureUse,
 };
 
 /// A material of the scene file.
@@ -148,7 +148,11 @@ fn kind(own: &FileMaterial) -> FileKind<'_> {
         (Some(4 | 6 | 7 | 9), _) if own.opacity_texture.is_none() => FileKind::Glass,
         (_, Some(physical)) => FileKind::Principled(physical),
         (Some(3 | 5 | 8), None) if own.specular.max_element() > 0.0 => {
-            if own.is_coated() { FileKind::Coated } else { FileKind::Mirror }
+            if own.is_coated() {
+                FileKind::Coated
+            } else {
+                FileKind::Mirror
+            }
         }
         (_, None) => FileKind::Phong,
     }
@@ -196,11 +200,12 @@ pub fn file_opacity(images: &Images, own: &FileMaterial) -> Option<Opacity> {
         return None;
     }
     let texture = own.opacity_texture.as_ref();
-    let value = match texture.and_then(|texture| file_texture(images, texture, file_opacity_use(own, texture))) {
-        Some(texture) => Number::Texture(texture),
-        None if own.opacity < 1.0 => Number::Constant(own.opacity),
-        None => return None,
-    };
+    let value =
+        match texture.and_then(|texture| file_texture(images, texture, file_opacity_use(own, texture))) {
+            Some(texture) => Number::Texture(texture),
+            None if own.opacity < 1.0 => Number::Constant(own.opacity),
+            None => return None,
+        };
     Some(Opacity { value, cutoff: 0.0 })
 }
 

@@ -247,11 +247,7 @@ pub fn coverage(scene: &Scene, texture: usize, cutoff: f32) -> Option<Cutoff> {
 }
 
 /// Use of a texture of a material of the scene file.
-pub fn texture_use(
-    scene: &Scene,
-    material: &Material,
-    (texture, role): (usize, TextureRole),
-) -> TextureUse {
+pub fn texture_use(scene: &Scene, material: &Material, (texture, role): (usize, TextureRole)) -> TextureUse {
     match role.texture_use() {
         TextureUse::Color | TextureUse::CutOut => {
             let is_alpha = |number| match number {
@@ -272,9 +268,10 @@ pub fn texture_use(
 /// Whether the image of a texture is also that of a color of the material.
 fn is_color(scene: &Scene, material: &Material, texture: usize) -> bool {
     let image = |texture: usize| (&scene.textures[texture].file.value, scene.textures[texture].image);
-    material.textures().into_iter().any(|(other, role)| {
-        role.texture_use() == TextureUse::Color && image(other) == image(texture)
-    })
+    material
+        .textures()
+        .into_iter()
+        .any(|(other, role)| role.texture_use() == TextureUse::Color && image(other) == image(texture))
 }
 
 /// Whether two textures show the same image at the same coordinates.
@@ -312,9 +309,7 @@ pub fn file_source(texture: &FileTexture, used: TextureUse) -> TextureSource {
         TextureUse::Color => ImageEncoding::Color,
         TextureUse::CutOut => ImageEncoding::CutOut(ColorCurve::Auto),
         TextureUse::Normal => ImageEncoding::Linear,
-        TextureUse::Number(of) => {
-            ImageEncoding::Number { of: texture.number.unwrap_or(of), is_srgb: false }
-        }
+        TextureUse::Number(of) => ImageEncoding::Number { of: texture.number.unwrap_or(of), is_srgb: false },
     };
     TextureSource { path: texture.path.clone(), image: None, encoding, coverage: None }
 }

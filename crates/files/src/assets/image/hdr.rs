@@ -144,7 +144,11 @@ impl Statements {
                     self.is_xyz = true;
                     true
                 }
-                other => return Err(format!("its format {other:?} is neither 32-bit_rle_rgbe nor 32-bit_rle_xyze")),
+                other => {
+                    return Err(format!(
+                        "its format {other:?} is neither 32-bit_rle_rgbe nor 32-bit_rle_xyze"
+                    ));
+                }
             },
             "EXPOSURE" => numbers(value).filter(positive).is_some_and(|[by]: [f64; 1]| {
                 self.exposure = Some(self.exposure.unwrap_or(1.0) * by);

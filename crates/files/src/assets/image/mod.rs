@@ -129,7 +129,6 @@ pub struct LoadedImage {
     pub warnings: Vec<String>,
 }
 
-
 /// Limits on the size of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageLimits {
@@ -180,11 +179,7 @@ pub fn load_hashed(
     Ok((load_source(source, encoding, Watch { progress, token })?, hash))
 }
 
-fn load_source(
-    file: Source,
-    encoding: ImageEncoding,
-    watch: Watch<'_>,
-) -> Result<LoadedImage, AssetError> {
+fn load_source(file: Source, encoding: ImageEncoding, watch: Watch<'_>) -> Result<LoadedImage, AssetError> {
     let (path, length) = (file.path.clone(), file.length as usize);
     watch.tick(0, length)?;
     let (texels, ignored) = file.read_apart(watch, move |file, report| {
@@ -425,7 +420,8 @@ impl Source {
             choose(reader, encoding, self.limits.memory_bytes).map_err(|error| reason(&error))?;
         let held_bytes = if is_jpeg { self.length } else { 0 };
         let texel = texel_bytes(decoder.color_type(), encoding, &facts);
-        let texel_bytes = check_size(&*decoder, texel, [self.length, held_bytes, in_memory], self.limits, growth)?;
+        let texel_bytes =
+            check_size(&*decoder, texel, [self.length, held_bytes, in_memory], self.limits, growth)?;
         if is_jpeg {
             let (width, height) = decoder.dimensions();
             jpeg::check_plausible(width, height, self.length)?;
@@ -497,7 +493,11 @@ fn texel_bytes(color: ColorType, encoding: ImageEncoding, facts: &Facts) -> u64 
     let is_packed = sample_bytes == 1 && encoding.space(facts).is_usual();
     match encoding {
         ImageEncoding::CutOut(_) if color.has_alpha() => {
-            if is_packed && facts.alpha != Alpha::Premultiplied { 4 } else { 16 }
+            if is_packed && facts.alpha != Alpha::Premultiplied {
+                4
+            } else {
+                16
+            }
         }
         _ if is_packed => 3,
         _ => 12,

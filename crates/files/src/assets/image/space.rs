@@ -12,7 +12,15 @@ pub(super) enum Curve {
     /// The sample to this power.
     Power(f64),
     /// (a·x + b)^g + e from d on, below c·x + f (ICC.1, 10.18).
-    Parametric { g: f64, a: f64, b: f64, c: f64, d: f64, e: f64, f: f64 },
+    Parametric {
+        g: f64,
+        a: f64,
+        b: f64,
+        c: f64,
+        d: f64,
+        e: f64,
+        f: f64,
+    },
     /// Values at equal distances, from 0 to 65535.
     Table(Vec<u16>),
 }
@@ -146,6 +154,8 @@ mod tests {
         let srgb = || Some([Curve::Srgb, Curve::Srgb, Curve::Srgb]);
         assert!(ColorSpace::new(srgb(), DMat3::IDENTITY).is_usual());
         assert!(!ColorSpace::new(srgb(), DMat3::from_diagonal(DVec3::new(1.0, 0.9, 1.0))).is_usual());
-        assert!(!ColorSpace::new(Some([Curve::Srgb, Curve::LINEAR, Curve::Srgb]), DMat3::IDENTITY).is_usual());
+        assert!(
+            !ColorSpace::new(Some([Curve::Srgb, Curve::LINEAR, Curve::Srgb]), DMat3::IDENTITY).is_usual()
+        );
     }
 }

@@ -32,7 +32,8 @@ fn warned(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join(name);
     fs::write(&path, bytes).expect("written");
-    let loaded = load(&path, encoding, ImageLimits::default(), &unwatched, &CancelToken::new()).expect("read");
+    let loaded =
+        load(&path, encoding, ImageLimits::default(), &unwatched, &CancelToken::new()).expect("read");
     let folder = format!("{}/", folder.path().display());
     loaded.warnings.iter().map(|warning| warning.replace(&folder, "")).collect()
 }

@@ -14,8 +14,8 @@ use super::meshes::Meshes;
 use super::{Counts, Findings, Reading, Staged, Stop, loaded_and_kept};
 use crate::assets::AssetError;
 use crate::assets::image::{
-    ColorCurve, ImageEncoding, ImageLimits, ImageWithin, LoadedImage, coverage, load_hashed, load_within, mipmaps,
-    size, size_within,
+    ColorCurve, ImageEncoding, ImageLimits, ImageWithin, LoadedImage, coverage, load_hashed, load_within,
+    mipmaps, size, size_within,
 };
 use crate::control::{Cancelled, Progress};
 use crate::materials::Mipmaps;
@@ -446,11 +446,7 @@ type Contents = (Content, Option<FileRead>);
 type Found = (Arc<Decoded>, Option<Arc<Mipmaps>>, bool);
 
 /// An image with its levels. `contents` become those that were decoded.
-fn load_one(
-    image: &Wanted<'_>,
-    contents: &mut Contents,
-    reading: &Reading<'_>,
-) -> Result<Found, AssetError> {
+fn load_one(image: &Wanted<'_>, contents: &mut Contents, reading: &Reading<'_>) -> Result<Found, AssetError> {
     let mut was_kept = true;
     let decoded = match &image.kept.texels {
         Some(decoded) => decoded.clone(),

@@ -7,8 +7,8 @@ use crate::assets::image::facts::{Alpha, Facts};
 use crate::assets::image::space::ColorSpace;
 use crate::assets::image::{ColorCurve, ImageEncoding};
 use crate::materials::texels::{TexelData, Texels};
-use crate::math::color::srgb_to_linear;
 use crate::math::Vec3;
+use crate::math::color::srgb_to_linear;
 
 /// Texels that are weighted by alpha; plain ones if the image is opaque.
 pub(super) fn texels(image: DynamicImage, curve: ColorCurve, facts: &Facts) -> Texels {

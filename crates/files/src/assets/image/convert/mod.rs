@@ -116,7 +116,11 @@ fn is_everywhere(image: &DynamicImage, place: usize, value: f32) -> bool {
 }
 
 /// A warning about the alpha that an opacity is taken from, if it is the same in all pixels.
-pub(super) fn constant_alpha(image: &DynamicImage, encoding: ImageEncoding, facts: &Facts) -> Option<&'static str> {
+pub(super) fn constant_alpha(
+    image: &DynamicImage,
+    encoding: ImageEncoding,
+    facts: &Facts,
+) -> Option<&'static str> {
     let ImageEncoding::Number { of: PixelNumber::Opacity | PixelNumber::Mask { .. }, .. } = encoding else {
         return None;
     };
@@ -125,7 +129,9 @@ pub(super) fn constant_alpha(image: &DynamicImage, encoding: ImageEncoding, fact
         return Some("its alpha is 0 everywhere: the surface is invisible");
     }
     match encoding {
-        ImageEncoding::Number { of: PixelNumber::Mask { of_any_color }, .. } if is_everywhere(image, alpha, 1.0) => {
+        ImageEncoding::Number { of: PixelNumber::Mask { of_any_color }, .. }
+            if is_everywhere(image, alpha, 1.0) =>
+        {
             Some(if numbers::is_gray_mask(image, of_any_color) {
                 "its alpha is 1 everywhere: its luminance is the opacity"
             } else {
@@ -190,7 +196,9 @@ fn bytes(samples: &[u8], channels: usize, encoding: ImageEncoding) -> TexelData 
 fn words(samples: &[u16], channels: usize, encoding: ImageEncoding) -> TexelData {
     let value = |word: u16| f32::from(word) / f32::from(u16::MAX);
     let linear: Vec<f32> = match encoding {
-        ImageEncoding::Linear | ImageEncoding::Number { .. } | ImageEncoding::CutOut(_) => (0..=u16::MAX).map(value).collect(),
+        ImageEncoding::Linear | ImageEncoding::Number { .. } | ImageEncoding::CutOut(_) => {
+            (0..=u16::MAX).map(value).collect()
+        }
         ImageEncoding::Color | ImageEncoding::Srgb | ImageEncoding::Raw => {
             (0..=u16::MAX).map(|word| srgb_to_linear(value(word))).collect()
         }
@@ -257,4 +265,3 @@ fn linear<T: Sample>(pixel: &[T], tables: Option<&[Vec<f32>; 3]>) -> [f32; 3] {
 fn clean(value: f32) -> f32 {
     if (0.0..=LARGEST as f32).contains(&value) { value } else { 0.0 }
 }
-

@@ -162,10 +162,18 @@ mod tests {
         let float =
             || DynamicImage::ImageRgb32F(ImageBuffer::from_pixel(1, 1, ::image::Rgb([2.0, f32::NAN, -1.0])));
         assert_eq!(number(float(), of(Channel::Red), false), 2.0);
-        let broken = texels(float(), ImageEncoding::Number { of: of(Channel::Green), is_srgb: false }, &Facts::default());
+        let broken = texels(
+            float(),
+            ImageEncoding::Number { of: of(Channel::Green), is_srgb: false },
+            &Facts::default(),
+        );
         assert_eq!((broken.get(0, 0).x, broken.unusable), (0.0, 1));
         // A pixel counts once, however many of its samples are broken.
-        let broken = texels(float(), ImageEncoding::Number { of: PixelNumber::Luminance, is_srgb: false }, &Facts::default());
+        let broken = texels(
+            float(),
+            ImageEncoding::Number { of: PixelNumber::Luminance, is_srgb: false },
+            &Facts::default(),
+        );
         assert_eq!(broken.unusable, 1);
     }
 }

@@ -100,7 +100,8 @@ type Layers = BTreeMap<String, Layer>;
 /// The channels to read. Colors come before gray, channels without a layer's name before those with one, those of one part before
 /// those of several, then the first; otherwise the only channel of a part, whatever its name.
 pub(super) fn choose(headers: &[Header]) -> Option<Chosen> {
-    let mut parts: Vec<Layers> = headers.iter().enumerate().map(|(part, header)| layers(part, header)).collect();
+    let mut parts: Vec<Layers> =
+        headers.iter().enumerate().map(|(part, header)| layers(part, header)).collect();
     let joined = across_parts(headers);
     // The Y of a part may belong to an X of another.
     for layers in &mut parts {

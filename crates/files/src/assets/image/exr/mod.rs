@@ -45,7 +45,8 @@ impl<R: BufRead + Seek> ExrDecoder<R> {
         let unpacking = Unpacking::new(reader.meta_data(), &samplings);
         check_samplings(unpacking.headers(), channels).map_err(decoding_error)?;
         let needed = channels.all().map(|channel| block_bytes(&reader.headers()[channel.part])).max();
-        let of_chroma = channels.chroma().map_or(0, |chroma| Chroma::memory_bytes(unpacking.headers(), chroma));
+        let of_chroma =
+            channels.chroma().map_or(0, |chroma| Chroma::memory_bytes(unpacking.headers(), chroma));
         if needed.unwrap_or_default().saturating_add(of_chroma) > memory_bytes {
             return Err(ImageError::Limits(LimitError::from_kind(LimitErrorKind::InsufficientMemory)));
         }
@@ -139,9 +140,9 @@ impl<R: BufRead + Seek> ImageDecoder for ExrDecoder<R> {
         };
         samples.fill(0);
         let is_read = |part: usize| channels.all().any(|channel| channel.part == part);
-        let chunks = self.reader.filter_chunks(false, |_, tile, block| {
-            is_read(block.layer) && tile.level_index == Vec2(0, 0)
-        });
+        let chunks = self
+            .reader
+            .filter_chunks(false, |_, tile, block| is_read(block.layer) && tile.level_index == Vec2(0, 0));
         for chunk in chunks.map_err(image_error)? {
             let block = chunk.and_then(|chunk| unpacking.unpacked(chunk)).map_err(image_error)?;
             image.add(&block, samples);
@@ -264,7 +265,9 @@ impl Line<'_> {
             places.zip(samples).for_each(|(place, sample)| put(place, *sample));
         }
         match self.kind {
-            SampleType::F32 => each(self.bytes, skipped, places, |at, bytes| put(at, f32::from_ne_bytes(bytes))),
+            SampleType::F32 => {
+                each(self.bytes, skipped, places, |at, bytes| put(at, f32::from_ne_bytes(bytes)))
+            }
             SampleType::F16 => {
                 each(self.bytes, skipped, places, |at, bytes| put(at, f16::from_ne_bytes(bytes).to_f32()));
             }

@@ -2,7 +2,10 @@
 
 use std::borrow::Cow;
 
-use ::png::{BitDepth, CodingIndependentCodePoints, ColorType, Encoder, Info, ScaledFloat, SourceChromaticities, SrgbRenderingIntent};
+use ::png::{
+    BitDepth, CodingIndependentCodePoints, ColorType, Encoder, Info, ScaledFloat, SourceChromaticities,
+    SrgbRenderingIntent,
+};
 
 use super::*;
 
@@ -67,14 +70,18 @@ const SRGB_CURVE: [f64; 5] = [2.4, 1.0 / 1.055, 0.055 / 1.055, 1.0 / 12.92, 0.04
 
 fn rgb_profile(colorants: [[f64; 3]; 3], curve: Vec<u8>) -> Vec<u8> {
     let [red, green, blue] = colorants.map(xyz);
-    icc(b"RGB ", b"XYZ ", &[
-        (b"rXYZ", red),
-        (b"gXYZ", green),
-        (b"bXYZ", blue),
-        (b"rTRC", curve.clone()),
-        (b"gTRC", curve.clone()),
-        (b"bTRC", curve),
-    ])
+    icc(
+        b"RGB ",
+        b"XYZ ",
+        &[
+            (b"rXYZ", red),
+            (b"gXYZ", green),
+            (b"bXYZ", blue),
+            (b"rTRC", curve.clone()),
+            (b"gTRC", curve.clone()),
+            (b"bTRC", curve),
+        ],
+    )
 }
 
 #[track_caller]
@@ -83,7 +90,8 @@ fn color(file: &[u8]) -> Vec3 {
 }
 
 fn is_plain(file: &[u8]) -> bool {
-    load_bytes("a.png", file, ImageEncoding::Color).expect("a PNG").data == TexelData::Srgb8(vec![[188, 128, 64]])
+    load_bytes("a.png", file, ImageEncoding::Color).expect("a PNG").data
+        == TexelData::Srgb8(vec![[188, 128, 64]])
 }
 
 fn power(exponent: f64) -> Vec3 {
@@ -110,7 +118,9 @@ fn gamma_and_primaries_of_png_count() {
     assert!(is_near(color(&wide), P3), "{}", color(&wide));
     // What files in sRGB say changes no bits.
     let usual = SourceChromaticities::new((0.3127, 0.329), (0.64, 0.33), (0.3, 0.6), (0.15, 0.06));
-    assert!(is_plain(&png(gamma(0.45455))) && is_plain(&png(|info| info.source_chromaticities = Some(usual))));
+    assert!(
+        is_plain(&png(gamma(0.45455))) && is_plain(&png(|info| info.source_chromaticities = Some(usual)))
+    );
 }
 
 #[test]
@@ -120,10 +130,13 @@ fn the_first_of_several_statements_counts() {
         gamma(0.5)(info);
         info.source_chromaticities = Some(p3());
     };
-    assert!(is_near(color(&png(|info| {
-        all(info);
-        profile(linear())(info);
-    })), power(1.0)));
+    assert!(is_near(
+        color(&png(|info| {
+            all(info);
+            profile(linear())(info);
+        })),
+        power(1.0)
+    ));
     let srgb = png(|info| {
         info.srgb = Some(SrgbRenderingIntent::Perceptual);
     });
@@ -172,7 +185,10 @@ fn profiles_that_are_not_read_are_warnings() {
         let file = png(profile(bytes));
         assert!(is_plain(&file), "{reason}");
         let warnings = warned("a.png", &file, ImageEncoding::Color);
-        assert_eq!(warnings, [format!("a.png: its color profile is ignored: {reason}; its colors count as sRGB")]);
+        assert_eq!(
+            warnings,
+            [format!("a.png: its color profile is ignored: {reason}; its colors count as sRGB")]
+        );
         assert_eq!(warned("a.png", &file, ImageEncoding::Srgb), warnings);
     }
     let whole = rgb_profile(SRGB, para(3, &SRGB_CURVE));

@@ -19,9 +19,8 @@ fn texels(image: DynamicImage, encoding: ImageEncoding, alpha: Alpha) -> Texels 
 #[test]
 fn alpha_weights_colors_unless_it_is_1_everywhere() {
     let cut = [[255, 0, 0, 51], [0, 255, 0, 255]];
-    let of = |pixels: &[[u8; 4]], curve| {
-        texels(bytes(pixels), ImageEncoding::CutOut(curve), Alpha::Straight).data
-    };
+    let of =
+        |pixels: &[[u8; 4]], curve| texels(bytes(pixels), ImageEncoding::CutOut(curve), Alpha::Straight).data;
     assert_eq!(of(&cut, ColorCurve::Auto), TexelData::SrgbAlpha8(cut.to_vec()));
     assert_eq!(of(&cut, ColorCurve::Linear), TexelData::LinearAlpha8(cut.to_vec()));
     assert_eq!(of(&[[1, 2, 3, 255]], ColorCurve::Srgb), TexelData::Srgb8(vec![[1, 2, 3]]));
@@ -74,7 +73,10 @@ fn a_mask_without_alpha_of_its_own_is_its_luminance() {
     };
     assert!(warning(gray(), mask(false)).is_some_and(|words| words.contains("its luminance is")));
     assert!(warning(red(), mask(false)).is_some_and(|words| words.contains("is opaque")));
-    assert!(warning(bytes(&[[1, 2, 3, 0]]), PixelNumber::Opacity).is_some_and(|words| words.contains("invisible")));
+    assert!(
+        warning(bytes(&[[1, 2, 3, 0]]), PixelNumber::Opacity)
+            .is_some_and(|words| words.contains("invisible"))
+    );
     assert_eq!(warning(red(), PixelNumber::Opacity), None);
     assert_eq!(warning(bytes(&[[1, 2, 3, 9], [1, 2, 3, 255]]), mask(false)), None);
 }

@@ -174,7 +174,10 @@ fn colors_may_have_a_part_for_each_channel() {
     let expected: Vec<_> = RAMP.iter().map(|&red| Vec3::new(red, 9.0, 1.0)).collect();
     let (nines, ones) = ([9.0; 4], [1.0; 4]);
     assert_eq!(texels(&parts(&[("R", RAMP), ("G", nines), ("B", ones)])), expected);
-    assert_eq!(texels(&parts(&[("Z", OTHER), ("B", ones), ("A", OTHER), ("G", nines), ("R", RAMP)])), expected);
+    assert_eq!(
+        texels(&parts(&[("Z", OTHER), ("B", ones), ("A", OTHER), ("G", nines), ("R", RAMP)])),
+        expected
+    );
     assert_eq!(texels(&parts(&[("l.R", RAMP), ("l.G", nines), ("l.B", ones), ("l.A", ones)])), expected);
     assert_eq!(texels(&parts(&[("Y", RAMP), ("Z", OTHER)])), grey(RAMP));
     for vector in [&["X", "Y", "Z"][..], &["R", "G"], &["u.Y", "u.X"]] {
@@ -245,13 +248,15 @@ fn subsampled(window: [i32; 4]) -> Vec<u8> {
         vec![0],
     ]
     .concat();
-    let floats = |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
+    let floats =
+        |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|value| value.to_le_bytes()).collect() };
     // Rows of BY, RY and Y, then of Y only.
     let rows = [floats(&[0.0, 1.0, 0.0, 0.5, 1.0, 1.0, 1.0, 1.0]), floats(&[2.0; 4])];
     let start = header.len() + 16;
     let offsets = [start, start + 8 + rows[0].len()].map(|offset| (offset as u64).to_le_bytes()).concat();
     let [first, second] = &rows;
-    let chunks = [ints(&[0, first.len() as i32]), first.clone(), ints(&[1, second.len() as i32]), second.clone()];
+    let chunks =
+        [ints(&[0, first.len() as i32]), first.clone(), ints(&[1, second.len() as i32]), second.clone()];
     [header, offsets, chunks.concat()].concat()
 }
 

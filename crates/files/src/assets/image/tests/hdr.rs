@@ -76,8 +76,8 @@ fn values_are_divided_by_all_exposures_and_corrections() {
     // The exposure is no matter of encoding.
     let number = ImageEncoding::Number { of: PixelNumber::Luminance, is_srgb: false };
     for encoding in [ImageEncoding::Linear, ImageEncoding::Raw, number] {
-        let [plain, divided] = ["", "EXPOSURE=2\n"]
-            .map(|header| texels(&file(header, "-Y 1 +X 1", &PIXEL), encoding)[0]);
+        let [plain, divided] =
+            ["", "EXPOSURE=2\n"].map(|header| texels(&file(header, "-Y 1 +X 1", &PIXEL), encoding)[0]);
         assert_eq!(divided, plain / 2.0, "{encoding:?}");
     }
     for line in ["EXPOSURE=0", "EXPOSURE=-1", "EXPOSURE=x", "EXPOSURE=1 2", "COLORCORR=1 1", "GAMMA=2.2"] {
@@ -92,7 +92,8 @@ fn values_are_divided_by_all_exposures_and_corrections() {
 fn primaries_are_converted() {
     let white = [64, 64, 64, 129];
     let rec_2020 = "PRIMARIES=.708 .292 .17 .797 .131 .046 .3127 .329\n";
-    let color = |header: &str, pixel: &[u8]| texels(&file(header, "-Y 1 +X 1", pixel), ImageEncoding::Color)[0];
+    let color =
+        |header: &str, pixel: &[u8]| texels(&file(header, "-Y 1 +X 1", pixel), ImageEncoding::Color)[0];
     let near = |a: Vec3, b: Vec3| (a - b).length() < 2e-3;
     assert!(near(color(rec_2020, &white), Vec3::splat(0.5)));
     assert!(near(color(rec_2020, &[64, 0, 0, 129]), Vec3::new(0.8302, 0.0, 0.0)));

@@ -30,8 +30,19 @@ impl Kind {
     /// The kind by its keyword, in any case.
     pub(super) fn of(keyword: &str) -> Option<Self> {
         const OTHERS: [&str; 13] = [
-            "map_Ns", "disp", "map_Disp", "decal", "refl", "map_Refl", "map_Tr", "map_Tf", "map_Ps", "map_Pc",
-            "map_Pcr", "map_aniso", "map_aat",
+            "map_Ns",
+            "disp",
+            "map_Disp",
+            "decal",
+            "refl",
+            "map_Refl",
+            "map_Tr",
+            "map_Tf",
+            "map_Ps",
+            "map_Pc",
+            "map_Pcr",
+            "map_aniso",
+            "map_aat",
         ];
         Some(match keyword.to_ascii_lowercase().as_str() {
             "map_kd" => Self::Diffuse,
@@ -51,12 +62,9 @@ impl Kind {
     fn is_color(self) -> bool {
         match self {
             Self::Diffuse | Self::Specular | Self::Emission | Self::Ambient => true,
-            Self::Opacity
-            | Self::Normal
-            | Self::Bump
-            | Self::Roughness
-            | Self::Metallic
-            | Self::Other(_) => false,
+            Self::Opacity | Self::Normal | Self::Bump | Self::Roughness | Self::Metallic | Self::Other(_) => {
+                false
+            }
         }
     }
 
@@ -184,7 +192,8 @@ impl Map {
 
     /// Options without effect on a map of this kind.
     pub(super) fn ignored(&self, kind: Kind) -> impl Iterator<Item = String> {
-        let channel = (self.number.is_some() && (kind.is_color() || kind.is_normal())).then(|| "-imfchan".to_owned());
+        let channel =
+            (self.number.is_some() && (kind.is_color() || kind.is_normal())).then(|| "-imfchan".to_owned());
         let range = (self.range != [0.0, 1.0] && kind.is_normal()).then(|| "-mm".to_owned());
         let strength = (self.strength != 1.0 && !kind.is_normal()).then(|| "-bm".to_owned());
         self.ignored.iter().cloned().chain(channel).chain(range).chain(strength)

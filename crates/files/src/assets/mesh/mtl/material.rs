@@ -13,7 +13,8 @@ use crate::math::{DVec3, Vec3};
 pub(in crate::assets::mesh) fn material(found: &MtlMaterial, folder: &Path) -> FileMaterial {
     let texture = |kind| found.map(kind).and_then(|map| map.texture(folder));
     let specular = color(found, Colour::Specular, 0.0);
-    let is_mirror = matches!(found.illumination, Some(at) if matches!(at.value, 3 | 5 | 8)) && specular != Vec3::ZERO;
+    let is_mirror =
+        matches!(found.illumination, Some(at) if matches!(at.value, 3 | 5 | 8)) && specular != Vec3::ZERO;
     let diffuse_texture = texture(Kind::Diffuse);
     let plain = match diffuse_texture {
         Some(_) => 1.0,
@@ -75,7 +76,8 @@ fn physical(found: &MtlMaterial, folder: &Path) -> Option<PhysicalMaterial> {
     let [roughness_map, metallic_map] = [Kind::Roughness, Kind::Metallic].map(|kind| found.map(kind));
     let is_physical = NUMBERS.iter().any(|number| found.number(*number).is_some());
     let has_maps = roughness_map.is_some() || metallic_map.is_some();
-    let number = |number, otherwise| found.number(number).map_or(otherwise, |value| value.clamp(0.0, 1.0) as f32);
+    let number =
+        |number, otherwise| found.number(number).map_or(otherwise, |value| value.clamp(0.0, 1.0) as f32);
     (is_physical || has_maps).then(|| PhysicalMaterial {
         roughness: number(Number::Roughness, 0.5),
         metallic: number(Number::Metallic, 0.0),

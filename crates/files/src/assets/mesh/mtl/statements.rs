@@ -159,7 +159,9 @@ fn number(keyword: &str, number: Number, rest: &str) -> Result<Statement, String
         words => words.first(),
     };
     let value = word.and_then(|word| finite::<f32>(word));
-    value.map(|value| Statement::Number(number, value)).ok_or_else(|| format!("`{keyword}` is followed by a finite number"))
+    value
+        .map(|value| Statement::Number(number, value))
+        .ok_or_else(|| format!("`{keyword}` is followed by a finite number"))
 }
 
 fn illumination(rest: &str) -> Result<Statement, String> {

@@ -16,7 +16,8 @@ fn warned(text: &[u8]) -> Vec<String> {
     let path = folder.path().join("a.mtl");
     std::fs::write(&path, text).expect("written");
     let token = CancelToken::new();
-    let Library { materials, ignored, .. } = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole");
+    let Library { materials, ignored, .. } =
+        load(&path, Watch { progress: &unwatched, token: &token }).expect("whole");
     warnings(Path::new("a.mtl"), ignored, materials.iter())
 }
 
@@ -156,8 +157,7 @@ fn the_pictures_of_all_maps_are_known() {
     let maps =
         ["map_Ka", "map_Kd", "map_Ks", "map_Ns", "map_d", "map_Bump", "norm", "map_Ke", "disp", "decal"];
     let statements = maps.map(|map| format!("{map} {map}.png\n")).concat();
-    std::fs::write(&path, format!("newmtl a\n{statements}refl -type sphere map_Kd.png\n"))
-        .expect("written");
+    std::fs::write(&path, format!("newmtl a\n{statements}refl -type sphere map_Kd.png\n")).expect("written");
     let token = CancelToken::new();
     let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole").materials;
     let mut expected = maps.map(|map| PathBuf::from(format!("models/{map}.png")));
@@ -184,8 +184,7 @@ fn a_comment_may_follow_a_file() {
     std::fs::write(folder.path().join("wall.png"), "").expect("written");
     std::fs::write(folder.path().join("Map #1.png"), "").expect("written");
     let file = |name: &str| Some(FileTexture::new(folder.path().join(name)));
-    let text =
-        "newmtl a\nmap_Kd -bm 2 wall.png # of brick\nmap_Ks Map #1.png # as it came\nnorm no #2.png\n";
+    let text = "newmtl a\nmap_Kd -bm 2 wall.png # of brick\nmap_Ks Map #1.png # as it came\nnorm no #2.png\n";
     let path = folder.path().join("a.mtl");
     std::fs::write(&path, text).expect("written");
     let token = CancelToken::new();
@@ -294,9 +293,18 @@ fn ignored_statements_are_named_with_their_line() {
         ("illum 99\n", "a.mtl:2: this `illum` is no model of the format; it counts as 2"),
         ("illum 4\n", "a.mtl:2: glass without an index of refraction `Ni` above 1 is invisible"),
         ("d .5\nTf 1 0 0\n", "a.mtl:3: `Tf` is ignored; a `material` of the scene may have a `tint`"),
-        ("Kd 255 0 0\n", "a.mtl:2: this material reflects more light than falls on it; keep `Kd` and `Ks` at or below 1"),
-        ("Kd .5 .5 .5\nKs .9 .9 .9\nNs 0.5\nillum 2\n", "a.mtl:2: this material reflects more light than falls on it; keep `Kd` and `Ks` at or below 1"),
-        ("Ks 2 2 2\nillum 3\n", "a.mtl:2: this mirror reflects more light than falls on it; `Ks` counts as 1"),
+        (
+            "Kd 255 0 0\n",
+            "a.mtl:2: this material reflects more light than falls on it; keep `Kd` and `Ks` at or below 1",
+        ),
+        (
+            "Kd .5 .5 .5\nKs .9 .9 .9\nNs 0.5\nillum 2\n",
+            "a.mtl:2: this material reflects more light than falls on it; keep `Kd` and `Ks` at or below 1",
+        ),
+        (
+            "Ks 2 2 2\nillum 3\n",
+            "a.mtl:2: this mirror reflects more light than falls on it; `Ks` counts as 1",
+        ),
         ("Kd .1 .1 .1\nKs .9 .9 .9\nillum 3\n", "a.mtl:2: `Kd` below a stronger mirror `Ks` is ignored"),
         ("Ps 0.5\n", "a.mtl:2: `Ps` is ignored"),
         ("Foo 1\n", "a.mtl:2: `Foo` is no known statement and is ignored"),
@@ -326,7 +334,8 @@ fn ignored_statements_are_named_with_their_line() {
 
 #[test]
 fn the_model_decides_about_highlights_and_mirrors() {
-    let of = |model: u8| read(&format!("newmtl a\nKd .8 0 0\nKs .5 .5 .5\nNs 9\nillum {model}\n")).expect("whole");
+    let of =
+        |model: u8| read(&format!("newmtl a\nKd .8 0 0\nKs .5 .5 .5\nNs 9\nillum {model}\n")).expect("whole");
     assert_eq!([0, 1, 2, 10].map(|model| of(model)[0].has_highlight()), [false, false, true, true]);
     assert!(of(3)[0].is_coated());
     let black = read("newmtl a\nKs .5 .5 .5\nillum 3\n").expect("whole");
