@@ -6,6 +6,9 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
+/// A triangle whose corners are this many times farther away than a hit and the start of its ray is huge.
+const HUGE: f64 = 1024.0;
+
 /// A triangle; the front is along (b − a) × (c − a).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
@@ -111,11 +114,15 @@ pub fn weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
 
 impl Exact for Triangle {
     #[inline(always)]
-    fn exact(&self, _: &RayF64, hit: &ShapeHit) -> ExactPoint {
+    fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let (u, v) = (f64::from(hit.u), f64::from(hit.v));
         let (ab, ac) = (self.b - self.a, self.c - self.a);
         let reach = (self.a.abs() + ab.abs() + ac.abs()).max_element();
-        ExactPoint { point: self.a + ab * u + ac * v, normal: ab.cross(ac), reach }
+        let (normal, by_weights) = (ab.cross(ac), self.a + ab * u + ac * v);
+        // The weights are rounded to `f32`: where the triangle is huge, the ray gives a better point.
+        let by_ray = ray.at((self.a - ray.origin).dot(normal) / ray.direction.dot(normal));
+        let is_huge = ray.origin.abs().max(by_ray.abs()).max_element() * HUGE < reach;
+        ExactPoint { point: if is_huge { by_ray } else { by_weights }, normal, reach }
     }
 }
 
@@ -137,6 +144,22 @@ mod tests {
             let origin = Vec3::new(0.3, 0.4, z);
             let hit = triangle.intersect(&Ray::new(origin, target - origin).to_f64()).expect("aimed inside");
             assert!((hit.t - 1.0).abs() < 1e-6 && (hit.u - 0.2).abs() < 1e-6 && (hit.v - 0.3).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_point_of_a_huge_triangle_is_on_the_ray() {
+        let corner = |x: f64, z: f64| DVec3::new(x, 0.3 * x - 0.2 * z, z);
+        for size in [1e5, 1e7, 1e9] {
+            let [a, b, c] = [corner(-size, size), corner(size, size), corner(0.1, -size)];
+            let ray = Ray::new(Vec3::new(0.25, 3.0, -0.5), Vec3::new(0.3, -1.0, 0.1)).to_f64();
+            let triangle = Triangle { a, b, c };
+            let surface = triangle.surface(&ray, &triangle.intersect(&ray).expect("below"));
+            let t =
+                (0.3 * 0.25 + 0.2 * 0.5 - 3.0) / (-1.0 - 0.3 * f64::from(0.3_f32) + 0.2 * f64::from(0.1_f32));
+            let off = (surface.point.as_dvec3() - ray.at(t)).abs().max_element();
+            assert!(off < 1e-6 + size * 1e-14, "{size}: {off}");
+            assert!(surface.error.max_element() < 1e-5 + size as f32 * 1e-13, "{size}: {}", surface.error);
         }
     }
 

@@ -1,6 +1,7 @@
 //! Points of the triangles of an instance: where, how exactly, and by which normals.
 
 use super::placement::Placement;
+use crate::geometry::RayF64;
 use crate::geometry::surface::double_error;
 use crate::math::{DVec3, Vec3};
 
@@ -20,7 +21,21 @@ pub(super) struct Facet {
     pub(super) barycentric: Vec3,
     /// Whether a ray that starts here may be beyond a neighbour, see [`PlacedMesh::drawn_in`].
     pub(super) is_beside_edge: bool,
+    /// Whether the weights may be too coarse for the point, see [`PlacedMesh::on_ray`].
+    is_coarse: bool,
 }
+
+impl Facet {
+    /// Whether [`PlacedMesh::corrected`] may change the point.
+    #[inline(always)]
+    pub(super) fn is_doubtful(&self) -> bool {
+        self.is_beside_edge | self.is_coarse
+    }
+}
+
+/// Corners of a triangle this many times farther away than the point and the start of the ray make the weights of `f32` too coarse:
+/// the point is then computed from the ray.
+const COARSE: f64 = 1024.0;
 
 /// Errors of a point between it and the edges of its triangle: rounding a point and moving it off the surface takes two of them.
 pub(super) const ASIDE: f64 = 4.0;
@@ -88,7 +103,50 @@ impl<P: Placement> PlacedMesh<P> {
             normal: self.placement.normal(across).normalize().as_vec3(),
             barycentric: Vec3::new(1.0 - u as f32 - v as f32, u as f32, v as f32),
             is_beside_edge,
+            is_coarse: f64::from(point.abs().max_element()) * COARSE < self.greatest(corners),
         }
+    }
+
+    /// The greatest coordinate of a triangle in the scene, or more.
+    #[inline(always)]
+    fn greatest(&self, [a, b, c]: [DVec3; 3]) -> f64 {
+        let greatest = self.placement.reach(a.abs().max(b.abs()).max(c.abs()));
+        (greatest + self.placement.shift().abs()).max_element()
+    }
+
+    /// The point of a doubtful facet and its error: from the ray, or drawn in from an edge.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn corrected(&self, facet: &Facet, ray: &RayF64, weights: [f32; 2]) -> [Vec3; 2] {
+        match self.on_ray(facet, ray) {
+            Some(corrected) => corrected,
+            None if facet.is_beside_edge => self.drawn_in(facet, weights),
+            None => [facet.point, facet.error],
+        }
+    }
+
+    /// Whether the point of a facet is computed from the ray.
+    #[inline(always)]
+    pub(super) fn is_on_ray(&self, facet: &Facet, ray: &RayF64) -> bool {
+        facet.is_coarse && self.on_ray(facet, ray).is_some()
+    }
+
+    /// The point where the ray meets the plane of a triangle much larger than the distances from the scene's origin to the point and to
+    /// the start of the ray. `None` for other triangles.
+    fn on_ray(&self, facet: &Facet, ray: &RayF64) -> Option<[Vec3; 2]> {
+        if !facet.is_coarse {
+            return None;
+        }
+        let [a, b, c] = facet.corners;
+        let greatest = self.greatest(facet.corners);
+        let normal = self.placement.normal((b - a).cross(c - a));
+        let t = (self.placement.point(a) - ray.origin).dot(normal) / ray.direction.dot(normal);
+        let point = ray.at(t);
+        let reach = ray.origin.abs().max(point.abs()).max_element();
+        let apart = (point - facet.point.as_dvec3()).abs().max_element();
+        let is_better = reach * COARSE < greatest && apart <= greatest * f64::from(32.0 * f32::EPSILON);
+        let rounded = point.as_vec3();
+        is_better.then(|| [rounded, self.error(rounded, facet.local, facet.corners)])
     }
 
     /// Least distance, in the mesh's coordinates, of a point from the edges of its triangle: errors of the point, and of the test of
@@ -101,9 +159,7 @@ impl<P: Placement> PlacedMesh<P> {
 
     /// A point beside an edge, and its error, drawn into the triangle until the errors are aside. Else a ray could start beyond the
     /// wall that meets this one there, and leave a closed room.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn drawn_in(&self, facet: &Facet, [u, v]: [f32; 2]) -> [Vec3; 2] {
+    fn drawn_in(&self, facet: &Facet, [u, v]: [f32; 2]) -> [Vec3; 2] {
         let [a, b, c] = facet.corners;
         let (ab, ac) = (b - a, c - a);
         let least = self.least_aside(facet.error, facet.corners) / ab.cross(ac).length();

@@ -199,8 +199,8 @@ impl MeshInstance {
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
         let facet = placed.facet(vertices.map(|vertex| mesh.positions[vertex]), [hit.u, hit.v]);
         let Facet { corners: [a, b, c], normal, barycentric, .. } = facet;
-        let [point, error] = match facet.is_beside_edge {
-            true => placed.drawn_in(&facet, [hit.u, hit.v]),
+        let [point, error] = match facet.is_doubtful() {
+            true => placed.corrected(&facet, ray, [hit.u, hit.v]),
             false => [facet.point, facet.error],
         };
         let (uv, dpdu, dpdv) = if asked.uv {
@@ -213,7 +213,7 @@ impl MeshInstance {
             let normals = self.tree.normals();
             let normals = vertices.map(|vertex| normals[vertex]);
             shading_normal = placed.shading_normal(&facet, &normals);
-            if asked.shadow_point {
+            if asked.shadow_point && !placed.is_on_ray(&facet, ray) {
                 shadow_point = placed.shadow_point(&facet, &normals, ray.direction);
             }
         }

@@ -51,18 +51,20 @@ impl MeshInstance {
         }
         let corners = of_vertices(&vertices, &mesh.positions);
         let corners_of = |i: usize| [lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)];
-        let (mut found, mut beside) = (SurfaceRow::EMPTY, [0; PACKET]);
+        let (mut found, mut doubtful) = (SurfaceRow::EMPTY, [0; PACKET]);
         for i in 0..PACKET {
             let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
             set_lane(&mut found.point, i, facet.point);
             set_lane(&mut found.error, i, facet.error);
             set_lane(&mut found.normal, i, facet.normal);
-            beside[i] = if facet.is_beside_edge { TRUE } else { 0 };
+            doubtful[i] = if facet.is_doubtful() { TRUE } else { 0 };
         }
-        // Few are beside an edge.
-        for i in lanes(folds.bits(&beside) & of) {
+        // Few are beside an edge, or of a huge triangle.
+        let doubtful = folds.bits(&doubtful) & of;
+        for i in lanes(doubtful) {
             let uv = [hits.u[i], hits.v[i]];
-            let [point, error] = placed.drawn_in(&placed.facet(corners_of(i), uv), uv);
+            let [point, error] =
+                placed.corrected(&placed.facet(corners_of(i), uv), &rays.ray(i).to_f64(), uv);
             set_lane(&mut found.point, i, point);
             set_lane(&mut found.error, i, error);
         }
@@ -79,6 +81,12 @@ impl MeshInstance {
                 let direction = lane(&rays.direction, i).as_dvec3();
                 let lifted = placed.shadow_point(&facet, &normals_of(i), direction);
                 set_lane(&mut found.shadow_point, i, lifted);
+            }
+            for i in lanes(doubtful) {
+                let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
+                if placed.is_on_ray(&facet, &rays.ray(i).to_f64()) {
+                    set_lane(&mut found.shadow_point, i, lane(&found.point, i));
+                }
             }
             surface.take_smooth(of, &found);
         }
@@ -193,6 +201,53 @@ mod tests {
             }
         }
         instances
+    }
+
+    #[test]
+    fn points_of_huge_triangles_are_on_their_rays() {
+        for size in [1e5_f32, 1e7, 1e9] {
+            let at = |x: f32, z: f32| Vec3::new(x * size, 0.0, z * size);
+            let mesh = TriangleMesh {
+                positions: vec![at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)],
+                triangles: vec![[0, 1, 2], [0, 2, 3]],
+                ..TriangleMesh::default()
+            };
+            let loaded = Arc::new(LoadedMesh { mesh, ..LoadedMesh::default() });
+            let tree = MeshTree::build(loaded, Accel::Bvh, &CancelToken::new()).expect("nobody cancels");
+            let tree = Arc::new(tree);
+            let turned = Transform::scale_rotate_translate(DVec3::ONE, DVec3::Y * 30.0, DVec3::Y * 0.25);
+            for (mesh, height) in [
+                (MeshInstance::new(Arc::clone(&tree), Transform::IDENTITY, false), 0.0),
+                (MeshInstance::new(Arc::clone(&tree), Transform::IDENTITY, true), 0.0),
+                (MeshInstance::new(tree, turned, true), 0.25),
+            ] {
+                let mut next = random(3);
+                // Some start on the edge that the two triangles share.
+                let ray = |i: usize| {
+                    let [x, z] = if i % 2 == 0 { [0.5, 0.5] } else { [next(), next()] };
+                    Ray::new(Vec3::new(x, 1.0 + height, z), Vec3::new(next() * 0.5, -1.0, next() * 0.5))
+                };
+                let rays: Vec<Ray> = (0..PACKET).map(ray).collect();
+                let mut hits = HitRows::none();
+                for (i, ray) in rays.iter().enumerate() {
+                    let hit = mesh.tree.triangles().closest(&mesh.local_ray(ray)).expect("the ground");
+                    hits.put(i, &hit);
+                }
+                let (of, set) = (u32::MAX >> (32 - PACKET), UvSet::First);
+                let filling = Filling { mesh: &mesh, rays: &rays, hits: &hits, of, set };
+                let row = Instructions::best().run(filling);
+                for (i, ray) in rays.iter().enumerate() {
+                    let exact = ray.origin.as_dvec3() + ray.direction.as_dvec3();
+                    let surface = mesh.surface(&ray.to_f64(), &hits.get(i).expect("a hit"), Asked::ALL);
+                    let off = (surface.point.as_dvec3() - exact).abs().max_element();
+                    assert!(off < 2e-6 + f64::from(size) * 1e-14, "{size}: {off}");
+                    assert!(surface.error.y < 2e-5 + size * 1e-14, "{size}: {}", surface.error);
+                    assert_eq!(surface.shadow_point, surface.point);
+                    assert_eq!([lane(&row.point, i), lane(&row.error, i)], [surface.point, surface.error]);
+                    assert!(!mesh.smooth || lane(&row.shadow_point, i) == surface.shadow_point);
+                }
+            }
+        }
     }
 
     #[test]
