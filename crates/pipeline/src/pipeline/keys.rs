@@ -24,7 +24,22 @@ pub(in crate::pipeline) fn tree(mesh: &Key, accel: Accel) -> Key {
 
 /// Key of all geometry in trees.
 pub(in crate::pipeline) fn geometry(scene: &Scene, of: &Referents<'_>, origin: DVec3) -> Key {
-    in_trees(&from(&shapes(scene, of), origin), scene.render.accel)
+    in_trees(&from(&coplanar(scene, of), origin), scene.render.accel)
+}
+
+/// Key of shapes and of which of them emit: lights in the plane of other shapes are moved.
+pub(in crate::pipeline) fn coplanar(scene: &Scene, of: &Referents<'_>) -> Key {
+    let mut key = Fingerprint::new("coplanar");
+    key.key(&shapes(scene, of));
+    for object in &scene.objects {
+        let material = object.material.map(|index| &scene.materials[index]);
+        let emission = material.filter(|material| material.emits()).map(|material| material.emission.sides);
+        key.flag(object.material.is_some()).flag(emission.is_some());
+        if let Some(sides) = emission {
+            key.choice(sides);
+        }
+    }
+    key.finish()
 }
 
 /// These things in coordinates that start somewhere.
@@ -64,11 +79,14 @@ pub(in crate::pipeline) fn glass(scene: &Scene, of: &Referents<'_>) -> Key {
 pub(in crate::pipeline) fn lights(
     scene: &Scene,
     of: &Referents<'_>,
-    origin: DVec3,
+    (origin, lifts): (DVec3, &[DVec3]),
     (sky, patterns): (Option<&Key>, &[&Key]),
 ) -> Key {
     let mut key = Fingerprint::new("lights");
     key.key(&from(&described_lights(scene, of), origin)).flag(sky.is_some());
+    for lift in lifts {
+        key.dvec3(*lift);
+    }
     if let Some(sky) = sky {
         key.key(sky);
     }

@@ -1,5 +1,6 @@
 //! The lights of a scene: those without extent, and the objects that emit.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::lower::{emission, file_emission, file_opacity, opacity};
@@ -199,7 +200,7 @@ fn mesh_lights(
                 (corners, Side::Front) => corners,
                 ([a, b, c], Side::Back) => [a, c, b],
             };
-            let triangles = triangles_of(mesh, own).map(|id| (corners(id), id)).collect();
+            let triangles = distinct(mesh, own).map(|id| (corners(id), id)).collect();
             let Some(emitter) = MeshEmitter::new(triangles, token)? else { return Ok(None) };
             let radiance = shining.emission.scale;
             let bounds = shining.mean_of(emitter.bounds().times(radiance));
@@ -226,6 +227,19 @@ fn triangles_of(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u
     let mesh = &mesh.tree.loaded().mesh;
     let is_meant = move |id: &u32| own.is_none() || mesh.materials.get(*id as usize).copied() == own;
     (0..mesh.triangles.len() as u32).filter(is_meant)
+}
+
+/// [`triangles_of`] without those whose corners another one has in the same order: a face that a file has twice emits once.
+fn distinct(mesh: &MeshInstance, own: Option<u32>) -> impl Iterator<Item = u32> {
+    let mut known = HashSet::new();
+    triangles_of(mesh, own).filter(move |id| {
+        // Adding 0 turns −0 into 0.
+        let place = |corner: Vec3| (corner + Vec3::ZERO).to_array().map(f32::to_bits);
+        let mut corners = mesh.tree.loaded().mesh.corners(*id).map(place);
+        let first = (0..3).min_by_key(|index| corners[*index]).unwrap_or(0);
+        corners.rotate_left(first);
+        known.insert(corners)
+    })
 }
 
 #[cfg(test)]

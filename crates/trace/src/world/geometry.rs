@@ -10,6 +10,7 @@ use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::scene::description::{self, Lowered, Scene};
 
+use super::coplanar::lifts;
 use super::isolated::Isolated;
 use super::merged::MergedTriangle;
 use super::{MergedMeshes, MeshInstance, MeshTree, Object};
@@ -38,6 +39,8 @@ pub struct Geometry {
     mesh_rounding: f32,
     /// Places with nothing near their surface.
     isolated: Isolated,
+    /// How far objects are moved; empty if none is.
+    lifts: Vec<DVec3>,
     instructions: Instructions,
 }
 
@@ -61,8 +64,18 @@ impl Geometry {
         origin: DVec3,
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
-        let objects = scene.objects.iter().map(|object| lowered(&object.shape, meshes, origin, token));
-        Ok(Self { origin, ..Self::build(objects.collect::<Result<_, _>>()?, token)? })
+        let loaded: Vec<_> = meshes.iter().map(|mesh| mesh.loaded()).collect();
+        let lifts = lifts(scene, &loaded, origin);
+        let lift = |object: usize| lifts.get(object).copied().unwrap_or(DVec3::ZERO);
+        let objects = scene.objects.iter().enumerate();
+        let built = objects.map(|(id, object)| lowered(&object.shape, meshes, origin - lift(id), token));
+        let built = built.collect::<Result<_, _>>()?;
+        Ok(Self { origin, lifts, ..Self::build(built, token)? })
+    }
+
+    /// How far objects are moved, see [`super::coplanar_lights`]; empty if none is.
+    pub fn lifts(&self) -> &[DVec3] {
+        &self.lifts
     }
 
     /// Builds the tree over objects.
@@ -87,7 +100,17 @@ impl Geometry {
         let mesh_rounding = rounding.fold(0.0, f32::max);
         let origin = DVec3::ZERO;
         let isolated = Isolated::new(&boxes);
-        Ok(Self { objects, origin, tree, merged, unbounded, mesh_rounding, isolated, instructions })
+        Ok(Self {
+            objects,
+            origin,
+            tree,
+            merged,
+            unbounded,
+            mesh_rounding,
+            isolated,
+            lifts: Vec::new(),
+            instructions,
+        })
     }
 
     /// The objects, which an index names.

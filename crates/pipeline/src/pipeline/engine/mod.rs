@@ -46,6 +46,7 @@ use super::settings::{Checkpoints, Overrides, OwnSettings, Resume, View};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
 use super::stages::containers::Containers;
+use super::stages::coplanar::coplanar;
 use super::stages::glass::glass;
 use super::stages::lights::{SkyMemo, lights};
 use super::stages::meshes::{KeptMesh, MeshName, Meshes, meshes};
@@ -70,7 +71,7 @@ use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
 use crate::system::threads::{check_room, not_started};
-use crate::world::{Bodies, Lookups, World};
+use crate::world::{Bodies, Coplanar, Lookups, World};
 
 /// Means of an engine; tests replace some of them.
 #[derive(Clone, Copy)]
@@ -95,6 +96,7 @@ pub(super) struct Engine {
     parsed: Memo<Arc<Parsed>>,
     meshes: Pool<MeshName, KeptMesh>,
     bodies: Memo<Arc<Bodies>>,
+    coplanar: Memo<Vec<Coplanar>>,
     textures: TextureCache,
     accel: AccelCache,
     /// Number of requests so far.
@@ -153,6 +155,7 @@ impl Engine {
             parsed: Memo::default(),
             meshes: Pool::default(),
             bodies: Memo::default(),
+            coplanar: Memo::default(),
             textures: TextureCache::default(),
             accel: AccelCache::default(),
             requests: 0,
@@ -529,6 +532,7 @@ impl Engine {
         let texels = table.run(Stage::Textures, || textures(loaded, &needed, cache, findings, reading))?;
         self.assets = findings.files.clone();
         let bodies = glass(loaded, &found, &mut self.bodies, findings, reading.token)?;
+        coplanar(loaded, &found, &mut self.coplanar, findings);
         if findings.errors.is_empty() {
             self.say_files(findings, table.sink);
             let warnings = [findings.conflicts.as_slice(), &findings.warnings].concat();
@@ -660,6 +664,7 @@ impl Engine {
             wanted.are_required = true;
             let texels = textures(loaded, &wanted, &mut self.textures, &mut findings, &reading)?.value;
             glass(loaded, &found, &mut self.bodies, &mut findings, token)?;
+            coplanar(loaded, &found, &mut self.coplanar, &mut findings);
             let overrides = Overrides::default();
             let plan = plan(&loaded.scene, path, &overrides)
                 .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;

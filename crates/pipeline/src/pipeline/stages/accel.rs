@@ -10,7 +10,7 @@ use super::{Reading, Staged, Stop};
 use crate::math::DVec3;
 use crate::scene::description::Scene;
 use crate::scene::fingerprint::{Key, Referents};
-use crate::world::{Geometry, MeshTree};
+use crate::world::{Geometry, MeshTree, with_lifted_lights};
 
 /// Cache of the stage.
 #[derive(Debug, Default)]
@@ -104,7 +104,8 @@ fn trees(
                 tree
             }
             None => {
-                let build = || MeshTree::build(mesh.mesh.clone(), accel, reading.token);
+                let loaded = with_lifted_lights(&mesh.mesh).map_or_else(|| mesh.mesh.clone(), Arc::new);
+                let build = || MeshTree::build(loaded, accel, reading.token);
                 let tree = Arc::new(reading.pool.install(build)?);
                 // The tree holds its mesh, also when that is read anew.
                 let bytes = tree.memory_bytes() + mesh.mesh.mesh.memory_bytes();

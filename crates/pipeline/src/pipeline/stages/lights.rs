@@ -28,7 +28,7 @@ pub(in crate::pipeline) fn lights(
     let map = textures.environment.as_ref().map(|(key, _)| key);
     let declared = patterns(scene).filter_map(|source| textures.key_of.get(&source));
     let patterns: Vec<&Key> = declared.chain(&textures.of_files).collect();
-    let key = keys::lights(scene, of, geometry.origin(), (map, &patterns));
+    let key = keys::lights(scene, of, (geometry.origin(), geometry.lifts()), (map, &patterns));
     if let Some(lights) = memo.get(key).filter(|lights| !lights.is_empty()) {
         return Ok(Staged::reused(lights.clone(), "no light changed"));
     }

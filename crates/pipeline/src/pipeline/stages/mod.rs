@@ -2,6 +2,7 @@
 
 pub(super) mod accel;
 pub(super) mod containers;
+pub(super) mod coplanar;
 pub(super) mod glass;
 pub(super) mod lights;
 pub(super) mod meshes;

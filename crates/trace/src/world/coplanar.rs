@@ -1,0 +1,331 @@
+//! Lights in the plane of other surfaces.
+//!
+//! No ray can tell which of two surfaces in one plane comes first. A light there would be hit on one path and missed on another, and the
+//! two estimates of its light would disagree. Such a light is lifted off the plane by a hair, towards the side to which it emits.
+
+use std::collections::HashMap;
+
+use super::lower::file_emits;
+use crate::assets::LoadedMesh;
+use crate::geometry::cuboid::Cuboid;
+use crate::geometry::mesh::TriangleMesh;
+use crate::materials::EmissionSides;
+use crate::math::{DVec3, Vec2, Vec3};
+use crate::scene::description::{Scene, Shape};
+
+/// Distance between a light and a plane, in units of the light's size, below which they coincide.
+const COINCIDENT: f64 = 1.0 / (1 << 20) as f64;
+/// The lift, in units of the size of the light and its surroundings: far above the rounding of `f32`, far below what is seen.
+const LIFT: f64 = 1.0 / (1 << 16) as f64;
+/// Greatest sine between the normals of coincident faces.
+const PARALLEL: f64 = 1e-5;
+/// Most sizes of the light that count as its surroundings.
+const SURROUNDINGS: f64 = 16.0;
+/// Most pairs of a light's face and another face that are compared; further faces of a scene with more are not.
+const MOST_PAIRS: usize = 1 << 26;
+
+/// A light in the plane of a surface that it overlaps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coplanar {
+    /// The object that emits.
+    pub light: usize,
+    /// The other object; the same one if both are faces of one mesh.
+    pub surface: usize,
+    /// Where the light has to be moved.
+    pub lift: DVec3,
+}
+
+/// A flat, convex part of an object.
+#[derive(Clone, Debug)]
+struct Face {
+    object: usize,
+    /// Corners in counterclockwise order, seen from the front; none for an infinite plane.
+    corners: Vec<DVec3>,
+    point: DVec3,
+    /// Unit normal of the front.
+    normal: DVec3,
+    emits: Option<EmissionSides>,
+}
+
+impl Face {
+    fn new(corners: Vec<DVec3>) -> Option<Self> {
+        let [a, b, c] = *corners.first_chunk()?;
+        let normal = (b - a).cross(c - a).try_normalize()?;
+        Some(Self { object: 0, corners, point: a, normal, emits: None })
+    }
+
+    /// The box around the corners. `None` for an infinite plane.
+    fn bounds(&self) -> Option<[DVec3; 2]> {
+        let first = *self.corners.first()?;
+        let grow = |[least, greatest]: [DVec3; 2], at: &DVec3| [least.min(*at), greatest.max(*at)];
+        Some(self.corners.iter().fold([first; 2], grow))
+    }
+
+    fn size(&self) -> f64 {
+        self.bounds().map_or(f64::INFINITY, |[least, greatest]| (greatest - least).max_element())
+    }
+
+    /// Whether it emits to the side of a normal.
+    fn emits_along(&self, normal: DVec3) -> bool {
+        match self.emits {
+            None => false,
+            Some(EmissionSides::Both) => true,
+            Some(EmissionSides::Front) => self.normal.dot(normal) > 0.0,
+        }
+    }
+}
+
+/// Lights that lie in the plane of a surface and overlap it, in coordinates that start at `origin`. `meshes` are those of the scene's
+/// mesh files.
+pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<Coplanar> {
+    let mut lights = Vec::new();
+    for object in 0..scene.objects.len() {
+        if may_emit(scene, meshes, object) {
+            each_face(scene, meshes, (object, origin), None, |face| {
+                if face.emits.is_some() && !face.corners.is_empty() {
+                    lights.push(face.clone());
+                }
+            });
+        }
+    }
+    let all = lights.iter().filter_map(Face::bounds);
+    let Some([least, greatest]) = all.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]) else {
+        return Vec::new();
+    };
+    let margin = (greatest - least).max_element() * COINCIDENT;
+    let region = [least - margin, greatest + margin];
+    let mut found: Vec<Coplanar> = Vec::new();
+    let mut pairs = 0;
+    for object in 0..scene.objects.len() {
+        each_face(scene, meshes, (object, origin), Some(region), |face| {
+            if face.bounds().is_some_and(|bounds| are_apart(bounds, region)) || pairs > MOST_PAIRS {
+                return;
+            }
+            pairs += lights.len();
+            for light in &lights {
+                if coincide(light, face) && is_lifted(light, face) {
+                    add(&mut found, light, face);
+                }
+            }
+        });
+    }
+    found.sort_by_key(|pair| (pair.light, pair.surface));
+    found
+}
+
+/// Whether two boxes, of their least and greatest coordinates, have no point in common.
+fn are_apart(a: [DVec3; 2], b: [DVec3; 2]) -> bool {
+    a[0].cmpgt(b[1]).any() || a[1].cmplt(b[0]).any()
+}
+
+/// How far each object has to be moved; empty if none has.
+pub(super) fn lifts(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<DVec3> {
+    let found = coplanar_lights(scene, meshes, origin);
+    if found.is_empty() {
+        return Vec::new();
+    }
+    let mut lifts = vec![DVec3::ZERO; scene.objects.len()];
+    let mut directions: Vec<(usize, DVec3)> = Vec::new();
+    for Coplanar { light, lift, .. } in found.into_iter().filter(|pair| pair.light != pair.surface) {
+        // Several surfaces in one plane lift a light once.
+        let direction = lift.normalize_or_zero();
+        let is_known = |known: &(usize, DVec3)| known.0 == light && known.1.dot(direction) > 1.0 - PARALLEL;
+        if !directions.iter().any(is_known) {
+            directions.push((light, direction));
+            lifts[light] += lift;
+        }
+    }
+    lifts
+}
+
+/// The mesh with those of its own lights lifted that are in the plane of its other faces. `None` if there are none.
+pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
+    let mesh = &loaded.mesh;
+    let emits = |triangle: u32| {
+        let material = mesh.materials.get(triangle as usize).and_then(|own| loaded.materials.get(*own as usize));
+        material.is_some_and(file_emits)
+    };
+    if !loaded.materials.iter().any(file_emits) {
+        return None;
+    }
+    // Find the triangles to lift.
+    let face = |triangle: u32| {
+        let face = Face::new(mesh.corners(triangle).map(|corner| corner.as_dvec3()).to_vec())?;
+        Some(Face { emits: emits(triangle).then_some(EmissionSides::Front), ..face })
+    };
+    let all = 0..mesh.triangles.len() as u32;
+    let lights: Vec<(u32, Face)> =
+        all.clone().filter(|id| emits(*id)).filter_map(|id| Some((id, face(id)?))).collect();
+    let others: Vec<Face> = all.filter(|id| !emits(*id)).filter_map(face).collect();
+    if lights.len().saturating_mul(others.len()) > MOST_PAIRS {
+        return None;
+    }
+    let found: Vec<(u32, DVec3)> = lights
+        .iter()
+        .filter(|(_, light)| others.iter().any(|other| coincide(light, other)))
+        .map(|(id, light)| (*id, light.normal))
+        .collect();
+    let greatest = |face: &Face| face.corners.iter().fold(face.size(), |most, at| most.max(at.abs().max_element()));
+    let height = LIFT * lights.iter().map(|(_, light)| greatest(light)).fold(0.0, f64::max);
+    // Give them vertices of their own.
+    let mut lifted = loaded.clone();
+    let mut known = HashMap::new();
+    for (triangle, normal) in &found {
+        let direction = (*normal * 1e4).round().to_array().map(|part| part as i32);
+        let corners = mesh.triangles[*triangle as usize].map(|corner| {
+            *known.entry((corner, direction)).or_insert_with(|| {
+                let at = mesh.positions[corner as usize].as_dvec3() + *normal * height;
+                copy_vertex(&mut lifted.mesh, corner as usize, at.as_vec3())
+            })
+        });
+        lifted.mesh.triangles[*triangle as usize] = corners;
+    }
+    (!found.is_empty()).then_some(lifted)
+}
+
+/// Adds a vertex with the values of another one, elsewhere.
+fn copy_vertex(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
+    fn copy<T: Copy>(values: &mut Vec<T>, vertex: usize) {
+        values.extend(values.get(vertex).copied());
+    }
+    mesh.positions.push(at);
+    copy(&mut mesh.normals, vertex);
+    copy(&mut mesh.normal_groups, vertex);
+    copy(&mut mesh.uvs, vertex);
+    copy(&mut mesh.second_uvs, vertex);
+    copy(&mut mesh.colors, vertex);
+    (mesh.positions.len() - 1) as u32
+}
+
+/// Adds a pair of objects, with the greatest lift of their faces in one direction.
+fn add(found: &mut Vec<Coplanar>, light: &Face, face: &Face) {
+    let size = light.size();
+    let around = face.size().max(light.point.abs().max_element()).min(SURROUNDINGS * size);
+    let lift = light.normal * (LIFT * size.max(around));
+    let pair = (light.object, face.object);
+    let is_same = |known: &&mut Coplanar| (known.light, known.surface) == pair && known.lift.dot(lift) > 0.0;
+    match found.iter_mut().find(is_same) {
+        Some(known) if known.lift.length_squared() < lift.length_squared() => known.lift = lift,
+        Some(_) => {}
+        None => found.push(Coplanar { light: light.object, surface: face.object, lift }),
+    }
+}
+
+/// Whether the light wins over the face on the side of its front. Of two lights, and behind a light with two sides, the lower
+/// number counts.
+fn is_lifted(light: &Face, face: &Face) -> bool {
+    let is_first = light.emits == Some(EmissionSides::Both) && light.object < face.object;
+    !is_first && !face.emits_along(light.normal)
+}
+
+/// Whether two faces are in one plane and overlap.
+fn coincide(light: &Face, face: &Face) -> bool {
+    let apart = light.size() * COINCIDENT;
+    let is_on_plane = |corner: &DVec3| (*corner - face.point).dot(face.normal).abs() <= apart;
+    let sine = light.normal.cross(face.normal).length_squared();
+    if sine > PARALLEL * PARALLEL || !light.corners.iter().all(is_on_plane) {
+        return false;
+    }
+    // Convex polygons overlap if no edge separates them.
+    let is_separated = |a: &Face, b: &Face| {
+        (0..a.corners.len()).any(|index| {
+            let corner = a.corners[index];
+            let edge = a.corners[(index + 1) % a.corners.len()] - corner;
+            let outside = edge.cross(a.normal).normalize_or_zero();
+            !b.corners.is_empty() && b.corners.iter().all(|other| (*other - corner).dot(outside) >= -apart)
+        })
+    };
+    !is_separated(light, face) && !is_separated(face, light)
+}
+
+/// Whether an object may have a face that emits.
+fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
+    let object = &scene.objects[object];
+    match (object.material, object.shape.mesh()) {
+        (Some(material), _) => scene.materials[material].emits(),
+        (None, Some(mesh)) => meshes[mesh.file].materials.iter().any(file_emits),
+        (None, None) => false,
+    }
+}
+
+/// Visits the flat faces of an object; of a mesh, those that may have a point in the region.
+fn each_face(
+    scene: &Scene,
+    meshes: &[&LoadedMesh],
+    (number, origin): (usize, DVec3),
+    region: Option<[DVec3; 2]>,
+    mut visit: impl FnMut(&Face),
+) {
+    let object = &scene.objects[number];
+    let material = object.material.map(|index| &scene.materials[index]);
+    let emits = material.filter(|material| material.emits()).map(|material| material.emission.sides);
+    let mut visit = |face: Option<Face>, emits: Option<EmissionSides>| {
+        if let Some(mut face) = face {
+            (face.object, face.emits) = (number, emits);
+            visit(&face);
+        }
+    };
+    let polygon = |corners: Vec<DVec3>| Face::new(corners.into_iter().map(|at| at - origin).collect());
+    match object.shape {
+        Shape::Quad { corner, u, v } => {
+            visit(polygon(vec![corner, corner + u, corner + u + v, corner + v]), emits);
+        }
+        Shape::Triangle { a, b, c } => visit(polygon(vec![a, b, c]), emits),
+        Shape::Box { center, size, rotate } => {
+            let cuboid = Cuboid::new(center, size, rotate);
+            for face in 0..6 {
+                let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y].map(|u| cuboid.place(face, u));
+                let mut face = polygon(corners.map(|corner| corner.point).to_vec());
+                if let Some(face) = &mut face {
+                    face.normal = corners[0].normal;
+                }
+                visit(face, emits);
+            }
+        }
+        Shape::Disk { center, normal, radius } => visit(polygon(octagon(center, normal, radius)), emits),
+        Shape::Cylinder { a, b, radius, caps: true } => {
+            visit(polygon(octagon(a, a - b, radius)), emits);
+            visit(polygon(octagon(b, b - a, radius)), emits);
+        }
+        Shape::Cone { base, tip, radius, cap: true } => {
+            visit(polygon(octagon(base, base - tip, radius)), emits);
+        }
+        Shape::Plane { point, normal } => {
+            let normal = normal.normalize_or_zero();
+            let face = Face { object: number, corners: Vec::new(), point: point - origin, normal, emits };
+            visit(Some(face), emits);
+        }
+        Shape::Mesh(ref mesh) => {
+            let loaded = meshes[mesh.file];
+            let transform = mesh.placed.transform();
+            let own = |triangle: usize| {
+                let material = *loaded.mesh.materials.get(triangle)? as usize;
+                loaded.materials.get(material).filter(|own| file_emits(own)).map(|_| EmissionSides::Front)
+            };
+            for triangle in 0..loaded.mesh.triangles.len() {
+                let corners = loaded.mesh.corners(triangle as u32);
+                let [a, b, c] = corners.map(|at| transform.point(at.as_dvec3() + loaded.mesh.origin));
+                let bounds = [a.min(b).min(c) - origin, a.max(b).max(c) - origin];
+                if region.is_some_and(|region| are_apart(bounds, region)) {
+                    continue;
+                }
+                let corners = if transform.mirrors() { vec![a, c, b] } else { vec![a, b, c] };
+                visit(polygon(corners), if material.is_some() { emits } else { own(triangle) });
+            }
+        }
+        Shape::Sphere { .. } | Shape::Torus { .. } | Shape::Cylinder { .. } | Shape::Cone { .. } => {}
+    }
+}
+
+/// An octagon in a circle, counterclockwise about the normal.
+fn octagon(center: DVec3, normal: DVec3, radius: f64) -> Vec<DVec3> {
+    let (x, y) = normal.normalize_or(DVec3::Y).any_orthonormal_pair();
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let turns = [(1.0, 0.0), (half, half), (0.0, 1.0), (-half, half)];
+    let all = turns.into_iter().chain(turns.map(|(cos, sin)| (-cos, -sin)));
+    all.map(|(cos, sin)| center + (x * cos + y * sin) * radius).collect()
+}
+
+#[cfg(test)]
+#[path = "coplanar_tests.rs"]
+mod tests;

@@ -1,0 +1,202 @@
+use std::path::Path;
+use std::sync::Arc;
+
+use super::*;
+use crate::control::CancelToken;
+use crate::geometry::Ray;
+use crate::geometry::mesh::TriangleMesh;
+use crate::lights::Source;
+use crate::math::Vec3;
+use crate::math::random::signed as random;
+use crate::scene::description::Accel;
+use crate::world::{Geometry, MeshTree};
+
+/// A square mesh about the origin that faces up.
+fn square() -> TriangleMesh {
+    let at = |x: f32, z: f32| Vec3::new(x, 0.0, z);
+    TriangleMesh {
+        positions: vec![at(-0.5, 0.5), at(0.5, 0.5), at(0.5, -0.5), at(-0.5, -0.5)],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..TriangleMesh::default()
+    }
+}
+
+fn scene(tables: &str) -> Scene {
+    let text = format!(
+        "[camera]\nposition = [0, 5, 1]\nlook_at = [0, 0, 0]\n[materials.w]\ndiffuse = 0.5\n\
+         [materials.l]\nemission = 1\n[materials.both]\nemission = 1\nemission_sides = \"both\"\n{tables}"
+    );
+    // The mesh file only has to exist: its content is `square`.
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scene.toml");
+    let outcome = crate::scene::parse(Arc::from(text.as_str()), &path);
+    outcome.scene.unwrap_or_else(|| panic!("{:?}: {text}", outcome.diagnostics))
+}
+
+fn loaded() -> LoadedMesh {
+    LoadedMesh { mesh: square(), ..LoadedMesh::default() }
+}
+
+fn pairs(scene: &Scene) -> Vec<(usize, usize)> {
+    let mesh = loaded();
+    let meshes = vec![&mesh; scene.mesh_files.len()];
+    coplanar_lights(scene, &meshes, DVec3::ZERO).into_iter().map(|pair| (pair.light, pair.surface)).collect()
+}
+
+/// Lights that face up in the plane y = 0, about the origin.
+const LIGHTS: [&str; 5] = [
+    "[[quad]]\ncorner = [-0.5, 0, 0.5]\nu = [1, 0, 0]\nv = [0, 0, -1]\nmaterial = 'l'\n",
+    "[[triangle]]\na = [-0.5, 0, 0.5]\nb = [0.5, 0, 0.5]\nc = [0, 0, -0.5]\nmaterial = 'l'\n",
+    "[[disk]]\ncenter = [0, 0, 0]\nnormal = [0, 1, 0]\nradius = 0.5\nmaterial = 'l'\n",
+    "[[box]]\ncenter = [0, -0.25, 0]\nsize = [1, 0.5, 1]\nmaterial = 'l'\n",
+    "[[mesh]]\nfile = '../../assets/gem.off'\nmaterial = 'l'\n",
+];
+
+/// Surfaces in the same plane, which are larger.
+const SURFACES: [&str; 6] = [
+    "[[quad]]\ncorner = [-2, 0, 2]\nu = [4, 0, 0]\nv = [0, 0, -4]\nmaterial = 'w'\n",
+    "[[quad]]\ncorner = [-2, 0, 2]\nu = [0, 0, -4]\nv = [4, 0, 0]\nmaterial = 'w'\n",
+    "[[triangle]]\na = [-9, 0, 9]\nb = [9, 0, 9]\nc = [0, 0, -9]\nmaterial = 'w'\n",
+    "[[plane]]\npoint = [3, 0, 1]\nnormal = [0, 1, 0]\nmaterial = 'w'\n",
+    "[[cylinder]]\na = [0, -1, 0]\nb = [0, 0, 0]\nradius = 3\nmaterial = 'w'\n",
+    "[[mesh]]\nfile = '../../assets/gem.off'\nscale = 4\nmaterial = 'w'\n",
+];
+
+#[test]
+fn a_light_in_the_plane_of_a_surface_is_found_in_any_order() {
+    for light in LIGHTS {
+        for surface in SURFACES {
+            assert_eq!(pairs(&scene(&format!("{light}{surface}"))), [(0, 1)], "{light}{surface}");
+            assert_eq!(pairs(&scene(&format!("{surface}{light}"))), [(1, 0)], "{surface}{light}");
+        }
+    }
+}
+
+#[test]
+fn lights_beside_above_or_across_a_surface_stay() {
+    let surface = SURFACES[0];
+    for light in [
+        // A hair above, beside, touching at an edge, upright, and a surface that does not emit.
+        LIGHTS[0].replace("-0.5, 0, 0.5", "-0.5, 1e-4, 0.5"),
+        LIGHTS[0].replace("-0.5, 0, 0.5", "2.5, 0, 0.5"),
+        LIGHTS[0].replace("-0.5, 0, 0.5", "2, 0, 0.5"),
+        LIGHTS[0].replace("[0, 0, -1]", "[0, 1, 0]"),
+        LIGHTS[0].replace("'l'", "'w'"),
+    ] {
+        assert!(pairs(&scene(&format!("{surface}{light}"))).is_empty(), "{light}");
+    }
+    // Two lights to one side, and a light with two sides before the surface.
+    assert!(pairs(&scene(&format!("{}{}", LIGHTS[0], LIGHTS[2]))).is_empty());
+    let both = LIGHTS[0].replace("'l'", "'both'");
+    assert!(pairs(&scene(&format!("{both}{surface}"))).is_empty());
+    assert_eq!(pairs(&scene(&format!("{surface}{both}"))), [(1, 0)]);
+}
+
+/// Geometry of a scene whose mesh files are all [`square`].
+fn built(scene: &Scene, accel: Accel) -> Geometry {
+    let token = CancelToken::new();
+    let tree = || Arc::new(MeshTree::build(Arc::new(loaded()), accel, &token).expect("nobody cancels"));
+    let meshes: Vec<_> = scene.mesh_files.iter().map(|_| tree()).collect();
+    Geometry::of_scene(scene, &meshes, DVec3::ZERO, &token).expect("nobody cancels")
+}
+
+#[test]
+fn rays_meet_the_light_first_from_its_front_and_the_surface_from_behind() {
+    let mut next = random(11);
+    for (light, surface) in LIGHTS.into_iter().flat_map(|light| SURFACES.map(|surface| (light, surface))) {
+        for (tables, number) in [(format!("{light}{surface}"), 0), (format!("{surface}{light}"), 1)] {
+            let scene = scene(&tables);
+            for accel in [Accel::Bvh, Accel::KdTree] {
+                let geometry = built(&scene, accel);
+                assert_eq!(geometry.lifts().len(), 2);
+                for _ in 0..50 {
+                    let target = Vec3::new(next() * 0.2, 0.0, next() * 0.2);
+                    let from = Vec3::new(next() * 8.0, 0.5 + next().abs() * 9.0, next() * 8.0);
+                    let hit = geometry.closest(&Ray::new(from, target - from)).expect("both");
+                    assert_eq!(hit.object, number, "{tables} {from}");
+                    // The surface below the light is in its shadow, and the light hides nothing of itself.
+                    let shadow = Ray::segment(from, target);
+                    assert!(!geometry.occluded(&shadow, Source::Object(number)), "{tables} {from}");
+                    let is_closed = tables.contains("box") || tables.contains("cylinder");
+                    let below = Vec3::new(from.x, -from.y, from.z);
+                    let hit = geometry.closest(&Ray::new(below, target - below)).expect("both");
+                    assert!(is_closed || hit.object != number, "{tables} {below}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn tilted_and_distant_planes_are_no_exception() {
+    let mut next = random(12);
+    for round in 0..40 {
+        let mut vector = || DVec3::new(next().into(), next().into(), next().into());
+        let (x, y) = (vector().normalize(), vector());
+        let y = (y - x * x.dot(y)).normalize() * 1.7;
+        let center = vector() * 30.0;
+        let quad = |half: f64, material: &str| {
+            let corner = center - (x + y) * half;
+            let show = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+            let [corner, u, v] = [corner, x * (2.0 * half), y * (2.0 * half)].map(show);
+            format!("[[quad]]\ncorner = {corner}\nu = {u}\nv = {v}\nmaterial = '{material}'\n")
+        };
+        let tables = format!("{}{}", quad(3.0, "w"), quad(1.0, "l"));
+        let geometry = built(&scene(&tables), Accel::Bvh);
+        assert_eq!(geometry.lifts().len(), 2, "{tables}");
+        for _ in 0..50 {
+            let target = center + vector() * 0.0 + (x * vector().x + y * vector().x) * 0.9;
+            let from = target + x.cross(y) * (2.0 + round as f64) + vector() * 2.0;
+            let ray = Ray::new(from.as_vec3(), (target - from).as_vec3());
+            assert_eq!(geometry.closest(&ray).expect("both").object, 1, "{tables} {from}");
+        }
+    }
+}
+
+#[test]
+fn lights_of_a_mesh_file_are_lifted_off_its_other_faces() {
+    let at = |x: f32, z: f32| Vec3::new(x, 2.0, z);
+    let ring = |half: f32| [at(-half, -half), at(half, -half), at(half, half), at(-half, half)];
+    let quad = |first: u32| [[first, first + 1, first + 2], [first, first + 2, first + 3]];
+    let mesh = TriangleMesh {
+        positions: [ring(2.0), ring(0.5)].concat(),
+        normals: vec![Vec3::NEG_Y; 8],
+        uvs: (0..8).map(|i| Vec2::splat(i as f32)).collect(),
+        triangles: [quad(0), quad(4)].concat(),
+        materials: vec![0, 0, 1, 1],
+        ..TriangleMesh::default()
+    };
+    let material = |emission: f32| crate::assets::FileMaterial {
+        name: String::new(),
+        diffuse: Vec3::ONE,
+        specular: Vec3::ZERO,
+        shininess: 0.0,
+        emission: Vec3::splat(emission),
+        ior: 1.0,
+        illumination_model: None,
+        opacity: 1.0,
+        opacity_texture: None,
+        diffuse_texture: None,
+        specular_texture: None,
+        emission_texture: None,
+        normal_texture: None,
+        normal_strength: 1.0,
+        physical: None,
+    };
+    let loaded = LoadedMesh { mesh, materials: vec![material(0.0), material(1.0)], ..LoadedMesh::default() };
+    let lifted = with_lifted_lights(&loaded).expect("a light in the plane").mesh;
+    assert_eq!(lifted.triangles[..2], loaded.mesh.triangles[..2]);
+    assert_eq!((lifted.positions.len(), lifted.normals.len(), lifted.uvs.len()), (12, 12, 12));
+    let down = (lifted.positions[1] - lifted.positions[0]).cross(lifted.positions[2] - lifted.positions[0]).y;
+    for triangle in 2..4 {
+        for (before, after) in loaded.mesh.corners(triangle).into_iter().zip(lifted.corners(triangle)) {
+            let moved = after - before;
+            assert!(moved.y * down > 0.0 && moved.y.abs() < 1e-4 && moved.x == 0.0 && moved.z == 0.0, "{moved}");
+        }
+    }
+    // Without a light, or with one elsewhere, the mesh stays as it is.
+    let dark = LoadedMesh { materials: vec![material(0.0), material(0.0)], ..loaded.clone() };
+    assert!(with_lifted_lights(&dark).is_none());
+    let mut below = loaded;
+    below.mesh.positions[4..].iter_mut().for_each(|position| position.y = 1.9);
+    assert!(with_lifted_lights(&below).is_none());
+}
