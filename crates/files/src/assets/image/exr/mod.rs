@@ -266,7 +266,7 @@ impl Line<'_> {
         }
         match self.kind {
             SampleType::F32 => {
-                each(self.bytes, skipped, places, |at, bytes| put(at, f32::from_ne_bytes(bytes)))
+                each(self.bytes, skipped, places, |at, bytes| put(at, f32::from_ne_bytes(bytes)));
             }
             SampleType::F16 => {
                 each(self.bytes, skipped, places, |at, bytes| put(at, f16::from_ne_bytes(bytes).to_f32()));
