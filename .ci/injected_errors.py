@@ -66,7 +66,7 @@ FAULTS = [
      "TRUE", "accel::facets_tests::what_is_decided_is_what_each_ray_finds_alone"),
     ("a closer candidate lost", "geometry/facets.rs", "is_hit & ⟦(hits.t[i] < candidates.next[i])⟧;", "true",
      "accel::facets_tests::what_is_decided_is_what_each_ray_finds_alone"),
-    ("triangles without margins", "geometry/facets.rs", "let margin = ⟦slender⟧ * folds.about(", "0.0",
+    ("triangles without margins", "geometry/facets.rs", "let margin = ⟦slender⟧ * simd.about(", "0.0",
      "accel::facets_tests::what_is_decided_is_what_each_ray_finds_alone"),
     ("rays that start behind an adjacent face", "world/mesh_facet.rs",
      "let is_beside_edge = ⟦is_near(u, ac, bound) | is_near(v, ab, bound) | is_near(w, ac - ab, bound)⟧;", "false",

@@ -1,30 +1,30 @@
-//! Boxes of trees along a ray, for views of the trees and of their traversal cost.
+//! Tree nodes along a ray, for visualizing trees and their traversal cost.
 
 use crate::geometry::{Aabb, Ray};
 
-/// A node of a tree.
+/// A tree node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Bounding box of the node.
+    /// Bounding box.
     pub bounds: Aabb,
-    /// Number of nodes above it.
+    /// Number of ancestors.
     pub depth: u32,
-    /// Number of shapes that the node holds itself; 0 if it has children.
+    /// Number of shapes in a leaf; 0 for inner nodes.
     pub shapes: u32,
 }
 
-/// Interval of a ray inside of a box.
+/// Interval of a ray inside a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stretch {
-    /// Distance at which the ray enters, with the axis of the face; below 0 if the ray starts inside.
+    /// Distance at which the ray enters and the axis of that face; negative if the ray starts inside.
     pub enter: (f32, usize),
-    /// Distance at which the ray leaves, with the axis of the face.
+    /// Distance at which the ray leaves and the axis of that face.
     pub leave: (f32, usize),
 }
 
 impl Stretch {
-    /// Intersects a ray's line with a box. `None` if the line misses the box between the ray's ends. By the plain slab test: a ray
-    /// that only touches a box may count either way.
+    /// Intersects a ray with a box. `None` if it misses the box between its ends. Uses the plain slab test:
+    /// rays that only touch the box may hit or miss.
     #[inline]
     pub fn new(bounds: &Aabb, ray: &Ray) -> Option<Self> {
         let (mut enter, mut leave) = ((f32::NEG_INFINITY, 0), (f32::INFINITY, 0));

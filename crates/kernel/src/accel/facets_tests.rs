@@ -1,4 +1,4 @@
-//! Few triangles against packets of rays: what is decided is what each ray finds alone, by every instruction set.
+//! Tests of facets: decided packet results must match single rays on every instruction set.
 
 use super::{Instructions, Loops};
 use crate::geometry::facets::Facets;
@@ -9,14 +9,14 @@ use crate::math::Vec3;
 use crate::math::lanes::Folds;
 use crate::math::random::signed;
 
-/// Hits of rays, the undecided, what hits any but its own, and the undecided of those.
-struct Asked<'a> {
+/// Nearest hits, undecided rays, rays that hit any triangle but their own, and undecided ones among those.
+struct FacetQueries<'a> {
     facets: &'a Facets,
     rays: &'a [Ray],
     except: &'a [u32; PACKET],
 }
 
-impl Loops for Asked<'_> {
+impl Loops for FacetQueries<'_> {
     type Done = (HitRows, [u32; 3]);
 
     #[inline(always)]
@@ -29,7 +29,7 @@ impl Loops for Asked<'_> {
     }
 }
 
-/// A box's six walls, two triangles each.
+/// The six walls of a box, with two triangles each.
 fn walls(low: Vec3, high: Vec3) -> Vec<[Vec3; 3]> {
     let corner =
         |i: usize| Vec3::from([0, 1, 2].map(|axis| if i >> axis & 1 == 0 { low[axis] } else { high[axis] }));
@@ -38,7 +38,7 @@ fn walls(low: Vec3, high: Vec3) -> Vec<[Vec3; 3]> {
     quads.into_iter().flat_map(each).collect()
 }
 
-/// Rooms of walls with bodies in them, turned, askew, far off, or small.
+/// Rooms with objects inside: rotated, skewed, far from the origin, or small.
 fn room(round: usize, next: &mut dyn FnMut() -> f32) -> Vec<[Vec3; 3]> {
     let mut triangles = walls(Vec3::splat(-1.0), Vec3::ONE);
     for _ in 0..round % 3 {
@@ -81,10 +81,10 @@ fn alone(triangles: &[[Vec3; 3]], ray: &Ray, except: u32) -> Option<ShapeHit> {
 }
 
 #[test]
-fn what_is_decided_is_what_each_ray_finds_alone() {
+fn decided_packets_match_single_rays() {
     let mut next = signed(11);
-    // Rays of each kind: all, hits, and undecided ones.
-    // Of those from surfaces near the origin, all and the undecided.
+    // Count all rays, hits and undecided rays. For rays from surfaces near the origin, count all and the
+    // undecided ones.
     let (mut bounces, mut left) = (0, 0);
     let mut counts = [[0_u32; 3]; 6];
     for round in 0..6000 {
@@ -102,14 +102,14 @@ fn what_is_decided_is_what_each_ray_finds_alone() {
             let (start, target) = (on(&triangles[from], next), on(&triangles[to], next));
             let own = Ray::new(start, target - start).leaving(from as u32);
             match kind {
-                // From surfaces in any direction and to others, as bounces and shadow rays.
+                // Rays from surfaces in any direction and to other surfaces, like bounces and shadow rays.
                 0 => Ray { direction: Vec3::new(next(), next(), next()), ..own },
                 1 => Ray { t_max: 1.0 - 1e-5, ..own },
-                // At corners, along edges and along axes.
+                // Rays at corners, along edges and along axes.
                 2 => Ray { direction: triangles[to][0] - start, ..own },
                 3 => Ray::new(triangles[from][0], triangles[from][1] - triangles[from][0]),
                 4 => Ray::new(start, [Vec3::X, Vec3::NEG_Y, Vec3::Z][to % 3]).leaving(from as u32),
-                // From afar, and within planes.
+                // Distant rays, and rays within planes.
                 _ if to % 2 == 0 => Ray::new(start * 50.0 - target * 49.0, target - start),
                 _ => Ray::new(start, on(&triangles[from], next) - start),
             }
@@ -119,7 +119,7 @@ fn what_is_decided_is_what_each_ray_finds_alone() {
             std::array::from_fn(|i| if i % 3 == 0 { any(&mut next) as u32 } else { u32::MAX });
         for instructions in Instructions::ALL {
             let (found, [open, hits_any, open_any]) =
-                instructions.run(Asked { facets: &facets, rays: &rays, except: &except });
+                instructions.run(FacetQueries { facets: &facets, rays: &rays, except: &except });
             for (i, ray) in rays.iter().enumerate() {
                 let (own, other) = (alone(&triangles, ray, u32::MAX), alone(&triangles, ray, except[i]));
                 let is = |bits: u32| bits & 1 << i != 0;
@@ -140,11 +140,11 @@ fn what_is_decided_is_what_each_ray_finds_alone() {
         }
     }
     assert!(counts.iter().all(|[all, hits, _]| *all > 5000 && hits * 4 > *all), "{counts:?}");
-    assert!(left * 20 < bounces, "{left} of {bounces} are left undecided");
+    assert!(left * 20 < bounces, "{left} of {bounces} are undecided");
 }
 
 #[test]
-fn no_ray_is_lost_for_numbers_that_are_none() {
+fn nan_rays_are_undecided() {
     let facets = Facets::new(walls(Vec3::splat(-1.0), Vec3::ONE)).expect("a room");
     let bad = [f32::NAN, f32::INFINITY, 0.0, -0.0, 1e38, 1e-40];
     for (a, b) in bad.into_iter().flat_map(|a| bad.map(|b| (a, b))) {
@@ -153,8 +153,11 @@ fn no_ray_is_lost_for_numbers_that_are_none() {
             Ray::new(Vec3::splat(0.1), Vec3::new(a, b, a)),
         ] {
             for instructions in Instructions::ALL {
-                let (found, [open, any, open_any]) =
-                    instructions.run(Asked { facets: &facets, rays: &[ray], except: &[u32::MAX; PACKET] });
+                let (found, [open, any, open_any]) = instructions.run(FacetQueries {
+                    facets: &facets,
+                    rays: &[ray],
+                    except: &[u32::MAX; PACKET],
+                });
                 let own = alone(&walls(Vec3::splat(-1.0), Vec3::ONE), &ray, u32::MAX);
                 assert!(open & 1 == 1 || found.get(0) == own, "{ray:?}");
                 assert!(open_any & 1 == 1 || (any & 1 == 1) == own.is_some(), "{ray:?}");
@@ -164,7 +167,7 @@ fn no_ray_is_lost_for_numbers_that_are_none() {
 }
 
 #[test]
-fn needles_and_crowds_are_left_to_others() {
+fn needles_and_large_meshes_are_rejected() {
     let needle = [Vec3::ZERO, Vec3::X, Vec3::new(0.5, 1e-5, 0.0)];
     assert!(Facets::new(vec![needle]).is_none());
     let wall = [Vec3::ZERO, Vec3::X, Vec3::Y];

@@ -1,5 +1,5 @@
-//! Trees over boxes and ids. They know no shape: a closure tests the shape of an id. The exceptions are [`wide_bvh`], a
-//! tree over triangles whose leaves hold them ready for vector instructions, and [`kd_tree`], its alternative.
+//! Bounding volume hierarchies and kd-trees. [`bvh`] knows only boxes and ids; a closure tests the shape with
+//! an id. [`wide_bvh`] and its alternative [`kd_tree`] are trees over triangles, stored in their leaves.
 
 mod along;
 pub mod bvh;
@@ -23,7 +23,7 @@ pub use wide_bvh::{Instructions, Loops, WideBvh};
 
 pub use crate::geometry::rows::{Ends, PACKET};
 
-/// The ends of at most [`PACKET`] rays.
+/// Ends of at most [`PACKET`] rays.
 #[inline(always)]
 pub fn ends(rays: &[crate::geometry::Ray]) -> Ends {
     let mut ends = [-1.0; PACKET];

@@ -1,11 +1,12 @@
-//! Meshes that break trees, and their right answers.
+//! Meshes that are hard on trees, and brute-force reference hits.
 
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::math::random::signed as random;
 
-/// Meshes that break trees: noise, grids with coplanar and doubled faces, slivers, one, none, all alike, NaN.
+/// Hard meshes: noise, slivers, grids with coplanar and duplicate faces, identical triangles, a single
+/// triangle, none, and NaN.
 pub fn meshes() -> Vec<Vec<[Vec3; 3]>> {
     let mut next = random(5);
     let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
@@ -45,7 +46,7 @@ pub fn meshes() -> Vec<Vec<[Vec3; 3]>> {
     ]
 }
 
-/// The nearest hit by testing every triangle but the one on which the ray starts.
+/// Nearest hit found by testing every triangle except the one on which the ray starts.
 pub fn brute(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit> {
     let sheared = ShearedRay::new(ray.origin, ray.direction);
     let others = (0..).zip(mesh).filter(|&(id, _)| id != ray.start);
@@ -55,7 +56,8 @@ pub fn brute(mesh: &[[Vec3; 3]], ray: &Ray) -> Option<ShapeHit> {
     hits.min_by(|a, b| a.t.total_cmp(&b.t).then(a.primitive.cmp(&b.primitive)))
 }
 
-/// Rays at random, at corners and edges, along axes with both zeros, from corners, and some that leave a triangle out.
+/// Rays in random directions, at corners and edges, along axes with both zeros, from corners, and some that
+/// start on a triangle.
 pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
     let mut next = random(11);
     let mut rays = Vec::new();
@@ -73,7 +75,7 @@ pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
         rays.push(Ray { t_max: 0.9, ..Ray::new(origin, target - origin) });
         rays.push(Ray::new(Vec3::new(target.x, 20.0, target.z), Vec3::new(zero, -1.0, zero)));
         rays.push(Ray::new(triangle[2], Vec3::new(next(), next(), next())));
-        // Through a triangle that is left out, and from one.
+        // Through a triangle that is excluded, and from one.
         let start = (i % mesh.len().max(1)) as u32;
         rays.push(Ray::new(origin, target - origin).leaving(start));
         rays.push(Ray::new(target, Vec3::new(next(), next(), next())).leaving(start));
@@ -84,7 +86,7 @@ pub fn rays(mesh: &[[Vec3; 3]]) -> Vec<Ray> {
     rays
 }
 
-/// The bits of a hit, to compare.
+/// The bits of a hit, for exact comparison.
 pub fn bits(hit: Option<ShapeHit>) -> Option<(u32, u32, u32, u32)> {
     hit.map(|hit| (hit.t.to_bits(), hit.primitive, hit.u.to_bits(), hit.v.to_bits()))
 }

@@ -1,4 +1,4 @@
-//! Boxes in vector registers, and the part of a triangle inside one.
+//! SIMD bounding boxes, and triangle references clipped to a cell.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,8 @@ use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DVec3, Vec3, Vec4};
 
-/// A box; the last lanes mean nothing. The greatest corner is held negated, so that boxes grow by minima alone.
+/// A SIMD box, with unused last lanes. The maximum corner is stored negated, so that boxes grow with minima
+/// only.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub struct Bounds {
@@ -18,13 +19,13 @@ pub struct Bounds {
 impl Bounds {
     pub const EMPTY: Self = Self { min: Vec4::INFINITY, minus_max: Vec4::INFINITY };
 
-    /// The box between two corners.
+    /// Box between two corners.
     #[inline(always)]
     pub fn new(min: Vec4, max: Vec4) -> Self {
         Self { min, minus_max: -max }
     }
 
-    /// The box around references.
+    /// Bounding box of some references.
     #[inline]
     pub fn around(references: &[Reference]) -> Self {
         references.iter().fold(Self::EMPTY, |mut all, reference| {
@@ -33,13 +34,13 @@ impl Bounds {
         })
     }
 
-    /// The greatest corner.
+    /// Maximum corner.
     #[inline(always)]
     pub fn max(&self) -> Vec4 {
         -self.minus_max
     }
 
-    /// The extent, from the least to the greatest corner.
+    /// Edge lengths.
     #[inline(always)]
     pub fn extent(&self) -> Vec4 {
         self.max() - self.min
@@ -51,7 +52,7 @@ impl Bounds {
         self.minus_max = self.minus_max.min(other.minus_max);
     }
 
-    /// Half of the area of its surface.
+    /// Half of the surface area.
     #[inline(always)]
     pub fn half_area(&self) -> f32 {
         let e = self.extent();
@@ -63,7 +64,7 @@ impl Bounds {
         Aabb { min: self.min.truncate(), max: self.max().truncate() }
     }
 
-    /// The parts below and above a plane.
+    /// Parts below and above a plane.
     #[inline]
     pub fn halves(&self, axis: usize, at: f32) -> [Self; 2] {
         let (mut left, mut right) = (*self, *self);
@@ -73,24 +74,24 @@ impl Bounds {
     }
 }
 
-/// Bit that is set in the numbers that references hold as the bits of floats: without it they would be denormal, which slows
-/// some processors down.
+/// Bit set in ids stored as the bits of floats. Without it they would be denormals, which are slow on some
+/// processors.
 const NORMAL: u32 = 1 << 29;
 
 const _: () = assert!(TriangleMesh::MOST_TRIANGLES < 1 << 29);
 
-/// A triangle's number and the box around its part inside a cell.
+/// A triangle id and the bounding box of the triangle's part inside a cell.
 #[derive(Clone, Copy, Debug)]
 pub struct Reference {
-    /// Bounds whose `min` holds the bits of the number in its last lane.
+    /// Bounds whose `min` has the bits of the id in its last lane.
     pub bounds: Bounds,
 }
 
 impl Reference {
-    /// References to all triangles, by their numbers, but those that cannot be hit or whose box has no finite size.
+    /// References to all triangles in order, except those that cannot be hit or whose box is not finite.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the build was canceled.
     pub fn usable(
         count: u32,
         corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
@@ -105,11 +106,11 @@ impl Reference {
         Ok(references)
     }
 
-    /// The reference to a whole triangle.
+    /// Reference to a whole triangle.
     #[inline]
     pub fn new(id: u32, corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(|corner| corner.extend(0.0));
-        // `min` and `max` drop a NaN: put it back.
+        // `min` and `max` drop NaN: put it back.
         let poison = (a + b + c).truncate().to_array().map(|sum| if sum.is_nan() { f32::NAN } else { 0.0 });
         let mut min = a.min(b).min(c) + Vec3::from(poison).extend(0.0);
         min.w = f32::from_bits(id | NORMAL);
@@ -125,13 +126,14 @@ impl Reference {
         self.bounds.min.w.to_bits() & !NORMAL
     }
 
-    /// Whether the triangle can be hit at all and its box has a size.
+    /// Whether the triangle can be hit and has a finite box.
     fn is_usable(&self) -> bool {
         self.bounds.extent().truncate().is_finite()
     }
 
-    /// References to the parts on each side of a plane through the box. Each box contains that part of the whole triangle,
-    /// rounded outwards, and stays in the old box. If rounding leaves nothing on a side, that whole side counts.
+    /// Splits the reference at a plane through its box. Each box contains the part of the whole triangle on
+    /// its side, rounded outward, within the old box. If rounding leaves nothing on a side, its box is the
+    /// entire half.
     #[inline]
     pub fn split(&self, axis: usize, at: f32, corners: [Vec3; 3]) -> [Self; 2] {
         let mut parts = [Bounds::EMPTY; 2];
@@ -158,7 +160,7 @@ impl Reference {
         [self.within(left, &parts[0]), self.within(right, &parts[1])]
     }
 
-    /// The reference with the overlap of two boxes; with `half` if they do not overlap.
+    /// The reference with the intersection of two boxes, or `half` if they do not overlap.
     #[inline(always)]
     fn within(&self, half: Bounds, part: &Bounds) -> Self {
         let mut both = Bounds { min: half.min.max(part.min), minus_max: half.minus_max.max(part.minus_max) };
@@ -168,7 +170,7 @@ impl Reference {
     }
 }
 
-/// A box around a point in double precision, rounded outwards.
+/// Box around a double-precision point, rounded outward.
 #[inline(always)]
 fn around_rounded(exact: DVec3) -> Bounds {
     let near = exact.as_vec3();
@@ -184,7 +186,8 @@ fn around_rounded(exact: DVec3) -> Bounds {
     Bounds::new(min.extend(0.0), max.extend(0.0))
 }
 
-/// A triangle cut by up to six planes (Sutherland, Hodgman, *Reentrant Polygon Clipping*, 1974), in double precision.
+/// A triangle clipped by up to six planes in double precision (Sutherland, Hodgman, *Reentrant Polygon
+/// Clipping*, 1974).
 #[derive(Clone, Copy)]
 pub struct Polygon {
     points: [DVec3; 9],
@@ -194,7 +197,7 @@ pub struct Polygon {
 impl Polygon {
     const NOTHING: Self = Self { points: [DVec3::ZERO; 9], count: 0 };
 
-    /// The part of a triangle inside a box, its faces included.
+    /// Clips a triangle to a box, including its faces.
     pub fn clipped(corners: [Vec3; 3], bounds: &Aabb) -> Self {
         let (least, greatest) =
             (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
@@ -235,8 +238,8 @@ impl Polygon {
         }
     }
 
-    /// Adds a corner. Six planes leave at most nine points of a triangle, but for rounding, whose surplus points add no
-    /// extent.
+    /// Adds a vertex. Clipping a triangle by six planes gives at most nine vertices; any surplus comes from
+    /// rounding and does not extend the polygon.
     fn push(&mut self, point: DVec3) {
         if let Some(place) = self.points.get_mut(self.count) {
             *place = point;
@@ -244,12 +247,12 @@ impl Polygon {
         }
     }
 
-    /// Corners of the polygon.
+    /// Vertices of the polygon.
     pub fn points(&self) -> &[DVec3] {
         &self.points[..self.count]
     }
 
-    /// Least and greatest coordinates; ∞ and −∞ if nothing is left.
+    /// Bounding box; ∞ and −∞ if the polygon is empty.
     pub fn extent(&self) -> (DVec3, DVec3) {
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         self.points().iter().fold(none, |(min, max), &p| (min.min(p), max.max(p)))
@@ -261,7 +264,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_clipped_corner_has_the_box_of_the_piece() {
+    fn clipped_corners_have_tight_bounds() {
         let corners = [Vec3::ZERO, Vec3::new(4.0, 0.0, 0.0), Vec3::new(0.0, 4.0, 4.0)];
         let whole = Reference::new(7, corners);
         let [left, right] = whole.split(0, 3.0, corners);
@@ -274,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_is_outwards() {
+    fn bounds_are_rounded_outward() {
         let corners = [Vec3::ZERO, Vec3::new(3.0, 1.0, 0.1), Vec3::new(3.0, 1.0, 0.7)];
         let [left, right] = Reference::new(0, corners).split(0, 1.0, corners);
         for (low, exact, high) in [

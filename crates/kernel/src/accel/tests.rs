@@ -1,4 +1,4 @@
-//! Comparison of brute force, the tree of planes and the tree of boxes.
+//! Comparison of the kd-tree and the wide BVH with brute force.
 
 use rayon::prelude::*;
 
@@ -22,7 +22,7 @@ fn wide_bvh(mesh: &[[Vec3; 3]]) -> WideBvh {
     tree.expect("nobody cancels")
 }
 
-/// A closed box of so many squares along each edge.
+/// A closed box with `squares` squares along each edge.
 fn cuboid(squares: u32) -> Mesh {
     let at = |face: usize, i: u32, j: u32| {
         let (u, v) = (i as f32 / squares as f32 * 2.0 - 1.0, j as f32 / squares as f32 * 2.0 - 1.0);
@@ -43,7 +43,7 @@ fn cuboid(squares: u32) -> Mesh {
         .collect()
 }
 
-/// Triangles of all sizes at random places, long ones among them.
+/// Triangles of all sizes at random positions, some of them long.
 fn noise(seed: u64, count: usize) -> Mesh {
     let mut next = random(seed);
     let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
@@ -55,7 +55,8 @@ fn noise(seed: u64, count: usize) -> Mesh {
     (0..count).map(triangle).collect()
 }
 
-/// More than fifty meshes: each pathological mesh, boxes and noise, as it is, far from the origin, tiny and huge.
+/// More than fifty meshes: pathological meshes, boxes and noise, each as is, far from the origin, tiny and
+/// huge.
 fn scenes() -> Vec<Mesh> {
     let shorten = |mesh: Mesh| mesh.into_iter().take(240).collect::<Mesh>();
     let mut own: Vec<Mesh> = meshes().into_iter().map(shorten).collect();
@@ -70,8 +71,8 @@ fn scenes() -> Vec<Mesh> {
     [own, tiny, huge, far].concat()
 }
 
-/// A ray at a mesh. It starts outside, far outside, or at a corner or an edge; it goes to one of the mesh's points,
-/// anywhere, along an axis, or in the plane of two axes.
+/// A ray near a mesh. It starts outside, far away, or at a corner or an edge. It is directed at a vertex, in
+/// a random direction, along an axis, or in the plane of two axes.
 fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut() -> f32) -> Ray {
     let (center, size) = (bounds.center(), bounds.extent().max_element().max(f32::MIN_POSITIVE));
     let mut pick = || mesh[((next() * 0.5 + 0.5) * mesh.len() as f32) as usize % mesh.len()];
@@ -94,7 +95,7 @@ fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut()
     match kind / 28 % 4 {
         0 => direction[kind % 3] = zero,
         1 => {
-            // Start beside the target along an axis, to meet it.
+            // Start at an axial offset from the target, to hit it along the axis.
             let axis = kind % 3;
             let mut origin = target;
             origin[axis] = center[axis] + 2.0 * size;
@@ -108,7 +109,7 @@ fn aimed(mesh: &[[Vec3; 3]], bounds: &Aabb, kind: usize, next: &mut impl FnMut()
     Ray { t_max, ..Ray::new(origin, direction) }
 }
 
-/// Number of rays at a scene for which either tree's answer differs from brute force, and the first such ray.
+/// Number of rays for which a tree disagrees with brute force, with a description of the first one.
 fn differences(mesh: &[[Vec3; 3]], seed: u64, count: usize) -> (usize, Option<String>) {
     let (planes, boxes) = (kd_tree(mesh), wide_bvh(mesh));
     let mut next = random(seed);
@@ -150,18 +151,18 @@ fn no_difference(rays: usize) {
 }
 
 #[test]
-fn a_million_rays_see_the_same_by_brute_force_and_under_both_trees() {
+fn both_trees_match_brute_force() {
     no_difference(1_000_000);
 }
 
 #[test]
 #[ignore = "43 s on two cores: cargo test --release -p glimt-kernel --lib ten_million_rays -- --ignored"]
-fn ten_million_rays_see_the_same_by_brute_force_and_under_both_trees() {
+fn ten_million_rays_match_brute_force() {
     no_difference(10_000_000);
 }
 
 #[test]
-fn trees_of_planes_are_sound_and_see_what_brute_force_sees() {
+fn kd_trees_are_valid_and_match_brute_force() {
     for (number, mesh) in meshes().into_iter().chain([cuboid(3), noise(4, 3000)]).enumerate() {
         let tree = kd_tree(&mesh);
         tree.validate(mesh.len() as u32, |id| mesh[id as usize])
@@ -175,23 +176,24 @@ fn trees_of_planes_are_sound_and_see_what_brute_force_sees() {
 }
 
 #[test]
-fn every_scene_has_a_sound_tree_of_planes() {
+fn kd_trees_of_all_scenes_are_valid() {
     for (number, mesh) in scenes().iter().enumerate() {
         let sound = kd_tree(mesh).validate(mesh.len() as u32, |id| mesh[id as usize]);
         assert_eq!(sound, Ok(()), "scene {number}");
     }
 }
 
-/// Checks that planes split this mesh into many leaves: if it were one leaf, no test above would test a plane.
+/// Checks that this mesh is split into many leaves: with a single leaf, the tests above would not test any
+/// plane.
 #[test]
-fn planes_part_what_can_be_parted() {
+fn kd_trees_split_large_meshes() {
     let mesh = noise(9, 3000);
     let (nodes, triangles) = kd_tree(&mesh).expected_visits();
     assert!(nodes > 10.0 && triangles < 100.0, "{nodes} nodes, {triangles} triangles");
 }
 
 #[test]
-fn the_tree_is_the_same_whatever_the_threads() {
+fn kd_tree_does_not_depend_on_thread_count() {
     let mesh = noise(6, 80_000);
     let text = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
@@ -202,14 +204,14 @@ fn the_tree_is_the_same_whatever_the_threads() {
 }
 
 #[test]
-fn a_cancelled_build_stops() {
+fn builds_can_be_canceled() {
     let token = CancelToken::new();
     token.cancel();
     assert!(KdTree::build(1, |_| [Vec3::ZERO, Vec3::X, Vec3::Y], &token).is_err());
 }
 
 #[test]
-fn a_leaf_without_one_of_its_triangles_is_found_out() {
+fn validation_finds_a_missing_triangle() {
     let mesh = noise(9, 400);
     let mut shifted = mesh.clone();
     shifted[17] = shifted[17].map(|corner| corner + Vec3::splat(0.5));

@@ -1,4 +1,4 @@
-//! Tests of triangles against rays in rows, by every instruction set.
+//! Tests of packet triangle intersection on every instruction set.
 
 use super::{Instructions, Loops};
 use crate::geometry::rows::{HitRows, PACKET, RayRows};
@@ -31,11 +31,12 @@ impl Loops for Tested<'_> {
 }
 
 #[test]
-fn rays_side_by_side_have_the_bits_that_each_has_alone() {
+fn packets_have_the_bits_of_single_rays() {
     let mut next = signed(7);
     let (mut hits, mut shared) = (0, 0);
     for round in 0..20_000 {
-        // Corners that many triangles share, among them flat ones; rays along axes, into corners and from surfaces.
+        // Use corners shared by many triangles, some of them flat, and rays along axes, into corners and from
+        // surfaces.
         let step = [1.0, 0.25, 1e-6][round % 3];
         let corners: Vec<Vec3> = (0..6)
             .map(|_| (Vec3::new(next(), next(), next()) / step).round() * step + Vec3::splat(0.5))

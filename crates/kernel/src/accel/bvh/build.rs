@@ -1,5 +1,6 @@
-//! Builds by binned surface area (Wald, *On fast Construction of SAH-based Bounding Volume Hierarchies*, 2007), the
-//! halves of large nodes in parallel. The tree is a function of the boxes alone, not of the threads.
+//! Construction with the binned surface area heuristic (Wald, *On fast Construction of SAH-based Bounding
+//! Volume Hierarchies*, 2007). The halves of large nodes are built in parallel. The tree depends only on the
+//! boxes, not on the threads.
 
 use super::top_node::TopNode;
 use super::{Bvh, Child, LEAF_SIZE, Node, SURFACE_AREA_LEVELS};
@@ -9,13 +10,13 @@ use crate::math::Vec3;
 
 const BINS: usize = 16;
 
-/// Nodes with more primitives than this build their halves in parallel, and poll the token.
+/// Nodes with more primitives build their halves in parallel and poll the token.
 const PARALLEL_SIZE: usize = 4096;
 
-/// Cost of one step of traversal, in tests of a primitive.
+/// Cost of a traversal step relative to a primitive test.
 const TRAVERSAL_COST: f32 = 1.0;
 
-/// A box with its id while the tree is built.
+/// A box and its id during construction.
 #[derive(Clone, Copy)]
 pub(super) struct Reference {
     pub(super) bounds: Aabb,
@@ -23,7 +24,7 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// Twice the centre.
+    /// Twice the center.
     fn centroid(&self) -> Vec3 {
         self.bounds.min + self.bounds.max
     }
@@ -33,15 +34,15 @@ impl Reference {
 struct Subtree {
     root: Child,
     bounds: Aabb,
-    /// Levels of nodes.
+    /// Number of levels of nodes.
     depth: usize,
 }
 
 impl Bvh {
-    /// Builds a tree over boxes; empty boxes and those with a NaN are in no leaf.
+    /// Builds a tree over boxes. Empty boxes and boxes with NaN are left out.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the build was canceled.
     pub fn build(boxes: &[Aabb], token: &CancelToken) -> Result<Self, Cancelled> {
         let mut references: Vec<Reference> = boxes
             .iter()
@@ -53,11 +54,11 @@ impl Bvh {
             let (nodes, order) = (Vec::new(), Vec::new());
             return Ok(Self { nodes, order, bounds: Aabb::EMPTY, depth: 0, top: TopNode::EMPTY });
         }
-        // A tree over n boxes has fewer than n nodes; every subtree writes into a stretch of its own.
+        // A tree over n boxes has fewer than n nodes. Every subtree writes to its own slice.
         let mut nodes = vec![Node::EMPTY; (references.len() - 1).max(1)];
         let tree = build_subtree(&mut references, &mut nodes, Start { place: 0, node: 0, depth: 0 }, token)?;
         if tree.root.count > 0 {
-            // The other side is never visited, but by rays that are not finite; their traversal ends there too.
+            // Only non-finite rays ever visit the other side, and their traversal ends there as well.
             nodes[0] = Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root; 2] };
         }
         let order = references.iter().map(|reference| reference.id).collect();
@@ -66,18 +67,18 @@ impl Bvh {
     }
 }
 
-/// Place at which a subtree is written.
+/// Output position of a subtree.
 #[derive(Clone, Copy)]
 struct Start {
-    /// Its first index in the final order.
+    /// Index of its first reference in leaf order.
     place: usize,
     /// Index of its first node.
     node: usize,
-    /// Number of levels above.
+    /// Number of ancestors.
     depth: usize,
 }
 
-/// Builds over references, into at most one node fewer than there are references.
+/// Builds a subtree with at most one node fewer than there are references.
 fn build_subtree(
     references: &mut [Reference],
     nodes: &mut [Node],
@@ -114,7 +115,7 @@ fn build_subtree(
     Ok(Subtree { root, bounds, depth: 1 + left.depth.max(right.depth) })
 }
 
-/// Sorts the references into two halves. `None` if a leaf is cheaper.
+/// Partitions the references into two halves, or returns `None` if a leaf is cheaper.
 fn partition(references: &mut [Reference], bounds: Aabb, start: &Start) -> Option<usize> {
     let count = references.len();
     if count == 1 {
@@ -147,7 +148,7 @@ struct Split {
     bins_per_length: f32,
     /// Bins below this one are on the left.
     bin: usize,
-    /// Area-weighted count of both sides.
+    /// Number of primitives on both sides, weighted by area.
     cost: f32,
 }
 
@@ -161,7 +162,7 @@ fn bin_of(centroid: f32, start: f32, bins_per_length: f32) -> usize {
     (((centroid - start) * bins_per_length) as usize).min(BINS - 1)
 }
 
-/// The cheapest of all planes between bins. `None` if all centroids coincide.
+/// Finds the cheapest plane between bins. `None` if all centroids coincide.
 fn best_split(references: &[Reference], centroids: Aabb) -> Option<Split> {
     let extent = centroids.extent();
     let bins_per_length = extent.map(|length| BINS as f32 / length);
@@ -190,7 +191,7 @@ fn best_split(references: &[Reference], centroids: Aabb) -> Option<Split> {
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
-/// Sweeps from both ends over the bins of an axis.
+/// Finds the cheapest plane by sweeping over the bins of an axis from both ends.
 fn cheapest_plane(bounds: &[Aabb; BINS], counts: &[u32; BINS]) -> Option<(usize, f32)> {
     let mut right_cost = [0.0_f32; BINS];
     let (mut box_so_far, mut count) = (Aabb::EMPTY, 0);
@@ -212,7 +213,7 @@ fn cheapest_plane(bounds: &[Aabb; BINS], counts: &[u32; BINS]) -> Option<(usize,
     best
 }
 
-/// Moves the references for which `is_left` holds to the front and returns their number.
+/// Moves the references for which `is_left` returns true to the front and returns their number.
 fn partition_by(references: &mut [Reference], is_left: impl Fn(&Reference) -> bool) -> usize {
     let (mut start, mut end) = (0, references.len());
     while start < end {
@@ -251,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn sound_over_grids_duplicates_slivers_and_nothing() {
+    fn trees_over_degenerate_boxes_are_valid() {
         built(&[]);
         built(&[unit_box(Vec3::ZERO)]);
         built(&vec![unit_box(Vec3::ONE); 1000]);
@@ -259,13 +260,14 @@ mod tests {
         let grid: Vec<_> =
             (0..20_000).map(|i| unit_box(Vec3::new((i % 40) as f32, (i / 40) as f32, 0.0))).collect();
         built(&grid);
-        // Each box twice as far as the one before: the surface area heuristic peels them off one by one.
+        // Each box is at twice the distance of the previous one: the surface area heuristic splits them off
+        // one by one.
         let geometric: Vec<_> = (0..250).map(|i| unit_box(Vec3::X * 2.0_f32.powi(i / 2))).collect();
         built(&geometric);
     }
 
     #[test]
-    fn the_tree_does_not_depend_on_the_threads() {
+    fn tree_does_not_depend_on_thread_count() {
         let boxes: Vec<_> = (0..30_000_u32)
             .map(|i| {
                 unit_box(Vec3::new(

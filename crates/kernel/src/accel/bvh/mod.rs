@@ -1,4 +1,4 @@
-//! A binary bounding volume hierarchy, built by binned surface area.
+//! A binary bounding volume hierarchy built with the binned surface area heuristic.
 
 mod build;
 mod packet;
@@ -10,34 +10,34 @@ use crate::geometry::Aabb;
 pub use packet::{AnyTest, ClosestTest};
 use top_node::TopNode;
 
-/// Most primitives in a leaf that the surface area heuristic may make.
+/// Maximum number of primitives in a leaf chosen by the surface area heuristic.
 const LEAF_SIZE: usize = 4;
 
-/// Number of levels that the surface area heuristic splits. Deeper nodes are halved by number, so that no input makes a
-/// deep tree.
+/// Number of levels split with the surface area heuristic. Deeper nodes are split at the median, which limits
+/// the depth for any input.
 const SURFACE_AREA_LEVELS: usize = 56;
 
-/// Stack size for the deepest possible tree: the levels above and a halving of 2³² primitives.
+/// Stack size for the deepest possible tree: the levels above and repeated halving of 2³² primitives.
 const DEEP_STACK: usize = SURFACE_AREA_LEVELS + 34;
 
-/// Stack size for small trees, whose traversal takes less time than clearing a deep stack.
+/// Stack size for small trees, whose traversal takes less time than initializing a deep stack.
 const SHALLOW_STACK: usize = 12;
 
-/// A tree over boxes, which an index names.
+/// A binary BVH over boxes identified by index.
 #[derive(Clone, Debug)]
 pub struct Bvh {
-    /// Nodes; the root is node 0. Empty if there are no boxes.
+    /// Nodes, starting with the root. Empty if there are no boxes.
     nodes: Vec<Node>,
-    /// Ids of the boxes, in the order of the leaves.
+    /// Box ids in leaf order.
     order: Vec<u32>,
     bounds: Aabb,
     /// Number of levels of nodes.
     depth: usize,
-    /// Start of the traversal by packets.
+    /// Start of packet traversal.
     top: TopNode,
 }
 
-/// Two children with their boxes, one cache line.
+/// Two children with their boxes, in one cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct Node {
@@ -50,7 +50,7 @@ impl Node {
     const EMPTY: Self = Self { bounds: [Aabb::EMPTY; 2], child: [Child::NONE; 2] };
 }
 
-/// An inner node, or a leaf of `count` > 0 entries of [`Bvh::order`] from `first` on.
+/// An inner node, or a leaf with `count` > 0 entries of [`Bvh::order`] starting at `first`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Child {
     first: u32,
@@ -62,16 +62,15 @@ impl Child {
 }
 
 impl Bvh {
-    /// Bytes that the tree takes.
+    /// Memory used by the tree, in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.order.as_slice())
     }
 
-    /// Walks the tree and reports faults: a box that does not contain its subtree, an id that occurs twice or not at
-    /// all.
+    /// Checks the tree: every box must contain its subtree, and every id must occur exactly once.
     ///
     /// # Errors
-    /// The first fault, in words.
+    /// A description of the first fault.
     pub fn validate(&self, boxes: &[Aabb]) -> Result<(), String> {
         let mut seen = vec![false; boxes.len()];
         let mut pending: Vec<(u32, Aabb)> =
@@ -93,7 +92,7 @@ impl Bvh {
                 for &id in &self.order[range] {
                     let own = boxes[id as usize];
                     if own.union(bounds) != bounds {
-                        return Err(format!("box {id} reaches out of its leaf"));
+                        return Err(format!("box {id} extends outside its leaf"));
                     }
                     if std::mem::replace(&mut seen[id as usize], true) {
                         return Err(format!("box {id} is in two leaves"));
@@ -102,7 +101,7 @@ impl Bvh {
             }
         }
         match seen.iter().position(|seen| !seen) {
-            Some(id) if !boxes[id].is_empty() => Err(format!("box {id} is in no leaf")),
+            Some(id) if !boxes[id].is_empty() => Err(format!("box {id} is not in any leaf")),
             _ => Ok(()),
         }
     }

@@ -1,6 +1,6 @@
-//! Traversal by up to sixteen rays at once: a box is visited if any of the rays meets it. The arithmetic is that of
-//! [`SlabRay::enter`], side by side in plain arrays. All of it is inlined, so that it is compiled with its caller's
-//! instructions.
+//! Packet traversal with up to 16 rays: a node is visited if any ray hits its box. The arithmetic is the same
+//! as in [`SlabRay::enter`], on plain arrays. Everything is inlined, so that it is compiled with the caller's
+//! instruction set.
 //!
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
@@ -15,26 +15,26 @@ use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::rows::{RayRows, Row, lanes};
 use crate::math::lanes::{Folds, TRUE};
 
-/// A test for the nearest hits of the rays of a packet.
+/// Callback that finds the nearest hits of a packet.
 pub trait ClosestTest {
-    /// Tests a primitive against the rays whose bits are set in `met`, and shortens the ends of the rays that hit it.
-    /// Primitives at exactly a ray's end are still tested, to break ties by id.
+    /// Tests a primitive against the rays in `met` and shortens the ends of those that hit it. Primitives
+    /// exactly at a ray's end are still tested, so that ties can be broken by id.
     fn test(&mut self, id: u32, met: u32, ends: &mut Ends);
 }
 
-/// A test for any hit of the rays of a packet.
+/// Callback that finds any hits of a packet.
 pub trait AnyTest {
-    /// The bits of the rays in `met` that hit a primitive.
+    /// Returns the bits of the rays in `met` that hit a primitive.
     fn test(&mut self, id: u32, met: u32, ends: &Ends) -> u32;
 }
 
-/// Rays prepared for the slab test.
+/// A packet prepared for the slab test.
 struct SlabPacket<'a> {
     origin: &'a [Row; 3],
     inverse: [Row; 3],
 }
 
-/// Interval of distances in which each ray is in a box; empty if the first is the greater.
+/// Interval of distances in which each ray is inside a box; empty if `near` > `far`.
 struct Stretches {
     near: Row,
     far: Row,
@@ -71,8 +71,8 @@ impl<'a> SlabPacket<'a> {
 }
 
 impl Stretches {
-    /// Least distance at which one of the rays that meet the box enters it. Compares bits, which for numbers ≥ 0 have the
-    /// order of the numbers, and ignore NaN.
+    /// Smallest distance at which a ray that hits the box enters it. Compares bits, which sort like numbers ≥
+    /// 0 and ignore NaN.
     #[inline(always)]
     fn first(&self) -> f32 {
         let mut entries = [0; PACKET];
@@ -84,7 +84,7 @@ impl Stretches {
     }
 }
 
-/// A bit for each ray that meets a box before its end.
+/// Bits of the rays that hit a box before their end.
 #[inline(always)]
 fn met(stretches: &Stretches, folds: impl Folds) -> u32 {
     let mut met = [0; PACKET];
@@ -94,7 +94,7 @@ fn met(stretches: &Stretches, folds: impl Folds) -> u32 {
     folds.bits(&met)
 }
 
-/// Greatest end of any ray; below 0 if no ray is traced. Compares bits as in [`Stretches::first`].
+/// Largest end of all rays, negative if no ray is traced. Compares bits as in [`Stretches::first`].
 #[inline(always)]
 fn greatest(ends: &Ends) -> f32 {
     let mut all = [0; PACKET];
@@ -104,10 +104,10 @@ fn greatest(ends: &Ends) -> f32 {
     f32::from_bits(folded!(all, >) as u32)
 }
 
-/// Stack of a packet: a lower bound on the entry distance, the rays that may meet the child, and the child.
+/// Traversal stack: a lower bound on the entry distance, the rays that may hit the child, and the child.
 type Waiting = ArrayVec<(f32, u32, Child), DEEP_STACK>;
 
-/// Subtrees of the top node still to visit, the nearest last.
+/// Subtrees of the top node still to be visited, with the nearest last.
 struct Near {
     entry: Row,
     order: [u8; PACKET],
@@ -139,7 +139,8 @@ impl Near {
 }
 
 impl Bvh {
-    /// Subtrees of the top node that the rays of a packet may meet, with lower bounds on their entry distances.
+    /// Finds the subtrees of the top node that the packet may hit, with lower bounds on their entry
+    /// distances.
     #[inline(always)]
     fn top_met(&self, slabs: &SlabPacket<'_>, ends: &Ends, traced: u32, folds: impl Folds) -> (u32, Row) {
         if traced == 0 {
@@ -148,8 +149,8 @@ impl Bvh {
         self.top.met(&Beam::around(slabs.origin, &slabs.inverse, (ends, traced), folds), folds)
     }
 
-    /// Visits the leaves that any of at most [`PACKET`] rays may meet, near ones first. Primitives outside of the tree come
-    /// before all leaves. `traced` are the bits of the rays that have an end.
+    /// Visits the leaves that any ray of the packet may hit, roughly front to back, after the primitives
+    /// outside the tree. `traced` has the bits of the rays with an end.
     #[inline(always)]
     pub fn closest_packet(
         &self,
@@ -210,8 +211,8 @@ impl Bvh {
         }
     }
 
-    /// A bit for each of at most [`PACKET`] rays that hits anything, in the tree or outside of it. `traced` are the bits of the
-    /// rays that have an end.
+    /// Returns the bits of the rays that hit anything, inside or outside the tree. `traced` has the bits of
+    /// the rays with an end.
     #[inline(always)]
     pub fn any_packet(
         &self,

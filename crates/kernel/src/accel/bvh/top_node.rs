@@ -1,6 +1,6 @@
-//! The top of a tree as one row of boxes. One test of all boxes against the intervals of the rays' coordinates skips the boxes
-//! that all rays of a packet miss. Rounding is monotonic: bounds on the inputs of [`SlabRay::enter`] bound its results too, so
-//! that no box is skipped that any ray alone would meet.
+//! The upper levels of a tree, flattened into one packet of boxes. A single test against the intervals of a
+//! packet's coordinates skips the boxes that all rays miss. Rounding is monotonic, so bounds on the inputs of
+//! [`SlabRay::enter`] also bound its results, and no box is skipped that a ray would hit on its own.
 //!
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
@@ -13,19 +13,19 @@ use crate::geometry::rows::Row;
 use crate::math::Vec3;
 use crate::math::lanes::{Folds, PlainFolds, TRUE};
 
-/// Up to [`PACKET`] subtrees that hold all primitives and replace the upper levels; a small scene is entirely in the
-/// top node.
+/// Up to [`PACKET`] subtrees that contain all primitives and replace the upper levels. Small scenes fit
+/// entirely into the top node.
 #[derive(Clone, Debug)]
 pub(super) struct TopNode {
     min: [Row; 3],
     max: [Row; 3],
     child: [Child; PACKET],
-    /// A bit for each subtree in use.
+    /// Bits of the subtrees in use.
     used: u32,
 }
 
 impl TopNode {
-    /// The top node of an empty tree.
+    /// Top node of an empty tree.
     pub(super) const EMPTY: Self = Self {
         min: [[f32::INFINITY; PACKET]; 3],
         max: [[f32::NEG_INFINITY; PACKET]; 3],
@@ -33,7 +33,7 @@ impl TopNode {
         used: 0,
     };
 
-    /// Opens the largest nodes, then the largest leaves, as long as there is room.
+    /// Opens the largest nodes, then the largest leaves, while there is room.
     pub(super) fn new(root: (Aabb, Child), nodes: &[Node], references: &[Reference]) -> Self {
         let mut open = vec![root];
         while let Some(place) = largest(&open, |child, room| child.count == 0 && room > 0) {
@@ -59,14 +59,14 @@ impl TopNode {
         top
     }
 
-    /// One of the subtrees and its box.
+    /// A subtree and its bounding box.
     #[inline(always)]
     pub(super) fn subtree(&self, i: usize) -> (Aabb, Child) {
         let corner = |rows: &[Row; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
         (Aabb { min: corner(&self.min), max: corner(&self.max) }, self.child[i])
     }
 
-    /// A bit for each subtree whose box overlaps another one.
+    /// Bits of the subtrees whose box overlaps `other`.
     #[inline]
     pub(super) fn meeting(&self, other: &Aabb) -> u32 {
         let mut met = [TRUE; PACKET];
@@ -80,8 +80,7 @@ impl TopNode {
         PlainFolds.bits(&met) & self.used
     }
 
-    /// A bit for each subtree whose box the rays of a beam may meet, and a lower bound on the distance at which they
-    /// enter it.
+    /// Bits of the subtrees that the rays of a beam may hit, with a lower bound on the entry distances.
     #[inline(always)]
     pub(super) fn met(&self, beam: &Beam, folds: impl Folds) -> (u32, Row) {
         let (mut near, mut far) = ([0.0_f32; PACKET], [beam.end * SLAB_PAD; PACKET]);
@@ -114,7 +113,8 @@ impl TopNode {
     }
 }
 
-/// The largest box whose subtree may be opened; `may_open` gets the child and the number of free places.
+/// Index of the largest box whose subtree may be opened. `may_open` receives the child and the number of free
+/// slots.
 fn largest(open: &[(Aabb, Child)], may_open: impl Fn(Child, usize) -> bool) -> Option<usize> {
     let room = PACKET - open.len();
     let each = open.iter().enumerate().filter(|(_, (_, child))| may_open(*child, room));
@@ -123,16 +123,16 @@ fn largest(open: &[(Aabb, Child)], may_open: impl Fn(Child, usize) -> bool) -> O
 
 /// Intervals that contain the coordinates of several rays.
 pub(super) struct Beam {
-    /// Least and greatest coordinates of the origins.
+    /// Minimum and maximum coordinates of the origins.
     origin: [[f32; 2]; 3],
-    /// Least and greatest coordinates of the inverse directions.
+    /// Minimum and maximum coordinates of the inverse directions.
     inverse: [[f32; 2]; 3],
-    /// Greatest end of any ray.
+    /// Largest end of all rays.
     end: f32,
 }
 
 impl Beam {
-    /// The beam around the rays of a packet that have an end: there is one at least, and their bits are those of `traced`.
+    /// Bounds the rays in `traced`, which must not be empty.
     #[inline(always)]
     pub(super) fn around(
         origin: &[Row; 3],
@@ -149,7 +149,7 @@ impl Beam {
 }
 
 impl Bvh {
-    /// Whether the top node holds all primitives one by one.
+    /// Whether every subtree of the top node is a single primitive.
     #[cfg(test)]
     pub(super) fn is_flat(&self) -> bool {
         self.top.child.iter().enumerate().all(|(i, child)| self.top.used >> i & 1 == 0 || child.count == 1)
@@ -166,7 +166,7 @@ mod tests {
     use crate::geometry::rows::{RayRows, lanes, traced};
     use crate::math::random::signed as random;
 
-    /// Test that notes which primitives are tested, and for which rays.
+    /// Records which primitives are tested, and for which rays.
     struct Seen(Vec<u32>);
 
     impl ClosestTest for Seen {
@@ -183,13 +183,13 @@ mod tests {
     }
 
     #[test]
-    fn packets_test_every_box_that_a_ray_meets_alone() {
+    fn packets_test_every_box_hit_by_a_ray() {
         let mut next = random(11);
         for count in [0, 1, 2, 5, 15, 16, 17, 40, 300] {
             let cell = |next: &mut dyn FnMut() -> f32| {
                 let middle = Vec3::new(next(), next(), next()) * 4.0;
                 let half = Vec3::new(next(), next(), next()).abs() * 0.8;
-                // Some are flat, as quads are.
+                // Some boxes are flat, like quads.
                 let half = if next() > 0.5 { half * Vec3::new(1.0, 0.0, 1.0) } else { half };
                 Aabb { min: middle - half, max: middle + half }
             };
@@ -202,7 +202,7 @@ mod tests {
                 let spread = [0.001, 0.1, 4.0][round % 3];
                 let mut ray = || {
                     let jitter = Vec3::new(next(), next(), next()) * spread;
-                    // Rays go along an axis, from one point, or from many.
+                    // Send the rays along an axis, from one point or from many.
                     match round % 7 {
                         0 => Ray::new(from + jitter, Vec3::NEG_Y),
                         1 | 2 => Ray::new(from + jitter, to - from),
@@ -211,7 +211,7 @@ mod tests {
                 };
                 let rays: Vec<Ray> = (0..=round % PACKET).map(|_| ray()).collect();
                 let (rows, mut ends) = RayRows::new(&rays);
-                // Some rays are not traced.
+                // Leave some rays untraced.
                 for lane in (0..rays.len()).filter(|lane| round % 5 == 0 && lane % 3 == 1) {
                     ends[lane] = -1.0;
                 }
@@ -230,10 +230,10 @@ mod tests {
                     tested += closest.0[id].count_ones();
                 }
             }
-            assert!(met > 0 || count == 0, "{count}: the rays meet something");
+            assert!(met > 0 || count == 0, "{count}: the rays hit something");
             assert!(
                 count > PACKET || tested == met,
-                "{count}: {tested} tests for {met}: alone in its leaf, no box is too much"
+                "{count}: {tested} tests for {met}: in single-box leaves, no test is superfluous"
             );
         }
     }

@@ -1,4 +1,4 @@
-//! Ordered traversal for the closest hit, and traversal for any hit.
+//! Single-ray traversal: ordered for the closest hit, unordered for any hit.
 
 use arrayvec::ArrayVec;
 
@@ -9,8 +9,9 @@ use crate::geometry::rows::lanes;
 use crate::geometry::{Aabb, Ray};
 
 impl Bvh {
-    /// Visits the leaves that the ray may meet, near ones first. `test(id, t_max)` tests one primitive and returns the new end
-    /// of the ray if it hits. Primitives at exactly the ray's end are still tested, so that the caller can break ties by id.
+    /// Visits the leaves that the ray may hit, roughly front to back. `test(id, t_max)` tests a primitive and
+    /// returns the ray's new end if it hits. Primitives exactly at the ray's end are still tested, so that
+    /// the caller can break ties by id.
     #[inline]
     pub fn closest(&self, ray: &Ray, test: impl FnMut(u32, f32) -> Option<f32>) {
         if self.depth < SHALLOW_STACK {
@@ -78,7 +79,7 @@ impl Bvh {
         }
     }
 
-    /// Whether `test(id)` holds for any primitive that the ray may meet.
+    /// Whether `test(id)` returns true for any primitive that the ray may hit.
     #[inline]
     pub fn any(&self, ray: &Ray, test: impl FnMut(u32) -> bool) -> bool {
         if self.depth < SHALLOW_STACK {
@@ -88,8 +89,8 @@ impl Bvh {
         }
     }
 
-    /// Visits the nodes whose boxes a ray meets, parents first, in an order that depends on the tree alone. `visit` says whether to
-    /// descend; `own` gets the ids of leaves.
+    /// Visits the nodes whose boxes a ray hits, parents first, in an order that depends only on the tree.
+    /// `visit` returns whether to descend; `own` receives the ids and depths of leaf entries.
     pub fn along(
         &self,
         ray: &Ray,
@@ -114,7 +115,7 @@ impl Bvh {
         }
     }
 
-    /// Visits every box that overlaps another one.
+    /// Visits every primitive in a leaf whose box overlaps `other`.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         let mut stack = ArrayVec::<Child, DEEP_STACK>::new();
         for subtree in lanes(self.top.meeting(other)) {
@@ -170,7 +171,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::signed;
 
-    /// Brute force over boxes as shapes: a ray hits a box at its entry.
+    /// Brute force with the boxes as shapes: a ray hits a box where it enters.
     fn brute(boxes: &[Aabb], ray: &Ray) -> Option<(f32, u32)> {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let hits =
@@ -179,9 +180,9 @@ mod tests {
     }
 
     #[test]
-    fn the_same_hits_as_testing_every_box() {
+    fn hits_match_brute_force() {
         let mut next = signed(1);
-        // A coarse grid of positions makes coplanar faces and exact ties.
+        // A coarse grid of positions produces coplanar faces and exact ties.
         let boxes: Vec<_> = (0..500)
             .map(|_| {
                 let at = Vec3::new(next(), next(), next()).map(|x| (x * 8.0).round());
@@ -221,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_of_no_number_comes_to_an_end() {
+    fn traversal_ends_for_nan_rays() {
         for count in 1..4 {
             let at = |i: usize| Vec3::splat(i as f32 * 3.0);
             let boxes: Vec<_> = (0..count).map(|i| Aabb { min: at(i), max: at(i) + Vec3::ONE }).collect();

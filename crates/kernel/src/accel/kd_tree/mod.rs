@@ -1,8 +1,9 @@
-//! A tree of planes over triangles (J. L. Bentley, *Multidimensional binary search trees used for associative searching*,
-//! 1975): another structure altogether than the tree of boxes, with the same answers to the bit.
+//! A kd-tree over triangles (J. L. Bentley, *Multidimensional binary search trees used for associative
+//! searching*, 1975). Unlike the BVH, it partitions space, but it returns the same hits to the bit.
 //!
-//! Planes are chosen by surface areas. Triangles on both sides of a plane are in both children, each with the box of its
-//! piece. Rounding misses no leaf; of hits at one distance the lowest number wins.
+//! Planes are chosen with the surface area heuristic. Triangles on both sides of a plane are in both
+//! children, each with the bounding box of its part. Rounding never misses a leaf, and the lowest index wins
+//! among hits at the same distance.
 
 mod build;
 mod node;
@@ -16,23 +17,23 @@ use crate::math::Vec3;
 
 use node::{Kind, Node, Triangle};
 
-/// A tree over triangles.
+/// A kd-tree over triangles.
 #[derive(Clone, Debug)]
 pub struct KdTree {
-    /// Nodes: the root is node 0, and a left child follows its parent. Empty if there are no triangles.
+    /// Nodes: the root comes first, and a left child follows its parent. Empty if there are no triangles.
     nodes: Vec<Node>,
     /// Indices into `triangles`, leaf by leaf.
     references: Vec<u32>,
-    /// Each triangle once, in the order in which leaves first name them.
+    /// Each triangle once, in the order in which leaves first refer to it.
     triangles: Vec<Triangle>,
     bounds: Aabb,
 }
 
 impl KdTree {
-    /// Builds over `count` triangles, which a number names; triangles with a NaN are never hit.
+    /// Builds a tree over `count` indexed triangles. Triangles with NaN are never hit.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the build was canceled.
     pub fn build(
         count: u32,
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
@@ -42,19 +43,19 @@ impl KdTree {
         Ok(Self { nodes, references, triangles, bounds })
     }
 
-    /// The box around all triangles.
+    /// Bounding box of all triangles.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// Bytes that the tree takes.
+    /// Memory used by the tree, in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice())
             + size_of_val(self.references.as_slice())
             + size_of_val(self.triangles.as_slice())
     }
 
-    /// Expected visits of a random line that meets the box around all, by surface areas: nodes, with leaves among them,
+    /// Expected visits for a random line through the bounding box, by surface area: nodes (including leaves)
     /// and triangles.
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
@@ -69,8 +70,8 @@ impl KdTree {
         visits
     }
 
-    /// Visits every triangle that has a point in a box, and maybe others near it. A triangle in several leaves may come more
-    /// than once.
+    /// Visits every triangle that overlaps a box, and possibly others near it. A triangle in several leaves
+    /// may be visited more than once.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         self.meeting_while(other, |triangle| {
             visit(triangle);
@@ -78,7 +79,8 @@ impl KdTree {
         });
     }
 
-    /// [`KdTree::meeting`] until `visit` returns false; returns whether it visited all.
+    /// Like [`KdTree::meeting`], but stops when `visit` returns false. Returns whether all triangles were
+    /// visited.
     pub fn meeting_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
         let mut pending = [0_u32; traverse::STACK_SIZE];
         let mut size = usize::from(!self.nodes.is_empty() && self.bounds.meets(other));
@@ -107,8 +109,8 @@ impl KdTree {
         true
     }
 
-    /// Visits the nodes whose cells a ray meets, parents first, in an order that depends on the tree alone. `visit` says whether to
-    /// descend.
+    /// Visits the nodes whose cells a ray hits, parents first, in an order that depends only on the tree.
+    /// `visit` returns whether to descend.
     pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Cell, &Stretch) -> bool) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
         while let Some((bounds, place, depth)) = pending.pop() {
@@ -142,7 +144,7 @@ impl KdTree {
     }
 }
 
-/// The parts of a box below and above a plane.
+/// Parts of a box below and above a plane.
 fn halves(cell: Aabb, axis: usize, at: f32) -> [Aabb; 2] {
     let (mut below, mut above) = (cell, cell);
     below.max[axis] = at;

@@ -1,35 +1,35 @@
-//! Nodes of eight bytes, and the triangles that leaves name.
+//! Kd-tree nodes of eight bytes, and the triangles in the leaves.
 
 use crate::math::Vec3;
 
-/// Tag of a leaf, in place of the axis of an inner node.
+/// Tag of a leaf, in place of an inner node's axis.
 const LEAF: u32 = 3;
 
-/// Greatest number that fits beside the axis.
+/// Largest number that fits next to the axis.
 pub const MOST: u32 = u32::MAX >> 2;
 
-/// A node. The left child of an inner node is the next node.
+/// An encoded node. The left child of an inner node is the next node.
 #[derive(Clone, Copy, Debug)]
 pub struct Node {
-    /// Bits of the plane's coordinate for an inner node, index of the first reference for a leaf.
+    /// Bits of the plane's coordinate for an inner node, or index of the first reference for a leaf.
     payload: u32,
     /// Axis or [`LEAF`] in the two low bits; above them the right child, or the number of references.
     tag: u32,
 }
 
-/// The contents of a node.
+/// A decoded node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// A node that a plane splits.
+    /// An inner node, split by a plane.
     Inner {
         /// Axis of the plane's normal.
         axis: usize,
         /// Coordinate of the plane.
         at: f32,
-        /// The child above the plane.
+        /// Index of the child above the plane.
         right: u32,
     },
-    /// A leaf: references to triangles.
+    /// A leaf with references to triangles.
     Leaf {
         /// Index of the first reference.
         first: u32,
@@ -64,7 +64,7 @@ impl Node {
         }
     }
 
-    /// The node behind so many other nodes and references.
+    /// The node with its indices offset by `nodes` preceding nodes and `references` preceding references.
     pub fn moved(self, nodes: u32, references: u32) -> Self {
         Self::new(match self.kind() {
             Kind::Inner { axis, at, right } => Kind::Inner { axis, at, right: right + nodes },
@@ -73,7 +73,7 @@ impl Node {
     }
 }
 
-/// A triangle with its number in the mesh.
+/// A triangle and its index in the mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct Triangle {
     pub corners: [Vec3; 3],

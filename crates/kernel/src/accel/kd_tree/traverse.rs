@@ -1,7 +1,7 @@
-//! Front-to-back traversal with a stack of the far children.
+//! Front-to-back traversal with a stack of far children.
 //!
-//! Every distance is padded, so that rounding never misses a triangle that the test would hit. The arithmetic of test
-//! and planes displaces a ray by a few roundings of the lengths that they work on; no such length is greater than the
+//! Every distance is padded, so that rounding never misses a triangle that the test would hit. The triangle
+//! and plane tests displace a ray by a few roundings of the lengths involved, none of which exceeds the
 //! distance from the ray's origin to the far end of the mesh.
 
 use super::KdTree;
@@ -9,27 +9,28 @@ use super::node::Kind;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 
-/// Displacement of a ray by rounding, relative to the greatest length.
+/// Displacement of a ray by rounding, relative to the largest length.
 const PAD: f32 = 32.0 * f32::EPSILON;
 
-/// Size of the deepest stack: the depth limit for as many triangles as there are numbers, and one more.
+/// Stack size: the depth limit for the largest possible number of triangles, plus one.
 pub(super) const STACK_SIZE: usize = 64;
 
-/// A ray prepared for planes, in steps of a direction whose greatest component is between 1 and 2.
+/// A ray prepared for plane tests, parametrized by a direction scaled so that its largest component is
+/// between 1 and 2.
 struct PlaneRay {
     origin: [f32; 3],
     inverse: [f32; 3],
     backward: [bool; 3],
     /// Bound on the displacement of a plane or the ray.
     pad: f32,
-    /// Steps for each unit of the ray's t.
+    /// Scaled length per unit of the ray's t.
     steps: f32,
 }
 
 impl PlaneRay {
     fn new(ray: &Ray, bounds: &Aabb) -> Self {
         let greatest = ray.direction.abs().max_element();
-        // The power of two just below, from the exponent's bits alone: scaling by it is exact.
+        // Largest power of two below, taken from the exponent bits: scaling by it is exact.
         let steps = f32::from_bits(greatest.to_bits() & 0x7f80_0000)
             .clamp(f32::MIN_POSITIVE, 1.0 / f32::MIN_POSITIVE);
         let inverse = (ray.direction * (1.0 / steps)).recip();
@@ -43,8 +44,9 @@ impl PlaneRay {
         }
     }
 
-    /// Bounds on the ray's distance at a plane, from below and above. If the ray runs in the plane but for rounding, all
-    /// distances are within; if it runs beside the plane, −∞ or ∞. NaN stands for no bound.
+    /// Lower and upper bounds on the ray's distance to a plane. If the ray runs within the plane up to
+    /// rounding, the bounds include all distances; if it runs parallel to it, both are −∞ or both ∞. NaN
+    /// means unbounded.
     #[inline(always)]
     fn meets(&self, axis: usize, at: f32) -> (f32, f32) {
         let distance = at - self.origin[axis];
@@ -53,7 +55,7 @@ impl PlaneRay {
         if self.backward[axis] { (high, low) } else { (low, high) }
     }
 
-    /// The interval of the ray that is in the box.
+    /// Interval of the ray inside the box.
     fn inside(&self, bounds: &Aabb, t_max: f32) -> Option<(f32, f32)> {
         let (mut near, mut far) = (0.0_f32, self.end(t_max));
         for axis in 0..3 {
@@ -65,18 +67,18 @@ impl PlaneRay {
         (near <= far).then_some((near, far))
     }
 
-    /// Greatest distance, in steps, of a ray that ends at `t_max`.
+    /// Upper end, in scaled distance, of a ray that ends at `t_max`.
     #[inline(always)]
     fn end(&self, t_max: f32) -> f32 {
         t_max * self.steps + self.pad
     }
 }
 
-/// Entry of the stack: a node and the interval of the ray in it.
+/// Stack entry: a node and the interval of the ray inside it.
 type Pending = (u32, f32, f32);
 
 impl KdTree {
-    /// The nearest hit; of hits at one distance, the triangle of the lowest number.
+    /// Finds the nearest hit; the lowest triangle index wins among hits at the same distance.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         let sheared = ShearedRay::new(ray.origin, ray.direction);
         let mut best: Option<ShapeHit> = None;
@@ -98,7 +100,7 @@ impl KdTree {
         best
     }
 
-    /// Whether the ray hits any triangle but `except`.
+    /// Whether the ray hits any triangle except `except`.
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
         let sheared = ShearedRay::new(ray.origin, ray.direction);
         let mut found = false;
@@ -113,8 +115,8 @@ impl KdTree {
         found
     }
 
-    /// Visits the leaves that the ray may meet, near ones first. `test` gets the indices of a leaf's triangles and returns the new
-    /// end of the ray; `None` ends the visit. A ray that is not finite meets no leaf.
+    /// Visits the leaves that the ray may hit, front to back. `test` receives the indices of a leaf's
+    /// triangles and returns the ray's new end, or `None` to stop. Non-finite rays do not visit any leaf.
     #[inline(always)]
     fn visit(&self, ray: &Ray, mut test: impl FnMut(&[u32]) -> Option<f32>) {
         if self.nodes.is_empty() || !ray.origin.is_finite() || !ray.direction.is_finite() {

@@ -1,4 +1,4 @@
-//! Validation of a tree by other means than those that built it.
+//! Validation of a kd-tree, independent of the code that builds it.
 
 use super::build::depth_limit;
 use super::node::Kind;
@@ -7,22 +7,23 @@ use crate::accel::reference::Polygon;
 use crate::geometry::Aabb;
 use crate::math::{DVec3, Vec3};
 
-/// State of a walk from the root at a node.
+/// State of the traversal at a node.
 struct Visit {
     place: u32,
     cell: Aabb,
     depth: u32,
-    /// Triangles with a point in the cell, its faces included.
+    /// Triangles that overlap the cell, including its faces.
     inside: Vec<u32>,
 }
 
 impl KdTree {
-    /// Walks the tree and reports faults: planes outside their cells (otherwise the leaves tile the box), nodes that are
-    /// reached twice or never, a depth beyond the limit, leaves that name a triangle twice or one that is elsewhere, leaves
-    /// that do not name one which reaches into them, faces between leaves with a triangle that neither names.
+    /// Checks the tree. Planes must be inside their cells, so that the leaves tile the box. Every node must
+    /// be reached exactly once, within the depth limit. Leaves must refer to every triangle that extends into
+    /// them, never twice, and only to triangles that overlap them. A triangle in a face between leaves must
+    /// be in one of them.
     ///
     /// # Errors
-    /// The first fault, in words.
+    /// A description of the first fault.
     pub fn validate(&self, count: u32, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<(), String> {
         let usable = |id: &u32| {
             let bounds = Aabb::around(corners(*id));
@@ -30,10 +31,14 @@ impl KdTree {
         };
         let all: Vec<u32> = (0..count).filter(usable).collect();
         if self.nodes.is_empty() {
-            return if all.is_empty() { Ok(()) } else { Err("a tree without nodes".to_owned()) };
+            return if all.is_empty() {
+                Ok(())
+            } else {
+                Err("the tree has triangles but no nodes".to_owned())
+            };
         }
         if Aabb::around(all.iter().flat_map(|&id| corners(id))) != self.bounds {
-            return Err("the box is not that of the triangles".to_owned());
+            return Err("the bounding box does not match the triangles".to_owned());
         }
         let limit = depth_limit(all.len());
         let mut named = Named::new(&all, &corners);
@@ -41,10 +46,10 @@ impl KdTree {
         let mut pending = vec![Visit { place: 0, cell: self.bounds, depth: 0, inside: all }];
         while let Some(Visit { place, cell, depth, inside }) = pending.pop() {
             if depth > limit {
-                return Err(format!("node {place} is {depth} planes deep"));
+                return Err(format!("node {place} has depth {depth}, which exceeds the limit"));
             }
             if place != reached {
-                return Err(format!("node {place} is not where it belongs"));
+                return Err(format!("node {place} is out of order"));
             }
             reached += 1;
             match self.nodes[place as usize].kind() {
@@ -68,16 +73,16 @@ impl KdTree {
             }
         }
         if reached as usize != self.nodes.len() {
-            return Err("nodes that are never reached".to_owned());
+            return Err("some nodes are unreachable".to_owned());
         }
         if let Some(triangle) = self.triangles.iter().find(|own| own.corners != corners(own.id)) {
-            return Err(format!("triangle {} has other corners", triangle.id));
+            return Err(format!("triangle {} has different corners", triangle.id));
         }
         named.missing()
     }
 }
 
-/// Checks that a leaf names the right triangles and no more.
+/// Checks that a leaf refers to exactly the right triangles.
 fn leaf(
     place: u32,
     cell: &Aabb,
@@ -88,14 +93,14 @@ fn leaf(
     let mut sorted = ids.to_vec();
     sorted.sort_unstable();
     if sorted.windows(2).any(|pair| pair[0] == pair[1]) {
-        return Err(format!("leaf {place} names a triangle twice"));
+        return Err(format!("leaf {place} refers to a triangle twice"));
     }
     if let Some(id) = sorted.iter().find(|&&id| !overlap(cell, &Aabb::around(corners(id)))) {
-        return Err(format!("leaf {place} names triangle {id}, which is elsewhere"));
+        return Err(format!("leaf {place} refers to triangle {id}, which is outside its cell"));
     }
     let must = |id: &&u32| reaches_into(cell, corners(**id));
     match inside.iter().filter(must).find(|id| sorted.binary_search(id).is_err()) {
-        Some(id) => Err(format!("leaf {place} does not name triangle {id}")),
+        Some(id) => Err(format!("leaf {place} lacks triangle {id}")),
         None => Ok(()),
     }
 }
@@ -104,7 +109,7 @@ fn overlap(a: &Aabb, b: &Aabb) -> bool {
     a.min.cmple(b.max).all() && b.min.cmple(a.max).all()
 }
 
-/// Whether more of a triangle is in a cell than what lies in one of its faces.
+/// Whether a triangle extends into a cell by more than a part within one of its faces.
 fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     let (min, max) = Polygon::clipped(corners, cell).extent();
     (0..3).all(|axis| {
@@ -114,7 +119,7 @@ fn reaches_into(cell: &Aabb, corners: [Vec3; 3]) -> bool {
     })
 }
 
-/// Points of every triangle, and for each whether a leaf at the point names the triangle.
+/// Points on every triangle, and for each whether a leaf at the point refers to the triangle.
 struct Named {
     points: Vec<(u32, Vec<(DVec3, bool)>)>,
 }
@@ -143,6 +148,6 @@ impl Named {
 
     fn missing(&self) -> Result<(), String> {
         let lost = self.points.iter().find(|(_, points)| points.iter().any(|(_, named)| !named));
-        lost.map_or(Ok(()), |(id, _)| Err(format!("no leaf names triangle {id} where a part of it is")))
+        lost.map_or(Ok(()), |(id, _)| Err(format!("part of triangle {id} is not in any leaf")))
     }
 }

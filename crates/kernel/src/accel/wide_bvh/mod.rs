@@ -1,7 +1,7 @@
-//! A tree eight boxes wide over triangles, four in a pack.
+//! A BVH over triangles with eight children per node and four triangles per pack.
 //!
-//! Whatever instructions traverse it, a ray gets the same hit, bit for bit: box tests may only let too much through, the
-//! arithmetic of the triangle test is always the same, and of hits at one distance the lowest id wins.
+//! A ray gets the same hit, bit for bit, on every instruction set: box tests may only be conservative, the
+//! triangle test always uses the same arithmetic, and the lowest id wins among hits at the same distance.
 
 mod build;
 mod node;
@@ -18,10 +18,10 @@ use crate::accel::{Cell, Ends, PACKET, Stretch};
 
 use node::{Node, TrianglePack};
 
-/// A tree over triangles.
+/// An eight-wide BVH over triangles.
 #[derive(Clone, Debug)]
 pub struct WideBvh {
-    /// Nodes; the root is node 0. Empty if there are no triangles.
+    /// Nodes, starting with the root. Empty if there are no triangles.
     nodes: Vec<Node>,
     packs: Vec<TrianglePack>,
     bounds: Aabb,
@@ -29,21 +29,21 @@ pub struct WideBvh {
     quality: Quality,
 }
 
-/// Effort of building a tree.
+/// Build quality of a tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quality {
     /// Each triangle is in one leaf.
     #[default]
     Medium,
-    /// Triangles that are much smaller than their boxes are in several leaves.
+    /// Triangles much smaller than their boxes are split and may be in several leaves.
     High,
 }
 
 impl WideBvh {
-    /// Builds over `count` triangles, which a number names; triangles with a NaN are never hit.
+    /// Builds a tree over `count` indexed triangles. Triangles with NaN are never hit.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the build was canceled.
     pub fn build(
         count: u32,
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
@@ -52,10 +52,10 @@ impl WideBvh {
         Self::build_with(Quality::default(), count, corners, token)
     }
 
-    /// Builds with this effort; the hits are the same.
+    /// Builds a tree with the given quality, which does not affect the hits.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the build was canceled.
     pub fn build_with(
         quality: Quality,
         count: u32,
@@ -66,28 +66,28 @@ impl WideBvh {
         Ok(Self { nodes, packs, bounds, instructions: Instructions::best(), quality })
     }
 
-    /// The same tree, traversed by other instructions. If the processor lacks them, it takes the best that it has.
+    /// Sets the instruction set for traversal. Falls back to the best one that the processor has.
     pub fn with(mut self, instructions: Instructions) -> Self {
         self.instructions = instructions.available();
         self
     }
 
-    /// Instructions that traverse the tree.
+    /// Instruction set used for traversal.
     pub fn instructions(&self) -> Instructions {
         self.instructions
     }
 
-    /// The box around all triangles.
+    /// Bounding box of all triangles.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// Bytes that the tree takes.
+    /// Memory used by the tree, in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.nodes.as_slice()) + size_of_val(self.packs.as_slice())
     }
 
-    /// Expected visits of a random line that meets the box around all, by surface areas: nodes, and packs of triangles.
+    /// Expected visits for a random line through the bounding box, by surface area: nodes and triangle packs.
     pub fn expected_visits(&self) -> (f64, f64) {
         let whole = f64::from(self.bounds.half_area());
         let mut visits = (f64::from(!self.nodes.is_empty()), 0.0);
@@ -104,8 +104,8 @@ impl WideBvh {
         visits
     }
 
-    /// Visits the nodes whose boxes a ray meets, parents first, in an order that depends on the tree alone. `visit` says whether to
-    /// descend.
+    /// Visits the nodes whose boxes a ray hits, parents first, in an order that depends only on the tree.
+    /// `visit` returns whether to descend.
     pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Cell, &Stretch) -> bool) {
         let root = (self.bounds, node::Child::Inner(0), 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
@@ -129,18 +129,18 @@ impl WideBvh {
         }
     }
 
-    /// The nearest hit; of hits at one distance, the triangle of the lowest number.
+    /// Finds the nearest hit; the lowest triangle index wins among hits at the same distance.
     pub fn closest(&self, ray: &Ray) -> Option<ShapeHit> {
         if self.nodes.is_empty() { None } else { simd::closest(self, ray) }
     }
 
-    /// Whether the ray hits any triangle but `except`.
+    /// Whether the ray hits any triangle except `except`.
     pub fn any(&self, ray: &Ray, except: Option<u32>) -> bool {
         !self.nodes.is_empty() && simd::any(self, ray, except)
     }
 
-    /// [`WideBvh::closest`] for at most [`PACKET`] rays up to their ends; faster if they go in much the same direction, as
-    /// rays of neighbouring pixels do.
+    /// [`WideBvh::closest`] for at most [`PACKET`] rays up to their ends. Faster for rays in similar
+    /// directions, such as those of neighboring pixels.
     pub fn closest_packet(&self, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) {
         debug_assert!(rays.len() <= PACKET && rays.len() == hits.len());
         hits.fill(None);
@@ -151,8 +151,8 @@ impl WideBvh {
         }
     }
 
-    /// [`WideBvh::any`] for at most [`PACKET`] rays up to their ends: a bit for each ray that hits. `except` has one entry for
-    /// each ray, or is empty.
+    /// [`WideBvh::any`] for at most [`PACKET`] rays up to their ends. Returns the bits of the rays that hit.
+    /// `except` has one entry per ray, or is empty.
     pub fn any_packet(&self, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> u32 {
         debug_assert!(rays.len() <= PACKET && (except.is_empty() || rays.len() == except.len()));
         if self.nodes.is_empty() {
@@ -178,8 +178,8 @@ impl WideBvh {
         bits
     }
 
-    /// Visits every triangle that has a point in a box, and maybe others near it. A triangle in pieces may come more
-    /// than once.
+    /// Visits every triangle that overlaps a box, and possibly others near it. A split triangle may be
+    /// visited more than once.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
         self.meeting_while(other, |triangle| {
             visit(triangle);
@@ -187,7 +187,8 @@ impl WideBvh {
         });
     }
 
-    /// [`WideBvh::meeting`] until `visit` returns false; returns whether it visited all.
+    /// Like [`WideBvh::meeting`], but stops when `visit` returns false. Returns whether all triangles were
+    /// visited.
     pub fn meeting_while(&self, other: &Aabb, mut visit: impl FnMut(u32) -> bool) -> bool {
         self.nodes.is_empty() || self.meeting_below(0, other, &mut visit)
     }
@@ -203,10 +204,10 @@ impl WideBvh {
         })
     }
 
-    /// Walks the tree and reports faults.
+    /// Checks that boxes contain their subtrees and that every triangle is in the right leaves.
     ///
     /// # Errors
-    /// The first fault, in words.
+    /// A description of the first fault.
     pub fn validate(&self, count: u32, corners: impl Fn(u32) -> [Vec3; 3]) -> Result<(), String> {
         let mut leaves: Vec<Vec<Aabb>> = vec![Vec::new(); count as usize];
         let in_pieces = self.quality == Quality::High;
@@ -225,7 +226,7 @@ impl WideBvh {
                         for pack in &self.packs[first as usize..(first + count) as usize] {
                             for id in pack.ids() {
                                 if !in_pieces && Aabb::around(corners(id)).union(bounds) != bounds {
-                                    return Err(format!("triangle {id} reaches out of its leaf"));
+                                    return Err(format!("triangle {id} extends outside its leaf"));
                                 }
                                 if !in_pieces && !leaves[id as usize].is_empty() {
                                     return Err(format!("triangle {id} is in two leaves"));
@@ -245,15 +246,15 @@ impl WideBvh {
             let points = [a, b, c, (a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5];
             points.iter().all(|point| point.is_finite()) && !points.iter().all(|&point| in_a_leaf(*id, point))
         };
-        (0..count).find(lost).map_or(Ok(()), |id| Err(format!("a part of triangle {id} is in no leaf")))
+        (0..count).find(lost).map_or(Ok(()), |id| Err(format!("part of triangle {id} is not in any leaf")))
     }
 }
 
-/// Number of shadow rays below which tracing them one by one is faster.
+/// Number of shadow rays below which tracing them one at a time is faster.
 const SMALL_GROUP: usize = 8;
 
-/// Calls `take` for each group of rays with the same signs of direction and the same longest axis, with their ends and
-/// their number. The ends of all other rays are below 0.
+/// Calls `take` for each group of rays whose directions have the same signs and the same longest axis, with
+/// their ends and their number. All other rays get negative ends.
 fn for_each_group(rays: &[Ray], ends: &Ends, mut take: impl FnMut(&Ends, usize)) {
     let way = |ray: &Ray| {
         let [x, y, z] = ray.direction.to_array().map(f32::abs);
@@ -302,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn every_way_to_traverse_gives_the_bits_of_testing_every_triangle() {
+    fn traversals_match_brute_force_bit_for_bit() {
         let of_each =
             |mesh: &[[Vec3; 3]]| [Quality::Medium, Quality::High].map(|quality| built_with(quality, mesh));
         for (number, mesh) in meshes().iter().enumerate() {
@@ -324,7 +325,7 @@ mod tests {
         }
     }
 
-    /// Packets of rays that go in much the same direction, and some that do not, of all sizes.
+    /// Packets of all sizes, some with similar directions and some without.
     fn packets(mesh: &[[Vec3; 3]]) -> Vec<Vec<Ray>> {
         let mut next = random(17);
         let mut packets: Vec<Vec<Ray>> = rays(mesh).chunks(PACKET).map(<[Ray]>::to_vec).collect();
@@ -345,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn a_packet_gives_the_bits_of_its_rays_one_by_one() {
+    fn packets_match_single_rays() {
         for (number, mesh) in meshes().iter().enumerate() {
             let mut tree = built(mesh);
             for instructions in Instructions::ALL {
@@ -385,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_that_go_the_same_way_are_traced_side_by_side() {
+    fn coherent_rays_are_traced_as_packets() {
         let mesh = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
         let rays: Vec<_> = (0..PACKET)
             .map(|i| Ray::new(Vec3::new(0.1 + 0.02 * i as f32, 0.2, 1.0), Vec3::new(0.01, 0.02, -1.0)))
@@ -409,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_ray_far_out_meets_what_it_hits_though_numbers_overflow() {
+    fn distant_rays_hit_despite_overflow() {
         let (at, size) = (Vec3::new(1e8, 0.0, 0.0), 96.0);
         let mesh = [[
             at + Vec3::new(-size, -size, size),
@@ -430,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn any_hit_leaves_one_triangle_out() {
+    fn any_hit_skips_the_excluded_triangle() {
         let mesh = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
         let tree = built(&mesh);
         let ray = Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z);

@@ -1,41 +1,42 @@
-//! Nodes and packs of triangles, laid out for vector loads.
+//! Nodes and triangle packs, laid out for SIMD loads.
 
 use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 
-/// Number of children of a node.
+/// Number of children per node.
 pub const WIDTH: usize = 8;
 
-/// Most triangles in a pack.
+/// Maximum number of triangles per pack.
 pub const PACK: usize = 4;
 
-/// Most packs of a leaf.
+/// Maximum number of packs per leaf.
 pub const MOST_PACKS: u32 = 8;
 
-/// Bit that marks a leaf in [`Node::children`]; the next three bits hold the number of its packs less one, the others
-/// the first pack.
+/// Bit that marks a leaf in [`Node::children`]. The next three bits hold the number of packs minus one, and
+/// the rest the index of the first pack.
 const LEAF: u32 = 1 << 31;
 
 const FIRST_BITS: u32 = 28;
 
-/// The bits of a leaf that are not the number of its first pack.
+/// Bits of an encoded leaf other than the index of its first pack.
 pub const LEAF_BITS: u32 = !((1 << FIRST_BITS) - 1);
 
-/// A mesh in pieces has at most 1.3 references a triangle; no pack and no node is without one of its own.
+/// A split mesh has at most 1.3 references per triangle, and every pack and node has at least one of its own.
 const _: () = assert!(TriangleMesh::MOST_TRIANGLES as u64 * 13 / 10 < 1 << FIRST_BITS);
 
-/// Eight boxes as rows of their least and greatest x, y and z, and the children in them.
+/// Eight child boxes as arrays of their minimum and maximum coordinates, and the children.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Node {
-    /// Rows: least x, greatest x, least y, greatest y, least z, greatest z. Empty boxes are ∞ … −∞, met by no finite arithmetic.
+    /// Minimum x, maximum x, minimum y, maximum y, minimum z and maximum z of each box. Empty boxes are ∞ …
+    /// −∞, which finite arithmetic never hits.
     pub rows: [[f32; WIDTH]; 6],
-    /// Encoded children, see [`Child`].
+    /// Encoded children; see [`Child`].
     pub children: [u32; WIDTH],
 }
 
-/// Child of a node.
+/// A decoded child of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
     /// Index of a node.
@@ -50,7 +51,7 @@ pub enum Child {
 }
 
 impl Child {
-    /// Decodes a child from its form in a node.
+    /// Decodes a child.
     #[inline(always)]
     pub fn decode(code: u32) -> Self {
         if code & LEAF == 0 {
@@ -72,14 +73,14 @@ impl Child {
 }
 
 impl Node {
-    /// Eight empty boxes. If numbers overflow, all boxes are met: an empty box leads to the first pack, so that the
-    /// traversal still ends.
+    /// A node with eight empty boxes. If arithmetic overflows, all boxes are hit: empty boxes lead to the
+    /// first pack, so that traversal still ends.
     pub const EMPTY: Self = {
         let (least, greatest) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
         Self { rows: [least, greatest, least, greatest, least, greatest], children: [LEAF; WIDTH] }
     };
 
-    /// Fills a slot.
+    /// Sets the box and child of a slot.
     pub fn set(&mut self, slot: usize, bounds: Aabb, child: Child) {
         for axis in 0..3 {
             self.rows[2 * axis][slot] = bounds.min[axis];
@@ -88,12 +89,12 @@ impl Node {
         self.set_child(slot, child);
     }
 
-    /// Changes the child of a slot.
+    /// Replaces the child of a slot.
     pub fn set_child(&mut self, slot: usize, child: Child) {
         self.children[slot] = child.encode();
     }
 
-    /// The box of a slot. `None` if it is empty.
+    /// Box of a slot, or `None` if it is empty.
     pub fn bounds(&self, slot: usize) -> Option<Aabb> {
         let corner = |side: usize| {
             Vec3::new(self.rows[side][slot], self.rows[2 + side][slot], self.rows[4 + side][slot])
@@ -101,7 +102,7 @@ impl Node {
         Some(Aabb { min: corner(0), max: corner(1) }).filter(|bounds| !bounds.is_empty())
     }
 
-    /// A bit for each slot whose box overlaps another one.
+    /// Bits of the slots whose box overlaps `other`.
     #[inline]
     pub fn meeting(&self, other: &Aabb) -> u32 {
         let mut met = [true; WIDTH];
@@ -114,24 +115,24 @@ impl Node {
         (0..WIDTH).fold(0, |bits, slot| bits | u32::from(met[slot]) << slot)
     }
 
-    /// The child of a slot.
+    /// Child of a slot.
     pub fn child(&self, slot: usize) -> Child {
         Child::decode(self.children[slot])
     }
 }
 
-/// Four triangles; lanes without one are NaN, which no ray hits.
+/// Four triangles. Unused lanes are NaN, which no ray hits.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub struct TrianglePack {
-    /// Rows: x, y, z of the first corners, of the second, of the third.
+    /// Coordinates x, y, z of the first corners, then the second, then the third.
     pub rows: [[f32; PACK]; 9],
-    /// Numbers of the triangles; `u32::MAX` in lanes without one.
+    /// Triangle indices; `u32::MAX` in unused lanes.
     pub ids: [u32; PACK],
 }
 
 impl TrianglePack {
-    /// A pack of at most four triangles.
+    /// Packs at most four triangles.
     pub fn new(triangles: impl IntoIterator<Item = (u32, [Vec3; 3])>) -> Self {
         let mut pack = Self { rows: [[f32::NAN; PACK]; 9], ids: [u32::MAX; PACK] };
         for (lane, (id, corners)) in triangles.into_iter().take(PACK).enumerate() {
@@ -152,7 +153,7 @@ impl TrianglePack {
             .map(|row| Vec3::new(self.rows[row][lane], self.rows[row + 1][lane], self.rows[row + 2][lane]))
     }
 
-    /// Numbers of the triangles in use.
+    /// Indices of the triangles in use.
     pub fn ids(&self) -> impl Iterator<Item = u32> {
         self.ids.into_iter().filter(|&id| id != u32::MAX)
     }

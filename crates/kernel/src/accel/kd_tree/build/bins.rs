@@ -1,6 +1,7 @@
-//! Splits of large cells: planes at equal distances on all three axes, where each box is counted in the bins of its
-//! start and its end (Shevtsov, Soupikov, Kapustin, *Highly Parallel Fast KD-tree Construction for Interactive Ray
-//! Tracing of Dynamic Scenes*, 2007); and the two faces of the box around all, beyond which space is empty.
+//! Splits of large cells. Candidate planes are evenly spaced on all three axes, and each box is counted in
+//! the bins where it starts and ends (Shevtsov, Soupikov, Kapustin, *Highly Parallel Fast KD-tree
+//! Construction for Interactive Ray Tracing of Dynamic Scenes*, 2007). The faces of the bounding box, beyond
+//! which space is empty, are also candidates.
 
 use std::array;
 
@@ -13,7 +14,7 @@ use crate::math::Vec4;
 /// Number of bins along an axis.
 const BINS: usize = 31;
 
-/// Number of planes: between bins, before the first and behind the last.
+/// Number of planes: between bins, before the first and after the last.
 const PLANES: usize = BINS + 1;
 
 /// Number of references above which they are counted in parallel.
@@ -25,13 +26,13 @@ struct Histogram {
     ends: [[u32; PLANES]; 3],
 }
 
-/// Constant that, added to a number from −½ to 2²², leaves the nearest integer in the low bits.
+/// Added to a number between −½ and 2²², leaves the nearest integer in the low bits.
 const ROUND: f32 = 12_582_912.0;
 
 impl Histogram {
     fn of(references: &[Reference], start: Vec4, per_length: Vec4) -> Self {
         let mut own = Self { starts: [[0; PLANES]; 3], ends: [[0; PLANES]; 3] };
-        // Subtract a half, so that the nearest integer is the one below.
+        // Subtract ½, so that rounding to the nearest integer rounds down.
         let bins = |at: Vec4| {
             let place = (at - start) * per_length - Vec4::splat(0.5);
             place.clamp(Vec4::ZERO, Vec4::splat((BINS - 1) as f32)) + Vec4::splat(ROUND)
@@ -56,7 +57,7 @@ impl Histogram {
     }
 }
 
-/// The cheapest plane. `None` if a leaf is as cheap.
+/// Finds the cheapest plane. `None` if a leaf is at least as cheap.
 pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
     let around = Bounds::around(references);
     let extent = around.extent();
@@ -86,6 +87,6 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
         let counts = |counts: [u32; PLANES]| four(counts.map(|count| count as f32));
         search.offer(axis, false, &Planes { at: four(at), left: counts(left), right: counts(right) });
     }
-    // References in the plane must not go to the side that is to be empty.
+    // References within the plane must not go to the side that should be empty.
     search.cheapest().map(|plane| Plane { planar_right: plane.at <= around.min[plane.axis], ..plane })
 }

@@ -1,19 +1,19 @@
-//! Expected cost of a split, by surface areas (MacDonald, Booth, *Heuristics for ray tracing using space subdivision*,
-//! 1990). Four planes are weighed at a time.
+//! Expected cost of a split by surface area (MacDonald, Booth, *Heuristics for ray tracing using space
+//! subdivision*, 1990). Evaluates four planes at a time.
 
 use crate::accel::reference::Bounds;
 use crate::math::{Vec3, Vec4};
 
-/// Cost of one step of traversal, in tests of a triangle.
+/// Cost of a traversal step relative to a triangle test.
 const TRAVERSAL_COST: f32 = 1.0;
 
-/// Factor on the cost of a split that cuts empty space off.
+/// Cost factor for a split that cuts off empty space.
 const EMPTY_FACTOR: f32 = 0.8;
 
 /// Tag of a leaf, in place of an axis.
 const LEAF: usize = 3;
 
-/// Bit above the axis in a tag: triangles in the plane go to the right.
+/// Tag bit above the axis: triangles within the plane go to the right.
 const PLANAR_RIGHT: usize = 4;
 
 /// A splitting plane.
@@ -21,12 +21,12 @@ const PLANAR_RIGHT: usize = 4;
 pub struct Plane {
     pub axis: usize,
     pub at: f32,
-    /// Whether triangles in the plane go to the right.
+    /// Whether triangles within the plane go to the right.
     pub planar_right: bool,
 }
 
-/// 4·`N` planes across one axis, with the number of triangles on either side of each; a triangle on both sides counts
-/// on both.
+/// 4·`N` planes across one axis, with the number of triangles on either side of each. Triangles on both sides
+/// count on both.
 #[derive(Clone, Copy)]
 pub struct Planes<const N: usize> {
     pub at: [Vec4; N],
@@ -34,21 +34,21 @@ pub struct Planes<const N: usize> {
     pub right: [Vec4; N],
 }
 
-/// Search among the planes of one cell, 4·`N` at a time; keeps the cheapest of each lane.
+/// Search over the planes of one cell, 4·`N` at a time. Keeps the cheapest plane of each lane.
 pub struct Search<const N: usize> {
     min: [f32; 4],
     max: [f32; 4],
-    /// Extents of the cell; flat ones are taken as a little thick, so that cells without area are split as well.
+    /// Edge lengths of the cell. Flat cells are slightly thickened, so that cells without area can be split.
     extent: [f32; 3],
     inverse_area: f32,
     cost: [Vec4; N],
     at: [Vec4; N],
-    /// Axis or [`LEAF`], and [`PLANAR_RIGHT`]; as floats, because all selection is by floats.
+    /// Axis or [`LEAF`], and [`PLANAR_RIGHT`], as floats because all selection works on floats.
     tag: [Vec4; N],
 }
 
 impl<const N: usize> Search<N> {
-    /// A search in which only planes count that make `count` triangles cheaper than a leaf of them.
+    /// Starts a search for planes that are cheaper than a leaf with `count` triangles.
     #[inline(always)]
     pub fn new(cell: &Bounds, count: usize) -> Self {
         let extent = cell.extent().truncate();
@@ -65,11 +65,12 @@ impl<const N: usize> Search<N> {
         }
     }
 
-    /// Offers planes; those outside of the cell do not count.
+    /// Adds candidate planes. Planes outside the cell are ignored.
     #[inline(always)]
     pub fn offer(&mut self, axis: usize, planar_right: bool, planes: &Planes<N>) {
         let (u, v) = (self.extent[(axis + 1) % 3], self.extent[(axis + 2) % 3]);
-        // Area of the plane in the cell, and what each unit of length along the axis adds; relative to the cell's.
+        // Area of the plane within the cell, and area per unit of length along the axis, relative to the
+        // cell's area.
         let face = Vec4::splat(u * v * self.inverse_area);
         let per_length = Vec4::splat((u + v) * self.inverse_area);
         let (min, max) = (Vec4::splat(self.min[axis]), Vec4::splat(self.max[axis]));
@@ -85,7 +86,7 @@ impl<const N: usize> Search<N> {
         }
     }
 
-    /// Takes the lanes whose cost is less than the best so far.
+    /// Replaces the lanes whose cost is lower than the best one so far.
     #[inline(always)]
     fn take(&mut self, i: usize, cost: Vec4, at: Vec4, tag: Vec4) {
         let is_cheaper = cost.cmplt(self.cost[i]);
@@ -94,7 +95,7 @@ impl<const N: usize> Search<N> {
         self.tag[i] = Vec4::select(is_cheaper, tag, self.tag[i]);
     }
 
-    /// The cheapest plane. `None` if a leaf is as cheap.
+    /// Returns the cheapest plane, or `None` if a leaf is at least as cheap.
     #[inline(always)]
     pub fn cheapest(mut self) -> Option<Plane> {
         for i in 1..N {

@@ -1,4 +1,4 @@
-//! Joins the parts of a tree, in parallel.
+//! Joins the parts of a kd-tree in parallel.
 
 use rayon::prelude::*;
 
@@ -7,11 +7,11 @@ use super::subtree::Subtree;
 use crate::accel::kd_tree::node::{Kind, Node};
 use crate::accel::wide_bvh::pages;
 
-/// A part of the tree above the subtrees.
+/// A part of the tree: an upper node or a subtree.
 pub enum Part {
-    /// A plane, and the parts below and above it.
+    /// A plane with the parts below and above it.
     Halves { plane: Plane, size: Size, halves: Box<[Part; 2]> },
-    /// A subtree that one thread built.
+    /// A subtree built by a single thread.
     Built(Subtree),
 }
 
@@ -23,7 +23,7 @@ pub struct Size {
 }
 
 impl Part {
-    /// Size of a plane and both parts.
+    /// Creates an upper node from its plane and both parts.
     pub fn halves(plane: Plane, halves: [Self; 2]) -> Self {
         let [left, right] = halves.each_ref().map(Self::size);
         let size = Size { nodes: 1 + left.nodes + right.nodes, ids: left.ids + right.ids };
@@ -37,7 +37,7 @@ impl Part {
         }
     }
 
-    /// Joins all parts into one subtree: node before children, left before right.
+    /// Joins all parts into one subtree, with nodes before their children and left before right.
     pub fn join(self) -> Subtree {
         let size = self.size();
         let mut all = Subtree { nodes: pages::large(size.nodes), ids: pages::large(size.ids) };
@@ -50,7 +50,7 @@ impl Part {
         all
     }
 
-    /// Writes the part behind so many nodes and references.
+    /// Writes the part after `before` nodes and references.
     fn write(self, nodes: &mut [Node], ids: &mut [u32], before: Size) {
         match self {
             Self::Built(subtree) => {

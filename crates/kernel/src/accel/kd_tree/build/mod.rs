@@ -1,7 +1,8 @@
-//! Building from the top: each cell is split by the plane of least expected cost, large cells by bins, small ones by perfect
-//! splits, until a leaf is as cheap. Triangles on both sides of a plane go to both, each with the box of its piece.
+//! Top-down construction: splits each cell at the plane with the lowest expected cost until a leaf is at
+//! least as cheap. Large cells use bins and small ones perfect splits. Triangles on both sides of a plane go
+//! to both, each with the bounding box of its part.
 //!
-//! The tree is a function of the triangles alone, not of the threads.
+//! The tree depends only on the triangles, not on the threads.
 
 mod bins;
 mod cost;
@@ -25,26 +26,27 @@ use join::Part;
 use partition::Scratch;
 use subtree::Subtree;
 
-/// Most references of a cell that one thread builds; the token is polled between such cells.
+/// Maximum number of references in a cell built by a single thread. The token is polled between such cells.
 const TASK_SIZE: usize = 4096;
 
-/// Most leaves and references in all: a tree has less than two nodes for each leaf, and their numbers must fit.
+/// Maximum number of leaves plus references: a tree has less than two nodes per leaf, and node indices must
+/// fit.
 const MOST_ROOM: u64 = node::MOST as u64 / 2;
 
-/// One leaf with all triangles is always possible.
+/// A single leaf with all triangles must always be possible.
 const _: () = assert!((TriangleMesh::MOST_TRIANGLES as u64) < MOST_ROOM);
 
-/// Most leaves and references for each triangle: several times what meshes need, but a small part of what triangles
-/// around one vertex could take.
+/// Maximum number of leaves and references per triangle: several times what meshes need, but a small fraction
+/// of what triangles around a single vertex could take.
 const MOST_PER_TRIANGLE: u64 = 24;
 
-/// Fewest triangles that count for that limit; smaller trees get the room of so many.
+/// Minimum triangle count used for that limit.
 const FEW: u64 = 64;
 
-/// Index of a triangle that has no place yet.
+/// Marks a triangle without an assigned position.
 const NOWHERE: u32 = u32::MAX;
 
-/// Result of building.
+/// Result of construction.
 pub struct Built {
     pub nodes: Vec<Node>,
     /// Indices into `triangles`, leaf by leaf.
@@ -53,15 +55,15 @@ pub struct Built {
     pub bounds: Aabb,
 }
 
-/// Most planes above a leaf, for so many triangles (Havran's 8 + 1.3·log₂ n).
+/// Maximum number of planes above a leaf for `count` triangles (Havran's 8 + 1.3·log₂ n).
 pub fn depth_limit(count: usize) -> u32 {
     8 + (1.3 * log2(count.max(1) as f32)) as u32
 }
 
-/// Builds over `count` triangles; triangles whose box has no finite size are in no leaf.
+/// Builds a tree over `count` triangles. Triangles without a finite box are left out.
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Cancelled`] if the build was canceled.
 pub fn build(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
@@ -71,7 +73,7 @@ pub fn build(
     build_within(room, count, corners, token)
 }
 
-/// [`build`] with this room for leaves and references together.
+/// [`build`] with at most `room` leaves and references together.
 fn build_within(
     room: u64,
     count: u32,
@@ -93,7 +95,7 @@ fn build_within(
     Ok(Built { nodes: all.nodes, references, triangles, bounds: bounds.aabb() })
 }
 
-/// Triangles in the order in which leaves first name them, and `ids` as indices into that order.
+/// Orders the triangles by their first use in a leaf and rewrites `ids` as indices into that order.
 fn by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
     let mut places = vec![NOWHERE; count as usize];
     let mut order = Vec::with_capacity(count as usize);
@@ -108,18 +110,18 @@ fn by_first_use(mut ids: Vec<u32>, count: u32) -> (Vec<u32>, Vec<u32>) {
     (ids, order)
 }
 
-/// A part of space.
+/// A region of space.
 #[derive(Clone, Copy)]
 struct Cell {
     bounds: Bounds,
-    /// Number of planes that may yet follow.
+    /// Number of planes that may follow below.
     levels: u32,
-    /// Number of leaves and references that may come of the cell.
+    /// Number of leaves and references that the cell may produce.
     room: u64,
 }
 
 impl Cell {
-    /// The plane to split it by. `None` for a leaf.
+    /// Chooses the splitting plane. `None` for a leaf.
     fn plane(&self, references: &[Reference]) -> Option<Plane> {
         // A plane through all triangles doubles them.
         let has_room = 2 * leaf_room(references.len()) <= self.room;
@@ -132,10 +134,10 @@ impl Cell {
         }
     }
 
-    /// The cell's halves, with so many references in each.
+    /// The two halves of the cell, given the number of references in each.
     fn halves(&self, plane: &Plane, counts: [usize; 2]) -> [Self; 2] {
         let [left, right] = counts.map(leaf_room);
-        // Share the room in proportion: as the whole suffices for both, each share does.
+        // Divide the room proportionally: it suffices for both together, so each share suffices as well.
         let room = self.room * left / (left + right);
         let levels = self.levels - 1;
         let [below, above] = self.bounds.halves(plane.axis, plane.at);
@@ -143,12 +145,12 @@ impl Cell {
     }
 }
 
-/// The room that a leaf of so many references takes.
+/// Room taken by a leaf with `count` references.
 fn leaf_room(count: usize) -> u64 {
     count as u64 + 1
 }
 
-/// Splits until one thread can take over.
+/// Splits cells in parallel until a single thread can take over.
 fn part(
     cell: &Cell,
     mut references: Vec<Reference>,
@@ -187,17 +189,17 @@ mod tests {
     }
 
     #[test]
-    fn triangles_that_share_a_vertex_get_no_more_room_than_others() {
+    fn fans_do_not_exceed_the_room() {
         for count in [500, 20_000] {
             let built = build(count, fan(count), &CancelToken::new()).expect("nobody cancels");
             let size = (built.nodes.len() / 2 + built.references.len()) as u64;
             assert!(size <= MOST_PER_TRIANGLE * (u64::from(count) + FEW), "{size} for {count}");
-            assert!(size > 4 * u64::from(count), "{size} for {count}: what room there is is used");
+            assert!(size > 4 * u64::from(count), "{size} for {count}: the available room is used");
         }
     }
 
     #[test]
-    fn a_tree_without_room_makes_leaves_early() {
+    fn small_room_leads_to_early_leaves() {
         let fan = |id: u32| {
             let angle = id as f32 * 0.1;
             [Vec3::ZERO, Vec3::new(angle.cos(), angle.sin(), 1.0), Vec3::new(angle.sin(), 1.0, angle.cos())]
@@ -214,6 +216,6 @@ mod tests {
             assert!(size(room) <= room, "{} in {room}", size(room));
         }
         assert_eq!(size(6001), 6001, "one leaf");
-        assert!(size(20_000) > 6001, "what room there is is used");
+        assert!(size(20_000) > 6001, "the available room is used");
     }
 }

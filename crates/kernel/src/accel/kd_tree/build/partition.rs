@@ -1,24 +1,25 @@
-//! Partition of the references of a cell by a plane.
+//! Partitioning of a cell's references at a plane.
 
 use super::cost::Plane;
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec3;
 
-/// Memory for partitioning, to be used again.
+/// Reusable memory for partitioning.
 #[derive(Default)]
 pub struct Scratch {
-    /// References on the left, with undefined ones behind them.
+    /// References on the left, followed by undefined ones.
     left: Vec<Reference>,
-    /// Indices, on the left and on the right, of the references on both sides.
+    /// Left and right indices of the references on both sides.
     on_both: Vec<[u32; 2]>,
 }
 
 impl Scratch {
-    /// Partitions the references from index `first` on. References on the right stay, each with the box of its part there;
-    /// those on the left are returned. A reference that only touches the plane goes to its own side. The order is kept.
+    /// Partitions the references from index `first` on. References on the right stay in place, each with the
+    /// bounding box of its part there; those on the left are returned. A reference that only touches the
+    /// plane goes to its own side. Preserves the order.
     ///
-    /// No branch depends on the data, as it would often be mispredicted: every reference is written to both sides, and each
-    /// side's end then moves on or not.
+    /// No branch depends on the data, as it would often be mispredicted: every reference is written to both
+    /// sides, and the end of each side then advances or not.
     pub fn partition(
         &mut self,
         references: &mut Vec<Reference>,
@@ -74,7 +75,7 @@ mod tests {
     use crate::math::random::signed as random;
 
     #[test]
-    fn each_side_has_what_reaches_into_it_in_order() {
+    fn partitioning_keeps_order_and_overlap() {
         let mut next = random(29);
         let mut step = || Vec3::new(next(), next(), next()).map(|x| (x * 6.0).round());
         let mesh: Vec<[Vec3; 3]> = (0..200_u32)
@@ -105,7 +106,7 @@ mod tests {
                 let on_right = expected(&|min, max| max > 1.0 || (planar(min, max) && planar_right));
                 let ids = |side: &[Reference]| side.iter().map(Reference::id).collect::<Vec<_>>();
                 assert_eq!((ids(&left), ids(&own[50..])), (on_left, on_right), "{plane:?}");
-                assert_eq!(ids(&own[..50]), ids(&all[..50]), "those of other cells stay");
+                assert_eq!(ids(&own[..50]), ids(&all[..50]), "references of other cells are unchanged");
                 assert!(left.iter().all(|one| one.bounds.max()[axis] <= 1.0), "{plane:?}");
                 assert!(own[50..].iter().all(|one| one.bounds.min[axis] >= 1.0), "{plane:?}");
             }

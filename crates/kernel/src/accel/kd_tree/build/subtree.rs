@@ -1,4 +1,4 @@
-//! Subtree that one thread builds.
+//! Subtrees built by a single thread.
 
 use super::Cell;
 use super::partition::Scratch;
@@ -7,7 +7,7 @@ use crate::accel::reference::Reference;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
-/// Nodes and references, counted from the subtree's own first.
+/// Nodes and references, with indices relative to the subtree.
 #[derive(Default)]
 pub struct Subtree {
     pub nodes: Vec<Node>,
@@ -18,7 +18,7 @@ impl Subtree {
     /// Builds the subtree of a cell and its references.
     ///
     /// # Errors
-    /// [`Cancelled`].
+    /// [`Cancelled`] if the build was canceled.
     pub fn build(
         cell: &Cell,
         references: Vec<Reference>,
@@ -35,7 +35,7 @@ impl Subtree {
 /// Builds a subtree in memory that is allocated once.
 struct Builder<'a, C> {
     built: Subtree,
-    /// References of all cells that are yet to be built, the next cell's last.
+    /// References of all pending cells; those of the next cell come last.
     references: Vec<Reference>,
     scratch: Scratch,
     corners: &'a C,
@@ -43,7 +43,8 @@ struct Builder<'a, C> {
 }
 
 impl<C: Fn(u32) -> [Vec3; 3]> Builder<'_, C> {
-    /// Adds a cell whose references begin at `first`, and removes them. Recursion is as deep as the tree, which is limited.
+    /// Adds a cell whose references begin at `first`, and removes them. Recurses to the depth of the tree,
+    /// which is limited.
     fn add(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
         let place = self.built.nodes.len();
         let own = &self.references[first..];

@@ -1,15 +1,15 @@
-//! Splits of small cells: tries every plane through a face of a clipped triangle's box ("perfect splits": Wald, Havran,
-//! *On building fast kd-trees for ray tracing, and on doing that in O(N log N)*, 2006). For so few triangles, counting
-//! both sides of all planes anew, side by side, is quicker than keeping them in order.
+//! Splits of small cells. Tries every plane through a face of a clipped triangle's box ("perfect splits":
+//! Wald, Havran, *On building fast kd-trees for ray tracing, and on doing that in O(N log N)*, 2006). For so
+//! few triangles, recounting both sides of all planes with SIMD is faster than keeping them sorted.
 
 use super::cost::{Plane, Planes, Search};
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec4;
 
-/// Most references of a cell that is swept.
+/// Maximum number of references in a swept cell.
 pub const SWEPT: usize = 24;
 
-/// The cheapest plane. `None` if a leaf is as cheap.
+/// Finds the cheapest plane. `None` if a leaf is at least as cheap.
 pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
     match references.len() {
         0..=4 => cheapest_of::<1>(references, cell),
@@ -25,7 +25,7 @@ type Row<const N: usize> = [[f32; 4]; N];
 /// [`cheapest`] for at most 4·`N` references.
 fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Option<Plane> {
     let mut search = Search::<N>::new(cell, references.len());
-    // Starts and ends of the boxes along each axis; lanes without a box start above every plane and end below.
+    // Starts and ends of the boxes along each axis. Unused lanes start above every plane and end below it.
     let (mut starts, mut ends) = ([[[f32::INFINITY; 4]; N]; 3], [[[f32::NEG_INFINITY; 4]; N]; 3]);
     for (place, reference) in references.iter().take(4 * N).enumerate() {
         let (min, max) = (reference.bounds.min.to_array(), reference.bounds.max().to_array());
@@ -44,7 +44,7 @@ fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Optio
     search.cheapest()
 }
 
-/// Offers the planes across an axis, with the boxes that start and end there.
+/// Offers the planes at `at` across an axis.
 #[inline(always)]
 fn offer<const N: usize>(
     axis: usize,
@@ -85,7 +85,7 @@ mod tests {
     use crate::math::Vec3;
     use crate::math::random::signed as random;
 
-    /// The cost of a plane by the definition; infinite if the plane does not go through the cell.
+    /// Cost of a plane by definition; infinite if the plane does not intersect the cell.
     fn cost(references: &[Reference], cell: &Bounds, plane: &Plane) -> f32 {
         let Plane { axis, at, planar_right } = *plane;
         if !(at > cell.min[axis] && at < cell.max()[axis]) {
@@ -103,12 +103,13 @@ mod tests {
     }
 
     #[test]
-    fn no_face_is_a_cheaper_plane_than_the_cheapest() {
+    fn cheapest_plane_beats_all_faces() {
         let mut next = random(23);
         let (mut planes, mut leaves) = (0, 0);
         for round in 0..3000 {
             let count = 1 + round % SWEPT;
-            // Boxes lie on a grid, so that they touch and lie in planes, in a cell whose end some of them reach.
+            // Put the boxes on a grid, so that they touch and share planes, in a cell that some of them fill
+            // to the end.
             let mut step = |size: f32| Vec3::new(next(), next(), next()).map(|x| (x * size).round() / 8.0);
             let references: Vec<Reference> = (0..count as u32)
                 .map(|id| {

@@ -1,4 +1,4 @@
-//! Joins the parts of a tree.
+//! Joins the parts of a wide BVH.
 
 use rayon::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::accel::reference::Bounds;
 use crate::accel::wide_bvh::node::{Child, Node, WIDTH};
 use crate::accel::wide_bvh::simd::pages;
 
-/// All nodes, the root first, and the contents of all packs.
+/// Joins all nodes, root first, and the contents of all packs.
 pub fn join(root: Part) -> (Vec<Node>, Vec<Pack>) {
     let mut top = Top::default();
     match root {
@@ -49,7 +49,7 @@ struct Top {
 }
 
 impl Top {
-    /// Makes the node over a part and everything below; returns its index.
+    /// Creates the node over a part and everything below it, and returns its index.
     fn node(&mut self, bounds: Bounds, part: Part) -> usize {
         let place = self.nodes.len();
         self.nodes.push(Vec::new());
@@ -93,7 +93,7 @@ impl Top {
         (nodes, self.subtrees.iter().flat_map(|subtree| subtree.packs.iter().copied()).collect())
     }
 
-    /// Starts of all subtrees, and the end of the last one.
+    /// Starts of all subtrees, followed by the end of the last one.
     fn starts(&self) -> Vec<Start> {
         let mut start = Start { node: self.nodes.len() as u32, pack: 0 };
         let mut starts = vec![start];

@@ -1,7 +1,7 @@
-//! Building: large parts are split in two by binned surface area, in parallel, until each is small enough for one
-//! thread. That thread makes its nodes, eight children at once; then all parts are joined.
+//! Construction: splits large parts in two with the binned surface area heuristic, in parallel, until each is
+//! small enough for a single thread. That thread builds eight-wide nodes, and finally all parts are joined.
 //!
-//! The tree is a function of the triangles alone, not of the threads.
+//! The tree depends only on the triangles, not on the threads.
 
 mod join;
 mod pieces;
@@ -20,20 +20,20 @@ use crate::math::Vec3;
 use split::{Segment, partition};
 use subtree::Subtree;
 
-/// Most triangles of a part that one thread builds; the token is polled between such parts.
+/// Maximum number of triangles in a part built by a single thread. The token is polled between such parts.
 const TASK_SIZE: usize = 8192;
 
-/// Result of building.
+/// Result of construction.
 pub struct Built {
     pub nodes: Vec<Node>,
     pub packs: Vec<TrianglePack>,
     pub bounds: Aabb,
 }
 
-/// Builds over `count` triangles; triangles whose box has no finite size are in no leaf.
+/// Builds a tree over `count` triangles. Triangles without a finite box are left out.
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Cancelled`] if the build was canceled.
 pub fn build(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
@@ -62,15 +62,16 @@ pub fn build(
     Ok(Built { nodes, packs, bounds })
 }
 
-/// A part of the tree above the subtrees.
+/// A part of the tree: an upper node or a subtree.
 enum Part {
-    /// Two halves, to be collapsed.
+    /// Two halves, to be collapsed into a wide node.
     Halves(Box<[(Bounds, Part); 2]>),
-    /// A subtree that one thread built.
+    /// A subtree built by a single thread.
     Built(Subtree),
 }
 
-/// Splits until one thread can take over. `start` is the index of the first reference among all.
+/// Splits parts in parallel until a single thread can take over. `start` is the index of the first reference
+/// among all.
 fn part(
     references: &mut [Reference],
     start: usize,

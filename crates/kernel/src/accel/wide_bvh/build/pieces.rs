@@ -1,6 +1,6 @@
-//! Large triangles are cut into several small boxes before a tree is built over them (Karras, Aila, *Fast Parallel
-//! Construction of High-Quality Bounding Volume Hierarchies*, 2013, section 4): first those whose box is much larger
-//! than the triangle, at the planes that halve the whole again and again.
+//! Triangle splitting: cuts large triangles into several small boxes before construction (Karras, Aila, *Fast
+//! Parallel Construction of High-Quality Bounding Volume Hierarchies*, 2013, section 4). Prefers triangles
+//! whose box is much larger than the triangle, and cuts at planes that recursively halve the bounding box.
 
 use rayon::prelude::*;
 
@@ -9,19 +9,19 @@ use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
 
-/// Most pieces beyond one for each triangle, as a share of the triangles.
+/// Maximum number of additional references, as a fraction of the triangles.
 const MOST_MORE: f64 = 0.3;
 
-/// Levels of the grid of planes, which has 2 to this many cells along each axis.
+/// Levels of the grid of planes, which has 2 to this power cells along each axis.
 const LEVELS: u32 = 20;
 
-/// References that are cut between two looks at the token.
+/// Number of references cut between polls of the token.
 const CHUNK: usize = 4096;
 
-/// The references with some of them in pieces. The order and the pieces are a function of the triangles alone.
+/// Splits some of the references. The order and the splits depend only on the triangles.
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Cancelled`] if the build was canceled.
 pub fn in_pieces(
     references: &[Reference],
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
@@ -43,12 +43,12 @@ pub fn in_pieces(
     Ok(chunks.map(of_chunk).collect::<Result<Vec<_>, _>>()?.concat())
 }
 
-/// Number of cuts of a triangle.
+/// Number of times to cut a triangle.
 fn cuts(priority: f32, factor: f32) -> u32 {
     (priority * factor) as u32
 }
 
-/// The largest factor with which all triangles together are cut at most `most` times, by bisection.
+/// Finds the largest factor with which the triangles together are cut at most `most` times, by bisection.
 fn largest_factor(priorities: &[f32], most: u64) -> f32 {
     let total =
         |factor: f32| priorities.par_iter().map(|&priority| u64::from(cuts(priority, factor))).sum::<u64>();
@@ -56,7 +56,7 @@ fn largest_factor(priorities: &[f32], most: u64) -> f32 {
     if !(sum > 0.0 && sum.is_finite()) {
         return 0.0;
     }
-    // Rounding down removes less than one cut from each.
+    // Rounding down removes less than one cut from each triangle.
     let (mut low, mut high) =
         ((most as f64 / sum) as f32, ((most as f64 + priorities.len() as f64) / sum) as f32);
     for _ in 0..12 {
@@ -66,7 +66,7 @@ fn largest_factor(priorities: &[f32], most: u64) -> f32 {
     if total(low) <= most { low } else { 0.0 }
 }
 
-/// The box around everything, halved again and again.
+/// The recursively halved bounding box.
 struct Grid {
     start: Vec3,
     extent: Vec3,
@@ -76,7 +76,7 @@ struct Grid {
 struct Plane {
     axis: usize,
     at: f32,
-    /// Level: 0 halves a cell of the finest grid, more a larger one.
+    /// Level of the plane: 0 halves a cell of the finest grid, higher levels halve larger cells.
     level: u32,
 }
 
@@ -86,7 +86,7 @@ impl Grid {
         Self { start: all.min.truncate(), extent: all.extent().truncate() }
     }
 
-    /// The coarsest plane that goes through a box. `None` if no plane does.
+    /// The coarsest plane that intersects a box, or `None`.
     fn plane(&self, bounds: &Bounds) -> Option<Plane> {
         let cells = (1_u32 << LEVELS) as f32;
         let on_axis = |axis: usize| {
@@ -102,7 +102,7 @@ impl Grid {
         (0..3).filter_map(on_axis).max_by(|a, b| a.level.cmp(&b.level).then(length(a).total_cmp(&length(b))))
     }
 
-    /// Priority of cutting a triangle: the excess area of its box, less for finer planes.
+    /// Priority for cutting a triangle: the excess area of its box, reduced for finer planes.
     fn priority(&self, reference: &Reference, [a, b, c]: [Vec3; 3]) -> f32 {
         let Some(plane) = self.plane(&reference.bounds) else { return 0.0 };
         let normal = (b - a).cross(c - a).abs();
@@ -112,7 +112,7 @@ impl Grid {
         if priority.is_finite() { priority } else { 0.0 }
     }
 
-    /// Cuts a triangle so often, longer pieces more often.
+    /// Cuts a triangle `cuts` times, longer parts more often.
     fn cut(&self, reference: Reference, cuts: u32, corners: [Vec3; 3], pieces: &mut Vec<Reference>) {
         let plane = if cuts == 0 { None } else { self.plane(&reference.bounds) };
         let Some(Plane { axis, at, .. }) = plane else { return pieces.push(reference) };
@@ -129,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_triangles_are_cut_and_flat_ones_are_not() {
+    fn long_triangles_are_split_but_flat_ones_are_not() {
         let mesh: Vec<[Vec3; 3]> = (0..100)
             .map(|i| {
                 let at = Vec3::new((i % 10) as f32, (i / 10) as f32, 0.0);

@@ -1,5 +1,5 @@
-//! Choice of a split: the cheapest plane between bins by surface area (Wald, *On fast Construction of SAH-based
-//! Bounding Volume Hierarchies*, 2007).
+//! Split selection with the binned surface area heuristic (Wald, *On fast Construction of SAH-based Bounding
+//! Volume Hierarchies*, 2007).
 
 use rayon::prelude::*;
 
@@ -8,10 +8,10 @@ use crate::accel::wide_bvh::node::{MOST_PACKS, PACK};
 use crate::accel::wide_bvh::simd;
 use crate::math::Vec4;
 
-/// Most bins along an axis.
+/// Maximum number of bins along an axis.
 pub const BINS: usize = 32;
 
-/// Most bins of segments of at most [`FEW`] references.
+/// Maximum number of bins for segments with at most [`FEW`] references.
 const FEW_BINS: usize = 8;
 
 const FEW: usize = 32;
@@ -19,32 +19,34 @@ const FEW: usize = 32;
 /// Number of references above which a segment is binned in parallel.
 const PARALLEL_SIZE: usize = 1 << 16;
 
-/// Cost of one step of traversal, in tests of a pack.
+/// Cost of a traversal step relative to testing a pack.
 const TRAVERSAL_COST: f32 = 1.0;
 
-/// Halvings that the surface area heuristic makes. Deeper segments are halved by number, so that no input makes a deep
-/// tree.
+/// Number of levels split with the surface area heuristic. Deeper segments are halved by count, which limits
+/// the depth for any input.
 const SURFACE_AREA_LEVELS: u32 = 56;
 
-/// A range of references, and the way to split them.
+/// A range of references and how to split it.
 #[derive(Clone, Debug)]
 pub struct Segment {
     pub count: usize,
     pub bounds: Bounds,
-    /// Number of halvings above.
+    /// Number of splits above.
     level: u32,
-    /// The split. `None` if a leaf is as cheap, even if the node above had room for the boxes of its parts.
+    /// The split. `None` if a leaf is at least as cheap, even if the parent had room for the boxes of both
+    /// halves.
     pub split: Option<Split>,
     /// Whether the segment is worth a node of its own.
     pub is_node: bool,
 }
 
-/// Way to split a segment.
+/// How to split a segment.
 #[derive(Clone, Copy, Debug)]
 pub enum Split {
-    /// At a plane: references below a bin of an axis go to the left; with the boxes around both sides.
+    /// At a plane: references below a bin of an axis go to the left. Includes the bounding boxes of both
+    /// sides.
     Plane { axis: usize, bin: usize, bins: Bins, sides: [Bounds; 2] },
-    /// In the middle of the references, in their order.
+    /// In the middle of the references in their current order.
     Middle,
 }
 
@@ -62,7 +64,7 @@ impl Segment {
     }
 }
 
-/// The box around some references, and the one around their centroids.
+/// Bounding box of some references, and of their centroids.
 #[derive(Clone, Copy)]
 struct Boxes {
     bounds: Bounds,
@@ -93,7 +95,7 @@ impl Boxes {
     }
 }
 
-/// The best split of a segment, and whether the segment is worth a node.
+/// Chooses the best split of a segment and whether the segment is worth a node.
 fn choose(references: &[Reference], boxes: &Boxes, level: u32) -> (Option<Split>, bool) {
     let count = references.len();
     let must = count > PACK * MOST_PACKS as usize;
@@ -119,23 +121,23 @@ fn choose(references: &[Reference], boxes: &Boxes, level: u32) -> (Option<Split>
     }
 }
 
-/// Number of packs for so many triangles.
+/// Number of packs for `count` triangles.
 #[inline(always)]
 fn blocks(count: u32) -> u32 {
     count.div_ceil(PACK as u32)
 }
 
-/// Map from centroids to bins.
+/// Mapping of centroids to bins.
 #[derive(Clone, Copy, Debug)]
 pub struct Bins {
     /// Start of the first bin.
     pub start: Vec4,
-    /// Bins for each unit of length; 0 along axes without extent.
+    /// Bins per unit of length; 0 along axes without extent.
     pub per_length: Vec4,
     count: usize,
 }
 
-/// Constant that, added to a number from −½ to 2²², leaves the nearest integer in the low bits.
+/// Added to a number between −½ and 2²², leaves the nearest integer in the low bits.
 pub const ROUND: f32 = 12_582_912.0;
 
 impl Bins {
@@ -143,7 +145,7 @@ impl Bins {
         let count = BINS.min(4 + references / 8).max(if references > FEW { FEW_BINS } else { 0 });
         let extent = centroids.extent();
         let scale = |length: f32| {
-            // Take a little less, so that the last centroid is in the last bin.
+            // Scale down slightly, so that the last centroid falls into the last bin.
             let per_length = count as f32 * 0.999_99 / length;
             if length > 0.0 && per_length.is_finite() { per_length } else { 0.0 }
         };
@@ -151,7 +153,7 @@ impl Bins {
         Self { start: centroids.min, per_length, count }
     }
 
-    /// Numbers of the bins, plus [`ROUND`].
+    /// Bin numbers plus [`ROUND`].
     #[inline(always)]
     fn place(&self, centroid: Vec4) -> Vec4 {
         (centroid - self.start) * self.per_length - Vec4::splat(0.5) + Vec4::splat(ROUND)
@@ -175,7 +177,7 @@ struct Cheapest {
     axis: usize,
     /// First bin on the right.
     bin: usize,
-    /// Area-weighted packs of both sides.
+    /// Number of packs on both sides, weighted by area.
     cost: f32,
     sides: [Bounds; 2],
 }
@@ -215,7 +217,7 @@ impl<const N: usize> Histogram<N> {
         self
     }
 
-    /// Sweeps over the planes between bins, from both ends.
+    /// Sweeps over the planes between bins from both ends.
     fn cheapest(&self, bins: &Bins) -> Option<Cheapest> {
         let mut best: Option<(usize, usize, f32)> = None;
         let count = bins.count.min(N);
@@ -253,7 +255,7 @@ impl<const N: usize> Histogram<N> {
     }
 }
 
-/// Reorders the references by the split and returns the two segments, neither of them empty.
+/// Reorders the references by the split and returns the two nonempty segments.
 pub fn partition(references: &mut [Reference], segment: &Segment, split: &Split) -> (Segment, Segment) {
     let (middle, left, right) = match split {
         Split::Plane { axis, bin, bins, sides } => {
@@ -288,9 +290,9 @@ fn partitioned<const AXIS: usize>(
     }
 }
 
-/// Moves the references below a bin to the front and returns their number, with the boxes around the centroids of both
-/// sides. No branch depends on the data, as it would often be mispredicted: every reference changes places with the first on
-/// the right, which then counts to the left or not.
+/// Moves the references below a bin to the front. Returns their number and the bounding boxes of the
+/// centroids on both sides. No branch depends on the data, as it would often be mispredicted: every reference
+/// is swapped with the first one on the right, which then counts as left or not.
 #[allow(clippy::manual_swap)] // `swap` goes through memory, where the next round stalls: half the speed of all building
 fn partition_by_plane<const AXIS: usize>(
     references: &mut [Reference],
@@ -340,7 +342,7 @@ mod tests {
 
     type Partition = fn(&mut [Reference], usize, &Bins) -> (usize, [Bounds; 2]);
 
-    /// Partitions by vectors and by plain code, along each axis.
+    /// Partitions with SIMD and with scalar code along each axis.
     const PARTITIONS: [[Partition; 2]; 3] = [
         [partitioned::<0>, partition_by_plane::<0>],
         [partitioned::<1>, partition_by_plane::<1>],
@@ -348,7 +350,7 @@ mod tests {
     ];
 
     #[test]
-    fn vectors_count_as_plain_code_does() {
+    fn simd_histograms_match_scalar_ones() {
         fn counts<const N: usize>(references: &[Reference], bins: &Bins) {
             let mut plain = Histogram::<N>::EMPTY;
             plain.count(references, bins);
@@ -356,8 +358,8 @@ mod tests {
             assert_eq!(own.counts, plain.counts);
             for axis in 0..3 {
                 let counted: u32 = own.counts[..bins.count].iter().map(|counts| counts[axis]).sum();
-                assert_eq!(counted as usize, references.len(), "all are in the bins that there are");
-                // Each bin has its own references, and no others.
+                assert_eq!(counted as usize, references.len(), "all are in existing bins");
+                // Each bin has exactly its own references.
                 for (bin, (bounds, counts)) in own.bounds.iter().zip(&own.counts).enumerate() {
                     let inside = |one: &&Reference| bins.of(one)[axis] == bin;
                     let inside: Vec<Reference> = references.iter().filter(inside).copied().collect();
@@ -381,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn vectors_partition_as_plain_code_does_along_every_axis() {
+    fn simd_partitions_match_scalar_ones() {
         for count in [1, 2, 5, 33, 1000] {
             let references = references(count);
             let bins = Bins::new(&Boxes::around(&references).centroids, references.len());

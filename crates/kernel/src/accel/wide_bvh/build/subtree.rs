@@ -1,10 +1,10 @@
-//! Subtree that one thread builds.
+//! Subtrees built by a single thread.
 
 use super::split::{Segment, partition};
 use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::node::{Child, Node, PACK, WIDTH};
 
-/// Range of references that a pack of triangles holds.
+/// The references of a triangle pack.
 #[derive(Clone, Copy, Debug)]
 pub struct Pack {
     /// Index of the first reference among all.
@@ -13,7 +13,7 @@ pub struct Pack {
     pub count: u32,
 }
 
-/// Nodes and packs; children are counted from the first of each.
+/// Nodes and packs, with indices relative to the subtree.
 #[derive(Debug)]
 pub struct Subtree {
     pub nodes: Vec<Node>,
@@ -51,8 +51,8 @@ impl Subtree {
         Child::Leaf { first, count: self.packs.len() as u32 - first }
     }
 
-    /// Splits the child with the largest box until there are eight (Wald, Benthin, Boulos, *Getting Rid of Packets*,
-    /// 2008).
+    /// Builds a node by splitting the child with the largest box until there are eight (Wald, Benthin,
+    /// Boulos, *Getting Rid of Packets*, 2008).
     fn node(&mut self, references: &mut [Reference], start: usize, segment: Segment) -> u32 {
         let place = self.nodes.len();
         self.nodes.push(Node::EMPTY);

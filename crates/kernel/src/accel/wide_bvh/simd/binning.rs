@@ -1,16 +1,16 @@
-//! The inner loops of building, with a whole box in a register: they do the work of the plain code in `build::split`,
-//! with the same numbers.
+//! SIMD inner loops of construction, with a whole box per register. They compute the same numbers as the
+//! scalar code in `build::split`.
 
 use super::Instructions;
 use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::build::split::{Bins, Histogram};
 
-/// Puts references into the bins of a histogram. Returns false, and does nothing, if the processor lacks the
-/// instructions.
+/// Adds references to the bins of a histogram. Returns false without doing anything if the processor lacks
+/// the instructions.
 pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut Histogram<N>) -> bool {
     #[cfg(target_arch = "x86_64")]
     if Instructions::best() >= Instructions::Avx2 {
-        // SAFETY: the processor has them.
+        // SAFETY: the processor has AVX2.
         unsafe { avx2::count(references, bins, into) };
         return true;
     }
@@ -18,8 +18,8 @@ pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut H
     false
 }
 
-/// Moves the references below a bin to the front and returns their number, with the boxes around the centroids of both sides.
-/// `None`, with nothing done, if the processor lacks the instructions.
+/// Moves the references below a bin to the front. Returns their number and the bounding boxes of the
+/// centroids on both sides, or `None` without doing anything if the processor lacks the instructions.
 pub fn partition<const AXIS: usize>(
     references: &mut [Reference],
     bin: usize,
@@ -27,7 +27,7 @@ pub fn partition<const AXIS: usize>(
 ) -> Option<(usize, [Bounds; 2])> {
     #[cfg(target_arch = "x86_64")]
     if Instructions::best() >= Instructions::Avx2 {
-        // SAFETY: the processor has them.
+        // SAFETY: the processor has AVX2.
         return Some(unsafe { avx2::partition::<AXIS>(references, bin, bins) });
     }
     let _ = (references, bin, bins);
@@ -46,18 +46,18 @@ mod avx2 {
     #[target_feature(enable = "avx2")]
     #[inline]
     fn load(bounds: &Bounds) -> __m256 {
-        // SAFETY: eight floats, aligned as they are.
+        // SAFETY: a box is eight floats with sufficient alignment.
         unsafe { _mm256_load_ps(std::ptr::from_ref(bounds).cast()) }
     }
 
     #[target_feature(enable = "avx2")]
     #[inline]
     fn store(bounds: __m256, to: &mut Bounds) {
-        // SAFETY: room for eight floats, aligned as they are.
+        // SAFETY: a box has room for eight floats with sufficient alignment.
         unsafe { _mm256_store_ps(std::ptr::from_mut(to).cast(), bounds) }
     }
 
-    /// [`Reference::centroid`].
+    /// SIMD version of [`Reference::centroid`].
     #[target_feature(enable = "avx2")]
     #[inline]
     fn centroid(bounds: __m256) -> __m128 {
@@ -65,7 +65,7 @@ mod avx2 {
         _mm_sub_ps(_mm256_castps256_ps128(halves), _mm256_extractf128_ps::<1>(halves))
     }
 
-    /// `Bins::place`.
+    /// SIMD version of `Bins::place`.
     #[target_feature(enable = "avx2")]
     #[inline]
     fn place(centroid: __m128, start: __m128, per_length: __m128) -> __m128 {
@@ -93,8 +93,8 @@ mod avx2 {
         }
     }
 
-    /// The partition without a branch on the data, which would often be mispredicted: every reference changes places with the
-    /// first on the right, which then counts to the left or not.
+    /// Branch-free partition, as branches on the data would often be mispredicted: every reference is swapped
+    /// with the first one on the right, which then counts as left or not.
     #[target_feature(enable = "avx2")]
     pub fn partition<const AXIS: usize>(
         references: &mut [Reference],

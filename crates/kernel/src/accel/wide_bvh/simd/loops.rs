@@ -1,5 +1,5 @@
-//! Plain loops, compiled once more for the vector instructions that the processor has. Nothing is reordered, and
-//! fused only where the last bits decide nothing: the results have the same bits.
+//! Compiles portable loops again for the instruction sets of the processor. Operations are never reordered,
+//! and fused only where the last bits do not matter, so all results have the same bits.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
@@ -11,13 +11,13 @@ use crate::math::lanes::PlainFolds;
 use crate::math::lanes::{Folds, LANES, Lanes, Truths};
 
 impl Instructions {
-    /// Does the work by these instructions, or by the best that the processor has.
+    /// Runs a kernel with this instruction set, or the best one that the processor has.
     #[inline]
     pub fn run<L: Loops>(self, work: L) -> L::Done {
         match self.available() {
             Self::Portable => work.run(PlainFolds),
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: the processor has what is available.
+            // SAFETY: `available` returns an instruction set that the processor has.
             Self::Avx2 => unsafe { avx2(work) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above.
@@ -51,7 +51,7 @@ struct Avx2Folds(());
 impl Folds for Avx2Folds {
     #[inline(always)]
     fn bits(self, holds: &Truths) -> u32 {
-        // SAFETY: a value is made where the processor has AVX2 and FMA alone.
+        // SAFETY: values are only created if the processor has AVX2 and FMA.
         unsafe { avx2_bits(holds) }
     }
 
@@ -88,7 +88,7 @@ struct Avx512Folds(());
 impl Folds for Avx512Folds {
     #[inline(always)]
     fn bits(self, holds: &Truths) -> u32 {
-        // SAFETY: a value is made where the processor has AVX-512F, VL, DQ and BW alone.
+        // SAFETY: values are only created if the processor has AVX-512F, VL, DQ and BW.
         unsafe { avx512_bits(holds) }
     }
 
@@ -121,7 +121,7 @@ impl Folds for Avx512Folds {
 #[target_feature(enable = "avx2")]
 fn avx2_bits(holds: &Truths) -> u32 {
     let (low, high) = holds.split_at(LANES / 2);
-    // SAFETY: eight numbers may be read from each half, at any address.
+    // SAFETY: reads eight numbers from each half; no alignment is required.
     let [low, high] = [low, high].map(|half| unsafe { _mm256_loadu_ps(half.as_ptr().cast()) });
     (_mm256_movemask_ps(low) | _mm256_movemask_ps(high) << (LANES / 2)) as u32
 }
@@ -130,12 +130,12 @@ fn avx2_bits(holds: &Truths) -> u32 {
 #[inline]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 fn avx512_bits(holds: &Truths) -> u32 {
-    // SAFETY: sixteen numbers may be read, at any address.
+    // SAFETY: reads 16 numbers; no alignment is required.
     let row = unsafe { _mm512_loadu_epi32(holds.as_ptr().cast()) };
     u32::from(_mm512_movepi32_mask(row))
 }
 
-/// [`Folds::span`] of two halves, in the order of the plain folds.
+/// [`Folds::span`] of two halves, in the order of the portable implementation.
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
@@ -161,7 +161,7 @@ fn avx2_span(row: &Lanes, of: u32) -> [f32; 2] {
     let [low, high] = [(low, of), (high, of >> (LANES / 2))].map(|(half, of)| {
         let own = _mm256_and_si256(_mm256_set1_epi32(of as i32), lanes);
         let holds = _mm256_castsi256_ps(_mm256_cmpeq_epi32(own, lanes));
-        // SAFETY: eight numbers may be read, at any address.
+        // SAFETY: reads eight numbers; no alignment is required.
         _mm256_blendv_ps(other, unsafe { _mm256_loadu_ps(half.as_ptr()) }, holds)
     });
     span_of_halves(low, high)
@@ -172,7 +172,7 @@ fn avx2_span(row: &Lanes, of: u32) -> [f32; 2] {
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 fn avx512_span(row: &Lanes, of: u32) -> [f32; 2] {
     let other = _mm512_set1_ps(row[of.trailing_zeros() as usize % LANES]);
-    // SAFETY: sixteen numbers may be read, at any address.
+    // SAFETY: reads 16 numbers; no alignment is required.
     let row = unsafe { _mm512_mask_loadu_ps(other, of as u16, row.as_ptr()) };
     span_of_halves(_mm512_castps512_ps256(row), _mm512_extractf32x8_ps::<1>(row))
 }
@@ -183,7 +183,7 @@ fn avx512_span(row: &Lanes, of: u32) -> [f32; 2] {
 fn avx2_reciprocals(row: &Lanes) -> Lanes {
     let mut inverse = [0.0; LANES];
     for (own, row) in inverse.chunks_exact_mut(8).zip(row.chunks_exact(8)) {
-        // SAFETY: eight numbers may be read and written, at any address.
+        // SAFETY: reads and writes eight numbers; no alignment is required.
         unsafe {
             let row = _mm256_loadu_ps(row.as_ptr());
             _mm256_storeu_ps(own.as_mut_ptr(), _mm256_div_ps(_mm256_set1_ps(1.0), row));
@@ -197,7 +197,7 @@ fn avx2_reciprocals(row: &Lanes) -> Lanes {
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 fn avx512_reciprocals(row: &Lanes) -> Lanes {
     let mut inverse = [0.0; LANES];
-    // SAFETY: sixteen numbers may be read and written, at any address.
+    // SAFETY: reads and writes 16 numbers; no alignment is required.
     unsafe {
         let row = _mm512_loadu_ps(row.as_ptr());
         _mm512_storeu_ps(inverse.as_mut_ptr(), _mm512_div_ps(_mm512_set1_ps(1.0), row));
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_folded_into_their_bits_by_all_instructions() {
+    fn movemask_is_equal_on_all_instruction_sets() {
         for instructions in Instructions::ALL {
             for bits in 0..1 << 16 {
                 assert_eq!(instructions.run(Folding(bits)), bits, "{instructions:?}");
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn spans_and_reciprocals_have_the_same_bits_by_all_instructions() {
+    fn reductions_are_equal_on_all_instruction_sets() {
         let mut next = signed(21);
         let odd = [0.0, -0.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-45, f32::MAX];
         for round in 0..20_000_u32 {
@@ -256,7 +256,7 @@ mod tests {
             let bits =
                 |(span, inverse): ([f32; 2], Lanes)| (span.map(f32::to_bits), inverse.map(f32::to_bits));
             assert!(each.iter().all(|one| bits(*one) == bits(each[0])), "{row:?} {of:b} {each:?}");
-            // Without numbers that are none, they are the least and the greatest.
+            // Without NaN, they are the minimum and the maximum.
             let lanes = || (0..LANES).filter(|i| of >> i & 1 == 1).map(|i| row[i]);
             if !lanes().any(f32::is_nan) {
                 let ([least, greatest], inverse) = each[0];

@@ -1,6 +1,7 @@
-//! Traversal by vector instructions, chosen at run time: the one place with `unsafe` code.
+//! Traversal with SIMD instructions selected at run time. The tree's `unsafe` code is confined to this
+//! module.
 //!
-//! All instruction sets give the bits of [`portable`], which is plain Rust.
+//! All instruction sets give the same bits as [`portable`], which is plain Rust.
 
 #[allow(unsafe_code)]
 pub mod binning;
@@ -35,23 +36,23 @@ use super::WideBvh;
 use crate::accel::Ends;
 use crate::geometry::{Ray, ShapeHit};
 
-/// Instructions to traverse with.
+/// Instruction set for traversal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Instructions {
-    /// Plain Rust; any processor.
+    /// Plain Rust, for any processor.
     Portable,
-    /// 256-bit vectors of x86-64.
+    /// 256-bit vectors on x86-64.
     Avx2,
-    /// 512-bit vectors of x86-64.
+    /// 512-bit vectors on x86-64.
     Avx512,
 }
 
 impl Instructions {
-    /// All of them, slowest first.
+    /// All instruction sets, slowest first.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
-    /// The fastest that this processor has. `GLIMT_SIMD=portable` or `avx2` in the environment lowers the choice, to
-    /// compare.
+    /// The fastest instruction set of this processor. For comparisons, the environment variable
+    /// `GLIMT_SIMD=portable` or `avx2` selects a slower one.
     pub fn best() -> Self {
         static BEST: LazyLock<Instructions> =
             LazyLock::new(|| match std::env::var("GLIMT_SIMD").as_deref() {
@@ -62,7 +63,7 @@ impl Instructions {
         *BEST
     }
 
-    /// These instructions, or the best that the processor has if it lacks them.
+    /// This instruction set, or the best one that the processor has if it lacks it.
     pub fn available(self) -> Self {
         static AVAILABLE: LazyLock<Instructions> = LazyLock::new(available);
         self.min(*AVAILABLE)
@@ -86,20 +87,20 @@ fn available() -> Instructions {
     Instructions::Portable
 }
 
-/// See [`WideBvh::closest`]; the tree is not empty.
+/// [`WideBvh::closest`] for a nonempty tree.
 #[allow(unsafe_code)]
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     match tree.instructions {
         Instructions::Portable => portable::closest(tree, ray),
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: a tree has these instructions only where the processor has them (`Instructions::available`).
+        // SAFETY: a tree only has an instruction set that the processor has (`Instructions::available`).
         Instructions::Avx2 | Instructions::Avx512 => unsafe { single::closest(tree, ray) },
         #[cfg(not(target_arch = "x86_64"))]
         _ => portable::closest(tree, ray),
     }
 }
 
-/// See [`WideBvh::any`]; the tree is not empty.
+/// [`WideBvh::any`] for a nonempty tree.
 #[allow(unsafe_code)]
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     match tree.instructions {
@@ -112,7 +113,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     }
 }
 
-/// See [`WideBvh::closest_packet`]; the tree is not empty. Returns whether it did the work.
+/// [`WideBvh::closest_packet`] for a nonempty tree. Returns whether the packet was traced.
 #[allow(unsafe_code)]
 pub fn closest_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
     match tree.instructions {
@@ -126,7 +127,8 @@ pub fn closest_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Opt
     }
 }
 
-/// See [`WideBvh::any_packet`]; the tree is not empty. A bit for each ray that hits. `None` if it did not do the work.
+/// [`WideBvh::any_packet`] for a nonempty tree: the bits of the rays that hit, or `None` if the packet was
+/// not traced.
 #[allow(unsafe_code)]
 pub fn any_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
     match tree.instructions {

@@ -1,9 +1,9 @@
-//! Memory for large arrays with random access: by large pages, if the system offers them.
+//! Huge pages for large arrays with random access, where the system offers them.
 
-/// Number of bytes from which it pays to ask.
+/// Allocation size in bytes from which huge pages pay off.
 const LARGE: usize = 1 << 21;
 
-/// An empty vector with room for `count`.
+/// An empty vector with room for `count` items.
 pub fn large<T>(count: usize) -> Vec<T> {
     let items = Vec::with_capacity(count);
     let bytes = count * size_of::<T>();
@@ -20,8 +20,8 @@ fn ask(start: usize, bytes: usize) {
     let first = start.next_multiple_of(PAGE);
     let length = (start + bytes).saturating_sub(first) / PAGE * PAGE;
     if let Some(address) = std::ptr::NonNull::new(first as *mut std::ffi::c_void) {
-        // SAFETY: the pages lie inside the allocation, and the advice changes nothing that they hold. A refusal loses
-        // nothing, so the result is ignored.
+        // SAFETY: the pages are inside the allocation, and the advice does not change their content. The
+        // result is ignored, as a refusal is harmless.
         let _ = unsafe { madvise(address, length, MmapAdvise::MADV_HUGEPAGE) };
     }
 }

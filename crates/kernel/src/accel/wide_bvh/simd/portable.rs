@@ -1,4 +1,4 @@
-//! Plain Rust: the twin that all instruction sets must equal.
+//! Portable traversal, the reference for all instruction sets.
 
 use super::super::WideBvh;
 use super::super::node::{Child, Node, PACK, TrianglePack, WIDTH};
@@ -7,13 +7,13 @@ use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 
-/// Whether a ray can hit anything: a ray that is not finite, or has no direction, hits nothing, although the box tests
-/// would find it in every box.
+/// Whether a ray can hit anything. Rays that are not finite or have no direction hit nothing, although they
+/// would pass every box test.
 fn may_hit(ray: &Ray) -> bool {
     ray.origin.is_finite() && ray.direction.is_finite() && ray.direction != Vec3::ZERO
 }
 
-/// The nearest hit. Visits children nearest first, by a stack in memory of its own.
+/// Finds the nearest hit, visiting children front to back.
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     if !may_hit(ray) {
         return None;
@@ -48,7 +48,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     best
 }
 
-/// Whether any triangle is hit. Visits children in any order, until one is hit.
+/// Whether any triangle is hit. Visits children in any order until one is hit.
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     if !may_hit(ray) {
         return false;
@@ -79,7 +79,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     false
 }
 
-/// Children that a ray meets, with the distances at which it enters them.
+/// Children that a ray hits, with their entry distances.
 fn met(node: &Node, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, Child)> {
     (0..WIDTH).filter_map(move |slot| {
         let corner = |side: usize| {
@@ -89,7 +89,7 @@ fn met(node: &Node, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, C
     })
 }
 
-/// Takes a lane's hit if it is nearer, or as near with a lower number.
+/// Updates the best hit with a lane's hit if it is nearer, or equally near with a lower index.
 #[inline]
 pub fn nearer(pack: &TrianglePack, lane: usize, ray: &ShearedRay, t_max: f32, best: &mut Option<ShapeHit>) {
     if let Some(hit) = ray.intersect(&pack.corners(lane), t_max) {

@@ -1,4 +1,5 @@
-//! A ray in all lanes of vectors, prepared without a branch, as the signs of random rays are random.
+//! A ray broadcast to SIMD registers. Prepared without branches, as the signs of random rays are
+//! unpredictable.
 
 use std::arch::x86_64::*;
 
@@ -8,19 +9,19 @@ use crate::accel::wide_bvh::node::{Node, TrianglePack};
 use crate::geometry::aabb::{FAR_PAD, TRIANGLE_ERROR};
 use crate::geometry::{Aabb, Ray};
 
-/// Least speed along an axis, as a fraction of the greatest.
+/// Minimum speed along an axis, as a fraction of the maximum.
 const LEAST_PART: f32 = 1.0 / (1_u64 << 40) as f32;
 
 /// A ray prepared for the boxes of nodes and the triangles of packs.
 pub struct Lines {
-    /// t for each unit along an axis.
+    /// Inverse direction.
     to_near: [F8; 3],
-    /// t for each unit along an axis, padded so that a far plane is never met too early.
+    /// Inverse direction, padded so that a far plane is never reached too early.
     to_far: [F8; 3],
-    /// Origins for near and far planes, a margin apart, in units of t.
+    /// Origins for near and far planes, a margin apart, multiplied by the inverse direction.
     from_near: [F8; 3],
     from_far: [F8; 3],
-    /// Rows of a node that are near along each axis.
+    /// Row of a node with the near planes of each axis.
     near: [usize; 3],
     /// Origin along the axes of the sheared ray.
     origin: [F4; 3],
@@ -30,8 +31,8 @@ pub struct Lines {
     start: u32,
 }
 
-/// Axes of a sheared ray, indexed by the truth of x > y, x > z and y > z for the sizes of its direction, and by which
-/// of x, y, z go down: see `ShearedRay::new`.
+/// Axes of a sheared ray, indexed by whether x > y, x > z and y > z for the magnitudes of its direction, and
+/// by which of x, y, z are negative; see `ShearedRay::new`.
 const AXES: [[i32; 4]; 64] = {
     let mut table = [[0; 4]; 64];
     let mut case = 0;
@@ -51,17 +52,17 @@ const AXES: [[i32; 4]; 64] = {
     table
 };
 
-/// Origin and direction; the last lane of each holds the float that follows in memory.
+/// Origin and direction. The last lane of each holds the float that follows in memory.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn origin_and_direction(ray: &Ray) -> (__m128, __m128) {
     const _: () = assert!(size_of::<Ray>() == 32 && std::mem::offset_of!(Ray, direction) == 12);
     let floats: *const f32 = std::ptr::from_ref(ray).cast();
-    // SAFETY: the first four of the seven floats of a ray, and the four after the first three.
+    // SAFETY: reads the first four of a ray's seven floats, and the four after the first three.
     unsafe { (_mm_loadu_ps(floats), _mm_loadu_ps(floats.add(3))) }
 }
 
-/// Whether the ray is finite and goes somewhere.
+/// Whether the ray is finite and has a direction.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 pub fn may_hit(ray: &Ray) -> bool {
@@ -76,13 +77,13 @@ pub fn may_hit(ray: &Ray) -> bool {
     _mm_movemask_ps(finite) & 0b111 == 0b111 && _mm_movemask_ps(goes) & 0b111 != 0
 }
 
-/// Both corners; the last lane of each holds another float.
+/// Both corners. The last lane of each holds another float.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn corners(bounds: &Aabb) -> (__m128, __m128) {
     const _: () = assert!(size_of::<Aabb>() == 24 && std::mem::offset_of!(Aabb, max) == 12);
     let floats: *const f32 = std::ptr::from_ref(bounds).cast();
-    // SAFETY: the first four and the last four of the six floats of a box.
+    // SAFETY: reads the first four and the last four of a box's six floats.
     let (min, max) = unsafe { (_mm_loadu_ps(floats), _mm_loadu_ps(floats.add(2))) };
     (min, _mm_permute_ps::<0b00_11_10_01>(max))
 }
@@ -95,7 +96,7 @@ fn overflows(v: __m128) -> __m128 {
     _mm_cmpeq_ps(unsigned, _mm_set1_ps(f32::INFINITY))
 }
 
-/// The greatest of three lanes that are not negative, in all four.
+/// Broadcasts the maximum of three nonnegative lanes.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn greatest(v: __m128) -> __m128 {
@@ -103,7 +104,7 @@ fn greatest(v: __m128) -> __m128 {
     _mm_permute_ps::<0>(_mm_max_ps(v, _mm_permute_ps::<0b01>(v)))
 }
 
-/// Three lanes, each spread over eight.
+/// Broadcasts each of three lanes to eight.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn in_eight(v: __m128) -> [F8; 3] {
@@ -111,7 +112,7 @@ fn in_eight(v: __m128) -> [F8; 3] {
     [F8(_mm256_broadcastss_ps(x.0)), F8(_mm256_broadcastss_ps(y.0)), F8(_mm256_broadcastss_ps(z.0))]
 }
 
-/// Three lanes, each spread over four.
+/// Broadcasts each of three lanes to four.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
 fn in_four(v: __m128) -> [F4; 3] {
@@ -126,14 +127,16 @@ impl Lines {
         let (origin, direction) = origin_and_direction(ray);
         let (min, max) = corners(whole);
         let unsigned = _mm_castsi128_ps(_mm_set1_epi32(i32::MAX));
-        // Margin of the boxes beyond their triangles: `triangle_margin`, and the additional error of fused products.
+        // Margin of the boxes around their triangles: `triangle_margin`, plus the additional error of fused
+        // products.
         let below = _mm_and_ps(_mm_sub_ps(min, origin), unsigned);
         let above = _mm_and_ps(_mm_sub_ps(max, origin), unsigned);
         let farthest = greatest(_mm_max_ps(below, above));
         let margin = _mm_mul_ps(farthest, _mm_set1_ps(TRIANGLE_ERROR));
         let reach = _mm_add_ps(margin, _mm_mul_ps(_mm_and_ps(origin, unsigned), _mm_set1_ps(f32::EPSILON)));
-        // Boxes. If the ray hardly moves along an axis, it may as well move a little more: less than a margin all the way
-        // through the boxes. Thereby the inverse of all but the slowest rays stays finite.
+        // Prepare the box tests. A ray that hardly moves along an axis may as well move slightly more: less
+        // than a margin over its whole way through the boxes. This keeps the inverse finite for all but the
+        // slowest rays.
         let size = _mm_and_ps(direction, unsigned);
         let least = _mm_mul_ps(greatest(size), _mm_set1_ps(LEAST_PART));
         let moving = _mm_or_ps(_mm_max_ps(size, least), _mm_andnot_ps(unsigned, direction));
@@ -142,16 +145,16 @@ impl Lines {
         let (before, after) = (_mm_sub_ps(origin, reach), _mm_add_ps(origin, reach));
         let padded = _mm_mul_ps(inverse, _mm_set1_ps(FAR_PAD));
         let downs = _mm_movemask_ps(is_down) as usize;
-        // Triangles.
+        // Prepare the triangle tests.
         let larger = _mm_cmplt_ps(_mm_permute_ps::<0b10_10_01>(size), _mm_permute_ps::<0b01_00_00>(size));
         let signs = _mm_movemask_ps(_mm_cmplt_ps(direction, _mm_setzero_ps())) as usize;
         let axes = &AXES[(_mm_movemask_ps(larger) as usize & 7) | (signs & 7) << 3];
-        // SAFETY: four numbers.
+        // SAFETY: reads four numbers.
         let places = unsafe { _mm_loadu_si128(axes.as_ptr().cast()) };
         let scale = _mm_permute_ps::<0xaa>(_mm_permutevar_ps(inverse, places));
         let shear = _mm_mul_ps(_mm_permutevar_ps(direction, places), scale);
         let [shear_x, shear_y, _] = in_four(shear);
-        // An axis along which the numbers overflow bounds nothing.
+        // Along an axis on which the arithmetic overflows, the ray is unbounded.
         let (endless, minus_endless) = (_mm_set1_ps(f32::INFINITY), _mm_set1_ps(f32::NEG_INFINITY));
         let from_near = _mm_mul_ps(inverse, _mm_blendv_ps(after, before, is_down));
         let from_far = _mm_mul_ps(padded, _mm_blendv_ps(before, after, is_down));
@@ -168,13 +171,14 @@ impl Lines {
         }
     }
 
-    /// Distances at which the ray enters the eight boxes, and a bit for each box that it meets before `end`. A distance that
-    /// is NaN leaves the interval as it is, as in `SlabRay::enter`.
+    /// Distances at which the ray enters the eight boxes, and the bits of the boxes that it hits before
+    /// `end`. A NaN distance leaves the interval unchanged, as in `SlabRay::enter`.
     #[inline(always)]
     pub fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
         let (mut near, mut far) = (end.like(0.0), end);
         for axis in 0..3 {
-            // SAFETY: there is a value of the type; both are rows, of a pair that begins with an even one.
+            // SAFETY: values of this type exist, so the processor has the instructions; both pointers are
+            // rows of a pair that begins with an even one.
             let (to_near, to_far) = unsafe {
                 let row = node.rows.as_ptr().add(self.near[axis]);
                 let other = node.rows.as_ptr().add(self.near[axis] ^ 1);
@@ -189,7 +193,7 @@ impl Lines {
         (near, F8::bits(near.le(far)))
     }
 
-    /// Tests the triangles of a pack, but the one on which the ray starts.
+    /// Tests the triangles of a pack, except the one on which the ray starts.
     #[inline(always)]
     pub fn hits(&self, pack: &TrianglePack, t_max: f32) -> Hits<F4> {
         let corners = [self.corner(pack, 0), self.corner(pack, 3), self.corner(pack, 6)];
@@ -198,10 +202,10 @@ impl Lines {
         Hits { hit: hits.hit & others, doubtful: hits.doubtful & others, ..hits }
     }
 
-    /// A bit for the lane of the triangle on which the ray starts.
+    /// Bit of the lane with the triangle on which the ray starts.
     #[inline(always)]
     fn own_lane(&self, pack: &TrianglePack) -> u32 {
-        // SAFETY: there is a value of `F4`; four numbers.
+        // SAFETY: values of `F4` exist, so the processor has the instructions; reads four numbers.
         unsafe {
             let ids = _mm_loadu_si128(pack.ids.as_ptr().cast());
             let is_own = _mm_cmpeq_epi32(ids, _mm_set1_epi32(self.start.cast_signed()));
@@ -218,7 +222,8 @@ impl Lines {
 
     #[inline(always)]
     fn row(&self, pack: &TrianglePack, row: usize, axis: usize) -> F4 {
-        // SAFETY: there is a value of the type; `row` is 0, 3 or 6 of 9, axes are less than 3.
+        // SAFETY: values of this type exist, so the processor has the instructions; `row` is 0, 3 or 6 of 9,
+        // and axes are less than 3.
         let row = unsafe { F4::load(pack.rows.as_ptr().add(row + self.axes[axis]).cast()) };
         row - self.origin[axis]
     }

@@ -2,17 +2,17 @@
 
 use std::mem::MaybeUninit;
 
-/// Size of the stack: fewer than 96 levels of the binary tree, each with at most seven children to come back to.
+/// Stack size: fewer than 96 levels of the binary tree, each with at most seven pending children.
 const STACK_SIZE: usize = 96 * 7;
 
-/// A stack that no tree fills.
+/// A stack with room for the deepest tree.
 pub struct Stack<T> {
     entries: [MaybeUninit<T>; STACK_SIZE],
     size: usize,
 }
 
 impl<T: Copy> Stack<T> {
-    /// An empty stack.
+    /// Creates an empty stack.
     #[inline(always)]
     pub fn new() -> Self {
         Self { entries: [const { MaybeUninit::uninit() }; STACK_SIZE], size: 0 }
@@ -25,7 +25,7 @@ impl<T: Copy> Stack<T> {
         self.size += 1;
     }
 
-    /// Pushes an entry if it is wanted, without a branch.
+    /// Pushes an entry if `is_wanted`, without a branch.
     #[inline(always)]
     pub fn push_if(&mut self, entry: T, is_wanted: bool) {
         self.entries[self.size].write(entry);
@@ -40,7 +40,7 @@ impl<T: Copy> Stack<T> {
         Some(unsafe { self.entries[self.size].assume_init() })
     }
 
-    /// The entry `back` places below the top, which was pushed before.
+    /// The entry `back` positions below the top.
     #[inline(always)]
     fn below(&mut self, back: usize) -> &mut T {
         debug_assert!(back < self.size);
@@ -49,21 +49,21 @@ impl<T: Copy> Stack<T> {
     }
 }
 
-/// Key of a child, greater the farther the child is: the bits of its entry distance above its code. Distances are at least 0,
-/// so that their bits have their order.
+/// Sort key of a child: the bits of its entry distance above its code. Distances are at least 0, so their
+/// bits sort like the distances.
 #[inline(always)]
 pub fn key(entry: f32, code: u32) -> u64 {
     u64::from(entry.to_bits()) << 32 | u64::from(code)
 }
 
-/// Entry distance of a key's child.
+/// Entry distance stored in a key.
 #[inline(always)]
 pub fn entry(key: u64) -> f32 {
     f32::from_bits((key >> 32) as u32)
 }
 
 impl Stack<u64> {
-    /// Inserts a key among the topmost `count`, which get nearer towards the top.
+    /// Inserts a key among the topmost `count` keys, which are sorted with the nearest on top.
     #[inline(always)]
     pub fn insert(&mut self, key: u64, count: usize) {
         self.push(key);

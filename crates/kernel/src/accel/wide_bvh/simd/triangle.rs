@@ -1,5 +1,5 @@
-//! The watertight triangle test in every lane, with the operations of `ShearedRay::intersect` in their order and without
-//! fused products, so that the bits are the same.
+//! SIMD watertight triangle test. Performs the operations of `ShearedRay::intersect` in the same order and
+//! without fused products, so the bits are equal.
 
 use super::lanes::Lanes;
 use crate::geometry::watertight::ILL_CONDITIONED;
@@ -10,18 +10,19 @@ pub type Corners<V> = [[V; 3]; 3];
 
 /// Hits of a ray.
 pub struct Hits<V: Lanes> {
-    /// A bit for each lane that is hit.
+    /// Bits of the lanes that are hit.
     pub hit: u32,
-    /// A bit for each lane that must be tested again in higher precision: an edge function is exactly 0, the triangle is too
-    /// thin for t, or t is too near 0.
+    /// Bits of the lanes that must be tested again in higher precision: an edge function is exactly 0, the
+    /// triangle is too thin to determine t, or t is too close to 0.
     pub doubtful: u32,
     pub t: V,
     pub u: V,
     pub v: V,
 }
 
-/// Tests all lanes; `shear_z` is t for each unit of z. The division and the error bound are saved if no ray passes through a
-/// triangle. `is_single` saves them for triangles behind the ray's start or beyond its end, too, which most packs have.
+/// Tests all lanes; `shear_z` is t per unit of z. Skips the division and the error bound if no ray passes
+/// through a triangle. With `is_single`, also skips them for triangles behind the origin or past the end of
+/// the ray, which is the case for most packs.
 #[inline(always)]
 pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: bool) -> Hits<V> {
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *corners;
@@ -52,13 +53,13 @@ pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: boo
     Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
-/// Unit of rounding, divided by the ratio that makes a needle, and a little more for the rounding of [`may_count`] itself.
+/// Unit roundoff divided by the needle ratio, slightly enlarged for rounding in [`may_count`] itself.
 const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 
-/// False only if the triangle is no needle and t is below 0, or beyond the end, by more than its error. Let s be the sum of the
-/// greatest x and y, whose product is at most s²/4, and d the greatest z. Then [`distance_error`] is at most 30·s·(s + d) units
-/// of rounding of the reach, divided by the determinant. A determinant whose inverse may be infinite counts as a needle's.
-/// `along` is t times the determinant.
+/// Returns false only if the triangle is not a needle and t is below 0, or past the end, by more than its
+/// error. Let s be the sum of the largest x and y, whose product is at most s²/4, and d the largest z. Then
+/// [`distance_error`] is at most 30·s·(s + d) units of rounding of the reach, divided by the determinant. A
+/// determinant whose inverse may be infinite counts as a needle. `along` is t times the determinant.
 #[inline(always)]
 fn may_count<V: Lanes>(corners: &Corners<V>, determinant: V, shear_z: V, along: V, t_max: V) -> V::Mask {
     let (sum, deepest) = (greatest(corners, 0) + greatest(corners, 1), greatest(corners, 2));
@@ -69,7 +70,7 @@ fn may_count<V: Lanes>(corners: &Corners<V>, determinant: V, shear_z: V, along: 
     size.le(bound) | is_ahead
 }
 
-/// See `ShearedRay::distance_error`.
+/// SIMD version of `ShearedRay::distance_error`.
 #[inline(always)]
 fn distance_error<V: Lanes>(corners: &Corners<V>, shear_z: V, inverse_determinant: V) -> (V, V) {
     let (x, y, depth) = (greatest(corners, 0), greatest(corners, 1), greatest(corners, 2));
@@ -82,7 +83,7 @@ fn distance_error<V: Lanes>(corners: &Corners<V>, shear_z: V, inverse_determinan
     (shear_z.like(3.0) * sum * inverse_determinant.abs(), z)
 }
 
-/// Greatest absolute value of a coordinate.
+/// Largest absolute value of a coordinate.
 #[inline(always)]
 fn greatest<V: Lanes>(corners: &Corners<V>, axis: usize) -> V {
     corners[0][axis].abs().max(corners[1][axis].abs()).max(corners[2][axis].abs())
@@ -95,15 +96,16 @@ mod tests {
     use crate::accel::wide_bvh::simd::lanes::F4;
     use crate::math::random::signed as random;
 
-    /// Tests triangles at the limits of the filter, in thinness and in distance from the start, and a little beyond.
+    /// Tests triangles at the limits of the filter in thinness and distance from the origin, and slightly
+    /// beyond.
     #[test]
-    fn the_filter_lets_pass_whatever_is_doubtful_and_hardly_anything_else() {
-        // SAFETY: four floats are in every processor of this architecture.
+    fn filter_passes_doubtful_triangles_only() {
+        // SAFETY: every processor of this architecture has four-float vectors.
         let like = unsafe { F4::splat(0.0) };
         let mut next = random(31);
         let (mut needles, mut starts, mut passed, mut clear, mut beyond) = (0, 0, 0, 0, 0);
         for round in 0..400_000 {
-            // Take needles of all widths, sizes and distances; those whose corners have |x| = |y| are the worst.
+            // Use needles of all widths, sizes and distances; corners with |x| = |y| are the worst case.
             let size = 2.0_f32.powf(next() * 12.0);
             let depth = if round % 2 == 0 { 0.0 } else { size * 2.0_f32.powf(next() * 10.0) };
             let is_thin = round % 4 < 2;
@@ -128,7 +130,7 @@ mod tests {
             let (error, reach) = distance_error(&corners, shear_z, inverse);
             let is_needle = F4::bits((reach * like.like(ILL_CONDITIONED)).lt(error)) != 0;
             let is_at_start = F4::bits(t.abs().le(error)) != 0;
-            // Let the ray end before the triangle, at it, behind it, or nowhere.
+            // End the ray before the triangle, at it, behind it, or nowhere.
             let mut distance = [0.0; 4];
             t.store(&mut distance);
             let part = [0.5, 1.0, 1.0 + f32::EPSILON, 2.0, f32::INFINITY][round % 5];

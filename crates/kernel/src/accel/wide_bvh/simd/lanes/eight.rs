@@ -1,15 +1,15 @@
-//! Eight floats in a register.
+//! Eight floats in an AVX register.
 
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
 use super::{F4, Lanes, operators, wide_mask};
 
-/// Eight floats.
+/// Vector of eight floats.
 #[derive(Clone, Copy)]
 pub struct F8(pub(in crate::accel::wide_bvh::simd) __m256);
 
-/// Eight truth values.
+/// Mask of eight lanes.
 #[derive(Clone, Copy)]
 pub struct Mask8(__m256);
 
@@ -22,26 +22,26 @@ impl Lanes for F8 {
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: upheld by the caller.
         Self(unsafe { _mm256_set1_ps(x) })
     }
 
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: upheld by the caller.
         Self(unsafe { _mm256_loadu_ps(from) })
     }
 
     #[inline(always)]
     fn store(self, to: &mut [f32]) {
         assert!(to.len() >= Self::COUNT);
-        // SAFETY: there is a value of this type, and room.
+        // SAFETY: a value of this type exists; the slice has room.
         unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) }
     }
 
     #[inline(always)]
     fn over(self, divisor: Self) -> Self {
-        // SAFETY: there is a value of this type; so below.
+        // SAFETY: a value of this type exists, here and below.
         Self(unsafe { _mm256_div_ps(self.0, divisor.0) })
     }
 
@@ -131,13 +131,13 @@ impl Lanes for F8 {
 }
 
 impl F8 {
-    /// self · factor − less, rounded once.
+    /// Computes self · factor − less, rounded once.
     ///
     /// # Safety
-    /// The processor has fused products.
+    /// The processor must have fused multiply-add.
     #[inline(always)]
     pub unsafe fn times_less(self, factor: Self, less: Self) -> Self {
-        // SAFETY: there is a value of this type; fused products are the caller's.
+        // SAFETY: a value of this type exists; FMA is upheld by the caller.
         Self(unsafe { _mm256_fmsub_ps(self.0, factor.0, less.0) })
     }
 }

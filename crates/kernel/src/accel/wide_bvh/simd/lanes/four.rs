@@ -1,15 +1,15 @@
-//! Four floats in a register.
+//! Four floats in an SSE register.
 
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
 use super::{Lanes, operators, wide_mask};
 
-/// Four floats.
+/// Vector of four floats.
 #[derive(Clone, Copy)]
 pub struct F4(pub(in crate::accel::wide_bvh::simd) __m128);
 
-/// Four truth values.
+/// Mask of four lanes.
 #[derive(Clone, Copy)]
 pub struct Mask4(__m128);
 
@@ -22,26 +22,26 @@ impl Lanes for F4 {
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: upheld by the caller.
         Self(unsafe { _mm_set1_ps(x) })
     }
 
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: upheld by the caller.
         Self(unsafe { _mm_loadu_ps(from) })
     }
 
     #[inline(always)]
     fn store(self, to: &mut [f32]) {
         assert!(to.len() >= Self::COUNT);
-        // SAFETY: there is a value of this type, and room.
+        // SAFETY: a value of this type exists; the slice has room.
         unsafe { _mm_storeu_ps(to.as_mut_ptr(), self.0) }
     }
 
     #[inline(always)]
     fn over(self, divisor: Self) -> Self {
-        // SAFETY: there is a value of this type; so below.
+        // SAFETY: a value of this type exists, here and below.
         Self(unsafe { _mm_div_ps(self.0, divisor.0) })
     }
 

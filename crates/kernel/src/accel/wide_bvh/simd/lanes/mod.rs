@@ -1,8 +1,8 @@
-//! Vectors of floats as one type for every width, so that a kernel is written once.
+//! SIMD vectors of all widths behind one trait, so that kernels are written once.
 //!
-//! Only unsafe functions make a value, whose caller answers for the instructions, or functions of this folder from a
-//! register of a function that has the instructions. A value therefore proves that the processor has them, and its
-//! operators are safe.
+//! Values are created only by unsafe functions, whose callers guarantee the instruction set, or inside this
+//! module from a register of a function compiled with the instructions. A value therefore proves that the
+//! processor has the instructions, and its operators are safe.
 
 mod eight;
 mod four;
@@ -16,51 +16,53 @@ pub use four::F4;
 pub use pair::Pair;
 pub use sixteen::F16;
 
-/// Floats side by side. Comparisons with NaN are false; `min` and `max` return their argument if either is NaN.
+/// A SIMD vector of floats. Comparisons with NaN are false; `min` and `max` return their argument if either
+/// is NaN.
 pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// Number of lanes.
     const COUNT: usize;
-    /// A truth value for each lane.
+    /// One truth value per lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
 
-    /// The same number in all lanes.
+    /// Broadcasts a number to all lanes.
     ///
     /// # Safety
-    /// The processor has the instructions of this type.
+    /// The processor must have the instructions of this type.
     unsafe fn splat(x: f32) -> Self;
 
     /// Loads floats from memory.
     ///
     /// # Safety
-    /// The processor has the instructions of this type, and `from` points to [`Lanes::COUNT`] floats.
+    /// The processor must have the instructions of this type, and `from` must point to [`Lanes::COUNT`]
+    /// floats.
     unsafe fn load(from: *const f32) -> Self;
 
-    /// The same in all lanes.
+    /// Broadcasts a number to all lanes.
     #[inline(always)]
     fn like(self, x: f32) -> Self {
-        // SAFETY: there is a value of this type.
+        // SAFETY: a value of this type exists.
         unsafe { Self::splat(x) }
     }
 
-    /// Loads from an array of at least as many floats.
+    /// Loads from a slice with at least [`Lanes::COUNT`] floats.
     #[inline(always)]
     fn gather(self, from: &[f32]) -> Self {
         assert!(from.len() >= Self::COUNT);
-        // SAFETY: there is a value of this type; the length was checked.
+        // SAFETY: a value of this type exists; the length was checked.
         unsafe { Self::load(from.as_ptr()) }
     }
 
-    /// Stores into an array of at least as many floats.
+    /// Stores into a slice with at least [`Lanes::COUNT`] floats.
     fn store(self, to: &mut [f32]);
-    /// Quotients.
+    /// Divides by `divisor`.
     fn over(self, divisor: Self) -> Self;
-    /// Lesser of the two numbers in each lane.
+    /// Smaller number of each lane.
     fn min(self, other: Self) -> Self;
-    /// Greater of the two numbers in each lane.
+    /// Larger number of each lane.
     fn max(self, other: Self) -> Self;
-    /// Absolute values.
+    /// Absolute value of each lane.
     fn abs(self) -> Self;
-    /// Numbers, negated where `other` is below 0 or −0.
+    /// Negates the lanes in which `other` has its sign bit set.
     fn signed_by(self, other: Self) -> Self;
     /// self < other.
     fn lt(self, other: Self) -> Self::Mask;
@@ -68,28 +70,28 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
     fn le(self, other: Self) -> Self::Mask;
     /// self = other.
     fn eq(self, other: Self) -> Self::Mask;
-    /// `self` where the mask holds, else `other`, bit for bit.
+    /// Selects `self` where the mask is set and `other` elsewhere, bit for bit.
     fn or_else(self, mask: Self::Mask, other: Self) -> Self;
-    /// Lanes in which `mask` holds and `but` does not.
+    /// Lanes set in `mask` but not in `but`.
     fn without(mask: Self::Mask, but: Self::Mask) -> Self::Mask;
-    /// A bit for each lane in which the mask holds.
+    /// Packs a mask into bits, one per lane.
     fn bits(mask: Self::Mask) -> u32;
-    /// The mask of these bits; `like` proves that the processor has the instructions.
+    /// Expands bits into a mask; `like` proves that the processor has the instructions.
     fn mask(bits: u32, like: Self) -> Self::Mask;
-    /// Greatest of all lanes.
+    /// Maximum of all lanes.
     fn greatest(self) -> f32;
-    /// Least of all lanes.
+    /// Minimum of all lanes.
     fn least(self) -> f32;
 }
 
-/// Sums, differences and products of a type around a vector.
+/// Implements addition, subtraction and multiplication for a vector type.
 macro_rules! operators {
     ($name:ident, $add:ident, $sub:ident, $mul:ident) => {
         impl Add for $name {
             type Output = Self;
             #[inline(always)]
             fn add(self, other: Self) -> Self {
-                // SAFETY: there is a value of this type.
+                // SAFETY: a value of this type exists.
                 Self(unsafe { $add(self.0, other.0) })
             }
         }
@@ -97,7 +99,7 @@ macro_rules! operators {
             type Output = Self;
             #[inline(always)]
             fn sub(self, other: Self) -> Self {
-                // SAFETY: there is a value of this type.
+                // SAFETY: a value of this type exists.
                 Self(unsafe { $sub(self.0, other.0) })
             }
         }
@@ -105,21 +107,21 @@ macro_rules! operators {
             type Output = Self;
             #[inline(always)]
             fn mul(self, other: Self) -> Self {
-                // SAFETY: there is a value of this type.
+                // SAFETY: a value of this type exists.
                 Self(unsafe { $mul(self.0, other.0) })
             }
         }
     };
 }
 
-/// Masks that are as wide as the vectors.
+/// Implements `&` and `|` for masks as wide as their vectors.
 macro_rules! wide_mask {
     ($mask:ident, $and:ident, $or:ident) => {
         impl BitAnd for $mask {
             type Output = Self;
             #[inline(always)]
             fn bitand(self, other: Self) -> Self {
-                // SAFETY: there is a value of this type.
+                // SAFETY: a value of this type exists.
                 Self(unsafe { $and(self.0, other.0) })
             }
         }
@@ -127,7 +129,7 @@ macro_rules! wide_mask {
             type Output = Self;
             #[inline(always)]
             fn bitor(self, other: Self) -> Self {
-                // SAFETY: there is a value of this type.
+                // SAFETY: a value of this type exists.
                 Self(unsafe { $or(self.0, other.0) })
             }
         }

@@ -1,10 +1,10 @@
-//! Two vectors side by side.
+//! Pairs of vectors.
 
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
 use super::Lanes;
 
-/// Two vectors as one of twice as many floats.
+/// Two vectors used as one of twice the width.
 #[derive(Clone, Copy)]
 pub struct Pair<V>(V, V);
 
@@ -54,13 +54,13 @@ impl<V: Lanes> Lanes for Pair<V> {
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: upheld by the caller.
         unsafe { Self(V::splat(x), V::splat(x)) }
     }
 
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: the caller's: there are twice as many.
+        // SAFETY: upheld by the caller; a pair has twice as many floats.
         unsafe { Self(V::load(from), V::load(from.add(V::COUNT))) }
     }
 

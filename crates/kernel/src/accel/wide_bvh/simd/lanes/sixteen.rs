@@ -1,15 +1,15 @@
-//! Sixteen floats in a register.
+//! Sixteen floats in an AVX-512 register.
 
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
 use super::{Lanes, operators};
 
-/// Sixteen floats in one register.
+/// Vector of 16 floats.
 #[derive(Clone, Copy)]
 pub struct F16(pub(in crate::accel::wide_bvh::simd) __m512);
 
-/// Sixteen truth values, a bit each.
+/// Mask of 16 lanes, one bit each.
 #[derive(Clone, Copy)]
 pub struct Mask16(u16);
 
@@ -37,26 +37,26 @@ impl Lanes for F16 {
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: upheld by the caller.
         Self(unsafe { _mm512_set1_ps(x) })
     }
 
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self {
-        // SAFETY: the caller's.
+        // SAFETY: upheld by the caller.
         Self(unsafe { _mm512_loadu_ps(from) })
     }
 
     #[inline(always)]
     fn store(self, to: &mut [f32]) {
         assert!(to.len() >= Self::COUNT);
-        // SAFETY: there is a value of this type, and room.
+        // SAFETY: a value of this type exists; the slice has room.
         unsafe { _mm512_storeu_ps(to.as_mut_ptr(), self.0) }
     }
 
     #[inline(always)]
     fn over(self, divisor: Self) -> Self {
-        // SAFETY: there is a value of this type; so below.
+        // SAFETY: a value of this type exists, here and below.
         Self(unsafe { _mm512_div_ps(self.0, divisor.0) })
     }
 

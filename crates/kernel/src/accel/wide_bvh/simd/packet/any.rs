@@ -1,4 +1,4 @@
-//! Any hit of each ray; children are visited in any order.
+//! Any-hit packet traversal, which visits children in any order.
 
 use super::frustum::Frustum;
 use super::rays::Packet;
@@ -13,7 +13,7 @@ use crate::geometry::Ray;
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::watertight::ShearedRay;
 
-/// See [`WideBvh::any_packet`]. `None` if the rays do not go the same way.
+/// [`WideBvh::any_packet`]. `None` if the rays are not coherent.
 #[inline(always)]
 pub fn any<V: Lanes>(
     tree: &WideBvh,

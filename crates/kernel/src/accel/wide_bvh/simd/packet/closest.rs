@@ -1,4 +1,4 @@
-//! The nearest hit of each ray; near children are visited first.
+//! Closest-hit packet traversal, which visits near children first.
 
 use super::frustum::Frustum;
 use super::nearest::Nearest;
@@ -13,7 +13,7 @@ use crate::accel::wide_bvh::simd::stack::{Stack, entry, key};
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::{Ray, ShapeHit};
 
-/// See [`WideBvh::closest_packet`]. False if the rays do not go the same way.
+/// [`WideBvh::closest_packet`]. Returns false if the rays are not coherent.
 #[inline(always)]
 pub fn closest<V: Lanes>(
     tree: &WideBvh,
@@ -62,7 +62,7 @@ pub fn closest<V: Lanes>(
     true
 }
 
-/// Pushes the children that the rays meet, farthest first, so that the nearest is on top.
+/// Pushes the children that any ray hits, farthest first, so that the nearest is on top.
 #[inline(always)]
 fn push_ordered<V: Lanes>(
     tree: &WideBvh,

@@ -1,14 +1,14 @@
-//! A frustum around all rays of a packet.
+//! Frustum around the rays of a packet.
 
 use super::rays::Packet;
 use crate::accel::wide_bvh::node::Node;
 use crate::accel::wide_bvh::simd::lanes::{F8, Lanes};
 use crate::geometry::aabb::SLAB_PAD;
 
-/// Bounds that hold for every ray of a packet, against eight boxes at a time. Subtraction and multiplication round
-/// monotonically, so that no ray enters a box before the frustum does, or leaves it later.
+/// Bounds that hold for every ray of a packet, tested against eight boxes at a time. Subtraction and
+/// multiplication round monotonically, so no ray enters a box before the frustum does or leaves it later.
 pub struct Frustum {
-    /// Greatest origin if the rays go up, least if they go down: the origin that is nearest to the near plane.
+    /// Maximum origin if the rays go up, minimum if they go down: the origin closest to the near plane.
     near_origin: [F8; 3],
     far_origin: [F8; 3],
     inverse: [[F8; 2]; 3],
@@ -32,8 +32,8 @@ impl Frustum {
         Self { near_origin, far_origin, inverse, near: packet.near }
     }
 
-    /// A lower bound on the distance at which a ray enters each box, and a bit for each box that a ray may meet before
-    /// `end`.
+    /// A lower bound on the distance at which a ray enters each box, and the bits of the boxes that a ray may
+    /// hit before `end`.
     #[inline(always)]
     pub fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
         let pad = end.like(SLAB_PAD);

@@ -1,6 +1,6 @@
-//! Sixteen rays at a time that go in much the same direction. One test of a frustum around the rays skips what all of them
-//! miss (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005); the rest is tested for sixteen rays side
-//! by side.
+//! Packet traversal for 16 rays in similar directions. A frustum around the rays skips subtrees that all of
+//! them miss (Reshetov, Soupikov, Hurley, *Multi-Level Ray Tracing Algorithm*, 2005); the rest is tested for
+//! 16 rays at a time.
 
 mod any;
 mod closest;
@@ -17,34 +17,34 @@ use crate::geometry::{Ray, ShapeHit};
 use any::any;
 use closest::closest;
 
-/// [`closest`] by AVX2.
+/// [`closest`] with AVX2.
 #[target_feature(enable = "avx2")]
 pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
-    // SAFETY: this function has the instructions.
+    // SAFETY: this function is compiled with these instructions.
     let (like, like8) = unsafe { (Pair::<F8>::splat(0.0), F8::splat(0.0)) };
     closest(tree, rays, ends, hits, like, like8)
 }
 
-/// [`any`] by AVX2.
+/// [`any`] with AVX2.
 #[target_feature(enable = "avx2")]
 pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
-    // SAFETY: this function has the instructions.
+    // SAFETY: this function is compiled with these instructions.
     let (like, like8) = unsafe { (Pair::<F8>::splat(0.0), F8::splat(0.0)) };
     any(tree, rays, ends, except, like, like8)
 }
 
-/// [`closest`] by AVX-512.
+/// [`closest`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
 pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
-    // SAFETY: this function has the instructions.
+    // SAFETY: this function is compiled with these instructions.
     let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
     closest(tree, rays, ends, hits, like, like8)
 }
 
-/// [`any`] by AVX-512.
+/// [`any`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
 pub fn any_avx512(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
-    // SAFETY: this function has the instructions.
+    // SAFETY: this function is compiled with these instructions.
     let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
     any(tree, rays, ends, except, like, like8)
 }

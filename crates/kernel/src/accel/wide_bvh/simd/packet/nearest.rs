@@ -1,4 +1,4 @@
-//! The nearest hits of a packet's rays.
+//! Nearest hits of a packet.
 
 use super::rays::Packet;
 use crate::accel::PACKET as SIZE;
@@ -8,24 +8,25 @@ use crate::accel::wide_bvh::simd::triangle;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 
-/// The nearest hits so far.
+/// Nearest hits found so far.
 pub struct Nearest<V: Lanes> {
     pub t: V,
     u: V,
     v: V,
-    /// Bits of the triangles' numbers.
+    /// Triangle indices, as bits.
     id: V,
     found: u32,
 }
 
 impl<V: Lanes> Nearest<V> {
-    /// No hits yet, before these ends.
+    /// Starts without hits, with the given ends.
     #[inline(always)]
     pub fn new(ends: V) -> Self {
         Self { t: ends, u: ends, v: ends, id: ends.like(f32::from_bits(u32::MAX)), found: 0 }
     }
 
-    /// Takes each hit that is nearer, or as near with a lower number; returns a bit for each ray that took it.
+    /// Updates with hits that are nearer, or equally near with a lower index. Returns the bits of the updated
+    /// rays.
     #[inline(always)]
     pub fn take(&mut self, packet: &Packet<V>, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
         let hits = packet.hits(pack, lane, self.t);
@@ -59,7 +60,7 @@ impl<V: Lanes> Nearest<V> {
         taken
     }
 
-    /// [`Nearest::take`] for one ray, by the scalar test.
+    /// [`Nearest::take`] for one ray, with the scalar test.
     #[cold]
     #[inline(never)]
     fn keep_one(&mut self, ray: usize, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {

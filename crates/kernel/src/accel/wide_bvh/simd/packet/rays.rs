@@ -1,4 +1,4 @@
-//! The rays of a packet in registers, against a box or a triangle at a time.
+//! The rays of a packet in registers, tested against one box or triangle at a time.
 
 use super::rows::Rows;
 use crate::accel::wide_bvh::node::{Node, TrianglePack};
@@ -20,18 +20,18 @@ pub struct Packet<V: Lanes> {
     shear: [V; 3],
     /// World axes that are the x, y and z axes of every sheared ray.
     axes: [usize; 3],
-    /// The triangles on which the rays start, by the bits of their numbers.
+    /// Indices of the triangles on which the rays start, as bits.
     start: V,
-    /// Rows of a node that hold the near planes.
+    /// Rows of a node with the near planes.
     pub near: [usize; 3],
-    /// Least and greatest origins along each axis.
+    /// Minimum and maximum of the origins along each axis.
     pub origins: [[f32; 2]; 3],
-    /// Greatest margin that boxes need for any of the rays.
+    /// Largest margin around boxes that any of the rays needs.
     pub margin: f32,
 }
 
 impl<V: Lanes> Packet<V> {
-    /// The packet of these rows. `None` if the rays do not go the same way: to the same side along each axis, with the
+    /// Loads a packet. `None` if the rays are not coherent: their directions must have the same signs and the
     /// same longest axis.
     #[inline(always)]
     pub fn new(rows: &Rows, whole: &Aabb, like: V) -> Option<Self> {
@@ -74,7 +74,7 @@ impl<V: Lanes> Packet<V> {
             own.far_origin[axis] = if down == all { after } else { before };
             own.near[axis] = 2 * axis + usize::from(down == all);
         }
-        // Find the longest axis and the shears, as `ShearedRay::new` does, side by side.
+        // Find the longest axis and the shears, as in `ShearedRay::new`.
         let x_over_y = V::bits(size[1].lt(size[0]));
         let longest = match axes[2] {
             0 => x_over_y & V::bits(size[2].lt(size[0])),
@@ -90,7 +90,7 @@ impl<V: Lanes> Packet<V> {
         Some(own)
     }
 
-    /// Whether any ray meets the box in a slot before its end, `SlabRay::enter` side by side.
+    /// Whether any ray hits the box in a slot before its end; SIMD version of `SlabRay::enter`.
     #[inline(always)]
     pub fn meets(&self, node: &Node, slot: usize, end: V) -> bool {
         let pad = end.like(SLAB_PAD);
@@ -111,7 +111,7 @@ impl<V: Lanes> Packet<V> {
         triangle::hits(&[a, b, c], self.shear[2], t_max, false)
     }
 
-    /// A bit for each ray that starts on the triangle of this number.
+    /// Bits of the rays that start on the triangle with this index.
     #[inline(always)]
     pub fn starting_on(&self, triangle: u32) -> u32 {
         V::bits(self.start.eq(self.start.like(f32::from_bits(triangle))))

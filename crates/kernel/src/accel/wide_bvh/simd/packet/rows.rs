@@ -1,25 +1,25 @@
-//! Rays side by side in memory.
+//! Structure-of-arrays storage for the rays of a packet.
 
 use crate::accel::{Ends, PACKET as SIZE};
 use crate::geometry::Ray;
 
-/// Rows of a packet, one value for each ray.
+/// One value per ray.
 type Row = [f32; SIZE];
 
-/// Rays side by side.
+/// Rays in structure-of-arrays layout.
 pub struct Rows {
     pub origin: [Row; 3],
     pub direction: [Row; 3],
     pub ends: Ends,
     /// Bits of [`Ray::start`]; NaN for none.
     pub start: Row,
-    /// A bit for each ray that is traced.
+    /// Bits of the traced rays.
     pub traced: u32,
     /// First traced ray.
     pub first: Ray,
 }
 
-/// A bit for each lane.
+/// Bits of all lanes.
 const ALL: u32 = (1 << SIZE) - 1;
 
 impl Rows {
@@ -32,8 +32,8 @@ impl Rows {
         self.start[lane] = f32::from_bits(ray.start);
     }
 
-    /// Rows of these rays. Lanes without a ray, or with one that ends below 0, repeat the first. `None` if there is no
-    /// ray.
+    /// Loads rays. Lanes without a ray, or with a negative end, repeat the first ray. `None` if no ray is
+    /// traced.
     #[inline(always)]
     pub fn new(rays: &[Ray], ends: &Ends) -> Option<Self> {
         let count = rays.len().min(SIZE);
