@@ -1,30 +1,30 @@
-//! Axis-aligned boxes.
+//! Axis-aligned bounding boxes.
 
 use crate::math::float::gamma;
 use crate::math::{DVec3, Vec3};
 
-/// All points between two corners, the faces included. Empty if `min > max`.
+/// An axis-aligned box including its faces. Empty if `min > max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Aabb {
-    /// Least corner.
+    /// Minimum corner.
     pub min: Vec3,
-    /// Greatest corner.
+    /// Maximum corner.
     pub max: Vec3,
 }
 
 impl Aabb {
-    /// No point at all; the neutral element of [`Aabb::union`].
+    /// The empty box, which is the neutral element of [`Aabb::union`].
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
-    /// The smallest box around some points.
+    /// Smallest box around some points.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
         points
             .into_iter()
             .fold(Self::EMPTY, |bounds, p| Self { min: bounds.min.min(p), max: bounds.max.max(p) })
     }
 
-    /// The smallest `f32` box around double-precision points: every corner is rounded outwards.
+    /// Smallest `f32` box around double-precision points, rounded outward.
     pub fn around_f64(points: impl IntoIterator<Item = DVec3>) -> Self {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for p in points {
@@ -33,32 +33,32 @@ impl Aabb {
         Self { min: min.as_vec3().map(f32::next_down), max: max.as_vec3().map(f32::next_up) }
     }
 
-    /// The smallest box around both.
+    /// Smallest box around both boxes.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Whether it holds no point.
+    /// Whether the box is empty.
     pub fn is_empty(&self) -> bool {
         !self.min.cmple(self.max).all()
     }
 
-    /// Whether the two have a point in common.
+    /// Whether the two boxes overlap or touch.
     pub fn meets(&self, other: &Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
-    /// The box, larger by `margin` on every side.
+    /// Expands the box by `margin` on every side.
     pub fn grown(self, margin: Vec3) -> Self {
         Self { min: self.min - margin, max: self.max + margin }
     }
 
-    /// Max − min; negative or NaN if empty.
+    /// Edge lengths; negative or NaN if empty.
     pub fn extent(&self) -> Vec3 {
         self.max - self.min
     }
 
-    /// The middle.
+    /// Center of the box.
     pub fn center(&self) -> Vec3 {
         self.min * 0.5 + self.max * 0.5
     }
@@ -70,21 +70,21 @@ impl Aabb {
     }
 }
 
-/// Factor on distances that compensates the rounding of [`SlabRay::enter`].
+/// Factor on distances that compensates for rounding in [`SlabRay::enter`].
 pub const SLAB_PAD: f32 = 1.0 + 2.0 * gamma(3);
 
-/// [`SLAB_PAD`] as a factor on the inverse of a direction, which is rounded once more.
+/// [`SLAB_PAD`] as a factor on the inverse direction, which is rounded once more.
 pub const FAR_PAD: f32 = 1.0 + 2.0 * gamma(4);
 
-/// Error of the watertight triangle test across a ray, relative to the distance: less than 13 units of rounding in the
-/// projected coordinates.
+/// Error of the watertight triangle test perpendicular to a ray, relative to the distance: less than 13 units
+/// of rounding in the projected coordinates.
 pub const TRIANGLE_ERROR: f32 = 16.0 * f32::EPSILON;
 
-/// A ray prepared for many boxes.
+/// A ray prepared for the slab test.
 #[derive(Clone, Copy, Debug)]
 pub struct SlabRay {
     origin: Vec3,
-    /// Margin added to boxes on each side.
+    /// Margin added to each side of a box.
     margin: f32,
     inverse: Vec3,
 }
@@ -95,17 +95,17 @@ impl SlabRay {
         Self { origin, margin: 0.0, inverse: direction.recip() }
     }
 
-    /// Prepares a ray for boxes around triangles in `whole`: it misses no box whose triangle the watertight test may
-    /// find.
+    /// Prepares a ray for boxes around triangles in `whole`: it misses no box containing a triangle that the
+    /// watertight test may hit.
     pub fn for_triangles(origin: Vec3, direction: Vec3, whole: &Aabb) -> Self {
         Self { margin: triangle_margin(origin, whole), ..Self::new(origin, direction) }
     }
 
-    /// Distance at which the ray enters the box, if it meets it at a t in [0, `t_max`]. It never misses a box that the
-    /// exact ray meets: the far distance is padded by the slab test's own rounding (Ize, *Robust BVH Ray Traversal*,
-    /// JCGT 2013). A ray inside the plane of a face makes 0·∞ = NaN, which every comparison drops in favour of the
-    /// interval so far; thus both zeros of a direction behave the same. The ray's own end is padded alike, so that it
-    /// does not miss a box with a hit exactly there.
+    /// Distance at which the ray enters the box, if it overlaps it for a t in [0, `t_max`]. Never misses a
+    /// box that the exact ray hits: the far distance is padded for rounding in the slab test (Ize, *Robust
+    /// BVH Ray Traversal*, JCGT 2013). A ray in the plane of a face computes 0·∞ = NaN; every comparison with
+    /// it keeps the current interval, so both zeros of a direction behave the same. The ray's end is also
+    /// padded, so that a box with a hit exactly there is not missed.
     #[inline(always)]
     pub fn enter(&self, min: Vec3, max: Vec3, t_max: f32) -> Option<f32> {
         let a = (min - (self.origin + self.margin)) * self.inverse;
@@ -122,7 +122,7 @@ impl SlabRay {
     }
 }
 
-/// Margin that boxes in `whole` must have around their triangles for a ray from `origin`.
+/// Margin around the triangles of the boxes in `whole` that a ray from `origin` needs.
 pub fn triangle_margin(origin: Vec3, whole: &Aabb) -> f32 {
     (whole.min - origin).abs().max((whole.max - origin).abs()).max_element() * TRIANGLE_ERROR
 }
@@ -135,14 +135,14 @@ mod tests {
         SlabRay::new(origin, direction).enter(min, max, f32::INFINITY)
     }
 
-    /// A small generator of numbers for aimed rays.
+    /// A small random generator for aimed rays.
     fn random(state: &mut u64) -> f32 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((*state >> 40) as f32) / (1_u64 << 24) as f32
     }
 
     #[test]
-    fn both_zeros_of_a_direction_see_the_same() {
+    fn positive_and_negative_zero_are_equal() {
         let (min, max) = (Vec3::ZERO, Vec3::ONE);
         for x in [0.0, 1.0] {
             for zero in [0.0, -0.0] {
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_aimed_at_corners_of_flat_boxes_never_miss() {
+    fn corners_of_flat_boxes_are_never_missed() {
         let mut state = 7;
         let mut misses = 0;
         for _ in 0..400_000 {

@@ -1,4 +1,4 @@
-//! Shapes around an axis: their frame, lines moved near them, and the intersections of a line with their parts.
+//! Surfaces of revolution: local frames, lines in these frames, and intersections with the parts of a shape.
 
 use std::f64::consts::PI;
 
@@ -6,51 +6,51 @@ use super::surface::flat_axes;
 use super::{Aabb, RayF64, ShapeHit};
 use crate::math::{DMat3, DVec2, DVec3};
 
-/// An origin and orthonormal axes, of which the third is a shape's axis.
+/// An origin and orthonormal axes; the z axis is the axis of revolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxialFrame {
-    /// The origin in world coordinates.
+    /// Origin in world coordinates.
     pub origin: DVec3,
-    /// Axes of the frame as columns: map from the frame's coordinates to the world's.
+    /// Axes as columns: the map from local to world coordinates.
     axes: DMat3,
 }
 
 impl AxialFrame {
-    /// A frame from an origin and an axis of any length but 0.
+    /// Creates a frame from an origin and a nonzero axis.
     pub fn new(origin: DVec3, axis: DVec3) -> Self {
         let n = axis.normalize();
         let (u, v) = flat_axes(n);
         Self { origin, axes: DMat3::from_cols(u, v, n) }
     }
 
-    /// The axis, a unit vector.
+    /// Unit vector along the axis.
     pub fn axis(&self) -> DVec3 {
         self.axes.z_axis
     }
 
-    /// Transforms a point to the world.
+    /// Transforms a point to world coordinates.
     pub fn point(&self, local: DVec3) -> DVec3 {
         self.origin + self.axes * local
     }
 
-    /// Transforms a direction to the world.
+    /// Transforms a direction to world coordinates.
     pub fn vector(&self, local: DVec3) -> DVec3 {
         self.axes * local
     }
 
-    /// Transforms a point from the world.
+    /// Transforms a point from world coordinates.
     #[inline(always)]
     pub fn local(&self, point: DVec3) -> DVec3 {
         self.axes.transpose() * (point - self.origin)
     }
 
-    /// Height of a point of the world along the axis: the last of its coordinates.
+    /// Height of a world point along the axis: its local z.
     #[inline(always)]
     pub fn height(&self, point: DVec3) -> f64 {
         self.axes.z_axis.dot(point - self.origin)
     }
 
-    /// Line of a ray, from its point nearest to the origin.
+    /// Line of a ray, starting at its point nearest to the frame's origin.
     #[inline(always)]
     pub fn line(&self, ray: &RayF64) -> Line {
         let origin = self.local(ray.origin);
@@ -59,13 +59,13 @@ impl AxialFrame {
         Line { foot: origin + direction * start, direction, start }
     }
 
-    /// The box around a circle about the axis at a height.
+    /// Bounding box of a circle around the axis at a height.
     pub fn circle_bounds(&self, height: f64, radius: f64) -> Aabb {
         self.ball_bounds(height, radius, 0.0)
     }
 
-    /// The box around all balls of one radius with their centres on a circle about the axis at a height, with room for
-    /// the rounding of the sums.
+    /// Bounding box of all balls of radius `ball` centered on a circle around the axis, expanded by the
+    /// rounding of the sums.
     pub fn ball_bounds(&self, height: f64, radius: f64, ball: f64) -> Aabb {
         let center = self.point(DVec3::new(0.0, 0.0, height));
         let across = |i: usize| DVec2::new(self.axes.x_axis[i], self.axes.y_axis[i]).length() * radius + ball;
@@ -76,24 +76,24 @@ impl AxialFrame {
     }
 }
 
-/// A line in a frame's coordinates. It starts at its point nearest to the origin, so that no number is larger than the
-/// shape and rays from afar keep their digits.
+/// A line in local coordinates. It starts at its point nearest to the origin, so that numbers are at most the
+/// size of the shape and rays from far away stay precise.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
-    /// The point nearest to the origin.
+    /// Point nearest to the origin.
     pub foot: DVec3,
-    /// The ray's direction.
+    /// Direction of the ray.
     pub direction: DVec3,
     /// The ray's t at the foot.
     pub start: f64,
 }
 
-/// Interval of a line, counted from its foot; each end with the part of the shape that it is on.
+/// Interval of a line relative to its foot; each end has the index of the part that it is on.
 #[derive(Clone, Copy, Debug)]
 pub struct Stretch {
-    /// Its beginning.
+    /// Start of the interval.
     pub enter: (f64, u32),
-    /// Its end.
+    /// End of the interval.
     pub leave: (f64, u32),
 }
 
@@ -101,12 +101,12 @@ impl Stretch {
     /// The whole line.
     pub const WHOLE: Self = Self { enter: (f64::NEG_INFINITY, 0), leave: (f64::INFINITY, 0) };
 
-    /// The interval between two distances on the side, which is part 0.
+    /// Interval between two points of the side, which is part 0.
     pub fn of_side(enter: f64, leave: f64) -> Self {
         Self { enter: (enter, 0), leave: (leave, 0) }
     }
 
-    /// The interval between two heights, each with its part.
+    /// Interval between two heights, each with its part.
     pub fn between(line: &Line, low: (f64, u32), high: (f64, u32)) -> Option<Self> {
         let (z, dz) = (line.foot.z, line.direction.z);
         if dz == 0.0 {
@@ -122,8 +122,8 @@ impl Stretch {
     }
 }
 
-/// First t of the ray between its ends, with its part: on the solid if it is closed, on the bare side if not.
-/// `starts_on` says whether the ray starts on a part, within rounding, which is no hit.
+/// First t of the ray at an interval end: on the closed solid, or only on the side if it is open. `starts_on`
+/// returns whether the ray starts on a part, up to rounding, which is not a hit.
 pub fn meet(
     ray: &RayF64,
     line: &Line,
@@ -132,7 +132,7 @@ pub fn meet(
     closed: bool,
     starts_on: impl Fn(u32) -> bool,
 ) -> Option<(f64, u32)> {
-    // Of the two intersections with a side, the one next to the start is the start itself.
+    // Of the two intersections with a side, the one closer to the start is the start itself.
     let other_on_side = |along: f64| {
         let other = if along == side.enter.0 { side.leave.0 } else { side.enter.0 };
         (line.start + other).abs()
@@ -161,11 +161,12 @@ pub fn meet(
     [enter, leave].into_iter().find_map(accepted)
 }
 
-/// Square of the distance within which a hit may be the start of its ray, relative to the distance from the shape's origin: at a
-/// grazing angle, rounding moves the hit by the root of the last digit.
+/// Squared distance from the ray's origin within which a hit may be the origin itself, relative to the
+/// distance from the shape's origin: at grazing angles, rounding moves the hit by the square root of the last
+/// digit.
 const NEAR_START: f64 = 1e-12;
 
-/// Whether a distance of a ray's start from a surface is within rounding; `size` is that of the numbers it comes from.
+/// Whether a distance from a surface is within rounding error for numbers up to `size`.
 pub fn is_rounding(distance: f64, size: f64) -> bool {
     distance.abs() <= 8.0 * f64::EPSILON * size
 }
@@ -175,8 +176,9 @@ pub fn across(along: f64) -> f64 {
     (1.0 - along * along).max(0.0).sqrt()
 }
 
-/// Projected area of a surface whose normals lie evenly on a ring around an axis: ∫max(0, a·cos φ + b) over the area. At
-/// the angle φ around the axis, the normal's product with the direction is a·cos φ + b.
+/// Projected area of a surface whose normals are uniformly distributed on a ring around an axis: ∫max(0,
+/// a·cos φ + b) over the area, where a·cos φ + b is the cosine between normal and direction at the angle φ
+/// around the axis.
 pub fn ring_shown(area: f64, a: f64, b: f64) -> f64 {
     if b >= a {
         area * b
@@ -187,12 +189,12 @@ pub fn ring_shown(area: f64, a: f64, b: f64) -> f64 {
     }
 }
 
-/// A hit from a distance and a part.
+/// Converts a t and a part to a hit.
 pub fn hit((t, primitive): (f64, u32)) -> ShapeHit {
     ShapeHit { primitive, ..ShapeHit::at(t as f32) }
 }
 
-/// The t of a hit with all its digits, from a second intersection; the rounded t if that finds another hit.
+/// Unrounded t of a hit, from a second intersection; the rounded t if that finds another hit.
 pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     match again {
         Some((t, part)) if t as f32 == hit.t && part == hit.primitive => t,
@@ -200,8 +202,8 @@ pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
     }
 }
 
-/// The point of a hit with all its digits, where the line of its ray crosses the part that is hit; by a second intersection if not
-/// exactly one of the crossings is at the distance of the hit.
+/// Unrounded point of a hit, where the ray crosses the part that was hit. Uses a second intersection unless
+/// exactly one of the crossings is at the hit's distance.
 pub fn exact_point(
     (ray, line): (&RayF64, &Line),
     hit: &ShapeHit,
@@ -230,7 +232,7 @@ pub fn turn(p: DVec2) -> f64 {
     0.5 + libm::atan2(p.y, p.x) / std::f64::consts::TAU
 }
 
-/// The direction of [`turn`] = `u`.
+/// Inverse of [`turn`]: the direction for a value of `u`.
 pub fn at_turn(u: f64) -> DVec2 {
     let (sin, cos) = libm::sincos((u - 0.5) * std::f64::consts::TAU);
     DVec2::new(cos, sin)
@@ -247,14 +249,14 @@ pub(super) mod tests {
     use crate::math::random::unit;
 
     #[test]
-    fn who_starts_on_a_round_surface_does_not_meet_it_there() {
+    fn rays_do_not_hit_their_start_on_curved_shapes() {
         // All of these touch z = 0 from behind at the origin, or end there.
         let cylinder = |a, b, radius| Cylinder::new(a, b, radius, true);
         let mut next = unit(7);
         for _ in 0..2000 {
             let [x, y, z] = std::array::from_fn(|_| next() - 0.5);
             let out = Vec3::new(x, y, -z.abs() - 1e-6);
-            // The axis lies in any direction.
+            // Orient the axis in arbitrary directions.
             let [x, y] = std::array::from_fn(|_| f64::from(next()) - 0.5);
             let along = DVec3::new(x, y, 0.0);
             let middle = DVec3::Z;
@@ -267,7 +269,7 @@ pub(super) mod tests {
                 [bar.intersect(ray), ring.intersect(ray), standing.intersect(ray), cone.intersect(ray)]
             };
             assert_eq!(all(&ray(out)).map(|hit| hit.map(|hit| hit.t)), [None; 4], "{along} {out}");
-            // Through them it meets the other side.
+            // Rays through the shape hit the other side.
             for hit in all(&ray(-out)) {
                 let t = hit.map_or(0.0, |hit| hit.t);
                 assert!(t > 1e-7, "{along} {out}: {t}");
@@ -275,22 +277,22 @@ pub(super) mod tests {
         }
     }
 
-    /// A thin shape about the z axis from −1 to 1, for [`hits_from_afar`].
+    /// A thin shape around the z axis from −1 to 1, for [`hits_from_afar`].
     pub trait Thin {
-        /// The shape with this radius.
+        /// Creates the shape with this radius.
         fn thin(radius: f64, capped: bool) -> Self;
 
-        /// Its nearest hit.
+        /// Nearest hit.
         fn met(&self, ray: &RayF64) -> Option<(f64, u32)>;
 
-        /// The interval of the ray within its side.
+        /// Interval of the ray within the side.
         fn within(&self, ray: &RayF64) -> Option<Stretch>;
 
-        /// The point of a hit, with all its digits.
+        /// Unrounded point of a hit.
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3;
     }
 
-    /// Checks the points of hits from afar, where both crossings of the side are at the same rounded distance.
+    /// Checks the points of distant hits, where both crossings of the side round to the same distance.
     pub fn hits_from_afar<T: Thin + std::fmt::Debug>() {
         let mut ambiguous = 0;
         for (i, capped) in (0..4000_u32).flat_map(|i| [(i, true), (i, false)]) {

@@ -1,4 +1,4 @@
-//! Cones, in double precision.
+//! Cones in double precision.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,17 +8,18 @@ use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// A cone with a round base, or its bare side; the front is outside. Parts: 0 the side, 1 the cap at the base.
+/// A cone with a round base, or only its side; the front is outside. Part 0 is the side and part 1 the cap at
+/// the base.
 ///
-/// Texture coordinates of the side: u once around, v from 0 at the base to 1 at the tip. On a cone that stands on its
-/// base, pictures therefore stand and are not mirrored. The cap's are those of a [`Disk`].
+/// On the side, u goes once around and v from 0 at the base to 1 at the tip. Images are upright and not
+/// mirrored on an upright cone with its base at the bottom. The cap is mapped like a [`Disk`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
-    /// Frame whose origin is the tip and whose axis goes to the base.
+    /// Frame with its origin at the tip and its axis towards the base.
     frame: AxialFrame,
     height: f64,
     radius: f64,
-    /// Length of the side from the tip to the base's border.
+    /// Length of the side from the tip to the rim of the base.
     slant: f64,
     capped: bool,
 }
@@ -35,14 +36,14 @@ impl Exact for Cone {
 }
 
 impl Cone {
-    /// A cone from the middle of its base, a tip elsewhere, and the base's radius > 0.
+    /// Creates a cone from the center of its base, a different point as the tip, and the base's radius > 0.
     pub fn new(base: DVec3, tip: DVec3, radius: f64, capped: bool) -> Self {
         let height = (base - tip).length();
         let slant = libm::hypot(height, radius);
         Self { frame: AxialFrame::new(tip, base - tip), height, radius, slant, capped }
     }
 
-    /// The nearest hit, from outside or inside.
+    /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         self.nearest(ray).map(axial::hit)
     }
@@ -55,7 +56,7 @@ impl Cone {
         axial::meet(ray, &line, self.side_stretch(&line)?, ends, self.capped, starts_on)
     }
 
-    /// Whether a ray starts on a part, within rounding.
+    /// Whether a ray starts on a part, up to rounding.
     fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
         let local = self.frame.local(ray.origin);
         let distance = match part {
@@ -65,10 +66,10 @@ impl Cone {
         is_rounding(distance, self.reach())
     }
 
-    /// Interval in which the line is inside the side, extended beyond the base and, by its image, beyond the tip:
-    /// |p| ≤ k|z|. The quadratic A·s² − 2B·s + C is that of the foot of the tip on the line, so that B is one
-    /// product. B² − AC is a difference of squares of the line's moment about the tip, exact to the last digits also for lines
-    /// that graze the side next to the tip.
+    /// Interval in which the line is inside the double cone |p| ≤ k|z|, which extends beyond the base and the
+    /// tip. The quadratic A·s² − 2B·s + C is relative to the point of the line nearest to the tip, so that B
+    /// is a single product. B² − AC is a difference of squares of the line's moment about the tip, which is
+    /// precise to the last digits even for lines that graze the side near the tip.
     fn side_stretch(&self, line: &Line) -> Option<Stretch> {
         let k = self.radius / self.height;
         let (p, d) = (line.foot, line.direction);
@@ -84,7 +85,8 @@ impl Cone {
             return None;
         }
         let q = b + discriminant.max(0.0).sqrt().copysign(b);
-        // A line as steep as the side meets it once: put the other root where slightly steeper lines have it.
+        // A line parallel to the side crosses it once: put the other root where slightly steeper lines have
+        // it.
         let a = if a == 0.0 { -0.0 } else { a };
         let (s0, s1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
         Some(match (crosses_both, d.z > 0.0) {
@@ -94,7 +96,7 @@ impl Cone {
         })
     }
 
-    /// The point of a hit, with all its digits.
+    /// Unrounded point of a hit.
     fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let line = self.frame.line(ray);
         let crossings = match hit.primitive {
@@ -104,7 +106,7 @@ impl Cone {
         axial::exact_point((ray, &line), hit, crossings, || self.nearest(ray))
     }
 
-    /// The surface at a hit.
+    /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
@@ -125,7 +127,7 @@ impl Cone {
         )
     }
 
-    /// The side in a direction from the axis, by [`Cone::along`].
+    /// Point of the side at a direction from the axis and the result of [`Cone::along`].
     fn exact_side(&self, out: DVec2, (down, along): (DVec2, f64)) -> ExactPoint {
         ExactPoint {
             point: self.frame.point((out * (down.x * along)).extend(down.y * along)),
@@ -134,14 +136,14 @@ impl Cone {
         }
     }
 
-    /// Unit vector from the tip down the side, as (outwards, along the axis), and the distance of a point down the
-    /// side.
+    /// Unit vector down the side from the tip, as (outward, along the axis), and a point's distance from the
+    /// tip along the side.
     fn along(&self, local: DVec3) -> (DVec2, f64) {
         let down = DVec2::new(self.radius, self.height) / self.slant;
         (down, DVec2::new(local.truncate().length(), local.z).dot(down).clamp(0.0, self.slant))
     }
 
-    /// Texture coordinates of a point of the surface.
+    /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         let local = self.frame.local(point);
         let (across, below) = (local.truncate().length(), self.height - local.z);
@@ -153,8 +155,8 @@ impl Cone {
         DVec2::new(turn(mirrored(radial(local.truncate()))), 1.0 - along / self.slant)
     }
 
-    /// Mean curvature at a point of a part; for the side, that of the normals' turn around the axis, which is unbounded
-    /// at the tip.
+    /// Mean curvature at a point of a part. On the side only the direction around the axis contributes, which
+    /// is unbounded at the tip.
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         let across = self.frame.local(point).truncate().length();
         if part == 0 && across > 0.0 { 0.5 * self.height / (self.slant * across) } else { 0.0 }
@@ -164,7 +166,7 @@ impl Cone {
         self.frame.origin.abs().max_element() + self.height + self.radius
     }
 
-    /// Point and unit normal of the side.
+    /// Point and unit normal of the side at texture coordinates.
     pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let out = mirrored(at_turn(u));
         let point = (out * self.radius).extend(self.height) * (1.0 - v);
@@ -172,7 +174,7 @@ impl Cone {
         (self.frame.point(point), self.frame.vector(normal))
     }
 
-    /// The cap, facing outwards.
+    /// The cap, facing outward.
     pub fn base(&self) -> Disk {
         Disk::new(self.frame.point(DVec3::Z * self.height), self.frame.axis(), self.radius)
     }
@@ -183,7 +185,7 @@ impl Cone {
         [PI * self.radius * self.slant, cap]
     }
 
-    /// A point of a part, uniform over its area.
+    /// Samples a point of a part uniformly over its area.
     pub fn place(&self, part: u32, u: Vec2) -> AreaPoint {
         match part {
             0 => {
@@ -194,27 +196,27 @@ impl Cone {
         }
     }
 
-    /// Centre of area.
+    /// Centroid of the surface.
     pub fn middle(&self) -> DVec3 {
         let [side, cap] = self.areas();
         self.frame.point(DVec3::Z * (self.height * (side * 2.0 / 3.0 + cap) / (side + cap)))
     }
 
-    /// Projected area: the area that faces a unit direction, times the cosines.
+    /// Projected area: the surface area facing a unit direction, weighted by the cosine.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap] = self.areas();
-        // The side's normals have these components across the axis and towards the tip.
+        // Components of the side's normals across the axis and towards the tip.
         let (cosine, sine) = (self.height / self.slant, self.radius / self.slant);
         ring_shown(side, cosine * across(along), -sine * along) + cap * along.max(0.0)
     }
 
-    /// Its tip.
+    /// The tip.
     pub fn tip(&self) -> DVec3 {
         self.frame.origin
     }
 
-    /// Whether it is closed.
+    /// Whether the cone has a cap.
     pub fn is_capped(&self) -> bool {
         self.capped
     }
@@ -236,13 +238,13 @@ impl Cone {
         p.z < self.height && p.truncate().length() < self.radius / self.height * p.z
     }
 
-    /// The box around it.
+    /// Bounding box.
     pub fn bounds(&self) -> Aabb {
         self.frame.circle_bounds(0.0, 0.0).union(self.frame.circle_bounds(self.height, self.radius))
     }
 }
 
-/// Mirrors a point: angles are counted about the axis from base to tip, opposite to the frame's.
+/// Reflects a point, as angles are counted about the axis from base to tip, opposite to the frame's.
 fn mirrored(p: DVec2) -> DVec2 {
     DVec2::new(p.x, -p.y)
 }
@@ -254,7 +256,7 @@ mod tests {
     use crate::geometry::axial::tests::{Thin, hits_from_afar};
     use crate::math::Vec3;
 
-    /// A cone on the ground, with its tip at y = 2 and a base of radius 1.
+    /// A cone on the ground with its tip at y = 2 and a base of radius 1.
     fn hat(capped: bool) -> Cone {
         Cone::new(DVec3::ZERO, DVec3::Y * 2.0, 1.0, capped)
     }
@@ -266,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn side_and_base_from_outside_and_inside() {
+    fn side_and_base_are_hit_from_both_sides() {
         let right = Vec3::new(2.0, 1.0, 0.0).normalize();
         let closed = hat(true);
         assert_eq!(met(&closed, [9.0, 1.0, 0.0], Vec3::NEG_X), Some((8.5, 0, right)));
@@ -274,14 +276,14 @@ mod tests {
         assert_eq!(met(&closed, [0.5, -3.0, 0.0], Vec3::Y), Some((3.0, 1, Vec3::NEG_Y)));
         assert_eq!(met(&closed, [0.5, 0.5, 0.0], Vec3::NEG_Y), Some((0.5, 1, Vec3::NEG_Y)));
         assert_eq!(met(&closed, [0.5, 5.0, 0.0], Vec3::NEG_Y), Some((4.0, 0, right)));
-        // The image of the side beyond the tip does not belong to it.
+        // The mirror image of the side beyond the tip is not part of the cone.
         assert_eq!(met(&closed, [-9.0, 3.0, 0.0], Vec3::X), None);
         assert_eq!(met(&closed, [0.5, 2.5, 0.0], Vec3::Y), None);
     }
 
     #[test]
-    fn lines_as_steep_as_the_side_meet_it_once() {
-        // Along (−1, 2): parallel to the left side, through the right one and the base.
+    fn lines_parallel_to_the_side_cross_it_once() {
+        // Direction (−1, 2): parallel to the left side, through the right side and the base.
         let slope = Vec3::new(-1.0, -2.0, 0.0);
         let right = Vec3::new(2.0, 1.0, 0.0).normalize();
         for capped in [true, false] {
@@ -294,8 +296,9 @@ mod tests {
     }
 
     #[test]
-    fn the_tip_is_as_sharp_as_it_is() {
-        // Rays past the tip at a millionth of its radius there are decided right, near the tip as anywhere.
+    fn the_tip_is_sharp() {
+        // Rays that pass near the tip, at a millionth of its radius there, are decided as precisely as
+        // elsewhere.
         for below in [1e-3_f64, 1e-6, 1e-9] {
             let radius = below / 2.0;
             for (factor, is_hit) in [(1.0 - 1e-5, true), (1.0 + 1e-5, false)] {
@@ -344,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hit_from_afar_is_at_the_crossing_that_counts() {
+    fn distant_hits_use_the_right_crossing() {
         hits_from_afar::<Cone>();
     }
 }

@@ -1,4 +1,4 @@
-//! Oriented boxes, in double precision.
+//! Oriented boxes in double precision.
 
 use super::rows::{Ends, HitRows, RayRows, accept};
 use super::surface::flat_axes;
@@ -7,22 +7,23 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
 
-/// A box with its own axes; the front is outside.
+/// An oriented box; the front is outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cuboid {
     center: DVec3,
     half: DVec3,
-    /// Axes of the box as columns: map from the box's coordinates to the world's.
+    /// Axes as columns: the map from local to world coordinates.
     axes: DMat3,
 }
 
 impl Cuboid {
-    /// A box from its centre, edge lengths > 0 and rotation in degrees about x, then y, then z.
+    /// Creates a box from its center, edge lengths > 0, and rotation in degrees about x, then y, then z.
     pub fn new(center: DVec3, size: DVec3, rotate_degrees: DVec3) -> Self {
         Self { center, half: size * 0.5, axes: rotation_xyz(rotate_degrees) }
     }
 
-    /// The nearest face in the ray's interval, from outside or inside. Faces are numbered −x, +x, −y, +y, −z, +z.
+    /// Finds the nearest face in the ray's interval, from outside or inside. Faces are numbered −x, +x, −y,
+    /// +y, −z, +z.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let origin = self.axes.transpose() * (ray.origin - self.center);
         let direction = self.axes.transpose() * ray.direction;
@@ -53,7 +54,7 @@ impl Cuboid {
             .find_map(|(t, face)| ray.accept(t).map(|t| ShapeHit { t, primitive: face, u: 0.0, v: 0.0 }))
     }
 
-    /// [`Cuboid::intersect`] side by side.
+    /// [`Cuboid::intersect`] for a packet.
     #[inline(always)]
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
         let axes = [self.axes.x_axis, self.axes.y_axis, self.axes.z_axis];
@@ -87,7 +88,7 @@ impl Cuboid {
         }
     }
 
-    /// The surface at a hit: the point is put onto the face.
+    /// Surface point at a hit, moved onto the face.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal: outwards, reach } = self.exact(ray, hit);
         let chart = self.chart(hit.primitive);
@@ -97,10 +98,10 @@ impl Cuboid {
         SurfacePoint::exact(point, outwards, uv, self.axes * (u * width), self.axes * (v * height), reach)
     }
 
-    /// Texture coordinates of a point of the surface.
+    /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         let local = self.axes.transpose() * (point - self.center);
-        // The point is on the face towards which it lies farthest out.
+        // The point is on the face in whose direction it is farthest out.
         let axis = (local / self.half).abs().max_position();
         let face = 2 * axis as u32 + u32::from(local[axis] > 0.0);
         self.chart(face).uv(local)
@@ -111,7 +112,7 @@ impl Cuboid {
         Chart { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
     }
 
-    /// Whether all but one of the faces are farther than this from a point of the surface.
+    /// Whether all faces but one are farther than `margin` from a point of the surface.
     pub fn is_on_one_face(&self, point: DVec3, margin: f64) -> bool {
         let from_center = point - self.center;
         let along = DVec3::new(
@@ -124,7 +125,7 @@ impl Cuboid {
         are_far.into_iter().filter(|&is_far| is_far).count() == 2 && 2.0 * self.half.min_element() > margin
     }
 
-    /// Position of a hit along the box's axes, from the centre, put onto the face.
+    /// Local coordinates of a hit, moved onto the face.
     #[inline(always)]
     fn local(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let from_center = ray.at(f64::from(hit.t)) - self.center;
@@ -140,7 +141,7 @@ impl Cuboid {
         )
     }
 
-    /// The box around it.
+    /// Bounding box.
     pub fn bounds(&self) -> Aabb {
         let reach = DVec3::new(
             self.axes.row(0).abs().dot(self.half),
@@ -150,7 +151,7 @@ impl Cuboid {
         Aabb::around_f64([self.center - reach, self.center + reach])
     }
 
-    /// A face as a parallelogram (corner, u, v) whose front is outside.
+    /// A face as a parallelogram (corner, u, v) whose front faces outward.
     pub fn face(&self, face: u32) -> (DVec3, DVec3, DVec3) {
         let (_, normal) = face_normal(face);
         let (u, v) = flat_axes(normal);
@@ -162,12 +163,12 @@ impl Cuboid {
         )
     }
 
-    /// Half the lengths along its axes.
+    /// Half of the edge lengths.
     pub fn half(&self) -> DVec3 {
         self.half
     }
 
-    /// Its axes in the world.
+    /// The axes in world coordinates.
     pub fn axes(&self) -> DMat3 {
         self.axes
     }
@@ -178,14 +179,14 @@ impl Cuboid {
         [y * z, y * z, x * z, x * z, x * y, x * y]
     }
 
-    /// A point of a face, uniform over its area.
+    /// Samples a point of a face uniformly over its area.
     pub fn place(&self, face: u32, u: Vec2) -> AreaPoint {
         let (corner, a, b) = self.face(face);
         let point = corner + a * f64::from(u.x) + b * f64::from(u.y);
         AreaPoint { point, normal: self.axes * face_normal(face).1 }
     }
 
-    /// Centre of area.
+    /// Centroid.
     pub fn middle(&self) -> DVec3 {
         self.center
     }
@@ -195,7 +196,7 @@ impl Cuboid {
         (self.axes.transpose() * (point - self.center)).abs().cmplt(self.half).all()
     }
 
-    /// Projected area: the area that faces a unit direction, times the cosines.
+    /// Projected area: the surface area facing a unit direction, weighted by the cosine.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = (self.axes.transpose() * direction).abs();
         let [x, _, y, _, z, _] = self.areas();
@@ -203,7 +204,7 @@ impl Cuboid {
     }
 }
 
-/// Chart of a face for its texture coordinates: unit vectors along u and v in the box's axes, and the face's sides.
+/// Texture mapping of a face: local unit vectors along u and v, and the face's edge lengths.
 struct Chart {
     u: DVec3,
     v: DVec3,
@@ -217,7 +218,7 @@ impl Chart {
     }
 }
 
-/// Axis and outward normal of a numbered face.
+/// Axis and outward normal of a face.
 fn face_normal(face: u32) -> (usize, DVec3) {
     let axis = (face / 2) as usize;
     let mut normal = DVec3::ZERO;
@@ -235,7 +236,7 @@ impl Exact for Cuboid {
     }
 }
 
-/// [`face_normal`] without an index.
+/// Branch-free [`face_normal`].
 #[inline(always)]
 fn outwards(face: u32) -> DVec3 {
     let size = if face & 1 == 1 { 1.0 } else { -1.0 };
@@ -250,7 +251,7 @@ mod tests {
     use crate::math::Vec3;
 
     #[test]
-    fn hit_from_outside_and_inside_with_the_face_s_normal() {
+    fn hits_have_the_normal_of_their_face() {
         let cube = Cuboid::new(DVec3::ZERO, DVec3::new(2.0, 4.0, 6.0), DVec3::ZERO);
         for (direction, t) in [(Vec3::X, 1.0), (Vec3::Y, 2.0), (Vec3::NEG_Z, 3.0)] {
             let inside = Ray::new(Vec3::ZERO, direction).to_f64();
@@ -265,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_box_is_hit_where_its_corner_is() {
+    fn rotated_boxes_are_hit_at_their_corner() {
         let cube = Cuboid::new(DVec3::ZERO, DVec3::splat(2.0), DVec3::new(0.0, 45.0, 0.0));
         let ray = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X).to_f64();
         let hit = cube.intersect(&ray).expect("the edge is on the axis");
@@ -274,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn faces_are_parallelograms_of_the_surface_facing_outwards() {
+    fn faces_are_outward_parallelograms() {
         let cube =
             Cuboid::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 2.0, 3.0), DVec3::new(10.0, 20.0, 30.0));
         for face in 0..6 {

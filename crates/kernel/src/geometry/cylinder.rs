@@ -1,4 +1,4 @@
-//! Cylinders, in double precision.
+//! Cylinders in double precision.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,14 +8,14 @@ use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// A round bar between two end points, or the bare tube; the front is outside. Parts: 0 the side, 1 the cap at the
-/// first end, 2 the cap at the second.
+/// A solid cylinder between two end points, or an open tube; the front is outside. Part 0 is the side, part 1
+/// the cap at the first end and part 2 the cap at the second.
 ///
-/// Texture coordinates of the side: u once around, v from 0 at the first end to 1 at the second. On a cylinder that
-/// stands on its first end, pictures therefore stand and are not mirrored. The caps' are those of a [`Disk`].
+/// On the side, u goes once around and v from 0 at the first end to 1 at the second. Images are upright and
+/// not mirrored on an upright cylinder with its first end at the bottom. The caps are mapped like a [`Disk`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cylinder {
-    /// Frame whose origin is in the middle and whose axis goes from the first end to the second.
+    /// Frame with its origin at the center and its axis from the first end to the second.
     frame: AxialFrame,
     half_length: f64,
     radius: f64,
@@ -34,13 +34,13 @@ impl Exact for Cylinder {
 }
 
 impl Cylinder {
-    /// A cylinder from two different end points and a radius > 0.
+    /// Creates a cylinder from two different end points and a radius > 0.
     pub fn new(a: DVec3, b: DVec3, radius: f64, capped: bool) -> Self {
         let frame = AxialFrame::new((a + b) * 0.5, b - a);
         Self { frame, half_length: (b - a).length() * 0.5, radius, capped }
     }
 
-    /// The nearest hit, from outside or inside.
+    /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         self.nearest(ray).map(axial::hit)
     }
@@ -53,7 +53,7 @@ impl Cylinder {
         axial::meet(ray, &line, self.side_stretch(&line)?, ends, self.capped, starts_on)
     }
 
-    /// Whether a ray starts on a part, within rounding.
+    /// Whether a ray starts on a part, up to rounding.
     fn starts_on(&self, ray: &RayF64, part: u32) -> bool {
         let local = self.frame.local(ray.origin);
         let distance = match part {
@@ -63,8 +63,9 @@ impl Cylinder {
         is_rounding(distance, self.reach())
     }
 
-    /// Interval in which the line is within the radius, by the distance of its projection from the axis and without
-    /// differences of near numbers, as for a sphere (Haines, Günther, Akenine-Möller, Ray Tracing Gems, chapter 7).
+    /// Interval in which the line is within the radius. Uses the distance of the projected line from the axis
+    /// and avoids cancellation, as for spheres (Haines, Günther, Akenine-Möller, Ray Tracing Gems, chapter
+    /// 7).
     fn side_stretch(&self, line: &Line) -> Option<Stretch> {
         let (p, d) = (line.foot.truncate(), line.direction.truncate());
         let factors = |distance: f64| (distance - self.radius) * (distance + self.radius);
@@ -82,7 +83,7 @@ impl Cylinder {
         Some(Stretch::of_side(t0.min(t1), t0.max(t1)))
     }
 
-    /// The point of a hit, with all its digits.
+    /// Unrounded point of a hit.
     fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let line = self.frame.line(ray);
         let height = if hit.primitive == 1 { -self.half_length } else { self.half_length };
@@ -93,7 +94,7 @@ impl Cylinder {
         axial::exact_point((ray, &line), hit, crossings, || self.nearest(ray))
     }
 
-    /// The surface at a hit.
+    /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let point = self.exact_point(ray, hit);
         if hit.primitive > 0 {
@@ -111,13 +112,13 @@ impl Cylinder {
         )
     }
 
-    /// Direction from the axis, and height, of the point of the side nearest to a point.
+    /// Direction from the axis and height of the point of the side nearest to `point`.
     fn chart(&self, point: DVec3) -> (DVec2, f64) {
         let local = self.frame.local(point);
         (radial(local.truncate()), local.z.clamp(-self.half_length, self.half_length))
     }
 
-    /// The side in a direction from the axis at a height.
+    /// Point of the side at a direction from the axis and a height.
     fn exact_side(&self, out: DVec2, z: f64) -> ExactPoint {
         ExactPoint {
             point: self.frame.point((out * self.radius).extend(z)),
@@ -126,12 +127,12 @@ impl Cylinder {
         }
     }
 
-    /// v of a point of the side.
+    /// Texture coordinate v of a point on the side.
     fn height(&self, z: f64) -> f64 {
         0.5 + z / (2.0 * self.half_length)
     }
 
-    /// Texture coordinates of a point of the surface.
+    /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         let local = self.frame.local(point);
         let (inwards, below) = (self.radius - local.truncate().length(), self.half_length - local.z.abs());
@@ -150,13 +151,13 @@ impl Cylinder {
         self.frame.origin.abs().max_element() + self.half_length + self.radius
     }
 
-    /// Point and unit normal of the side.
+    /// Point and unit normal of the side at texture coordinates.
     pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (out, z) = (at_turn(u), (2.0 * v - 1.0) * self.half_length);
         (self.frame.point((out * self.radius).extend(z)), self.frame.vector(out.extend(0.0)))
     }
 
-    /// A cap by its number, 1 or 2, facing outwards.
+    /// Cap 1 or 2, facing outward.
     pub fn cap(&self, number: u32) -> Disk {
         let side = if number == 1 { -1.0 } else { 1.0 };
         let center = self.frame.point(DVec3::Z * (side * self.half_length));
@@ -169,7 +170,7 @@ impl Cylinder {
         [TAU * self.radius * 2.0 * self.half_length, cap, cap]
     }
 
-    /// A point of a part, uniform over its area.
+    /// Samples a point of a part uniformly over its area.
     pub fn place(&self, part: u32, u: Vec2) -> AreaPoint {
         match part {
             0 => {
@@ -180,19 +181,19 @@ impl Cylinder {
         }
     }
 
-    /// Centre of area.
+    /// Centroid.
     pub fn middle(&self) -> DVec3 {
         self.frame.origin
     }
 
-    /// Projected area: the area that faces a unit direction, times the cosines.
+    /// Projected area: the surface area facing a unit direction, weighted by the cosine.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap, _] = self.areas();
         ring_shown(side, across(along), 0.0) + cap * along.abs()
     }
 
-    /// Whether it is closed.
+    /// Whether the cylinder has caps.
     pub fn is_capped(&self) -> bool {
         self.capped
     }
@@ -212,12 +213,12 @@ impl Cylinder {
 
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
-        // Most points tell it by their height.
+        // Most points can be rejected by height.
         self.frame.height(point).abs() < self.half_length
             && self.frame.local(point).truncate().length() < self.radius
     }
 
-    /// The box around it.
+    /// Bounding box.
     pub fn bounds(&self) -> Aabb {
         let end = |z| self.frame.circle_bounds(z, self.radius);
         end(-self.half_length).union(end(self.half_length))
@@ -231,7 +232,7 @@ mod tests {
     use crate::geometry::axial::tests::{Thin, hits_from_afar};
     use crate::math::Vec3;
 
-    /// A bar about the axis x = 1, z = 0, from y = 0 to y = 4.
+    /// A cylinder around the axis x = 1, z = 0, from y = 0 to y = 4.
     fn bar(capped: bool) -> Cylinder {
         Cylinder::new(DVec3::X, DVec3::new(1.0, 4.0, 0.0), 0.5, capped)
     }
@@ -243,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn side_and_caps_from_outside_and_inside() {
+    fn side_and_caps_are_hit_from_both_sides() {
         let closed = bar(true);
         let (down, up) = (Vec3::NEG_Y, Vec3::Y);
         assert_eq!(met(&closed, [-3.0, 1.0, 0.0], Vec3::X), Some((3.5, 0, Vec3::NEG_X)));
@@ -257,17 +258,17 @@ mod tests {
     }
 
     #[test]
-    fn a_tube_is_seen_through() {
+    fn open_tubes_can_be_looked_through() {
         let tube = bar(false);
         assert_eq!(met(&tube, [1.25, 9.0, 0.25], Vec3::NEG_Y), None);
-        // The ray goes in at the upper end and out through the side at x = 1.5, which it hits from inside: the front is
-        // still outside.
+        // The ray enters at the upper end and leaves through the side at x = 1.5, which it hits from inside;
+        // the front is still outside.
         let slanting = met(&tube, [0.5, 5.0, 0.0], Vec3::new(1.0, -2.0, 0.0));
         assert_eq!(slanting, Some((1.0, 0, Vec3::X)));
     }
 
     #[test]
-    fn texture_coordinates_go_around_and_along() {
+    fn texture_coordinates_follow_the_side() {
         let ray = Ray::new(Vec3::new(9.0, 3.0, 0.0), Vec3::NEG_X).to_f64();
         let hit = bar(true).intersect(&ray).expect("aimed at it");
         let surface = bar(true).surface(&ray, &hit);
@@ -281,7 +282,7 @@ mod tests {
     #[test]
     fn bounds_are_tight() {
         let slanting = Cylinder::new(DVec3::ZERO, DVec3::new(3.0, 4.0, 0.0), 1.0, true).bounds();
-        // A disk of radius 1 reaches √(1 − n²) along an axis.
+        // A disk of radius 1 extends to √(1 − n²) along an axis.
         assert!((slanting.min - Vec3::new(-0.8, -0.6, -1.0)).abs().max_element() < 1e-6);
         assert!((slanting.max - Vec3::new(3.8, 4.6, 1.0)).abs().max_element() < 1e-6);
     }
@@ -305,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hit_from_afar_is_at_the_crossing_that_counts() {
+    fn distant_hits_use_the_right_crossing() {
         hits_from_afar::<Cylinder>();
     }
 }

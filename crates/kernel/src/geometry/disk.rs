@@ -1,4 +1,4 @@
-//! Disks, in double precision.
+//! Disks in double precision.
 
 use std::f64::consts::PI;
 
@@ -10,12 +10,12 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// Margin of a border in units of the size, so that two pieces which share it leave no gap; far below what an `f32` ray
-/// can resolve.
+/// Relative margin of a border, so that two surfaces that share it leave no gap; far below the resolution of
+/// `f32` rays.
 pub const BORDER: f64 = 1e-14;
 
-/// A flat round piece. Its texture coordinates are those of the square around it: (½, ½) in the middle. A picture
-/// stands upright if the disk stands, and away from −z if it lies and faces up.
+/// A flat disk with the texture coordinates of its enclosing square: (½, ½) is the center. Images are upright
+/// on a vertical disk, and point towards −z on a horizontal one that faces up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
     frame: AxialFrame,
@@ -29,17 +29,17 @@ impl Exact for Disk {
 }
 
 impl Disk {
-    /// A disk from its centre, a normal of any length but 0, which is the front, and a radius > 0.
+    /// Creates a disk from its center, the nonzero normal of its front, and a radius > 0.
     pub fn new(center: DVec3, normal: DVec3, radius: f64) -> Self {
         Self { frame: AxialFrame::new(center, normal), radius }
     }
 
-    /// The intersection with the plane, if inside the border. `None` for rays in the plane.
+    /// Intersects the plane within the border. `None` for rays in the plane.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         self.nearest(ray).map(hit)
     }
 
-    /// [`Disk::intersect`] side by side.
+    /// [`Disk::intersect`] for a packet.
     #[inline(always)]
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
         let radius = self.radius * (1.0 + BORDER);
@@ -60,13 +60,13 @@ impl Disk {
         (across <= self.radius * (1.0 + BORDER) && ray.accept(t).is_some()).then_some((t, 0))
     }
 
-    /// The surface at a hit.
+    /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let t = exact_t(hit, self.nearest(ray));
         self.surface_near(ray.at(t), self.reach())
     }
 
-    /// The surface nearest to a point, which was computed from lengths up to `reach`.
+    /// Surface point nearest to `point`, which was computed from lengths up to `reach`.
     pub fn surface_near(&self, point: DVec3, reach: f64) -> SurfacePoint {
         let ExactPoint { point: near, normal, .. } = self.exact_near(point, reach);
         let edge = 2.0 * self.radius;
@@ -74,7 +74,7 @@ impl Disk {
         SurfacePoint::exact(near, normal, self.uv_at(point).as_vec2(), across, up, reach)
     }
 
-    /// The point of it nearest to a point, which was computed from lengths up to `reach`.
+    /// Point of the disk nearest to `point`, which was computed from lengths up to `reach`, before rounding.
     pub fn exact_near(&self, point: DVec3, reach: f64) -> ExactPoint {
         let (p, _) = self.chart(point);
         ExactPoint { point: self.frame.point(p.extend(0.0)), normal: self.normal(), reach }
@@ -84,13 +84,13 @@ impl Disk {
         self.frame.origin.abs().max_element() + self.radius
     }
 
-    /// A point in the plane of the disk's frame, and its texture coordinates.
+    /// Nearest point in the disk's plane coordinates, and its texture coordinates.
     fn chart(&self, point: DVec3) -> (DVec2, DVec2) {
         let p = self.frame.local(point).truncate().clamp_length_max(self.radius);
         (p, DVec2::splat(0.5) + p / (2.0 * self.radius))
     }
 
-    /// Texture coordinates of a point of it.
+    /// Texture coordinates of a point on the disk.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         self.chart(point).1
     }
@@ -100,12 +100,12 @@ impl Disk {
         self.frame.point((of_unit_disk * self.radius).extend(0.0))
     }
 
-    /// Centre of area.
+    /// Centroid.
     pub fn middle(&self) -> DVec3 {
         self.frame.origin
     }
 
-    /// Radius of the border.
+    /// Radius of the disk.
     pub fn radius(&self) -> f64 {
         self.radius
     }
@@ -115,23 +115,23 @@ impl Disk {
         self.frame.axis()
     }
 
-    /// Area of its one part.
+    /// Area of each part.
     pub fn areas(&self) -> [f64; 1] {
         [PI * self.radius * self.radius]
     }
 
-    /// A point of the surface, uniform over the area.
+    /// Samples a point uniformly over the area.
     pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
         AreaPoint { point: self.point(warp::disk(u).as_dvec2()), normal: self.normal() }
     }
 
-    /// Distance of a point from it.
+    /// Distance of a point from the disk.
     pub fn distance(&self, point: DVec3) -> f64 {
         let local = self.frame.local(point);
         DVec2::new((local.truncate().length() - self.radius).max(0.0), local.z).length()
     }
 
-    /// The form near a point.
+    /// Geometry of the disk near a point.
     pub fn local_form(&self, point: DVec3) -> LocalForm {
         let (normal, from) = (self.normal(), point - self.middle());
         let extent = Extent::Flat(self.radius - from.length());
@@ -139,18 +139,18 @@ impl Disk {
         LocalForm::Surface { distance: self.distance(point), ground: Some(ground) }
     }
 
-    /// Whether a point is inside: never, as a disk encloses nothing.
+    /// Whether a point is inside: always false, as a disk has no volume.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
 
-    /// Projected area: the area that faces a unit direction, times the cosine.
+    /// Projected area of the front: the area times the cosine between the normal and a unit direction.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let [area] = self.areas();
         area * self.normal().dot(direction).max(0.0)
     }
 
-    /// The box around it.
+    /// Bounding box.
     pub fn bounds(&self) -> Aabb {
         self.frame.circle_bounds(0.0, self.radius)
     }
@@ -163,7 +163,7 @@ mod tests {
     use crate::math::{Vec2, Vec3};
 
     #[test]
-    fn hit_inside_the_border_only_and_from_both_sides() {
+    fn hits_are_inside_the_border_from_both_sides() {
         let disk = Disk::new(DVec3::new(1.0, 2.0, 3.0), DVec3::new(0.0, 0.0, 4.0), 0.5);
         for (x, is_hit) in [(0.0, true), (0.5, true), (-0.5, true), (0.500_001, false)] {
             for z in [-2.0_f32, 2.0] {
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_on_it_stands() {
+    fn images_are_upright() {
         let disk = Disk::new(DVec3::ZERO, DVec3::Z, 2.0);
         let ray = Ray::new(Vec3::new(1.0, -0.5, 5.0), Vec3::NEG_Z).to_f64();
         let hit = disk.intersect(&ray).expect("the disk is ahead");

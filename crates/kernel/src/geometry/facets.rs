@@ -1,23 +1,30 @@
-//! Few triangles, such as the walls of a room, against the rays of a packet, whatever their directions.
+//! Brute-force intersection of ray packets with a few triangles, such as the walls of a room, for any ray
+//! directions.
 //!
-//! A watertight test of every triangle with every ray would be exact, but dear. So each ray first finds its nearest candidate: the
-//! planes of all facets are cut in single precision, and what lies within a bound on all errors may be hit. Two triangles that make
-//! a flat quadrilateral are one facet. Then each ray takes the watertight test of its own candidate. A ray whose hit is not certainly
-//! nearer than its other candidates stays undecided; few do, near edges. So every ray gets the bits that it gets alone.
+//! Testing every triangle watertightly against every ray would be exact but slow. Instead, each ray first
+//! finds its nearest candidate: the planes of all facets are intersected in single precision, and a facet may
+//! be hit if it is within a bound on all errors. Two triangles that form a flat quadrilateral are one facet.
+//! Each ray then runs the watertight test on its own candidate. If the hit is not certainly nearer than the
+//! ray's other candidates, the ray stays undecided, which is rare and happens near edges. Every ray therefore
+//! gets the same bits as if traced alone.
 //!
-//! Bounds, with the unit roundoff ε, the direction d of a ray, the unit normal n of a plane, the greatest coordinate M of origins and
-//! corners, and R the greatest distance along an axis from the ray's origin to any corner; and of a facet's lesser triangle the
-//! double area 2A and the longest edge D:
+//! Notation for the bounds: the unit roundoff ε; a ray's direction d; a plane's unit normal n; the largest
+//! coordinate M of origins and corners; the largest distance R along an axis from the ray's origin to any
+//! corner; and for the smaller triangle of a facet its double area 2A and its longest edge D.
 //!
-//! - The cut of a plane errs by less than 128 ε M/|n·d| in t: rounding n and n·p takes 20, n·d over a way of 3.5 M takes 28, and
-//!   the other triangle of a quadrilateral 4.
-//! - The watertight test of a triangle that the ray passes within a quarter of its size has sheared corners within 3 D. So it errs
-//!   in t by less than ε (972 D + 180 R) R D/(2A |n·d|) (*Physically Based Rendering*, 4th ed., section 6.8.7), where its determinant
-//!   is 2A |n·d| over the direction's longest component. One more D times the error of barycentric coordinates makes up for hits of
-//!   needles, which may be those of the nearest edge.
-//! - Barycentric coordinates of a triangle at a distance of X err by less than 204 ε R X |d|/(2A |n·d|). A ray that passes with a
-//!   coordinate of −m has X < 2 D (1 + 2 m), so that it misses for certain if m is above 544 ε R D |d|/(2A |n·d|), and that is small.
-//! - A ray that stays farther from a plane than the first two bounds, times |n·d|, misses for certain, however flat it comes.
+//! - The intersection with a plane has an error of less than 128 ε M/|n·d| in t: rounding n and n·p
+//!   contributes 20, n·d over a distance of 3.5 M contributes 28, and the other triangle of a quadrilateral
+//!   4.
+//! - The watertight test of a triangle that the ray passes within a quarter of its size has sheared corners
+//!   within 3 D. Its error in t is therefore less than ε (972 D + 180 R) R D/(2A |n·d|) (*Physically Based
+//!   Rendering*, 4th ed., section 6.8.7), where the determinant is 2A |n·d| over the direction's longest
+//!   component. Another D times the error of the barycentric coordinates covers hits on needles, which may be
+//!   moved to the nearest edge.
+//! - Barycentric coordinates of a triangle at a distance of X have an error of less than 204 ε R X |d|/(2A
+//!   |n·d|). A ray that passes with a coordinate of −m has X < 2 D (1 + 2 m), so it certainly misses if m is
+//!   above 544 ε R D |d|/(2A |n·d|) and that is small.
+//! - A ray that stays farther from a plane than the first two bounds, times |n·d|, certainly misses, however
+//!   grazing it is.
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, Row};
 use super::watertight_rows::ShearedRows;
@@ -25,91 +32,95 @@ use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::lanes::{Folds, TRUE, Truths, set_lane, take, take_u32};
 use crate::math::{DVec3, Vec3};
 
-/// Most triangles.
+/// Maximum number of triangles.
 pub const MOST: usize = 64;
 
-/// Error of the cut of a plane, by the greatest coordinate.
+/// Error of the intersection with a plane, relative to the largest coordinate.
 const PLANE: f32 = 128.0 * UNIT_ROUNDOFF;
 
-/// Errors of t by the watertight test: by R² D/(2A), and by R D²/(2A).
+/// Errors of t in the watertight test, relative to R² D/(2A) and to R D²/(2A).
 const ALONG: [f32; 2] = [256.0 * UNIT_ROUNDOFF, 2048.0 * UNIT_ROUNDOFF];
 
-/// Error of barycentric coordinates by the watertight test, by R D/(2A).
+/// Error of barycentric coordinates in the watertight test, relative to R D/(2A).
 const ACROSS: f32 = 1024.0 * UNIT_ROUNDOFF;
 
-/// Greatest error of coordinates at which a facet can be missed for certain.
+/// Maximum error of coordinates at which a facet can be missed with certainty.
 const BLUNT: f32 = 0.125;
 
-/// Most of D/(2A), by the size of all triangles.
+/// Maximum of D/(2A), relative to the size of all triangles.
 const MOST_SLENDER: f64 = 1e3;
 
-/// Number of no triangle.
+/// Index that no triangle has.
 const NONE: u32 = u32::MAX;
 
-/// A triangle, or two that make a flat quadrilateral.
+/// A triangle, or two triangles that form a flat quadrilateral.
 #[derive(Clone, Copy, Debug)]
 struct Facet {
     /// Unit normal.
     normal: Vec3,
-    /// Product of the normal and a point of the plane.
+    /// Dot product of the normal and a point of the plane.
     offset: f32,
-    /// Vectors whose products with a point, plus `start`, are its coordinates: 0 in the middle between the least and the greatest.
-    /// Along the edges at the first corner of the first triangle, they grow by 1.
+    /// Vectors whose dot products with a point, plus `start`, are its coordinates, centered between the
+    /// smallest and the largest. They grow by 1 along the edges from the first corner of the first triangle.
     across: [Vec3; 2],
     start: [f32; 2],
-    /// Greatest coordinates.
+    /// Largest coordinates.
     half: [f32; 2],
-    /// Sum of the coordinates on the edge across from the first corner, and the most by which it may be exceeded.
+    /// Sum of the coordinates on the edge opposite the first corner, and the most by which it may be
+    /// exceeded.
     diagonal: f32,
     beyond: f32,
-    /// Distance of the sum from `diagonal`, in margins, beyond which it is certain which triangle it is; below 0 if there is one.
+    /// Distance of the sum from `diagonal`, in margins, beyond which the hit triangle is certain; negative if
+    /// there is only one.
     split: f32,
-    /// Number of the triangle where the sum of the coordinates is below 1, and of that beyond; the same if there is one.
+    /// Index of the triangle where the sum of the coordinates is below 1, and of the one beyond; equal if
+    /// there is only one.
     numbers: [u32; 2],
-    /// D/(2A), which is not less than the length of either vector of `across`.
+    /// D/(2A), which is at least the length of either vector of `across`.
     slender: f32,
     /// [`ALONG`] times D/(2A), and times D.
     along: [f32; 2],
 }
 
-/// Triangles of a small scene.
+/// The triangles of a small scene.
 #[derive(Debug)]
 pub struct Facets {
     facets: Vec<Facet>,
     corners: Vec<[Vec3; 3]>,
-    /// The box around them.
+    /// Bounding box.
     low: Vec3,
     high: Vec3,
 }
 
 /// Nearest candidates of the rays of a packet.
 struct Candidates {
-    /// Lower bound on t of the nearest candidate; infinite if there is none.
+    /// Lower bound on t of the nearest candidate, or ∞.
     near: Row,
-    /// Its number.
+    /// Triangle index of the nearest candidate.
     number: [u32; PACKET],
-    /// Lower bound on t of the others.
+    /// Lower bound on t of the other candidates.
     next: Row,
-    /// Rays of which this tells nothing.
+    /// Rays whose candidates are unknown.
     doubtful: Truths,
 }
 
-/// The rays of a packet with the errors of their tests.
+/// Error terms of a packet.
 struct Errors {
-    /// [`PLANE`], for each ray.
+    /// [`PLANE`] term of each ray.
     plane: Row,
     /// R.
     far: Row,
-    /// [`PLANE`] and [`ACROSS`], for each ray, but for its length and D/(2A).
+    /// [`PLANE`] and [`ACROSS`] terms of each ray, without the factors for its length and D/(2A).
     across: Row,
     /// Bound on the length of the direction.
     length: Row,
-    /// Bound on t of a hit of any triangle.
+    /// Bound on t of a hit on any triangle.
     end: Row,
 }
 
 impl Facets {
-    /// Facets of these triangles; `None` if there are too many, or one is too slender for the bounds.
+    /// Creates the facets of some triangles. `None` if there are too many, or one is too slender for the
+    /// bounds.
     pub fn new(corners: Vec<[Vec3; 3]>) -> Option<Self> {
         let points = || corners.iter().flatten().copied();
         let (low, high) = (points().reduce(Vec3::min)?, points().reduce(Vec3::max)?);
@@ -145,8 +156,8 @@ impl Facets {
         Some(Self { facets, corners, low, high })
     }
 
-    /// Takes the nearest hits of the rays in `met`; the others end below 0. Returns a bit for each that is undecided, whose hit stays
-    /// as it was.
+    /// Updates `found` with the nearest hits of the rays in `met`; all other rays have negative ends. Returns
+    /// the bits of the undecided rays, whose hits are unchanged.
     #[inline(always)]
     pub fn closest(
         &self,
@@ -164,8 +175,8 @@ impl Facets {
         undecided
     }
 
-    /// A bit for each ray in `met` that hits any triangle but its own of `except`, and one for each that is undecided; the others
-    /// end below 0.
+    /// Returns the bits of the rays in `met` that hit any triangle except their own in `except`, and the bits
+    /// of the undecided rays. All other rays have negative ends.
     #[inline(always)]
     pub fn any(
         &self,
@@ -186,7 +197,8 @@ impl Facets {
         [folds.bits(&hit) & met, undecided]
     }
 
-    /// The nearest candidates; never the triangle on which a ray starts, nor that of `except`.
+    /// Finds the nearest candidates, excluding the triangle on which a ray starts and its triangle in
+    /// `except`.
     #[inline(always)]
     fn candidates(
         &self,
@@ -207,11 +219,11 @@ impl Facets {
         for facet in &self.facets {
             let Facet { normal, offset, across: [first, second], start, half, diagonal, beyond, .. } = *facet;
             let (slender, along, split) = (facet.slender, facet.along, facet.split);
-            // By bits, as compilers would choose between two places in memory, one lane after the other.
+            // Select with bit operations, as compilers would select between two addresses lane by lane.
             let [one, other] = facet.numbers;
             let between = one ^ other;
             for i in 0..PACKET {
-                // Cut the plane.
+                // Intersect the plane.
                 let above = folds.about(-normal.x, ox[i], offset);
                 let above = folds.about(-normal.y, oy[i], above);
                 let above = folds.about(-normal.z, oz[i], above);
@@ -229,7 +241,7 @@ impl Facets {
                 let distance = folds.about(far[i], folds.about(far[i], along[0], along[1]), plane[i]);
                 let error = distance * size;
                 let margin = slender * folds.about(size * length[i], across[i], plane[i]);
-                // A facet that the ray may hit is a candidate, also if a bound is NaN.
+                // A facet that the ray may hit is a candidate, even if a bound is NaN.
                 let least = t - error;
                 let over = u + v - diagonal;
                 let is_outside = (u.abs() > half[0] + margin)
@@ -239,12 +251,12 @@ impl Facets {
                     | (least > ends[i]);
                 let is_far = above.abs() > folds.about(falls.abs(), end[i], distance);
                 let is_sharp = margin < BLUNT;
-                // Decide which of the two triangles it is.
+                // Decide which of the two triangles is hit.
                 let number = other ^ (between & if over < 0.0 { TRUE } else { 0 });
                 let is_sure = is_sharp & (over.abs() > split * margin);
                 let is_left_out = is_sure & ((rays.start[i] == number) | (except[i] == number));
                 let is_candidate = !(is_far | is_outside & is_sharp | is_left_out);
-                // Keep the nearest.
+                // Keep the nearest candidate.
                 let (near, next, nearest) = (found.near[i], found.next[i], found.number[i]);
                 let least = if is_candidate { least } else { f32::INFINITY };
                 let is_nearer = least < near;
@@ -258,7 +270,7 @@ impl Facets {
         found
     }
 
-    /// Tests each ray with its nearest candidate.
+    /// Tests each ray against its nearest candidate.
     #[inline(always)]
     fn test(
         &self,
@@ -281,7 +293,7 @@ impl Facets {
             let is_any = candidates.near[i] < f32::INFINITY;
             let is_hit = (hits.hit[i] != 0) & is_any & (candidates.doubtful[i] == 0);
             let is_nearest = is_hit & (hits.t[i] < candidates.next[i]);
-            // Other candidates count if they may be hit before the end.
+            // Other candidates matter if they may be hit before the end.
             let has_others = candidates.next[i] <= ends[i];
             let is_open = is_any & !is_nearest & (has_others | (hits.doubtful[i] != 0));
             hit[i] = if is_nearest { TRUE } else { 0 };
@@ -290,7 +302,7 @@ impl Facets {
         Tested { hit, undecided: folds.bits(&undecided) & met, hits }
     }
 
-    /// The errors of tests of the rays.
+    /// Computes the error terms of the rays.
     #[inline(always)]
     fn errors(&self, rays: &RayRows) -> Errors {
         let none = [0.0; PACKET];
@@ -303,20 +315,20 @@ impl Facets {
                 far = greater(far, greater((high - at).abs(), (at - low).abs()));
                 length += rays.direction[axis][i].abs();
             }
-            // For an origin of NaN there is no bound; comparisons with it would leave `most` as it was.
+            // There is no bound for a NaN origin; comparisons with NaN would leave `most` unchanged.
             let sum = rays.origin[0][i] + rays.origin[1][i] + rays.origin[2][i];
             let most = if sum.is_nan() { f32::NAN } else { most };
             errors.plane[i] = PLANE * most;
             errors.far[i] = far;
             errors.across[i] = PLANE * most + ACROSS * far;
             errors.length[i] = length;
-            // The way is 2√3 R, and `length` at most √3 times that of the direction.
+            // The distance is at most 2√3 R, and `length` is at most √3 times the length of the direction.
             errors.end[i] = 6.0 * far / length;
         }
         errors
     }
 
-    /// Bytes that they take.
+    /// Memory used, in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(&*self.facets) + size_of_val(&*self.corners)
     }
@@ -326,7 +338,7 @@ impl Facets {
 struct Tested {
     /// Rays that certainly hit their candidate before all others.
     hit: Truths,
-    /// A bit for each ray that is undecided.
+    /// Bits of the undecided rays.
     undecided: u32,
     hits: super::watertight_rows::Hits,
 }
@@ -338,7 +350,7 @@ impl Facet {
         let normal = u.cross(v);
         let squared = normal.length_squared();
         let across = [v.cross(normal) / squared, normal.cross(u) / squared];
-        // Take the middle of the coordinates as their 0.
+        // Center the coordinates.
         let (mut low, mut high, mut beyond) = ([0.0; 2], [1.0_f64; 2], 0.0);
         if let Some(apex) = apex {
             let along = across.map(|across| across.dot(apex.as_dvec3() - a));
@@ -366,8 +378,8 @@ impl Facet {
     }
 }
 
-/// Two triangles that make a flat quadrilateral, near a parallelogram: both with the corners of the common edge in the middle and
-/// their own at the ends.
+/// Two triangles that form a flat quadrilateral close to a parallelogram. Both are returned with the corners
+/// of the shared edge in the middle and the outer corners at the ends.
 fn paired(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 2]> {
     let apart = |of: &[Vec3; 3], from: &[Vec3; 3]| {
         let mut own = (0..3).filter(|&i| !from.contains(&of[i]));
@@ -386,13 +398,14 @@ fn paired(one: &[Vec3; 3], other: &[Vec3; 3], reach: f32) -> Option<[[Vec3; 3]; 
     (is_flat && is_near).then_some([[a, b, c], [b, c, d]])
 }
 
-/// Distance of the fourth corner of a flat quadrilateral from its plane, by the greatest coordinate.
+/// Maximum distance of the fourth corner of a flat quadrilateral from its plane, relative to the largest
+/// coordinate.
 const FLAT: f32 = 4.0 * UNIT_ROUNDOFF;
 
-/// Greatest distance of the fourth corner from that of a parallelogram, by the edges.
+/// Maximum deviation of the fourth corner from a parallelogram, relative to the edges.
 const ASKEW: f64 = 0.25;
 
-/// D/(2A) of a triangle, and that times D.
+/// D/(2A) of a triangle, and D²/(2A).
 fn slender([a, b, c]: &[Vec3; 3]) -> [f64; 2] {
     let [a, b, c]: [DVec3; 3] = [a, b, c].map(|corner| corner.as_dvec3());
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
@@ -400,7 +413,7 @@ fn slender([a, b, c]: &[Vec3; 3]) -> [f64; 2] {
     [slender, slender * longest]
 }
 
-/// The greater number; `a` if `b` is NaN.
+/// The larger number; `a` if `b` is NaN.
 #[inline(always)]
 fn greater(a: f32, b: f32) -> f32 {
     if b > a { b } else { a }

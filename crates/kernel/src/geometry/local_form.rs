@@ -1,22 +1,23 @@
-//! Form of a shape near a point: flat pieces, or a surface at a distance.
+//! Local geometry of a shape near a point, over which a density kernel is integrated: flat polygons, or a
+//! surface at a distance.
 
 use arrayvec::ArrayVec;
 
 use crate::math::DVec3;
 
-/// A flat piece by its corners, counter-clockwise as seen from its front.
+/// Corners of a flat polygon, counterclockwise as seen from its front.
 pub type Piece = ArrayVec<DVec3, 4>;
 
-/// The form of a shape near a point.
+/// Geometry of a shape near a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LocalForm {
-    /// Number of the flat pieces that make up the shape: see [`Shape::piece`](super::Shape::piece).
+    /// Number of flat polygons that make up the shape; see [`Shape::piece`](super::Shape::piece).
     Pieces(u32),
     /// A surface at a distance from the point.
     Surface {
         /// Distance of the point from the surface.
         distance: f64,
-        /// The surface below the point, of planes, disks and spheres.
+        /// The surface below the point, for planes, disks and spheres.
         ground: Option<Ground>,
     },
 }
@@ -24,31 +25,31 @@ pub enum LocalForm {
 /// The surface below a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ground {
-    /// Unit normal at the foot of the point.
+    /// Unit normal at the surface point closest to the point.
     pub normal: DVec3,
-    /// Height of the point above the surface, to either side.
+    /// Height of the point above or below the surface.
     pub height: f64,
-    /// Extent of the surface around the foot.
+    /// Extent of the surface around the closest point.
     pub extent: Extent,
 }
 
 /// Extent of a surface around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Extent {
-    /// It is flat up to this distance.
+    /// Flat up to this distance.
     Flat(f64),
-    /// It is a sphere of this radius.
+    /// A sphere of this radius.
     Round(f64),
 }
 
-/// The parallelogram at a corner along two edges, (corner, u, v).
+/// Parallelogram with a corner c and edges u and v.
 #[inline]
 pub(super) fn parallelogram((c, u, v): (DVec3, DVec3, DVec3)) -> Piece {
     Piece::from([c, c + u, c + u + v, c + v])
 }
 
 impl LocalForm {
-    /// A curved surface of which the distance alone is known.
+    /// A curved surface of which only the distance is known.
     pub(super) fn curved(distance: f64) -> Self {
         Self::Surface { distance, ground: None }
     }

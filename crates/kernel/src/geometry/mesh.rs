@@ -2,13 +2,13 @@
 
 use crate::math::{DVec3, Vec2, Vec3};
 
-/// Triangles over shared vertices, in the mesh's own coordinates. Every index is in range and every position
-/// finite; no triangle has coincident corners.
+/// An indexed triangle mesh in object space. Every index is in range and every position finite; no triangle
+/// has coincident corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Origin of the positions, in the file's coordinates: 0, or a point near the mesh if it is far from there.
+    /// Origin of the positions in file coordinates: 0, or a point near the mesh if the mesh is far from 0.
     pub origin: DVec3,
-    /// Vertex positions, relative to the origin.
+    /// Vertex positions relative to `origin`.
     pub positions: Vec<Vec3>,
     /// Unit vertex normals, or empty.
     pub normals: Vec<Vec3>,
@@ -18,11 +18,11 @@ pub struct TriangleMesh {
     pub normal_groups: Vec<NormalGroup>,
     /// Second set of vertex texture coordinates, or empty.
     pub second_uvs: Vec<Vec2>,
-    /// Vertex colours in sRGB, or empty.
+    /// Vertex colors in sRGB, or empty.
     pub colors: Vec<[u8; 3]>,
-    /// Corners of each triangle; front along (b − a) × (c − a).
+    /// Vertex indices (a, b, c) of each triangle; the front faces along (b − a) × (c − a).
     pub triangles: Vec<[u32; 3]>,
-    /// Material of each triangle as an index into the file's own list, with `u32::MAX` for no material; or empty.
+    /// Material index of each triangle in the file's list, or `u32::MAX` for none; or empty.
     pub materials: Vec<u32>,
 }
 
@@ -43,24 +43,25 @@ impl NormalGroup {
 }
 
 impl TriangleMesh {
-    /// Most triangles of a mesh: such numbers fit into the nodes of every kind of tree, cut in pieces or not.
+    /// Maximum number of triangles: small enough for the indices in every kind of tree node, even if
+    /// triangles are split.
     pub const MOST_TRIANGLES: u32 = 1 << 27;
 
-    /// The three corners of a triangle.
+    /// Corners of a triangle.
     #[inline]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
         self.triangles[triangle as usize].map(|vertex| self.positions[vertex as usize])
     }
 
-    /// Least and greatest coordinates, in the file's. `None` without vertices.
+    /// Bounding box in file coordinates, or `None` without vertices.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let first = *self.positions.first()?;
         let grow = |[least, greatest]: [Vec3; 2], at: &Vec3| [least.min(*at), greatest.max(*at)];
         Some(self.positions.iter().fold([first; 2], grow).map(|at| at.as_dvec3() + self.origin))
     }
 
-    /// Vertices that lie farthest in each of 26 directions, in the file's coordinates: along the axes, and the diagonals of two and
-    /// of three of them.
+    /// Extreme vertices, in file coordinates, along 26 directions: the axes and the diagonals of two or three
+    /// axes.
     pub fn extremes(&self) -> Vec<DVec3> {
         let Some(first) = self.positions.first() else { return Vec::new() };
         let steps = [-1.0_f32, 0.0, 1.0];
@@ -76,7 +77,7 @@ impl TriangleMesh {
         directions.filter(|direction| *direction != Vec3::ZERO).map(farthest).collect()
     }
 
-    /// Bytes that the mesh takes.
+    /// Memory used by the mesh, in bytes.
     pub fn memory_bytes(&self) -> usize {
         size_of_val(self.positions.as_slice())
             + size_of_val(self.normals.as_slice())

@@ -1,7 +1,7 @@
 //! Rays, boxes, shapes and hits with error bounds.
 //!
-//! Triangles of meshes are tested in `f32` by a watertight method; every other shape is a quadric, a torus or a flat
-//! piece computed in `f64`, so that no `f32` ray sees its rounding.
+//! Mesh triangles are intersected in `f32` with a watertight test; all other shapes are flat, quadrics or
+//! tori, intersected in `f64` so that their rounding is invisible to `f32` rays.
 
 pub mod aabb;
 mod axial;
@@ -27,7 +27,7 @@ pub mod watertight_rows;
 pub use aabb::Aabb;
 pub use local_form::LocalForm;
 pub use ray::{Ray, RayF64};
-pub use surface::{AreaPoint, Asked, ShapeHit, SurfacePoint};
+pub use surface::{AreaPoint, ShapeHit, SurfacePoint, SurfaceRequest};
 
 use crate::math::lanes::Folds;
 use crate::math::{DVec2, DVec3, Vec2};
@@ -44,7 +44,7 @@ use surface_rows::{Exact as _, SurfaceRow};
 use torus::Torus;
 use triangle::Triangle;
 
-/// A shape that is computed from its parameters alone, in world coordinates.
+/// A shape in world coordinates, computed only from its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shape {
     /// A sphere.
@@ -67,7 +67,7 @@ pub enum Shape {
     Torus(Torus),
 }
 
-/// Calls the same method of a shape of any kind.
+/// Calls the same method on a shape of any type.
 macro_rules! of_any {
     ($shape:expr, $it:ident => $asked:expr) => {
         match $shape {
@@ -85,14 +85,14 @@ macro_rules! of_any {
 }
 
 impl Shape {
-    /// The nearest hit.
+    /// Finds the nearest hit.
     #[inline]
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         of_any!(self, it => it.intersect(ray))
     }
 
-    /// The nearest hits of the rays in `met`, side by side if the shape has a loop for that; the other rays end below 0.
-    /// `found` holds no hits before.
+    /// Finds the nearest hits of the rays in `met`, with a SIMD loop if the shape has one. All other rays
+    /// have negative ends, and `found` must not contain hits.
     #[inline(always)]
     pub fn intersect_rows(
         &self,
@@ -122,7 +122,7 @@ impl Shape {
         }
     }
 
-    /// [`SurfaceRow::fill`]: returns whether the shape has a loop for it.
+    /// [`SurfaceRow::fill`]: returns whether the shape has a SIMD loop.
     #[inline(always)]
     fn fill_surfaces(&self, row: &mut SurfaceRow, rays: &RayRows, hits: &HitRows, of: u32) -> bool {
         match self {
@@ -136,7 +136,7 @@ impl Shape {
         true
     }
 
-    /// [`SurfaceRow::fill_uv`]: returns whether the shape has a loop for it.
+    /// [`SurfaceRow::fill_uv`]: returns whether the shape has a SIMD loop.
     #[inline(always)]
     fn fill_uvs(&self, row: &mut SurfaceRow, rays: &RayRows, hits: &HitRows, of: u32) -> bool {
         match self {
@@ -153,19 +153,19 @@ impl Shape {
         true
     }
 
-    /// The surface at a hit.
+    /// Surface point at a hit.
     #[inline]
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         of_any!(self, it => it.surface(ray, hit))
     }
 
-    /// The requested parts of the surface at a hit.
+    /// Requested parts of the surface point at a hit.
     #[inline]
-    pub fn asked_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
+    pub fn asked_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         if asked.uv { self.surface(ray, hit) } else { of_any!(self, it => it.exact(ray, hit)).bare() }
     }
 
-    /// The box around it. `None` if the shape is infinite.
+    /// Bounding box, or `None` if the shape is infinite.
     #[inline]
     pub fn bounds(&self) -> Option<Aabb> {
         match self {
@@ -181,7 +181,7 @@ impl Shape {
         }
     }
 
-    /// Triangles that it is made of.
+    /// Number of triangles in the shape.
     pub fn triangle_count(&self) -> u64 {
         match self {
             Self::Triangle(_) => 1,
@@ -196,17 +196,17 @@ impl Shape {
         }
     }
 
-    /// Areas of its parts, by the part numbers of hits; empty if the shape is infinite.
+    /// Areas of the parts, indexed like `ShapeHit::primitive`; empty if the shape is infinite.
     pub fn areas(&self) -> Vec<f64> {
         of_any!(self, it => it.areas().to_vec())
     }
 
-    /// A point of a part, uniform over its area for uniform `u` in [0, 1)².
+    /// Samples a point of a part uniformly over its area, for uniform `u` in [0, 1)².
     pub fn place(&self, part: u32, u: Vec2) -> AreaPoint {
         of_any!(self, it => it.place(part, u))
     }
 
-    /// Centre of area.
+    /// Centroid of the surface.
     pub fn middle(&self) -> DVec3 {
         of_any!(self, it => it.middle())
     }
@@ -216,7 +216,7 @@ impl Shape {
         of_any!(self, it => it.contains(point))
     }
 
-    /// Whether it has an inside; the inside of a plane is behind it.
+    /// Whether the shape encloses a volume; a plane encloses the half-space behind it.
     #[inline]
     pub fn is_closed(&self) -> bool {
         match self {
@@ -227,13 +227,13 @@ impl Shape {
         }
     }
 
-    /// Whether a point is inside, or behind a plane. `None` if the shape has no inside.
+    /// Whether a point is inside, or behind a plane. `None` if the shape encloses no volume.
     #[inline]
     pub fn encloses(&self, point: DVec3) -> Option<bool> {
         self.encloses_each([point]).map(|[is_inside]| is_inside)
     }
 
-    /// [`Shape::encloses`] of several points.
+    /// [`Shape::encloses`] for several points.
     #[inline]
     pub fn encloses_each<const COUNT: usize>(&self, points: [DVec3; COUNT]) -> Option<[bool; COUNT]> {
         match self {
@@ -251,12 +251,12 @@ impl Shape {
         }
     }
 
-    /// Texture coordinates of a point of its surface.
+    /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         of_any!(self, it => it.uv_at(point))
     }
 
-    /// Mean curvature at a point of a part, > 0 if it bulges to the front.
+    /// Mean curvature at a point of a part; positive where the front is convex.
     #[inline]
     pub fn curvature(&self, part: u32, point: DVec3) -> f64 {
         match self {
@@ -268,7 +268,7 @@ impl Shape {
         }
     }
 
-    /// The form of the shape near a point.
+    /// Geometry of the shape near a point.
     #[inline]
     pub fn local_form(&self, point: DVec3) -> LocalForm {
         match self {
@@ -283,7 +283,8 @@ impl Shape {
         }
     }
 
-    /// The flat piece of a number. `None` if the shape does not have as many, or is not made of flat pieces.
+    /// Flat polygon with the given index. `None` if the index is out of range or the shape is not made of
+    /// flat polygons.
     #[inline]
     pub fn piece(&self, number: u32) -> Option<Piece> {
         match self {
@@ -301,8 +302,8 @@ impl Shape {
         }
     }
 
-    /// Whether a ray that enters or leaves its inside at a point of the surface goes farther than `distance` before it can
-    /// meet another side; `false` if that is not known.
+    /// Whether a ray that crosses the surface at a point certainly travels farther than `distance` before it
+    /// can meet another side. False if unknown.
     #[inline]
     pub fn is_far_side_beyond(&self, point: DVec3, distance: f64) -> bool {
         match self {
@@ -318,8 +319,8 @@ impl Shape {
         }
     }
 
-    /// Projected area: the area whose front faces a unit direction, times the cosines; for a torus, the mean over all
-    /// directions.
+    /// Projected area: the surface area facing a unit direction, weighted by the cosine. For a torus, the
+    /// mean over all directions.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         of_any!(self, it => it.projected_area(direction))
     }
@@ -348,7 +349,7 @@ mod tests {
 
     const SIDE: u32 = 400;
 
-    /// The integral of a function over the area.
+    /// Integrates a function over the area.
     fn integral(shape: &Shape, asked: impl Fn(&AreaPoint) -> f64) -> f64 {
         let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
         let over_part = |(part, area): (u32, f64)| {
@@ -358,7 +359,7 @@ mod tests {
         (0..).zip(shape.areas()).map(over_part).sum()
     }
 
-    /// Hits of rays towards the shape from a sphere around it.
+    /// Hits of rays aimed at the shape from a sphere around it.
     fn hits(shape: &Shape) -> impl Iterator<Item = (RayF64, ShapeHit)> + '_ {
         (0..4000).filter_map(move |i| {
             let around = Shape::Sphere(Sphere { center: shape.middle(), radius: 5.0 });
@@ -372,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn points_of_a_part_lie_where_rays_find_it_and_face_as_it_does() {
+    fn sampled_points_are_on_the_shape() {
         for shape in shapes() {
             for (part, _) in (0_u32..).zip(shape.areas()).filter(|(_, area)| *area > 0.0) {
                 for i in 0..200_u32 {
@@ -392,11 +393,11 @@ mod tests {
     }
 
     #[test]
-    fn surfaces_without_coordinates_are_those_with_them() {
+    fn surfaces_are_equal_without_coordinates() {
         for shape in shapes() {
             for (ray, hit) in hits(&shape).take(1000) {
-                let [bare, full] =
-                    [false, true].map(|uv| shape.asked_surface(&ray, &hit, Asked { uv, shadow_point: true }));
+                let [bare, full] = [false, true]
+                    .map(|uv| shape.asked_surface(&ray, &hit, SurfaceRequest { uv, shadow_point: true }));
                 let parts =
                     |of: &SurfacePoint| [of.point, of.error, of.normal, of.shadow_point, of.shading_normal];
                 assert_eq!(parts(&bare), parts(&full), "{shape:?} {ray:?}");
@@ -408,14 +409,14 @@ mod tests {
     }
 
     #[test]
-    fn what_a_shape_shows_is_the_integral_of_the_cosines() {
+    fn projected_area_integrates_the_cosines() {
         for shape in shapes().into_iter().filter(|shape| !shape.areas().is_empty()) {
             let directions = [DVec3::X, DVec3::NEG_Y, DVec3::new(-0.3, 0.5, 0.8).normalize()];
             let shown = |direction: DVec3| integral(&shape, |place| place.normal.dot(direction).max(0.0));
             let area: f64 = shape.areas().iter().sum();
             for direction in directions {
                 if matches!(shape, Shape::Torus(_)) {
-                    // The mean over the directions of a closed surface (Cauchy).
+                    // Mean over the directions of a closed surface (Cauchy).
                     assert_eq!(shape.projected_area(direction), area / 4.0);
                 } else {
                     let off = shape.projected_area(direction) - shown(direction);
@@ -426,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn the_middle_is_the_mean_of_the_points() {
+    fn centroid_is_the_mean_of_the_points() {
         for shape in shapes().into_iter().filter(|shape| !shape.areas().is_empty()) {
             let area: f64 = shape.areas().iter().sum();
             for axis in 0..3 {
@@ -437,7 +438,7 @@ mod tests {
     }
 
     #[test]
-    fn the_distance_of_a_point_is_that_of_the_nearest_place() {
+    fn distance_is_to_the_nearest_point() {
         let distance = |shape: &Shape, point: DVec3| match shape.local_form(point) {
             LocalForm::Surface { distance, .. } => Some(distance),
             LocalForm::Pieces(_) => None,
@@ -460,10 +461,10 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_goes_in_where_it_meets_a_front_and_out_where_it_meets_a_back() {
+    fn rays_enter_at_fronts_and_leave_at_backs() {
         for shape in shapes() {
             let mut seen = 0;
-            // A bare side has an inside as well, although it does not close it.
+            // A tube or an uncapped cone also contains points, although it is not closed.
             let is_closed = match shape {
                 Shape::Sphere(_) | Shape::Box(_) | Shape::Torus(_) => true,
                 Shape::Cylinder(_) | Shape::Cone(_) => shape.areas().iter().all(|&area| area > 0.0),
@@ -485,7 +486,7 @@ mod tests {
     }
 
     #[test]
-    fn tangents_are_how_points_move_with_their_texture_coordinates() {
+    fn tangents_are_derivatives_of_points() {
         for shape in shapes() {
             let mut seen = 0;
             for (ray, hit) in hits(&shape) {
@@ -493,7 +494,7 @@ mod tests {
                 let point = surface.point.as_dvec3();
                 let uv = shape.uv_at(point);
                 let (u, v) = (surface.dpdu.as_dvec3(), surface.dpdv.as_dvec3());
-                // Near seams, borders and poles, a step leads to other coordinates.
+                // Skip steps that cross a seam, a border or a pole.
                 let step = 1e-4;
                 let is_inside = |uv: DVec2| uv.min_element() > 0.02 && uv.max_element() < 0.98;
                 let is_round =
@@ -513,7 +514,8 @@ mod tests {
                 let moved = [shape.uv_at(point + u * step) - uv, shape.uv_at(point + v * step) - uv];
                 let off = (moved[0] - DVec2::X * step).length().max((moved[1] - DVec2::Y * step).length());
                 assert!(off < 0.02 * step, "{shape:?} at {uv}: {moved:?}");
-                // By the contract, u grows from x to z on spheres: pictures are mirrored on spheres, and on no other shape.
+                // The documented u grows from x to z on spheres: images are mirrored on spheres, and on no
+                // other shape.
                 let is_mirrored = u.cross(v).dot(surface.normal.as_dvec3()) < 0.0;
                 assert_eq!(is_mirrored, matches!(shape, Shape::Sphere(_)), "{shape:?}");
                 assert!((u.dot(surface.normal.as_dvec3())).abs() < 1e-5 * u.length(), "{shape:?}");
@@ -523,7 +525,7 @@ mod tests {
     }
 
     #[test]
-    fn curvature_is_half_the_divergence_of_the_normals() {
+    fn curvature_is_half_the_normal_divergence() {
         for shape in shapes() {
             let mut compared = 0;
             for (ray, hit) in hits(&shape).step_by(7) {
@@ -543,7 +545,7 @@ mod tests {
                 let Some(divergence) = along(a).zip(along(b)).map(|(a, b)| a + b) else { continue };
                 let curvature = shape.curvature(hit.primitive, point);
                 let allowed = 0.02 * curvature.abs() + 2e-3;
-                // Next to the tip of a cone the steps are too long.
+                // The steps are too long near the tip of a cone.
                 let is_tip = matches!(shape, Shape::Cone(_)) && curvature > 6.0;
                 assert!(
                     is_tip || (0.5 * divergence - curvature).abs() < allowed,

@@ -1,4 +1,4 @@
-//! Quads: squares and any other parallelograms, in double precision.
+//! Quads: squares and other parallelograms in double precision.
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
 use super::surface_rows::{Exact, ExactPoint, Mapped};
@@ -6,28 +6,28 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Folds, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// Margin of a quad's border in units of its edges, so that two quads which share an edge leave no gap between them;
-/// far below what an `f32` ray can resolve.
+/// Margin of the border relative to the edges, so that two quads that share an edge leave no gap; far below
+/// the resolution of `f32` rays.
 const BORDER: f64 = 1e-14;
 
-/// The points corner + s·u + t·v with s, t in [0, 1]; the front is along u × v.
+/// The points corner + s·u + t·v with s, t in [0, 1]; the front faces along u × v.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parallelogram {
-    /// The corner at s = t = 0.
+    /// Corner at s = t = 0.
     pub corner: DVec3,
     /// First edge.
     pub u: DVec3,
     /// Second edge.
     pub v: DVec3,
-    /// u × v.
+    /// Cross product u × v.
     normal: DVec3,
-    /// Vectors whose products with point − corner are s and t.
+    /// Vectors whose dot products with point − corner are s and t.
     dual_u: DVec3,
     dual_v: DVec3,
 }
 
 impl Parallelogram {
-    /// A quad from a corner and two edges that are not parallel.
+    /// Creates a quad from a corner and two edges that are not parallel.
     pub fn new(corner: DVec3, u: DVec3, v: DVec3) -> Self {
         let normal = u.cross(v);
         let area_squared = normal.length_squared();
@@ -41,7 +41,7 @@ impl Parallelogram {
         }
     }
 
-    /// The intersection with the plane, if inside the edges.
+    /// Intersects the plane within the edges.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let to_corner = self.corner - ray.origin;
         let t = self.normal.dot(to_corner) / self.normal.dot(ray.direction);
@@ -51,7 +51,7 @@ impl Parallelogram {
         (is_in_edge(s) && is_in_edge(t)).then(|| ShapeHit::at(accepted))
     }
 
-    /// [`Parallelogram::intersect`] side by side.
+    /// [`Parallelogram::intersect`] for a packet.
     #[inline(always)]
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows, folds: impl Folds) {
         let (mut above, mut along, mut may_hit) = ([0.0; PACKET], [0.0; PACKET], [0; PACKET]);
@@ -75,7 +75,7 @@ impl Parallelogram {
         }
     }
 
-    /// The surface at a hit.
+    /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
         SurfacePoint::exact(point, normal, self.uv(ray, hit).as_vec2(), self.u, self.v, reach)
@@ -93,44 +93,44 @@ impl Parallelogram {
         [self.dual_u, self.dual_v].map(|dual| from_corner.dot(dual).max(0.0).min(1.0))
     }
 
-    /// Texture coordinates of a point of it.
+    /// Texture coordinates of a point on the quad.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         DVec2::from_array(self.coordinates_of(point))
     }
 
-    /// The box around it.
+    /// Bounding box.
     pub fn bounds(&self) -> Aabb {
         let c = self.corner;
         Aabb::around_f64([c, c + self.u, c + self.v, c + self.u + self.v])
     }
 
-    /// Area.
+    /// Area of the quad.
     pub fn area(&self) -> f64 {
         self.normal.length()
     }
 
-    /// Area of its one part.
+    /// Area of each part.
     pub fn areas(&self) -> [f64; 1] {
         [self.normal.length()]
     }
 
-    /// A point of the surface, uniform over the area.
+    /// Samples a point uniformly over the area.
     pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
         let point = self.corner + self.u * f64::from(u.x) + self.v * f64::from(u.y);
         AreaPoint { point, normal: self.normal.normalize() }
     }
 
-    /// Centre of area.
+    /// Centroid.
     pub fn middle(&self) -> DVec3 {
         self.corner + (self.u + self.v) * 0.5
     }
 
-    /// Whether a point is inside: never, as a quad encloses nothing.
+    /// Whether a point is inside: always false, as a quad has no volume.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
 
-    /// Projected area: the area that faces a unit direction, times the cosine.
+    /// Projected area of the front: the area times the cosine between the normal and a unit direction.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         self.normal.dot(direction).max(0.0)
     }
@@ -153,7 +153,7 @@ impl Mapped for Parallelogram {
     }
 }
 
-/// Whether a coordinate is between the edges, or on one of them.
+/// Whether a coordinate is within the border, including its margin.
 #[inline(always)]
 fn is_in_edge(x: f64) -> bool {
     (-BORDER..=1.0 + BORDER).contains(&x)
@@ -166,7 +166,7 @@ mod tests {
     use crate::math::Vec3;
 
     #[test]
-    fn oblique_edges_give_their_own_coordinates() {
+    fn coordinates_follow_oblique_edges() {
         let quad = Parallelogram::new(
             DVec3::new(1.0, 2.0, 3.0),
             DVec3::new(2.0, 0.5, 0.0),

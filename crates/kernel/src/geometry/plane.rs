@@ -1,4 +1,4 @@
-//! Infinite planes, in double precision.
+//! Infinite planes in double precision.
 
 use super::local_form::{Extent, Ground, LocalForm};
 use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
@@ -13,27 +13,27 @@ use crate::math::{DVec2, DVec3, Vec2};
 pub struct Plane {
     /// A point of the plane, with texture coordinates (0, 0).
     pub point: DVec3,
-    /// Unit normal of its front.
+    /// Unit normal of the front.
     normal: DVec3,
     u: DVec3,
     v: DVec3,
 }
 
 impl Plane {
-    /// A plane from a point and a normal of any length but 0.
+    /// Creates a plane from a point and a nonzero normal.
     pub fn new(point: DVec3, normal: DVec3) -> Self {
         let normal = normal.normalize();
         let (u, v) = flat_axes(normal);
         Self { point, normal, u, v }
     }
 
-    /// The intersection. `None` for rays in the plane or parallel to it.
+    /// Intersects the plane. `None` for rays in the plane or parallel to it.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let t = self.normal.dot(self.point - ray.origin) / self.normal.dot(ray.direction);
         (t < f64::from(f32::MAX)).then(|| ray.accept(t)).flatten().map(ShapeHit::at)
     }
 
-    /// [`Plane::intersect`] side by side.
+    /// [`Plane::intersect`] for a packet.
     #[inline(always)]
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows, folds: impl Folds) {
         let (mut above, mut along, mut may_hit) = ([0.0; PACKET], [0.0; PACKET], [0; PACKET]);
@@ -53,7 +53,7 @@ impl Plane {
         }
     }
 
-    /// The surface at a hit; one texture tile per unit of length.
+    /// Surface point at a hit, with one texture tile per unit of length.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
         let uv = self.uv(ray, hit);
@@ -72,54 +72,54 @@ impl Plane {
         [offset.dot(self.u), offset.dot(self.v)]
     }
 
-    /// Texture coordinates of a point of it.
+    /// Texture coordinates of a point on the plane.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         DVec2::from_array(self.coordinates_of(point))
     }
 
-    /// Areas of its parts: it has no part with an area.
+    /// Areas of the parts: empty, as the area is infinite.
     pub fn areas(&self) -> [f64; 0] {
         []
     }
 
-    /// The point that the plane was made from, as no point is as likely as any other.
+    /// The plane's reference point, as no uniform sampling exists.
     pub fn place(&self, _: u32, _: Vec2) -> AreaPoint {
         AreaPoint { point: self.point, normal: self.normal }
     }
 
-    /// The point that the plane was made from.
+    /// The plane's reference point.
     pub fn middle(&self) -> DVec3 {
         self.point
     }
 
-    /// Unit normal of its front.
+    /// Unit normal of the front.
     pub fn normal(&self) -> DVec3 {
         self.normal
     }
 
-    /// Distance of a point from it.
+    /// Distance of a point from the plane.
     pub fn distance(&self, point: DVec3) -> f64 {
         (point - self.point).dot(self.normal).abs()
     }
 
-    /// The form near a point.
+    /// Geometry of the plane near a point.
     pub fn local_form(&self, point: DVec3) -> LocalForm {
         let distance = self.distance(point);
         let ground = Ground { normal: self.normal, height: distance, extent: Extent::Flat(f64::INFINITY) };
         LocalForm::Surface { distance, ground: Some(ground) }
     }
 
-    /// Whether a point is inside, where nothing is.
+    /// Whether a point is inside: always false.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
 
-    /// Whether a point is behind it.
+    /// Whether a point is behind the plane.
     pub fn is_behind(&self, point: DVec3) -> bool {
         self.normal.dot(point - self.point) < 0.0
     }
 
-    /// Projected area: the area that faces a unit direction, times the cosine.
+    /// Projected area of the front: infinite if it faces the direction.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         if self.normal.dot(direction) > 0.0 { f64::INFINITY } else { 0.0 }
     }
@@ -148,7 +148,7 @@ mod tests {
     use crate::math::Vec3;
 
     #[test]
-    fn one_root_or_none() {
+    fn rays_hit_once_or_never() {
         let floor = Plane::new(DVec3::new(0.0, 1.0, 0.0), DVec3::new(0.0, 5.0, 0.0));
         let down = Ray::new(Vec3::new(2.25, 3.0, -1.5), Vec3::NEG_Y).to_f64();
         let hit = floor.intersect(&down).expect("the floor is below");

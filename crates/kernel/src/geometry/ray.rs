@@ -1,4 +1,4 @@
-//! Rays as half-lines and segments, and starts of rays that leave a surface.
+//! Rays, segments and robust ray origins on surfaces.
 
 use crate::math::{DVec3, Vec3};
 
@@ -6,34 +6,34 @@ use crate::math::{DVec3, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Ray {
-    /// Start of the ray.
+    /// Origin of the ray.
     pub origin: Vec3,
-    /// Direction, of any length, which is the unit of t.
+    /// Direction of any nonzero length; t is measured in this length.
     pub direction: Vec3,
-    /// End of the ray; ∞ for a half-line.
+    /// Upper end of t; ∞ for a half-line.
     pub t_max: f32,
-    /// Number of the triangle on which the ray starts, among those that it may meet, or [`Ray::NO_TRIANGLE`]. A triangle is flat
-    /// and the ray starts on the side to which it goes, so that it does not meet this triangle again: tests leave it out.
+    /// Index of the triangle on which the ray starts, among the triangles it is tested against, or
+    /// [`Ray::NO_TRIANGLE`]. The ray leaves a flat triangle and cannot meet it again, so tests skip it.
     pub start: u32,
 }
 
 impl Ray {
-    /// A number that no triangle has.
+    /// Index that no triangle has.
     pub const NO_TRIANGLE: u32 = u32::MAX;
 
-    /// A half-line.
+    /// Creates a half-line.
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self { origin, direction, t_max: f32::INFINITY, start: Self::NO_TRIANGLE }
     }
 
-    /// The ray, with the triangle on which it starts.
+    /// Sets the triangle on which the ray starts.
     #[inline(always)]
     pub fn leaving(self, start: u32) -> Self {
         Self { start, ..self }
     }
 
-    /// The segment that ends just before `to`, shortened by the rounding errors of its two ends, so that it does not
-    /// hit a surface through `to` (t = 1 is the far end before shortening).
+    /// Creates the segment that ends just before `to`, shortened by the rounding errors of both ends so that
+    /// it does not hit a surface through `to` (t = 1 is `to` itself).
     #[inline(always)]
     pub fn segment(from: Vec3, to: Vec3) -> Self {
         let direction = to - from;
@@ -43,19 +43,19 @@ impl Ray {
         Self { t_max: 1.0 - shortening.min(0.5), ..Self::new(from, direction) }
     }
 
-    /// The segment, extended by the error of its end.
+    /// Extends the segment by the error of its end point.
     #[inline(always)]
     pub fn beyond(self, error: Vec3) -> Self {
         let relative = 4.0 * error.max_element() / self.direction.abs().max_element();
         Self { t_max: self.t_max + relative, ..self }
     }
 
-    /// The point at `t`.
+    /// Point at parameter `t`.
     pub fn at(&self, t: f32) -> Vec3 {
         self.origin + self.direction * t
     }
 
-    /// The same ray in double precision.
+    /// Converts the ray to double precision.
     pub fn to_f64(&self) -> RayF64 {
         RayF64 {
             origin: self.origin.as_dvec3(),
@@ -65,33 +65,33 @@ impl Ray {
     }
 }
 
-/// A [`Ray`] in double precision, for shapes that are computed in it.
+/// A [`Ray`] in double precision, for shapes that are intersected in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayF64 {
-    /// Start of the ray.
+    /// Origin of the ray.
     pub origin: DVec3,
     /// Direction.
     pub direction: DVec3,
-    /// End of the ray.
+    /// Upper end of t.
     pub t_max: f64,
 }
 
 impl RayF64 {
-    /// The point at `t`.
+    /// Point at parameter `t`.
     pub fn at(&self, t: f64) -> DVec3 {
         self.origin + self.direction * t
     }
 
-    /// `t` as `f32`, if the ray has such a point and it is finite.
+    /// `t` rounded to `f32`, if it is finite and within the ray's interval.
     pub fn accept(&self, t: f64) -> Option<f32> {
         let single = t as f32;
         (single > 0.0 && single < f32::INFINITY && f64::from(single) <= self.t_max).then_some(single)
     }
 }
 
-/// Start of a ray that leaves `point` towards `direction`: on that side of the surface for certain, if the error of
-/// each component of `point` is at most `error` (Pharr, Jakob, Humphreys, *Physically Based Rendering*, 4th ed.,
-/// section 6.8.6).
+/// Offsets the origin of a ray that leaves `point` towards `direction`, so that it is certainly on that side
+/// of the surface if each component of `point` has an error of at most `error` (Pharr, Jakob, Humphreys,
+/// *Physically Based Rendering*, 4th ed., section 6.8.6).
 #[inline(always)]
 pub fn offset_origin(point: Vec3, error: Vec3, normal: Vec3, direction: Vec3) -> Vec3 {
     let distance = normal.abs().dot(error);
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_offset_origin_is_beyond_the_error() {
+    fn offset_origin_exceeds_the_error() {
         let (p, error) = (Vec3::new(1e4, -3.0, 0.25), Vec3::splat(1e-3));
         let n = Vec3::new(0.6, 0.0, 0.8);
         assert!((offset_origin(p, error, n, n) - p).as_dvec3().dot(n.as_dvec3()) >= 0.0013);
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_segment_ends_before_its_target_at_any_scale() {
+    fn segments_end_before_their_target() {
         for scale in [1e-8_f32, 1.0, 1e8] {
             let (from, to) = (Vec3::new(3.0, 4.0, 5.0) * scale, Vec3::new(3.0, 4.5, 5.0) * scale);
             let ray = Ray::segment(from, to);

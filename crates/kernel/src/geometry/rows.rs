@@ -1,21 +1,21 @@
-//! Up to sixteen rays side by side, a row for each coordinate. A shape tests them in a loop without branches, which
-//! compilers turn into vector instructions. Every lane gets the bits that its ray gets alone.
+//! Packets of 16 rays in structure-of-arrays layout. Shapes test them in branch-free loops that compilers
+//! vectorize. Every lane gets the same bits as the scalar test of its ray.
 
 use super::{Ray, RayF64, ShapeHit};
 use crate::math::lanes::{Folds, LANES, TRUE};
 use crate::math::{DVec3, Vec3};
 
-/// Rays that are traced together.
+/// Number of rays in a packet.
 pub const PACKET: usize = LANES;
 
-/// One number for each ray of a packet.
+/// One number per ray of a packet.
 pub type Row = [f32; PACKET];
 
-/// End of each ray of a packet, in place of its own `t_max`; below 0 for a lane without a ray, or whose ray is not
-/// traced.
+/// Upper end of each ray of a packet, in place of its `t_max`; negative for lanes without a ray or with a ray
+/// that is not traced.
 pub type Ends = Row;
 
-/// A bit for each ray that has an end.
+/// Bits of the lanes with a nonnegative end.
 #[inline(always)]
 pub fn traced(ends: &Ends, folds: impl Folds) -> u32 {
     let mut traced = [0; PACKET];
@@ -25,7 +25,7 @@ pub fn traced(ends: &Ends, folds: impl Folds) -> u32 {
     folds.bits(&traced)
 }
 
-/// Lanes whose bits are set.
+/// Indices of the set bits.
 pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let lane = bits.trailing_zeros() as usize;
@@ -36,7 +36,7 @@ pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The rays of a packet; lanes without a ray are all 0, and have no end.
+/// The rays of a packet. Lanes without a ray are 0.
 #[derive(Clone, Debug)]
 pub struct RayRows {
     /// Coordinates of the origins.
@@ -48,31 +48,31 @@ pub struct RayRows {
 }
 
 impl RayRows {
-    /// Rows of these coordinates, of rays that start on no triangle.
+    /// Creates a packet of rays that do not start on triangles.
     #[inline(always)]
     pub fn of(origin: [Row; 3], direction: [Row; 3]) -> Self {
         Self { origin, direction, start: [Ray::NO_TRIANGLE; PACKET] }
     }
 
-    /// The rays, with the triangles on which they start.
+    /// Sets the triangles on which the rays start.
     #[inline(always)]
     pub fn leaving(self, start: [u32; PACKET]) -> Self {
         Self { start, ..self }
     }
 
-    /// The ray in a lane, without an end.
+    /// Returns the ray in a lane, without an end.
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> Ray {
         let of = |rows: &[Row; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
         Ray::new(of(&self.origin), of(&self.direction)).leaving(self.start[lane])
     }
 
-    /// Rows of at most [`PACKET`] rays, and their ends.
+    /// Packs up to [`PACKET`] rays and their ends.
     #[inline(always)]
     pub fn new(rays: &[Ray]) -> (Self, Ends) {
         let mut rows = Self::of([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
         let mut ends = [-1.0; PACKET];
-        // Compile full packets apart: their loop has a known length.
+        // Compile full packets separately, as the known length makes their loop faster.
         match <&[Ray; PACKET]>::try_from(rays) {
             Ok(full) => rows.fill(&mut ends, full),
             Err(_) => rows.fill(&mut ends, rays),
@@ -92,7 +92,7 @@ impl RayRows {
         }
     }
 
-    /// The ray in a lane in double precision, without an end.
+    /// Returns the ray in a lane in double precision, without an end.
     #[inline(always)]
     pub(super) fn line(&self, lane: usize) -> RayF64 {
         let [ox, oy, oz] = &self.origin;
@@ -105,10 +105,10 @@ impl RayRows {
     }
 }
 
-/// Hits of the rays of a packet: [`ShapeHit`]s side by side.
+/// Hits of a packet: [`ShapeHit`]s in structure-of-arrays layout.
 #[derive(Clone, Debug)]
 pub struct HitRows {
-    /// [`ShapeHit::t`]; NaN for a ray without a hit.
+    /// [`ShapeHit::t`], or NaN for a ray without a hit.
     pub t: Row,
     /// [`ShapeHit::primitive`].
     pub primitive: [u32; PACKET],
@@ -119,13 +119,13 @@ pub struct HitRows {
 }
 
 impl HitRows {
-    /// No hit.
+    /// Hits for a packet in which no ray hits.
     #[inline(always)]
     pub fn none() -> Self {
         Self { t: [f32::NAN; PACKET], primitive: [0; PACKET], u: [0.0; PACKET], v: [0.0; PACKET] }
     }
 
-    /// A bit for each ray that hits.
+    /// Bits of the rays with a hit.
     #[inline(always)]
     pub fn any(&self, folds: impl Folds) -> u32 {
         let mut any = [0; PACKET];
@@ -142,7 +142,7 @@ impl HitRows {
         (self.u[lane], self.v[lane]) = (hit.u, hit.v);
     }
 
-    /// The hit of the ray in a lane.
+    /// Returns the hit of the ray in a lane.
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Option<ShapeHit> {
         let hit =
@@ -151,7 +151,7 @@ impl HitRows {
     }
 }
 
-/// [`RayF64::accept`] without a branch; NaN in place of `None`.
+/// Branch-free [`RayF64::accept`], with NaN for `None`.
 #[inline(always)]
 pub(super) fn accept(t: f64, end: f32) -> f32 {
     let single = t as f32;
@@ -159,13 +159,14 @@ pub(super) fn accept(t: f64, end: f32) -> f32 {
     if is_on_it { single } else { f32::NAN }
 }
 
-/// Whether [`accept`] may take the quotient of `above` and `along`; if not, the division can be saved. The factor is more
-/// than the effect of rounding the quotient to `f32`; the terms make up for numbers too small for it.
+/// Whether [`accept`] may accept the quotient `above / along`; if not, the division can be skipped. The
+/// factor exceeds the effect of rounding the quotient to `f32`, and the added terms compensate for numbers
+/// too small for it.
 #[inline(always)]
 pub(super) fn may_accept(above: f64, along: f64, end: f32) -> bool {
     let is_ahead = ((above > 0.0) & (along > 0.0)) | ((above < 0.0) & (along < 0.0));
     let reach = along.abs() * ((f64::from(end) + f64::from(f32::MIN_POSITIVE)) * (1.0 + 1e-6)) + 1e-290;
-    // Not `<=`: an infinite end times 0 is NaN.
+    // `<=` would be wrong here: an infinite end times 0 is NaN.
     let is_beyond = above.abs() > reach;
     is_ahead & !is_beyond
 }

@@ -1,4 +1,4 @@
-//! Spheres, in double precision.
+//! Spheres in double precision.
 
 use std::f64::consts::PI;
 
@@ -9,19 +9,19 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Folds, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// All points at one distance from a centre; the front is outside.
+/// All points at one distance from a center; the front is outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
-    /// Centre.
+    /// Center.
     pub center: DVec3,
     /// Radius, > 0.
     pub radius: f64,
 }
 
 impl Sphere {
-    /// The nearest root in the ray's interval. The discriminant comes from the distance of the centre to the ray, not
-    /// from b² − ac, and the roots come without subtraction (Haines, Günther, Akenine-Möller, *Precision Improvements
-    /// for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
+    /// Finds the nearest root in the ray's interval. Computes the discriminant from the distance of the
+    /// center to the ray rather than as b² − ac, and the roots without cancellation (Haines, Günther,
+    /// Akenine-Möller, *Precision Improvements for Ray/Sphere Intersection*, Ray Tracing Gems, chapter 7).
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let to_origin = ray.origin - self.center;
         let a = ray.direction.length_squared();
@@ -39,7 +39,7 @@ impl Sphere {
         ray.accept(near).or_else(|| ray.accept(far)).map(ShapeHit::at)
     }
 
-    /// [`Sphere::intersect`] side by side.
+    /// [`Sphere::intersect`] for a packet.
     #[inline(always)]
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows, folds: impl Folds) {
         let (mut discriminants, mut may_hit) = ([0.0; PACKET], [0; PACKET]);
@@ -72,29 +72,29 @@ impl Sphere {
         }
     }
 
-    /// The surface at a hit.
+    /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
         let (uv, dpdu, dpdv) = sphere_parametrisation(normal);
         SurfacePoint::exact(point, normal, uv, dpdu * self.radius, dpdv * self.radius, reach)
     }
 
-    /// Texture coordinates of a point of the surface.
+    /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         sphere_parametrisation((point - self.center).normalize_or(DVec3::Y)).0.as_dvec2()
     }
 
-    /// The box around it.
+    /// Bounding box.
     pub fn bounds(&self) -> Aabb {
         Aabb::around_f64([self.center - DVec3::splat(self.radius), self.center + DVec3::splat(self.radius)])
     }
 
-    /// Area of its one part.
+    /// Area of each part.
     pub fn areas(&self) -> [f64; 1] {
         [4.0 * PI * self.radius * self.radius]
     }
 
-    /// A point of the surface, uniform over the area.
+    /// Samples a point uniformly over the area.
     pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         let height = 1.0 - 2.0 * x;
@@ -104,7 +104,7 @@ impl Sphere {
         AreaPoint { point: self.center + normal * self.radius, normal }
     }
 
-    /// Centre of area.
+    /// Centroid.
     pub fn middle(&self) -> DVec3 {
         self.center
     }
@@ -114,7 +114,7 @@ impl Sphere {
         ((point - self.center).length() - self.radius).abs()
     }
 
-    /// The form near a point.
+    /// Geometry of the sphere near a point.
     pub fn local_form(&self, point: DVec3) -> LocalForm {
         let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
         let ground = Ground { normal: out, height: distance, extent: Extent::Round(self.radius) };
@@ -124,15 +124,14 @@ impl Sphere {
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
         let (distance, radius) = ((point - self.center).length_squared(), self.radius * self.radius);
-        // The root, which takes long, decides only if the point is nearer than the rounding of the root and of the
-        // squares.
+        // The slow square root is only needed within the rounding error of the root and the squares.
         if (distance - radius).abs() > radius * (16.0 * f64::EPSILON) {
             return distance < radius;
         }
         (point - self.center).length() < self.radius
     }
 
-    /// Projected area: for every direction, that of the great circle.
+    /// Projected area, which is the area of a great circle for every direction.
     pub fn projected_area(&self, _: DVec3) -> f64 {
         PI * self.radius * self.radius
     }
@@ -142,7 +141,7 @@ impl Exact for Sphere {
     #[inline(always)]
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint {
         let outwards = ray.at(f64::from(hit.t)) - self.center;
-        // At the very centre any direction is right.
+        // At the center, any direction is valid.
         let is_told = outwards.length_squared() > 0.0;
         let n = (if is_told { outwards } else { -ray.direction }).normalize();
         let reach = self.center.abs().max_element() + self.radius;
@@ -150,8 +149,8 @@ impl Exact for Sphere {
     }
 }
 
-/// Texture coordinates u = ½ + atan2(z, x)/2π, v = ½ + asin(y)/π of a unit normal, and the change of the normal with
-/// each; at the poles, any pair of perpendicular tangents.
+/// Texture coordinates u = ½ + atan2(z, x)/2π and v = ½ + asin(y)/π of a unit normal, and the normal's
+/// derivatives. At the poles, the tangents are any perpendicular pair.
 fn sphere_parametrisation(n: DVec3) -> (Vec2, DVec3, DVec3) {
     let u = 0.5 + libm::atan2(n.z, n.x) / (2.0 * PI);
     let v = 0.5 + libm::asin(n.y.clamp(-1.0, 1.0)) / PI;
@@ -176,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn two_roots_one_root_and_none() {
+    fn rays_have_two_roots_one_or_none() {
         let ray = |x: f32| Ray::new(Vec3::new(x, 0.0, -3.0), Vec3::Z).to_f64();
         assert_eq!(unit().intersect(&ray(0.0)).map(|hit| hit.t), Some(2.0));
         assert_eq!(unit().intersect(&ray(1.0)).map(|hit| hit.t), Some(3.0));
@@ -188,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn precise_from_far_away() {
+    fn distant_hits_are_precise() {
         for distance in [2e1_f64, 2e2, 2e3, 2e4, 2e6] {
             let ray =
                 RayF64 { origin: DVec3::new(0.5, 0.0, -distance), direction: DVec3::Z, t_max: f64::INFINITY };
@@ -199,11 +198,11 @@ mod tests {
     }
 
     #[test]
-    fn a_giant_sphere_is_a_good_floor() {
+    fn giant_spheres_are_precise_floors() {
         let floor = Sphere { center: DVec3::new(0.0, -1e5, 0.0), radius: 1e5 };
         let ray = Ray::new(Vec3::Y, Vec3::new(0.6, -0.8, 0.0)).to_f64();
         let hit = floor.intersect(&ray).expect("the ray meets the floor");
-        // |o + t d − c| = R with |d| = 1 (but for its rounding): the smaller root of t² + 2bt + c.
+        // |o + t d − c| = R with |d| = 1 up to rounding: the smaller root of t² + 2bt + c.
         let (o, d) = (ray.origin - floor.center, ray.direction);
         let (a, b, c) = (d.length_squared(), o.dot(d), 2.0 * 1e5 + 1.0);
         let exact = c / (-b + (b * b - a * c).sqrt());
@@ -211,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn texture_coordinates_of_a_known_direction() {
+    fn texture_coordinates_have_known_values() {
         let (uv, ..) = sphere_parametrisation(DVec3::ONE.normalize());
         assert!((uv.x - 0.625).abs() < 1e-6 && (uv.y - 0.695_913_3).abs() < 1e-6);
         for pole in [DVec3::Y, DVec3::NEG_Y] {
@@ -221,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn tangents_are_the_derivatives_of_the_parametrisation() {
+    fn tangents_are_derivatives_of_the_normal() {
         let point = |u: f64, v: f64| {
             let (azimuth, height) = ((u - 0.5) * 2.0 * PI, (v - 0.5) * PI);
             DVec3::new(height.cos() * azimuth.cos(), height.sin(), height.cos() * azimuth.sin())

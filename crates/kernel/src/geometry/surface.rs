@@ -1,79 +1,81 @@
-//! Surface of a shape at a hit.
+//! Surface points and their error bounds.
 
 use crate::math::{DVec2, DVec3, Vec2, Vec3};
 
-/// The nearest intersection of a ray and a shape.
+/// Nearest intersection of a ray and a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapeHit {
     /// Distance along the ray in units of its direction's length.
     pub t: f32,
-    /// Part of the shape: triangle of a mesh, face of a box; else 0.
+    /// Index of the part: a mesh triangle or a box face; otherwise 0.
     pub primitive: u32,
-    /// Weight of a triangle's second corner; else 0.
+    /// Barycentric weight of a triangle's second corner; otherwise 0.
     pub u: f32,
-    /// Weight of a triangle's third corner; else 0.
+    /// Barycentric weight of a triangle's third corner; otherwise 0.
     pub v: f32,
 }
 
 impl ShapeHit {
-    /// A hit of a shape with a single part.
+    /// A hit on a shape with a single part.
     pub fn at(t: f32) -> Self {
         Self { t, primitive: 0, u: 0.0, v: 0.0 }
     }
 }
 
-/// A point of a surface, in world coordinates.
+/// A surface point in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// The point, on the surface but for rounding.
+    /// The point, on the surface up to rounding.
     pub point: Vec3,
-    /// Bound on each component's error, including that of the shape's own intersection test.
+    /// Bound on each component's error, including the error of the shape's intersection test.
     pub error: Vec3,
-    /// Unit geometric normal of the front side.
+    /// Unit geometric normal of the front.
     pub normal: Vec3,
-    /// Start of shadow rays on the side of the camera, if nothing is on the way there: the point, or a place above it if
-    /// facets stand for a surface that bulges.
+    /// Origin of shadow rays towards the camera's side if the way there is unobstructed: the point itself, or
+    /// a point above it if flat triangles approximate a convex surface.
     pub shadow_point: Vec3,
     /// Unit interpolated normal on the same side.
     pub shading_normal: Vec3,
-    /// Texture coordinates. For a plane they are large far from its point, and count by their fractions.
+    /// Texture coordinates. On a plane they are large far from its origin, and only their fractional part
+    /// matters.
     pub uv: DVec2,
-    /// Change of the point with u, of any length; 0 if there is no parametrisation.
+    /// Derivative of the point with respect to u, up to scale; 0 without a parametrization.
     pub dpdu: Vec3,
-    /// Change of the point with v.
+    /// Derivative of the point with respect to v, up to scale.
     pub dpdv: Vec3,
-    /// Weights of a triangle's corners; for other shapes (1 − u − v, u, v) of the texture coordinates.
+    /// Barycentric weights of a triangle's corners; for other shapes (1 − u − v, u, v) of the texture
+    /// coordinates.
     pub barycentric: Vec3,
 }
 
-/// Requested parts of a [`SurfacePoint`] beside the point and its normals. Other parts may stay 0, or be the point
-/// itself.
+/// Parts of a [`SurfacePoint`] requested in addition to the point and its normals. Parts that are not
+/// requested may be 0 or equal to the point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Asked {
-    /// Texture coordinates and their tangents.
+pub struct SurfaceRequest {
+    /// Texture coordinates and tangents.
     pub uv: bool,
     /// [`SurfacePoint::shadow_point`].
     pub shadow_point: bool,
 }
 
-impl Asked {
-    /// Everything.
+impl SurfaceRequest {
+    /// Requests everything.
     pub const ALL: Self = Self { uv: true, shadow_point: true };
 }
 
-/// A point of a surface that emits.
+/// A point on an emitting surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AreaPoint {
     /// The point.
     pub point: DVec3,
-    /// Unit normal of the front side.
+    /// Unit normal of the front.
     pub normal: DVec3,
 }
 
 impl SurfacePoint {
-    /// A point computed in double precision on a surface without shading normals. Its error is that of rounding to
-    /// `f32`. If the point is small beside the lengths from which it and the next hit are computed, their error counts
-    /// too: `reach` is the greatest of these lengths.
+    /// Creates a point that was computed in double precision on a surface without shading normals. The error
+    /// is from rounding to `f32`. If the point is small compared with the lengths from which it and the next
+    /// hit are computed, their error is included: `reach` is the largest of these lengths.
     pub fn exact(point: DVec3, normal: DVec3, uv: Vec2, dpdu: DVec3, dpdv: DVec3, reach: f64) -> Self {
         let normal = normal.normalize().as_vec3();
         let point = point.as_vec3();
@@ -91,14 +93,15 @@ impl SurfacePoint {
     }
 }
 
-/// Bound on each component's error, for a point that was computed in double precision from lengths up to `reach`, and
-/// for the next test from there.
+/// Bound on each component's error, for a point computed in double precision from lengths up to `reach` and
+/// for the next intersection test from there.
 #[inline(always)]
 pub fn error(point: Vec3, reach: f64) -> Vec3 {
     rounding_error(point) + Vec3::splat(double_error(reach))
 }
 
-/// Bound on the error of the `f64` arithmetic of a hit, its surface and the next test from there, with lengths up to `reach`.
+/// Bound on the error of the `f64` arithmetic for a hit, its surface point and the next intersection test
+/// from there, with lengths up to `reach`.
 #[inline(always)]
 pub fn double_error(reach: f64) -> f32 {
     (reach * (32.0 * f64::EPSILON)) as f32
@@ -110,8 +113,8 @@ pub fn rounding_error(point: Vec3) -> Vec3 {
     point.abs() * f32::EPSILON + Vec3::splat(f32::MIN_POSITIVE)
 }
 
-/// Tangents (u, v) of a flat surface with unit normal `n`, such that u × v = n: v goes up if the surface stands, and
-/// towards −z if it lies and faces up.
+/// Tangents (u, v) of a flat surface with unit normal `n`, with u × v = n. v points up on vertical surfaces,
+/// and towards −z on horizontal ones that face up.
 pub fn flat_axes(n: DVec3) -> (DVec3, DVec3) {
     let across = DVec3::Y.cross(n);
     let u = if across.length_squared() > 1e-12 { across } else { DVec3::X - n * n.x };
@@ -124,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tangents_are_perpendicular_also_next_to_the_vertical() {
+    fn tangents_are_perpendicular_near_vertical() {
         for tilt in [0.0, 1e-9, 9e-7, 1.1e-6, 0.3, 1.0] {
             for n in [DVec3::new(tilt, 1.0, 0.0), DVec3::new(-tilt, -1.0, tilt)].map(DVec3::normalize) {
                 let (u, v) = flat_axes(n);

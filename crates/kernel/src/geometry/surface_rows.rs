@@ -1,4 +1,4 @@
-//! Surfaces at the hits of a packet, side by side, for the most common shapes.
+//! Packets of surface points, computed with SIMD loops for the most common shapes.
 
 use super::rows::{HitRows, PACKET, RayRows, lanes};
 use super::surface::error;
@@ -6,51 +6,51 @@ use super::{RayF64, Shape, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Lanes3, set_lane, take, truths};
 use crate::math::{DVec2, DVec3, Vec2};
 
-/// Parts of [`SurfacePoint`]s that lights need, side by side.
+/// The parts of a packet of [`SurfacePoint`]s that lighting needs.
 #[derive(Clone, Debug)]
 pub struct SurfaceRow {
-    /// The points.
+    /// Points in world coordinates.
     pub point: Lanes3,
-    /// Bounds on their errors.
+    /// Bounds on the errors of the points.
     pub error: Lanes3,
-    /// Unit geometric normals of the front sides.
+    /// Unit geometric normals of the fronts.
     pub normal: Lanes3,
-    /// A bit for each lane whose shading normal and shadow point are set.
+    /// Bits of the lanes whose shading normal and shadow point are set.
     pub smooth: u32,
     /// Unit interpolated normals on the same sides.
     pub shading_normal: Lanes3,
-    /// [`SurfacePoint::shadow_point`](super::SurfacePoint::shadow_point)s.
+    /// [`SurfacePoint::shadow_point`](super::SurfacePoint::shadow_point) of each lane.
     pub shadow_point: Lanes3,
     /// Texture coordinates, if requested.
     pub uv: [[f64; PACKET]; 2],
 }
 
-/// A point of a surface before it is rounded.
+/// A surface point before rounding to `f32`.
 pub struct ExactPoint {
     /// The point, in world coordinates.
     pub point: DVec3,
-    /// Normal of the front side, of any length.
+    /// Normal of the front, not normalized.
     pub normal: DVec3,
-    /// The greatest length that the point is computed from.
+    /// Largest length from which the point is computed.
     pub reach: f64,
 }
 
 impl ExactPoint {
-    /// The surface without texture coordinates and tangents.
+    /// Surface point without texture coordinates and tangents.
     pub fn bare(&self) -> SurfacePoint {
         SurfacePoint::exact(self.point, self.normal, Vec2::ZERO, DVec3::ZERO, DVec3::ZERO, self.reach)
     }
 }
 
-/// A shape whose surface is computed in double precision.
+/// A shape whose surface points are computed in double precision.
 pub trait Exact {
-    /// The surface at a hit.
+    /// Surface point at a hit.
     fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> ExactPoint;
 }
 
-/// A shape whose texture coordinates are computed without branches.
+/// A shape with branch-free texture coordinates.
 pub trait Mapped {
-    /// Texture coordinates of a hit.
+    /// Texture coordinates at a hit.
     fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2;
 }
 
@@ -61,7 +61,7 @@ impl Default for SurfaceRow {
 }
 
 impl SurfaceRow {
-    /// Surfaces of which nothing is known.
+    /// A packet with all fields 0.
     pub const EMPTY: Self = Self {
         point: [[0.0; PACKET]; 3],
         error: [[0.0; PACKET]; 3],
@@ -72,14 +72,14 @@ impl SurfaceRow {
         uv: [[0.0; PACKET]; 2],
     };
 
-    /// Computes the surfaces of the hits of a packet whose bits are set, all of one shape. Returns whether the shape
-    /// has a loop for it.
+    /// Computes the surface points of the hits selected by `of`, all on one shape. Returns false if the shape
+    /// has no SIMD loop.
     #[inline(always)]
     pub fn fill(&mut self, shape: &Shape, rays: &RayRows, hits: &HitRows, of: u32) -> bool {
         shape.fill_surfaces(self, rays, hits, of)
     }
 
-    /// Computes the texture coordinates of the hits of a packet whose bits are set, all of one shape.
+    /// Computes the texture coordinates of the hits selected by `of`, all on one shape.
     #[inline(always)]
     pub fn fill_uv(&mut self, shape: &Shape, rays: &RayRows, hits: &HitRows, of: u32) {
         if shape.fill_uvs(self, rays, hits, of) {
@@ -92,7 +92,7 @@ impl SurfaceRow {
         }
     }
 
-    /// [`SurfaceRow::fill_uv`] for a shape with a loop.
+    /// [`SurfaceRow::fill_uv`] for a shape with a SIMD loop.
     #[inline(always)]
     pub(super) fn uv_from(&mut self, shape: &impl Mapped, rays: &RayRows, hits: &HitRows, of: u32) {
         for lane in 0..PACKET {
@@ -103,7 +103,7 @@ impl SurfaceRow {
         }
     }
 
-    /// [`SurfaceRow::fill`] for a shape with a loop.
+    /// [`SurfaceRow::fill`] for a shape with a SIMD loop.
     #[inline(always)]
     pub(super) fn fill_from(&mut self, shape: &impl Exact, rays: &RayRows, hits: &HitRows, of: u32) {
         let mut found = Self::EMPTY;
@@ -123,7 +123,7 @@ impl SurfaceRow {
         self.take(of, &found);
     }
 
-    /// Takes points, errors and normals of another row.
+    /// Copies the selected points, errors and normals from another packet.
     #[inline(always)]
     pub fn take(&mut self, of: u32, found: &Self) {
         let of = truths(of);
@@ -134,7 +134,7 @@ impl SurfaceRow {
         }
     }
 
-    /// Takes shading normals and shadow points of another row.
+    /// Copies the selected shading normals and shadow points from another packet.
     #[inline(always)]
     pub fn take_smooth(&mut self, of: u32, found: &Self) {
         self.smooth |= of;

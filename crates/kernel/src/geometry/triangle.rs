@@ -1,4 +1,4 @@
-//! Single triangles, in double precision.
+//! Single triangles in double precision.
 
 use super::rows::{Ends, HitRows, RayRows, accept};
 use super::surface_rows::{Exact, ExactPoint};
@@ -6,10 +6,10 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
 
-/// A triangle whose corners are this many times farther away than a hit and the start of its ray is huge.
+/// A triangle is huge if its corners are this many times farther away than a hit and the start of its ray.
 const HUGE: f64 = 1024.0;
 
-/// A triangle; the front is along (b − a) × (c − a).
+/// A triangle; the front faces along (b − a) × (c − a).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
     /// First corner.
@@ -21,8 +21,9 @@ pub struct Triangle {
 }
 
 impl Triangle {
-    /// The hit, from either side. Edges are tested by triple products of the corners relative to the ray's origin. Two
-    /// triangles at one edge compute these alike but for the sign: there is no gap between them.
+    /// Intersects the triangle from either side. Tests the edges with triple products of the corners relative
+    /// to the ray's origin. Two triangles compute the same value, up to sign, for a shared edge, so there is
+    /// no gap between them.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         let (a, b, c) = (self.a - ray.origin, self.b - ray.origin, self.c - ray.origin);
         let d = ray.direction;
@@ -36,7 +37,7 @@ impl Triangle {
         (sum != 0.0).then(|| ShapeHit { t, primitive: 0, u: (wb / sum) as f32, v: (wc / sum) as f32 })
     }
 
-    /// [`Triangle::intersect`] side by side.
+    /// [`Triangle::intersect`] for a packet.
     #[inline(always)]
     pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
         for (lane, &end) in ends.iter().enumerate() {
@@ -56,55 +57,55 @@ impl Triangle {
         }
     }
 
-    /// The surface at a hit; its texture coordinates are (0, 0), (1, 0), (0, 1) at the corners.
+    /// Surface point at a hit. The texture coordinates at the corners are (0, 0), (1, 0) and (0, 1).
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let ExactPoint { point, normal, reach } = self.exact(ray, hit);
         SurfacePoint::exact(point, normal, Vec2::new(hit.u, hit.v), self.b - self.a, self.c - self.a, reach)
     }
 
-    /// Texture coordinates of a point of it.
+    /// Texture coordinates of a point on the triangle.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         weights([self.a, self.b, self.c], point)
     }
 
-    /// The box around it.
+    /// Bounding box.
     pub fn bounds(&self) -> Aabb {
         Aabb::around_f64([self.a, self.b, self.c])
     }
 
-    /// u × v of its first two edges.
+    /// Normal: the cross product of the edges at the first corner.
     fn normal(&self) -> DVec3 {
         (self.b - self.a).cross(self.c - self.a)
     }
 
-    /// Area of its one part.
+    /// Area of each part.
     pub fn areas(&self) -> [f64; 1] {
         [0.5 * self.normal().length()]
     }
 
-    /// A point of the surface, uniform over the area.
+    /// Samples a point uniformly over the area.
     pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
         let w = warp::triangle(u).as_dvec3();
         AreaPoint { point: self.a * w.x + self.b * w.y + self.c * w.z, normal: self.normal().normalize() }
     }
 
-    /// Centre of area.
+    /// Centroid.
     pub fn middle(&self) -> DVec3 {
         (self.a + self.b + self.c) / 3.0
     }
 
-    /// Whether a point is inside: never, as a triangle encloses nothing.
+    /// Whether a point is inside: always false, as a triangle has no volume.
     pub fn contains(&self, _: DVec3) -> bool {
         false
     }
 
-    /// Projected area: the area that faces a unit direction, times the cosine.
+    /// Projected area of the front: the area times the cosine between the normal and a unit direction.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         (0.5 * self.normal().dot(direction)).max(0.0)
     }
 }
 
-/// Barycentric weights of the second and the third corner at a point of a triangle.
+/// Barycentric weights of the second and third corners at a point of a triangle.
 pub fn weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec2 {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let normal = ab.cross(ac);
@@ -133,7 +134,7 @@ mod tests {
     use crate::math::Vec3;
 
     #[test]
-    fn barycentrics_of_an_aimed_ray_from_both_sides() {
+    fn hits_have_the_aimed_barycentrics() {
         let triangle = Triangle {
             a: DVec3::new(0.1, 0.2, 0.3),
             b: DVec3::new(2.0, 0.0, 1.0),

@@ -1,15 +1,14 @@
-//! The watertight test of mesh triangles in `f32` (Woop, Benthin, Wald, *Watertight Ray/Triangle Intersection*, JCGT
-//! 2013): two triangles that share an edge leave no gap for any ray.
+//! Watertight intersection of mesh triangles in `f32` (Woop, Benthin, Wald, *Watertight Ray/Triangle
+//! Intersection*, JCGT 2013): no ray passes between two triangles that share an edge.
 
 use super::ShapeHit;
 use crate::math::float::gamma;
 use crate::math::{DVec3, Vec3};
 
-/// Limit of a needle: a triangle is a needle to a ray if the bound on the error of t is a larger part of its distance
-/// than this.
+/// Relative error of t above which the test treats a triangle as a needle.
 pub const ILL_CONDITIONED: f32 = 1.0 / 32.0;
 
-/// A ray prepared for many triangles: its longest axis is z, and it is sheared to run along it.
+/// A ray prepared for many triangles: its longest axis becomes z, and a shear aligns the ray with it.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
     origin: Vec3,
@@ -42,13 +41,13 @@ impl ShearedRay {
         }
     }
 
-    /// World axes that are the ray's x, y and z.
+    /// World axes that become the ray's x, y and z.
     pub fn axes(&self) -> [usize; 3] {
         self.axes
     }
 
-    /// The hit at a t in (0, `t_max`], from either side. A t within the test's own error of 0 (*Physically Based Rendering*, 4th
-    /// ed., section 6.8.7) is computed again in double precision.
+    /// Finds the hit at a t in (0, `t_max`], from either side. Recomputes t in double precision if it is
+    /// within its error bound of 0 (*Physically Based Rendering*, 4th ed., section 6.8.7).
     #[inline(always)]
     pub fn intersect(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let [x, y, z] = self.axes;
@@ -92,9 +91,9 @@ impl ShearedRay {
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: wb * inverse, v: wc * inverse })
     }
 
-    /// The hit of a triangle so thin for its distance that its place along the ray is uncertain in single precision. It is
-    /// settled that the ray goes through the triangle, so that neighbours leave no gap. If the ray passes by in double
-    /// precision, the nearest point of an edge counts.
+    /// Finds the hit on a triangle so thin at its distance that its position along the ray is uncertain in
+    /// single precision. The ray is already known to go through the triangle, so that neighbors leave no gap.
+    /// If the ray misses it in double precision, uses the nearest point of an edge.
     #[cold]
     fn intersect_needle(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let ([a, b, c], [wa, wb, wc]) = self.in_f64(corners);
@@ -113,8 +112,8 @@ impl ShearedRay {
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u: u as f32, v: v as f32 })
     }
 
-    /// The hit of a triangle whose plane passes so near the start that its side is uncertain in single precision. It is settled
-    /// that the ray goes through the triangle.
+    /// Finds the hit on a triangle whose plane is so close to the origin that its side is uncertain in single
+    /// precision. The ray is already known to go through the triangle.
     #[cold]
     fn intersect_at_start(&self, corners: &[Vec3; 3], t_max: f32) -> Option<ShapeHit> {
         let ([a, b, c], [wa, wb, wc]) = self.in_f64(corners);
@@ -124,7 +123,7 @@ impl ShearedRay {
         (t > 0.0 && t <= t_max).then_some(ShapeHit { t, primitive: 0, u, v })
     }
 
-    /// Corners in double precision, sheared so that their z are distances along the ray, and the edge functions.
+    /// Edge functions and sheared corners in double precision. The corners' z are distances along the ray.
     fn in_f64(&self, corners: &[Vec3; 3]) -> ([DVec3; 3], [f64; 3]) {
         let [x, y, z] = self.axes;
         let direction = self.direction.as_dvec3();
@@ -137,8 +136,8 @@ impl ShearedRay {
         ([a, b, c], [cross(c, b), cross(a, c), cross(b, a)])
     }
 
-    /// Bound on the absolute error of t, and the greatest t of a corner. The sheared x and y err by lengths, z by units of t;
-    /// these are the same for unit directions only.
+    /// Bound on the absolute error of t, and the largest t of a corner. The sheared x and y have errors in
+    /// lengths, and z in units of t, which are equal only for unit directions.
     fn distance_error(&self, corners: &[(f32, f32, f32); 3], inverse_determinant: f32) -> (f32, f32) {
         let greatest = |of: fn(&(f32, f32, f32)) -> f32| corners.iter().map(of).fold(0.0, f32::max);
         let x = greatest(|corner| corner.0.abs());
@@ -154,18 +153,18 @@ impl ShearedRay {
     }
 }
 
-/// The lesser number; `b` if either is NaN, as vector instructions have it.
+/// The smaller number; `b` if either is NaN, as with vector instructions.
 fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The greater number; `b` if either is NaN.
+/// The larger number; `b` if either is NaN.
 fn greatest(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The point nearest to 0 between p and q, whose z are distances along the ray: its squared distance from the ray, its
-/// fraction of the way to q, and its distance along the ray.
+/// Point of the segment from p to q that is nearest to the ray, where z are distances along the ray: its
+/// squared distance from the ray, its fraction of the segment, and its distance along the ray.
 fn nearest_of_edge(p: DVec3, q: DVec3) -> (f64, f64, f64) {
     let (start, way) = (p.truncate(), (q - p).truncate());
     let part = (-start.dot(way) / way.length_squared()).clamp(0.0, 1.0);
@@ -179,7 +178,7 @@ mod tests {
     use crate::math::random::signed;
 
     #[test]
-    fn axis_aligned_and_skew_rays_agree_with_the_plane() {
+    fn axis_aligned_and_oblique_rays_hit_the_plane() {
         let triangle = [Vec3::new(0.0, 0.0, 2.0), Vec3::new(1.0, 0.0, 2.0), Vec3::new(0.0, 1.0, 2.0)];
         let hit = ShearedRay::new(Vec3::new(0.25, 0.5, 0.0), Vec3::Z).intersect(&triangle, f32::INFINITY);
         let hit = hit.expect("straight through the inside");
@@ -191,12 +190,13 @@ mod tests {
     }
 
     #[test]
-    fn a_sheet_with_a_needle_in_it_has_no_hole() {
+    fn surfaces_with_needles_have_no_holes() {
         let mut random = signed(3);
         for (width, distance) in
             [(3e-4_f32, 200.0_f32), (1e-4, 200.0), (1e-4, 50.0), (1e-6, 3.0), (2e-7, 1e3)]
         {
-            // A strip of this width across the middle of a tilted square, and the square's two other parts.
+            // A strip of this width across the middle of a tilted square, and the other two parts of the
+            // square.
             let point = |x: f32, y: f32| Vec3::new(x, y, 0.3 * x - 0.2 * y);
             let [low, high] = [-width, width].map(|w| 0.5 * w);
             let quad = |a: f32, b: f32| {
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn no_number_in_a_ray_or_triangle_gives_a_hit_at_nan() {
+    fn hits_are_never_at_nan() {
         let bad = [f32::NAN, f32::INFINITY, 0.0, -0.0, 1e38, 1e-40];
         for a in bad {
             for b in bad {

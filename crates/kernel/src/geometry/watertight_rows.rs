@@ -1,5 +1,5 @@
-//! The watertight test of mesh triangles against the rays of a packet, which may have any directions. The operations of
-//! [`ShearedRay::intersect`] come in their order, so that the bits are the same.
+//! Watertight intersection of mesh triangles with packets of rays in any directions. Performs the operations
+//! of [`ShearedRay::intersect`] in the same order, so the bits are equal.
 
 use super::rows::{Ends, HitRows, PACKET, RayRows, lanes};
 use super::watertight::{ILL_CONDITIONED, ShearedRay};
@@ -12,25 +12,26 @@ pub struct ShearedRows<'a> {
     rays: &'a RayRows,
     /// Whether the longest axis of a ray is x, and whether it is y.
     longest: [Truths; 2],
-    /// Whether a ray goes down its longest axis: then its other axes are swapped, which only negates the edge functions.
+    /// Whether a ray points down its longest axis. The scalar test swaps the other axes, which only negates
+    /// the edge functions.
     is_down: Truths,
-    /// Shears of the axes after the longest one.
+    /// Shears of the axes following the longest one.
     shear: Lanes3,
 }
 
-/// Hits of the rays of a packet, each on one triangle.
+/// Hits of a packet, with one triangle per ray.
 pub(super) struct Hits {
     pub(super) hit: Truths,
-    /// Lanes that the scalar test has to decide.
+    /// Lanes that the scalar test must decide.
     pub(super) doubtful: Truths,
     pub(super) t: Lanes,
     pub(super) u: Lanes,
     pub(super) v: Lanes,
 }
 
-/// Corner of a triangle: one for all rays, or one for each.
+/// A triangle corner: one for all rays, or one per ray.
 pub(super) trait Corner: Copy {
-    /// A coordinate of the corner for the ray in a lane.
+    /// Coordinate of the corner for the ray in a lane.
     fn along(self, axis: usize, lane: usize) -> f32;
 }
 
@@ -49,7 +50,7 @@ impl Corner for &Lanes3 {
 }
 
 impl<'a> ShearedRows<'a> {
-    /// Prepares rays.
+    /// Prepares a packet.
     #[inline(always)]
     pub fn new(rays: &'a RayRows) -> Self {
         let (mut longest, mut is_down) = ([[0; PACKET]; 2], [0; PACKET]);
@@ -91,8 +92,8 @@ impl<'a> ShearedRows<'a> {
         Self { rays, longest, is_down, shear }
     }
 
-    /// Takes the nearer hits on a triangle whose number is higher than those before. `met` are the bits of the traced rays; the
-    /// others end below 0.
+    /// Updates `found` with nearer hits on a triangle, whose index must be higher than the previous ones.
+    /// `met` selects the traced rays; all other rays have negative ends.
     #[inline(always)]
     pub fn closest(
         &self,
@@ -104,7 +105,7 @@ impl<'a> ShearedRows<'a> {
         let hits = self.hits(&[number; PACKET], *corners, ends);
         let mut is_nearer = [0; PACKET];
         for i in 0..PACKET {
-            // A hit at the end of a ray counts; a hit as far as one on an earlier triangle does not.
+            // A hit at the end of a ray counts, but not at the same t as a hit on an earlier triangle.
             let is_tie = !found.t[i].is_nan() & (hits.t[i] == found.t[i]);
             is_nearer[i] = if is_tie { 0 } else { hits.hit[i] };
         }
@@ -119,7 +120,7 @@ impl<'a> ShearedRows<'a> {
         }
     }
 
-    /// A bit for each ray in `met` that hits a triangle; the others end below 0.
+    /// Bits of the rays in `met` that hit a triangle; all other rays have negative ends.
     #[inline(always)]
     pub fn any(&self, (number, corners): (u32, &[Vec3; 3]), met: u32, ends: &Ends, folds: impl Folds) -> u32 {
         let hits = self.hits(&[number; PACKET], *corners, ends);
@@ -128,7 +129,7 @@ impl<'a> ShearedRows<'a> {
         if doubtful == 0 { hit } else { hit | self.decided(doubtful, corners, ends) }
     }
 
-    /// [`ShearedRows::closest`] of these rays, one by one.
+    /// [`ShearedRows::closest`] for the given rays, one at a time.
     #[cold]
     #[inline(never)]
     fn decide(&self, these: u32, (number, corners): (u32, &[Vec3; 3]), ends: &mut Ends, found: &mut HitRows) {
@@ -141,7 +142,7 @@ impl<'a> ShearedRows<'a> {
         }
     }
 
-    /// [`ShearedRows::any`] of these rays, one by one.
+    /// [`ShearedRows::any`] for the given rays, one at a time.
     #[cold]
     #[inline(never)]
     fn decided(&self, these: u32, corners: &[Vec3; 3], ends: &Ends) -> u32 {
@@ -188,7 +189,8 @@ impl<'a> ShearedRows<'a> {
         seen
     }
 
-    /// [`ShearedRay::intersect`] side by side, each ray with its triangle, for the rays that do not start on it.
+    /// [`ShearedRay::intersect`] for a packet, with one triangle per ray. Rays that start on their triangle
+    /// do not hit it.
     #[inline(always)]
     pub(super) fn hits(&self, numbers: &[u32; PACKET], corners: [impl Corner; 3], ends: &Ends) -> Hits {
         let [a, b, c] = [self.sheared(corners[0]), self.sheared(corners[1]), self.sheared(corners[2])];
@@ -209,7 +211,7 @@ impl<'a> ShearedRows<'a> {
             let inverse = 1.0 / (wa + wb + wc);
             let shear_z = self.shear[2][i];
             let t = (wa * az + wb * bz + wc * cz) * shear_z * inverse;
-            // Bound the error as `ShearedRay::distance_error` does.
+            // Bound the error as in `ShearedRay::distance_error`.
             let first = greatest([ax, bx, cx]);
             let second = greatest([ay, by, cy]);
             let depth = greatest([az, bz, cz]);
@@ -234,7 +236,7 @@ impl<'a> ShearedRows<'a> {
     }
 }
 
-/// The greatest absolute value of three numbers.
+/// Largest absolute value of three numbers.
 #[inline(always)]
 fn greatest([a, b, c]: [f32; 3]) -> f32 {
     let (a, b, c) = (a.abs(), b.abs(), c.abs());

@@ -7,7 +7,7 @@
 use super::isolated::meets;
 use super::{Geometry, Hit, MeshInstance, Object, World};
 use crate::geometry::ray::offset_origin;
-use crate::geometry::{Aabb, Asked, Ray, Shape, ShapeHit, SurfacePoint};
+use crate::geometry::{Aabb, Ray, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
 
 /// The points on both sides of surfaces that touch.
@@ -180,7 +180,7 @@ impl World {
             return is_around.then_some(Near::Around { object, material });
         }
         let ray = sides.ray().to_f64();
-        let bare = Asked { uv: false, shadow_point: false };
+        let bare = SurfaceRequest { uv: false, shadow_point: false };
         let own = shape.intersect(&ray)?;
         let is_front = shape.asked_surface(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
         Some(self.surface_near(Hit { shape: own, object }, material, is_front))

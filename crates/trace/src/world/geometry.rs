@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::accel::{Bvh, Instructions};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::{Aabb, Asked, Ray, ShapeHit, SurfacePoint};
+use crate::geometry::{Aabb, Ray, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::lights::Source;
 use crate::math::color::srgb8_to_linear;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -273,11 +273,11 @@ impl Geometry {
 
     /// The surface at a hit of this ray.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        self.asked_surface(ray, hit, Asked::ALL)
+        self.asked_surface(ray, hit, SurfaceRequest::ALL)
     }
 
     /// The requested parts of the surface at a hit of this ray.
-    pub fn asked_surface(&self, ray: &Ray, hit: &Hit, asked: Asked) -> SurfacePoint {
+    pub fn asked_surface(&self, ray: &Ray, hit: &Hit, asked: SurfaceRequest) -> SurfacePoint {
         self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
     }
 

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Hit, Object, ObjectMaterial, World};
 use crate::geometry::ray::offset_origin;
-use crate::geometry::{Aabb, Asked, Ray, ShapeHit};
+use crate::geometry::{Aabb, Ray, ShapeHit, SurfaceRequest};
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// Rays that look for the surface of a body, if it has no more objects.
@@ -129,7 +129,7 @@ impl World {
             if body.is_covered && !self.is_glass(material) && Some(hit.object) != of {
                 return None;
             }
-            let bare = Asked { uv: false, shadow_point: false };
+            let bare = SurfaceRequest { uv: false, shadow_point: false };
             let surface = self.geometry.asked_surface(&ray, &hit, bare);
             if self.is_glass(material) && self.body(hit.object) == body.body {
                 let is_back = surface.normal.dot(ray.direction) > 0.0;

@@ -6,7 +6,7 @@ use super::super::{Geometry, Hit, Images, MeshTree, Parts, World, lights};
 use crate::assets::LoadedMesh;
 use crate::control::CancelToken;
 use crate::geometry::mesh::TriangleMesh;
-use crate::geometry::{Asked, Ray};
+use crate::geometry::{Ray, SurfaceRequest};
 use crate::math::{DVec3, Vec3};
 use crate::scene::description::{Accel, Mesh, MeshFile, Object, Placement, Scene, Shape};
 
@@ -247,7 +247,7 @@ fn what_is_isolated_is_what_a_search_finds_nothing_at() {
             if !world.is_glass(world.material_index(&hit) as u32) {
                 continue;
             }
-            let surface = world.geometry.asked_surface(&ray, &hit, Asked::ALL);
+            let surface = world.geometry.asked_surface(&ray, &hit, SurfaceRequest::ALL);
             let facing = surface.normal.dot(ray.direction);
             let normal = if facing > 0.0 { -surface.normal } else { surface.normal };
             let at = Meeting {

@@ -8,7 +8,7 @@ use super::mesh_tree::MeshTree;
 use super::placement::{Placement, Unmoved};
 use crate::accel::{Ends, PACKET};
 use crate::geometry::rows::{HitRows, RayRows, lanes};
-use crate::geometry::{Aabb, Asked, Ray, RayF64, ShapeHit, SurfacePoint};
+use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::materials::UvSet;
 use crate::math::transform::Transform;
 use crate::math::{DVec3, Vec2, Vec3};
@@ -181,7 +181,7 @@ impl MeshInstance {
     }
 
     /// The requested parts of the surface at a hit.
-    pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
+    pub(super) fn surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         match self.is_moved {
             true => self.surface_in(self.placed(&self.transform), ray, hit, asked),
             false => self.surface_in(self.placed(Unmoved), ray, hit, asked),
@@ -193,7 +193,7 @@ impl MeshInstance {
         placed: PlacedMesh<impl Placement>,
         ray: &RayF64,
         hit: &ShapeHit,
-        asked: Asked,
+        asked: SurfaceRequest,
     ) -> SurfacePoint {
         let mesh = &self.tree.loaded().mesh;
         let vertices = mesh.triangles[hit.primitive as usize].map(|vertex| vertex as usize);
@@ -325,7 +325,8 @@ mod tests {
             let mesh = MeshInstance::new(Arc::clone(&tree), transform, false);
             for primitive in 0..10 {
                 let hit = ShapeHit { primitive, u: 0.5, v: 0.25, t: 1.0 };
-                let surface = mesh.surface(&Ray::new(Vec3::ZERO, Vec3::Z).to_f64(), &hit, Asked::ALL);
+                let surface =
+                    mesh.surface(&Ray::new(Vec3::ZERO, Vec3::Z).to_f64(), &hit, SurfaceRequest::ALL);
                 let [a, b, c] = mesh.tree.loaded().mesh.corners(primitive);
                 let [a, b, c] = [a, b, c].map(|corner| transform.point(corner.as_dvec3()));
                 let off = surface.point.as_dvec3() - (a * 0.25 + b * 0.5 + c * 0.25);

@@ -133,7 +133,7 @@ mod tests {
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
     use crate::geometry::mesh::TriangleMesh;
-    use crate::geometry::{Asked, Ray, ShapeHit};
+    use crate::geometry::{Ray, ShapeHit, SurfaceRequest};
     use crate::math::DVec3;
     use crate::math::random::signed as random;
     use crate::math::transform::Transform;
@@ -275,7 +275,7 @@ mod tests {
                     assert_eq!(row.smooth, if mesh.smooth { of } else { 0 });
                     for i in (0..PACKET).filter(|i| of & 1 << i != 0) {
                         let hit = hits.get(i).expect("a hit");
-                        let alone = mesh.surface(&rays[i].to_f64(), &hit, Asked::ALL);
+                        let alone = mesh.surface(&rays[i].to_f64(), &hit, SurfaceRequest::ALL);
                         let bits = |v: Vec3| v.to_array().map(f32::to_bits);
                         let what = || format!("{instructions:?}, {hit:?}, {alone:?}");
                         assert_eq!(bits(lane(&row.point, i)), bits(alone.point), "{}", what());

@@ -4,7 +4,7 @@ use super::mesh_instance::MeshInstance;
 use crate::accel::{Ends, PACKET};
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::geometry::sphere::Sphere;
-use crate::geometry::{Aabb, Asked, Ray, RayF64, Shape, ShapeHit, SurfacePoint};
+use crate::geometry::{Aabb, Ray, RayF64, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::lights::{Ball, Outline};
 use crate::math::lanes::Folds;
 
@@ -81,7 +81,7 @@ impl Object {
     }
 
     /// The requested parts of the surface at a hit.
-    pub fn surface(&self, ray: &Ray, hit: &ShapeHit, asked: Asked) -> SurfacePoint {
+    pub fn surface(&self, ray: &Ray, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         let ray = ray.to_f64();
         match self {
             Self::Shape(shape) => shape.asked_surface(&ray, hit, asked),

@@ -8,7 +8,7 @@ use super::{Geometry, Hit, Loops, PACKET, World};
 use crate::accel::{AnyTest, Ends};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::{RayRows, lanes};
-use crate::geometry::{Asked, Ray};
+use crate::geometry::{Ray, SurfaceRequest};
 use crate::lights::{Source, SourceRow};
 use crate::materials::{Footprint, Material};
 use crate::math::Vec3;
@@ -94,7 +94,7 @@ impl World {
     pub fn beyond(&self, ray: &Ray, hit: &Hit, lookups: &mut u64) -> (Vec3, Ray) {
         let index = self.material_index(hit);
         let material = &self.materials[index];
-        let asked = Asked { uv: self.is_textured(index), shadow_point: false };
+        let asked = SurfaceRequest { uv: self.is_textured(index), shadow_point: false };
         let surface = self.geometry.asked_surface(ray, hit, asked);
         let cosine = surface.shading_normal.dot(ray.direction.normalize_or_zero());
         let color = self.vertex_color(hit).unwrap_or(Vec3::ONE);

@@ -1,31 +1,32 @@
 //! First crossing of a line and a torus.
 //!
-//! The coefficients of the quartic are not used: its roots lose half of their digits where the line grazes, and more if
-//! the tube is slim. With q(s) the line's distance from the axis and the circle's radius as unit,
+//! Does not use the coefficients of the quartic: its roots lose half of their digits where the line grazes
+//! the torus, and more if the tube is slim. With q(s) the line's distance from the axis and the circle's
+//! radius as the unit,
 //!
 //! ```text
 //! g(s) = (q − 1)² + z² − tube² = |p|² + 1 − tube² − 2q
 //! ```
 //!
 //! has the sign of the distance from the surface and is computed from that distance. Its second derivative is
-//! 2(1 − w/q³), with w a constant of the line: there are at most two points of inflection, known in closed form, and on each
-//! piece between them g is convex or concave. On such a piece, Newton's method from the right end goes to the nearest
-//! root without ever passing it, or shows that there is none.
+//! 2(1 − w/q³), where w is a constant of the line: there are at most two inflection points, known in closed
+//! form, and g is convex or concave on each interval between them. On such an interval, Newton's method from
+//! the correct end converges to the nearest root without overshooting it, or shows that there is no root.
 
 use crate::math::DVec3;
 
-/// Most steps; more than halving takes from the whole line to its last digit.
+/// Maximum number of steps; more than bisection needs from the whole line to its last digit.
 const MOST_STEPS: u32 = 200;
 
-/// Half the width of the neighbourhood of the axis in which slopes change their sign.
+/// Half the width of the neighborhood of the axis in which the slope changes its sign.
 const KINK: f64 = 1e-9;
 
-/// Rounding error of g near 0, relative to the tube: twice that of the distance from the circle.
+/// Rounding error of g near 0, relative to the tube: twice the error of the distance from the circle.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// A line near a torus about z whose circle has radius 1.
+/// A line near a torus around z whose circle has radius 1.
 pub(super) struct UnitLine {
-    /// The line's point nearest to the centre.
+    /// Point of the line nearest to the center.
     pub(super) foot: DVec3,
     /// Unit direction.
     pub(super) direction: DVec3,
@@ -33,7 +34,7 @@ pub(super) struct UnitLine {
     pub(super) tube: f64,
 }
 
-/// g and its derivative at a place of the line.
+/// Value and derivative of g at a point of the line.
 #[derive(Clone, Copy)]
 struct Sample {
     s: f64,
@@ -42,8 +43,8 @@ struct Sample {
 }
 
 impl UnitLine {
-    /// Interval of the line in the ball and between the planes around the torus, both with a margin in units of the
-    /// tube.
+    /// Interval of the line within the torus's bounding ball and bounding planes, both expanded by a margin
+    /// in units of the tube.
     pub(super) fn surroundings(&self, room: f64) -> Option<(f64, f64)> {
         let height = self.tube * (1.0 + room);
         let ball = 1.0 + height;
@@ -60,8 +61,8 @@ impl UnitLine {
         (half > 0.0 && enter < leave).then_some((enter, leave))
     }
 
-    /// The first place from `from` to `to` at which the line goes in or out. If the line starts on the surface, within rounding,
-    /// its start does not count.
+    /// First point between `from` and `to` where the line enters or leaves. If the line starts on the
+    /// surface, up to rounding, the start does not count.
     pub(super) fn first_crossing(&self, from: f64, to: f64) -> Option<f64> {
         if !(from < to) {
             return None;
@@ -89,16 +90,18 @@ impl UnitLine {
         None
     }
 
-    /// Whether the line goes away from the circle from here on, on the outer side: both parts of the distance grow.
+    /// Whether the line moves away from the circle from here on, on the outer side: both components of the
+    /// distance grow.
     fn goes_away(&self, from: f64) -> bool {
         let p = self.foot + self.direction * from;
         let (across, d) = (p.truncate(), self.direction.truncate());
         across.length_squared() >= 1.0 && across.dot(d) >= 0.0 && p.z * self.direction.z >= 0.0
     }
 
-    /// The places from `from`, which is outside, to `to` at which the line goes in: at most two, since it leaves as often.
+    /// Points between `from`, which is outside, and `to` where the line enters. There are at most two, as it
+    /// leaves as often.
     pub(super) fn entries(&self, from: f64, to: f64) -> [Option<f64>; 2] {
-        /// Step beyond a crossing, after which rounding does not change the side, unless the line grazes.
+        /// Step past a crossing after which rounding does not change the side, unless the line grazes.
         const BEYOND: f64 = 1e-10;
         let mut found = [None; 2];
         let mut start = from;
@@ -125,8 +128,8 @@ impl UnitLine {
         }
     }
 
-    /// The ends of the piece on which g is concave, with q³ < w. A line through the axis has a kink there, and the
-    /// piece is kept wide enough to contain it: no crossing is so near to the axis.
+    /// Ends of the interval on which g is concave, where q³ < w. A line through the axis has a kink there, so
+    /// the interval is kept wide enough to contain it; no crossing is that close to the axis.
     fn inflections(&self) -> Option<[f64; 2]> {
         let (p, d) = (self.foot.truncate(), self.direction.truncate());
         let a = d.length_squared();
@@ -138,17 +141,17 @@ impl UnitLine {
         (half >= 0.0).then(|| [middle - half.max(KINK), middle + half.max(KINK)])
     }
 
-    /// The first crossing on a piece that starts on a known side.
+    /// First crossing in an interval that starts on a known side.
     fn crossing_of_piece(&self, low: Sample, high: Sample, is_inside: bool, is_convex: bool) -> Option<f64> {
         if (high.value <= 0.0) != is_inside {
             let start = if is_inside == is_convex { high } else { low };
             return Some(self.between(low.s, high.s, start, is_inside));
         }
-        // If both ends are on one side, a convex piece may dip in between, and a concave one may rise out.
+        // If both ends are on one side, a convex g may dip in between, and a concave one may rise.
         (is_inside != is_convex).then(|| self.dip(low, high, if is_inside { -1.0 } else { 1.0 })).flatten()
     }
 
-    /// The only crossing between two places, by Newton's method as long as it stays between them.
+    /// The only crossing between two points. Uses Newton's method, with bisection if it leaves the interval.
     fn between(&self, mut low: f64, mut high: f64, start: Sample, is_inside: bool) -> f64 {
         let mut x = start;
         for _ in 0..MOST_STEPS {
@@ -166,9 +169,9 @@ impl UnitLine {
         x.s
     }
 
-    /// The first root from `low` on of a piece on which sign·g is convex and, at both ends, positive. The root of a
-    /// tangent is never beyond that of a convex function: if the tangents lead to the rise beyond the least value,
-    /// there is no root.
+    /// First root from `low` on in an interval on which sign·g is convex, and positive at both ends. For a
+    /// convex function, the root of a tangent is never past the function's root: if the tangents lead past
+    /// the minimum, there is no root.
     fn dip(&self, low: Sample, high: Sample, sign: f64) -> Option<f64> {
         if !(high.slope * sign > 0.0) {
             return None;
@@ -188,7 +191,7 @@ impl UnitLine {
             let before = x;
             x = self.at(next);
             if x.value * sign <= 0.0 {
-                // Rounding went too far.
+                // Rounding overshot the root.
                 return Some(self.between(before.s, x.s, before, sign < 0.0));
             }
         }
@@ -200,13 +203,13 @@ impl UnitLine {
 mod tests {
     use super::*;
 
-    /// A small generator for lines.
+    /// A small random generator for lines.
     fn random(state: &mut u64) -> f64 {
         *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((*state >> 11) as f64) / (1_u64 << 53) as f64 * 2.0 - 1.0
     }
 
-    /// Lines that come near the circle, some along the axis or through it.
+    /// Lines close to the circle, some along the axis or through it.
     fn lines(tube: f64) -> impl Iterator<Item = UnitLine> {
         let mut state = 3;
         (0..30_000).map(move |i| {
@@ -224,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn crossings_have_all_their_digits_however_slim_the_tube() {
+    fn crossings_are_precise_for_slim_tubes() {
         for tube in [1e-6, 1e-3, 0.3, 0.99] {
             let mut found = 0;
             for line in lines(tube) {
@@ -240,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn between_inflections_the_slope_rises_and_falls_as_told() {
+    fn slope_is_monotonic_between_inflections() {
         for line in lines(0.4) {
             let Some([first, second]) = line.inflections() else { continue };
             let slope = |s: f64| line.at(s).slope;

@@ -1,4 +1,4 @@
-//! Tori, in double precision.
+//! Tori in double precision.
 
 mod crossing;
 
@@ -11,13 +11,13 @@ use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitLine;
 
-/// Margin around a torus in units of its tube, so that a line comes to it from outside for certain.
+/// Margin around a torus in units of its tube, so that a line certainly approaches it from outside.
 const ROOM: f64 = 0.01;
 
-/// All points at one distance, the radius of the tube, from a circle about an axis; the front is outside.
+/// All points at one distance, the tube radius, from a circle around an axis; the front is outside.
 ///
-/// Texture coordinates: u once around the axis, v once around the tube, ½ on the outermost circle and rising there
-/// along the axis, so that pictures are not mirrored.
+/// Texture coordinate u goes once around the axis. v goes once around the tube; it is ½ on the outermost
+/// circle and increases there along the axis, so that images are not mirrored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Torus {
     frame: AxialFrame,
@@ -33,13 +33,13 @@ impl Exact for Torus {
 }
 
 impl Torus {
-    /// A torus from its centre, an axis of any length but 0, the radius of the circle and that of the tube,
-    /// 0 < tube < radius.
+    /// Creates a torus from its center, a nonzero axis, the radius of the circle and the radius of the tube,
+    /// with 0 < tube < radius.
     pub fn new(center: DVec3, axis: DVec3, radius: f64, tube: f64) -> Self {
         Self { frame: AxialFrame::new(center, axis), radius, tube }
     }
 
-    /// The nearest hit, from outside or inside.
+    /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
         self.nearest(ray).map(axial::hit)
     }
@@ -55,7 +55,7 @@ impl Torus {
         ray.accept(t).map(|_| (t, 0))
     }
 
-    /// A ray's line, the line in units of the circle's radius, and that unit in the ray's.
+    /// A ray's line, the line in units of the circle's radius, and this unit in terms of the ray's t.
     fn unit_line(&self, ray: &RayF64) -> (Line, UnitLine, f64) {
         let line = self.frame.line(ray);
         let length = line.direction.length();
@@ -67,7 +67,7 @@ impl Torus {
         (line, unit_line, self.radius / length)
     }
 
-    /// The t at which a ray from outside goes in: at most two.
+    /// Values of t at which a ray from outside enters: at most two.
     pub fn entries(&self, ray: &RayF64) -> [Option<f64>; 2] {
         let (line, unit_line, unit) = self.unit_line(ray);
         let Some((enter, leave)) = unit_line.surroundings(ROOM) else { return [None; 2] };
@@ -75,20 +75,20 @@ impl Torus {
         unit_line.entries(from, leave).map(|entry| entry.map(|s| line.start + s * unit))
     }
 
-    /// The surface at a hit.
+    /// Surface point at a hit.
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
         let (out, from_circle) = self.chart(ray.at(exact_t(hit, self.nearest(ray))));
         self.surface_at(out, from_circle)
     }
 
-    /// Directions of a point from the axis, and from the circle in the plane of both.
+    /// Direction of a point from the axis, and its direction from the circle in the plane of both.
     fn chart(&self, point: DVec3) -> (DVec2, DVec2) {
         let local = self.frame.local(point);
         let out = radial(local.truncate());
         (out, radial(DVec2::new(local.truncate().length() - self.radius, local.z)))
     }
 
-    /// Texture coordinates of a point of the surface.
+    /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         let (out, from_circle) = self.chart(point);
         DVec2::new(turn(out), turn(from_circle))
@@ -100,7 +100,7 @@ impl Torus {
         0.5 * (1.0 / self.tube + across / (self.radius + self.tube * across))
     }
 
-    /// The surface in a direction from the axis, and in a direction from the circle in the plane of both.
+    /// Surface point at a direction from the axis and a direction from the circle in the plane of both.
     fn surface_at(&self, out: DVec2, from_circle: DVec2) -> SurfacePoint {
         let (across, up) = (from_circle.x, from_circle.y);
         let ring = self.radius + self.tube * across;
@@ -137,8 +137,9 @@ impl Torus {
         self.frame.origin.abs().max_element() + self.radius + self.tube
     }
 
-    /// A point of the surface, uniform over the area. The angle ψ of the tube has the density 1 + (tube/radius)·cos ψ. The
-    /// densities at a uniform ψ and at its mirror image π − ψ sum to a constant, so that one of the two is chosen by its share.
+    /// Samples a point uniformly over the area. The tube angle ψ has a pdf proportional to 1 +
+    /// (tube/radius)·cos ψ. Its values at a uniform ψ and at the mirrored angle π − ψ have a constant sum, so
+    /// one of the two is chosen in proportion to them.
     pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         // cos ψ at v = y, since ψ = 0 is v = ½.
@@ -164,7 +165,7 @@ impl Torus {
         (self.radius, self.tube)
     }
 
-    /// Centre of area.
+    /// Centroid.
     pub fn middle(&self) -> DVec3 {
         self.frame.origin
     }
@@ -181,18 +182,18 @@ impl Torus {
         self.signed_distance(point) < 0.0
     }
 
-    /// Projected area on average over all directions: a quarter of the area.
+    /// Projected area averaged over all directions: a quarter of the area.
     pub fn projected_area(&self, _: DVec3) -> f64 {
         let [area] = self.areas();
         area / 4.0
     }
 
-    /// Area of its one part.
+    /// Area of each part.
     pub fn areas(&self) -> [f64; 1] {
         [4.0 * PI * PI * self.radius * self.tube]
     }
 
-    /// The box around it.
+    /// Bounding box.
     pub fn bounds(&self) -> Aabb {
         self.frame.ball_bounds(0.0, self.radius, self.tube)
     }
@@ -204,7 +205,7 @@ mod tests {
     use crate::geometry::Ray;
     use crate::math::Vec3;
 
-    /// A torus about y, from 1.5 to 2.5.
+    /// A torus around y, from 1.5 to 2.5.
     fn ring() -> Torus {
         Torus::new(DVec3::ZERO, DVec3::Y * 7.0, 2.0, 0.5)
     }
@@ -216,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn the_four_roots_of_a_line_through_the_middle() {
+    fn lines_through_the_center_have_four_roots() {
         for (x, expected) in [
             (-9.0, Some((6.5, Vec3::NEG_X))),
             (-2.0, Some((0.5, Vec3::X))),
@@ -229,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_goes_in_once_for_each_time_that_it_leaves() {
+    fn lines_enter_as_often_as_they_leave() {
         let entries = |origin: Vec3, direction: Vec3| {
             ring().entries(&Ray::new(origin, direction).to_f64()).map(|entry| entry.map(|t| t as f32))
         };
@@ -238,7 +239,8 @@ mod tests {
         assert_eq!(entries(x(0.0), Vec3::X), [Some(1.5), None]);
         assert_eq!(entries(x(-9.0), Vec3::NEG_X), [None; 2]);
         assert_eq!(entries(Vec3::new(2.0, 9.0, 0.0), Vec3::NEG_Y), [Some(8.5), None]);
-        // Rays go beside the axis, through the tube on both sides of the hole, and through its outer part alone.
+        // Rays parallel to the axis, through the tube on both sides of the hole, and only through its outer
+        // part.
         let [first, second] = entries(Vec3::new(-9.0, 0.0, 1.0), Vec3::X);
         assert!((first.expect("in") - (9.0 - 5.25_f32.sqrt())).abs() < 1e-5);
         assert!((second.expect("in again") - (9.0 + 1.25_f32.sqrt())).abs() < 1e-5);
@@ -246,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_along_the_axis() {
+    fn lines_along_the_axis_hit_only_the_tube() {
         assert_eq!(met([0.0, 9.0, 0.0], Vec3::NEG_Y), None);
         assert_eq!(met([1.499, 9.0, 0.0], Vec3::NEG_Y), None);
         assert_eq!(met([2.0, 9.0, 0.0], Vec3::NEG_Y), Some((8.5, Vec3::Y)));
@@ -255,14 +257,14 @@ mod tests {
     }
 
     #[test]
-    fn starts_on_the_surface_are_no_hits() {
+    fn rays_do_not_hit_their_start() {
         assert_eq!(met([2.5, 0.0, 0.0], Vec3::X), None);
         assert_eq!(met([2.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(1.0));
         assert_eq!(met([1.5, 0.0, 0.0], Vec3::NEG_X).map(|hit| hit.0), Some(3.0));
     }
 
     #[test]
-    fn texture_coordinates_are_in_the_middle_outside() {
+    fn outermost_circle_is_at_half_v() {
         let ray = Ray::new(Vec3::new(9.0, 0.0, 0.0), Vec3::NEG_X).to_f64();
         let hit = ring().intersect(&ray).expect("aimed at it");
         let surface = ring().surface(&ray, &hit);

@@ -6,7 +6,7 @@ use super::map::{GatherPoint, MIN_COSINE, REACH};
 use super::occlusion::is_occluded;
 use super::reservoir::PhotonPosition;
 use crate::geometry::ray::offset_origin;
-use crate::geometry::{Asked, Ray};
+use crate::geometry::{Ray, SurfaceRequest};
 use crate::math::frame::Frame;
 use crate::math::{Vec2, Vec3};
 use crate::sampling::warp;
@@ -77,7 +77,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
         let ray = Ray::segment(start, end);
         // Find the next surface below that may receive photons.
         let Some(hit) = world.geometry.closest_of(&ray, may_receive) else { return false };
-        let bare = Asked { uv: false, shadow_point: false };
+        let bare = SurfaceRequest { uv: false, shadow_point: false };
         let surface = world.geometry.asked_surface(&ray, &hit, bare);
         // Succeed if it does receive them, has about the same normal, and is not occluded.
         let cosine = surface.normal.dot(look.normal);

@@ -7,7 +7,7 @@ use super::interiors::InteriorList;
 use super::ray::PathRay;
 use super::tile::TileContext;
 use crate::geometry::ray::offset_origin;
-use crate::geometry::{Asked, Ray, SurfacePoint};
+use crate::geometry::{Ray, SurfacePoint, SurfaceRequest};
 use crate::integrators::RayCounters;
 use crate::materials::{Coated, Footprint, Material, Mirror, Pane, RoughBsdf, TexturePoint};
 use crate::math::Vec3;
@@ -74,7 +74,7 @@ impl<'a> Vertex<'a> {
     fn shaded(tile: &TileContext<'a>, path: &PathRay, (by, hit): (&Ray, &Hit), distance: f32) -> Self {
         let index = tile.world.material_index(hit);
         let is_lit = tile.world.materials[index].bsdf.is_lit();
-        let asked = Asked { uv: tile.world.is_textured(index), shadow_point: is_lit };
+        let asked = SurfaceRequest { uv: tile.world.is_textured(index), shadow_point: is_lit };
         let surface = tile.world.geometry.asked_surface(by, hit, asked);
         Self::at_surface(tile, path, index, surface, hit, distance)
     }
