@@ -25,8 +25,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use embree::{Embree, EmbreeScene};
-use glimt::accel::wide_bvh::{Instructions, Quality};
-use glimt::accel::{KdTree, PACKET, WideBvh, ends};
+use glimt::accel::wide_bvh::{InstructionSet, Quality};
+use glimt::accel::{KdTree, PACKET_SIZE, WideBvh, ends};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -41,7 +41,7 @@ const CHUNK: usize = 1 << 15;
 #[derive(Default)]
 struct BenchOptions {
     embree: Option<PathBuf>,
-    instructions: Option<Instructions>,
+    instructions: Option<InstructionSet>,
     isa: Option<String>,
     build_only: bool,
     high: bool,
@@ -87,7 +87,7 @@ fn options() -> BenchOptions {
             "--instructions" => {
                 let name = arguments.next().unwrap_or_default();
                 options.instructions =
-                    Instructions::ALL.into_iter().find(|own| format!("{own:?}").eq_ignore_ascii_case(&name));
+                    InstructionSet::ALL.into_iter().find(|own| format!("{own:?}").eq_ignore_ascii_case(&name));
             }
             "--high" => options.high = true,
             "--build" => options.build_only = true,
@@ -156,7 +156,7 @@ fn measure(name: &str, mesh: &TriangleMesh, embree: Option<&Embree>, options: &B
     if options.instructions.is_none() {
         kd_tree(mesh, &rays);
     }
-    for instructions in Instructions::ALL {
+    for instructions in InstructionSet::ALL {
         if instructions.available() != instructions
             || options.instructions.is_some_and(|only| only != instructions)
         {
@@ -192,7 +192,7 @@ fn timed(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray], any_hit:
         false => rays.iter().filter(|ray| tree.closest(ray).is_some()).count(),
     };
     let mut packets = |rays: &[Ray]| {
-        let mut hits = [None; PACKET];
+        let mut hits = [None; PACKET_SIZE];
         let mut found = |some: &[Ray]| {
             if any_hit {
                 return tree.any_packet(some, &ends(some), &[]).count_ones() as usize;
@@ -200,7 +200,7 @@ fn timed(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray], any_hit:
             tree.closest_packet(some, &ends(some), &mut hits[..some.len()]);
             hits[..some.len()].iter().flatten().count()
         };
-        rays.chunks(PACKET).map(&mut found).sum()
+        rays.chunks(PACKET_SIZE).map(&mut found).sum()
     };
     let own = rates(rays, [&mut single, &mut packets]);
     let peer = scene.map(|scene| {
@@ -235,16 +235,16 @@ fn all_threads(tree: &WideBvh, rays: &meshes::Rays, threads: usize) {
     };
     println!("  {:?}, {threads} threads: packets, but diffuse rays single", tree.instructions());
     let closest = |rays: &[Ray]| {
-        let mut hits = [None; PACKET];
+        let mut hits = [None; PACKET_SIZE];
         let mut found = |some: &[Ray]| {
             tree.closest_packet(some, &ends(some), &mut hits[..some.len()]);
             hits[..some.len()].iter().flatten().count()
         };
-        rays.chunks(PACKET).map(&mut found).sum()
+        rays.chunks(PACKET_SIZE).map(&mut found).sum()
     };
     let any = |rays: &[Ray]| {
         let found = |some: &[Ray]| tree.any_packet(some, &ends(some), &[]).count_ones() as usize;
-        rays.chunks(PACKET).map(found).sum()
+        rays.chunks(PACKET_SIZE).map(found).sum()
     };
     line("primary", "Mrays/s", chunks(&rays.primary, &closest), None);
     line(
@@ -316,8 +316,8 @@ fn any(name: &str, tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &[Ray]
 fn packets(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &meshes::Rays) {
     let mut closest = |rays: &[Ray]| {
         let mut found = 0;
-        let mut hits = [None; PACKET];
-        for sixteen in rays.chunks(PACKET) {
+        let mut hits = [None; PACKET_SIZE];
+        for sixteen in rays.chunks(PACKET_SIZE) {
             tree.closest_packet(sixteen, &ends(sixteen), &mut hits[..sixteen.len()]);
             found += hits.iter().filter(|hit| hit.is_some()).count();
         }
@@ -325,9 +325,9 @@ fn packets(tree: &WideBvh, scene: Option<&EmbreeScene<'_>>, rays: &meshes::Rays)
     };
     let mut any = |rays: &[Ray]| {
         let found = |sixteen: &[Ray]| tree.any_packet(sixteen, &ends(sixteen), &[]).count_ones() as usize;
-        rays.chunks(PACKET).map(found).sum()
+        rays.chunks(PACKET_SIZE).map(found).sum()
     };
-    println!("  {:?}, packets of {PACKET}", tree.instructions());
+    println!("  {:?}, packets of {PACKET_SIZE}", tree.instructions());
     if let Some(scene) = scene {
         let mut plain = |rays: &[Ray]| scene.closest16(rays, false);
         let mut coherent = |rays: &[Ray]| scene.closest16(rays, true);

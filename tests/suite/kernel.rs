@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use glimt::accel::wide_bvh::Instructions;
-use glimt::accel::{KdTree, PACKET, WideBvh, ends};
+use glimt::accel::wide_bvh::InstructionSet;
+use glimt::accel::{KdTree, PACKET_SIZE, WideBvh, ends};
 use glimt::control::CancelToken;
 use glimt::geometry::Ray;
 use glimt::geometry::mesh::TriangleMesh;
@@ -82,14 +82,14 @@ fn tree(mesh: &TriangleMesh) -> WideBvh {
 }
 
 /// Number of the rays from inside a closed mesh that escape; each is aimed at a vertex, or at an edge.
-fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instructions: Instructions) -> usize {
+fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instructions: InstructionSet) -> usize {
     let tree = tree(mesh).with(instructions);
     let mut random = Random(rays as u64);
     let mut leaks = 0;
-    for i in 0..rays / PACKET {
+    for i in 0..rays / PACKET_SIZE {
         let origin = random.vector() * 0.5 * scale + offset;
         let corners = mesh.corners(random.below(mesh.triangles.len()) as u32);
-        let packet: [Ray; PACKET] = std::array::from_fn(|lane| {
+        let packet: [Ray; PACKET_SIZE] = std::array::from_fn(|lane| {
             let target = if lane % 2 == 0 {
                 corners[lane / 2 % 3]
             } else {
@@ -98,10 +98,10 @@ fn leaks(mesh: &TriangleMesh, scale: f32, offset: Vec3, rays: usize, instruction
             Ray::new(origin, target - origin)
         });
         if i % 2 == 0 {
-            let mut hits = [None; PACKET];
+            let mut hits = [None; PACKET_SIZE];
             tree.closest_packet(&packet, &ends(&packet), &mut hits);
             leaks += hits.iter().filter(|hit| hit.is_none()).count();
-            leaks += PACKET - tree.any_packet(&packet, &ends(&packet), &[]).count_ones() as usize;
+            leaks += PACKET_SIZE - tree.any_packet(&packet, &ends(&packet), &[]).count_ones() as usize;
         } else {
             leaks += packet.iter().filter(|ray| tree.closest(ray).is_none() || !tree.any(ray, None)).count();
         }
@@ -133,7 +133,7 @@ fn assert_watertight(rays: usize) {
     for shape in [ball(16, 0.0), ball(60, 0.3), needles(24)] {
         for (scale, offset) in places {
             let mesh = placed(&shape, scale, offset);
-            for instructions in Instructions::ALL {
+            for instructions in InstructionSet::ALL {
                 let leaks = leaks(&mesh, scale, offset, rays, instructions);
                 assert_eq!(leaks, 0, "{} triangles × {scale} + {offset}", mesh.triangles.len());
             }
@@ -199,7 +199,7 @@ fn boxes_show_no_speck_from_any_side() {
         let mesh = boxes(side);
         let middle = Vec3::splat((side - 1) as f32 * 0.75 + 0.5);
         let mut random = Random(u64::from(side));
-        for instructions in Instructions::ALL {
+        for instructions in InstructionSet::ALL {
             let tree = tree(&mesh).with(instructions);
             for view in 0..1000 {
                 // The first looks are along the axes and their diagonals, where every ray lies in planes of faces.
@@ -295,7 +295,7 @@ fn hits_right_at_the_start_of_a_ray_are_found() {
     let corners = |id: u32| slivers[id as usize];
     let boxes = WideBvh::build(count, corners, &CancelToken::new()).expect("nobody cancels");
     let planes = KdTree::build(count, corners, &CancelToken::new()).expect("nobody cancels");
-    let trees = Instructions::ALL.map(|instructions| boxes.clone().with(instructions));
+    let trees = InstructionSet::ALL.map(|instructions| boxes.clone().with(instructions));
     let (mut before, mut behind, mut missed, mut wrong) = (0, 0, 0, 0);
     for i in 0..40_000 {
         let id = random.below(slivers.len());
@@ -316,7 +316,7 @@ fn hits_right_at_the_start_of_a_ray_are_found() {
         }
         before += u32::from(is_hit);
         behind += u32::from(is_free);
-        let (rays, mut hits) = ([ray; PACKET], [None; PACKET]);
+        let (rays, mut hits) = ([ray; PACKET_SIZE], [None; PACKET_SIZE]);
         let mut answers = vec![planes.any(&ray, None), planes.closest(&ray).is_some()];
         for tree in &trees {
             tree.closest_packet(&rays, &ends(&rays), &mut hits);

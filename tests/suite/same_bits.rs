@@ -1,6 +1,6 @@
 //! The same bits on every machine, by every instruction set: hashes of small pictures that stand here.
 
-use glimt::accel::Instructions;
+use glimt::accel::InstructionSet;
 
 use super::desk::Desk;
 
@@ -120,9 +120,11 @@ fn known_pictures_have_their_bits_by_every_instruction_set() {
     let known: Vec<(String, u64)> = plain.into_iter().chain(around).collect();
     let mut tried = Vec::new();
     let mut wrong = Vec::new();
-    for (name, instructions) in
-        [("portable", Instructions::Portable), ("avx2", Instructions::Avx2), ("avx512", Instructions::Avx512)]
-    {
+    for (name, instructions) in [
+        ("portable", InstructionSet::Portable),
+        ("avx2", InstructionSet::Avx2),
+        ("avx512", InstructionSet::Avx512),
+    ] {
         if instructions.available() != instructions {
             continue;
         }
@@ -139,7 +141,10 @@ fn known_pictures_have_their_bits_by_every_instruction_set() {
         }
     }
     eprintln!("tried {tried:?}");
-    assert!(tried.contains(&Instructions::Portable.max(Instructions::Avx512.available())), "tried {tried:?}");
+    assert!(
+        tried.contains(&InstructionSet::Portable.max(InstructionSet::Avx512.available())),
+        "tried {tried:?}"
+    );
     assert!(wrong.is_empty(), "other bits:\n{}", wrong.join("\n"));
 }
 
@@ -221,7 +226,7 @@ fn materials_have_the_same_bits_by_every_instruction_set() {
     );
     for integrator in ["whitted", "path"] {
         desk.write("materials.toml", MATERIALS.replace("INTEGRATOR", integrator));
-        let sets = [Instructions::Portable, Instructions::Avx2, Instructions::Avx512];
+        let sets = [InstructionSet::Portable, InstructionSet::Avx2, InstructionSet::Avx512];
         let names = ["portable", "avx2", "avx512"];
         let pictures =
             sets.into_iter().zip(names).filter(|(set, _)| set.available() == *set).map(|(_, name)| {
@@ -287,9 +292,11 @@ fn a_known_picture_with_photons_has_its_bits_by_all_threads_and_instructions() {
     let text = EVERYTHING.replace("FILTER", "box").replace("INTEGRATOR", "whitted");
     desk.write("all.toml", format!("{text}[photons]\nenabled = true\ncount = 5000\n"));
     let mut wrong = Vec::new();
-    for (name, instructions) in
-        [("portable", Instructions::Portable), ("avx2", Instructions::Avx2), ("avx512", Instructions::Avx512)]
-    {
+    for (name, instructions) in [
+        ("portable", InstructionSet::Portable),
+        ("avx2", InstructionSet::Avx2),
+        ("avx512", InstructionSet::Avx512),
+    ] {
         if instructions.available() != instructions {
             continue;
         }

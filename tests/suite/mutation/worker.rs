@@ -33,7 +33,7 @@ const MEMORY_BYTES: u64 = 768 << 20;
 const ADDRESS_BYTES: u64 = 16 << 30;
 
 /// Processes at work.
-const LANES: u64 = 2;
+const PACKET_SIZE: u64 = 2;
 
 /// Environment variable that makes a process of this test a worker, and names its cases.
 const ORDER: &str = "GLIMT_MUTATION_WORKER";
@@ -42,10 +42,10 @@ const ORDER: &str = "GLIMT_MUTATION_WORKER";
 pub(super) fn check_all(kind: Kind, seed: u64, count: u64) -> Vec<(Case, String)> {
     let failures = Mutex::new(Vec::new());
     std::thread::scope(|scope| {
-        for lane in 0..LANES {
+        for lane in 0..PACKET_SIZE {
             let failures = &failures;
             scope.spawn(move || {
-                let numbers = count * lane / LANES..count * (lane + 1) / LANES;
+                let numbers = count * lane / PACKET_SIZE..count * (lane + 1) / PACKET_SIZE;
                 let mut next = numbers.start;
                 while next < numbers.end {
                     let first = Case { kind, seed, number: next };

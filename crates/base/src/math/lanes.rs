@@ -4,28 +4,28 @@
 use super::Vec3;
 
 /// Number of lanes in a packet.
-pub const LANES: usize = 16;
+pub const PACKET_SIZE: usize = 16;
 
 /// One `f32` per lane.
-pub type Lanes = [f32; LANES];
+pub type F32x16 = [f32; PACKET_SIZE];
 
 /// One vector per lane, as one array per coordinate.
-pub type Lanes3 = [Lanes; 3];
+pub type Vec3x16 = [F32x16; 3];
 
 /// Returns the vector in lane `i`.
 #[inline(always)]
-pub fn lane(vectors: &Lanes3, i: usize) -> Vec3 {
+pub fn lane(vectors: &Vec3x16, i: usize) -> Vec3 {
     Vec3::new(vectors[0][i], vectors[1][i], vectors[2][i])
 }
 
 /// Sets the vector in lane `i`.
 #[inline(always)]
-pub fn set_lane(vectors: &mut Lanes3, i: usize, v: Vec3) {
+pub fn set_lane(vectors: &mut Vec3x16, i: usize, v: Vec3) {
     (vectors[0][i], vectors[1][i], vectors[2][i]) = (v.x, v.y, v.z);
 }
 
 /// Lane mask: [`TRUE`] or 0 for each lane.
-pub type Truths = [u32; LANES];
+pub type Mask = [u32; PACKET_SIZE];
 
 /// Mask value of a selected lane.
 pub const TRUE: u32 = u32::MAX;
@@ -33,39 +33,39 @@ pub const TRUE: u32 = u32::MAX;
 /// A computation in branch-free loops over packets, compiled once per instruction set. Everything called in
 /// its loops must be inlined and must not be a closure, or it is compiled without the instruction set's
 /// features.
-pub trait Loops {
+pub trait SimdKernel {
     /// Result of the computation.
-    type Done;
+    type Output;
 
     /// Runs the computation with this instruction set.
-    fn run(self, folds: impl Folds) -> Self::Done;
+    fn run(self, simd: impl Simd) -> Self::Output;
 }
 
 /// Token for an instruction set, with its cross-lane operations. A token for instructions that a processor
 /// may lack can only be created if the processor has them.
-pub trait Folds: Copy {
+pub trait Simd: Copy {
     /// Packs a mask into bits, one per lane.
-    fn bits(self, holds: &Truths) -> u32;
+    fn movemask(self, mask: &Mask) -> u32;
 
-    /// Minimum and maximum over the lanes set in `of`, which must not be 0. For NaN the result depends on
+    /// Minimum and maximum over the lanes set in `lanes`, which must not be 0. For NaN the result depends on
     /// lane order, identically on every instruction set.
-    fn span(self, row: &Lanes, of: u32) -> [f32; 2];
+    fn min_max(self, row: &F32x16, lanes: u32) -> [f32; 2];
 
     /// Reciprocal of every lane. A plain loop may be compiled to divisions of lane pairs.
-    fn reciprocals(self, row: &Lanes) -> Lanes;
+    fn reciprocals(self, row: &F32x16) -> F32x16;
 
     /// `a · b + c`, rounded once if the processor has a fused multiply-add and twice otherwise. Only for
     /// bounds and initial guesses, where the last bits do not matter.
-    fn about(self, a: f32, b: f32, c: f32) -> f32;
+    fn mul_add_relaxed(self, a: f32, b: f32, c: f32) -> f32;
 
     /// Runs a kernel in a function of its own that all callers share. Use it if the call overhead is small
     /// compared with the kernel and inlined copies would bloat the binary.
-    fn call<L: Loops>(self, work: L) -> L::Done;
+    fn call<L: SimdKernel>(self, work: L) -> L::Output;
 }
 
 /// Reduces 16 numbers pairwise by halves, which compiles to vector instructions.
 #[macro_export]
-macro_rules! folded {
+macro_rules! reduce {
     ($row:expr, $better:tt) => {{
         let mut row = $row;
         for i in 0..8 {
@@ -83,15 +83,15 @@ macro_rules! folded {
 
 /// Portable implementation, for every processor.
 #[derive(Clone, Copy)]
-pub struct PlainFolds;
+pub struct PortableSimd;
 
-impl Folds for PlainFolds {
+impl Simd for PortableSimd {
     /// Reduces by halves. Compilers turn sums of single bits into a test of each lane in sequence;
     /// `black_box` makes them finish the vector first.
     #[inline(always)]
-    fn bits(self, holds: &Truths) -> u32 {
-        let mut row = std::hint::black_box(*holds);
-        for i in 0..LANES {
+    fn movemask(self, mask: &Mask) -> u32 {
+        let mut row = std::hint::black_box(*mask);
+        for i in 0..PACKET_SIZE {
             row[i] &= 1 << i;
         }
         for i in 0..8 {
@@ -107,57 +107,57 @@ impl Folds for PlainFolds {
     }
 
     #[inline(always)]
-    fn span(self, row: &Lanes, of: u32) -> [f32; 2] {
-        let (holds, other) = (truths(of), row[of.trailing_zeros() as usize % LANES]);
-        let mut all = [other; LANES];
-        take(&holds, row, &mut all);
-        [folded!(all, <), folded!(all, >)]
+    fn min_max(self, row: &F32x16, lanes: u32) -> [f32; 2] {
+        let (mask, other) = (mask_from_bits(lanes), row[lanes.trailing_zeros() as usize % PACKET_SIZE]);
+        let mut all = [other; PACKET_SIZE];
+        select(&mask, row, &mut all);
+        [reduce!(all, <), reduce!(all, >)]
     }
 
     #[inline(always)]
-    fn reciprocals(self, row: &Lanes) -> Lanes {
-        let mut inverse = [0.0; LANES];
-        for i in 0..LANES {
+    fn reciprocals(self, row: &F32x16) -> F32x16 {
+        let mut inverse = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             inverse[i] = 1.0 / row[i];
         }
         inverse
     }
 
     #[inline(always)]
-    fn about(self, a: f32, b: f32, c: f32) -> f32 {
+    fn mul_add_relaxed(self, a: f32, b: f32, c: f32) -> f32 {
         a * b + c
     }
 
     #[inline(never)]
-    fn call<L: Loops>(self, work: L) -> L::Done {
+    fn call<L: SimdKernel>(self, work: L) -> L::Output {
         work.run(self)
     }
 }
 
 /// Expands bits into a mask.
 #[inline(always)]
-pub fn truths(bits: u32) -> Truths {
-    let mut holds = [0; LANES];
-    for i in 0..LANES {
-        holds[i] = if bits & 1 << i != 0 { TRUE } else { 0 };
+pub fn mask_from_bits(bits: u32) -> Mask {
+    let mut mask = [0; PACKET_SIZE];
+    for i in 0..PACKET_SIZE {
+        mask[i] = if bits & 1 << i != 0 { TRUE } else { 0 };
     }
-    holds
+    mask
 }
 
-/// Replaces the lanes of `own` selected by the mask with those of `new`. Uses bit operations, as compilers
+/// Replaces the lanes of `target` selected by the mask with those of `new`. Uses bit operations, as compilers
 /// may turn `if` and `else` into a per-lane choice between memory addresses.
 #[inline(always)]
-pub fn take(holds: &Truths, new: &Lanes, own: &mut Lanes) {
-    for i in 0..LANES {
-        own[i] = f32::from_bits(new[i].to_bits() & holds[i] | own[i].to_bits() & !holds[i]);
+pub fn select(mask: &Mask, new: &F32x16, target: &mut F32x16) {
+    for i in 0..PACKET_SIZE {
+        target[i] = f32::from_bits(new[i].to_bits() & mask[i] | target[i].to_bits() & !mask[i]);
     }
 }
 
-/// [`take`] for integers.
+/// [`select`] for integers.
 #[inline(always)]
-pub fn take_u32(holds: &Truths, new: &[u32; LANES], own: &mut [u32; LANES]) {
-    for i in 0..LANES {
-        own[i] = new[i] & holds[i] | own[i] & !holds[i];
+pub fn select_u32(mask: &Mask, new: &[u32; PACKET_SIZE], target: &mut [u32; PACKET_SIZE]) {
+    for i in 0..PACKET_SIZE {
+        target[i] = new[i] & mask[i] | target[i] & !mask[i];
     }
 }
 
@@ -167,15 +167,15 @@ mod tests {
 
     #[test]
     fn masks_select_their_lanes() {
-        for expected in 0..1_u32 << LANES {
-            let holds = std::array::from_fn(|i| if expected >> i & 1 == 1 { TRUE } else { 0 });
-            assert_eq!(PlainFolds.bits(&holds), expected);
-            assert_eq!(truths(expected), holds);
-            let (mut own, mut whole) = ([1.0; LANES], [1; LANES]);
-            take(&holds, &[f32::NAN; LANES], &mut own);
-            take_u32(&holds, &[7; LANES], &mut whole);
-            for (i, hold) in holds.iter().enumerate() {
-                assert_eq!((own[i].is_nan(), whole[i] == 7), (*hold == TRUE, *hold == TRUE));
+        for expected in 0..1_u32 << PACKET_SIZE {
+            let mask = std::array::from_fn(|i| if expected >> i & 1 == 1 { TRUE } else { 0 });
+            assert_eq!(PortableSimd.movemask(&mask), expected);
+            assert_eq!(mask_from_bits(expected), mask);
+            let (mut target, mut whole) = ([1.0; PACKET_SIZE], [1; PACKET_SIZE]);
+            select(&mask, &[f32::NAN; PACKET_SIZE], &mut target);
+            select_u32(&mask, &[7; PACKET_SIZE], &mut whole);
+            for (i, hold) in mask.iter().enumerate() {
+                assert_eq!((target[i].is_nan(), whole[i] == 7), (*hold == TRUE, *hold == TRUE));
             }
         }
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::check::count;
 use super::console::Console;
 use super::exit::Exit;
-use crate::accel::wide_bvh::Instructions;
+use crate::accel::wide_bvh::InstructionSet;
 use crate::bench::cache;
 use crate::tui::{self, Answers, ColorDepth, Probe, probe};
 
@@ -31,11 +31,11 @@ fn variable(name: &str) -> Option<String> {
 
 fn processor() -> String {
     let words = |instructions| match instructions {
-        Instructions::Portable => "no vector instructions that glimt uses",
-        Instructions::Avx2 => "AVX2",
-        Instructions::Avx512 => "AVX-512",
+        InstructionSet::Portable => "no vector instructions that glimt uses",
+        InstructionSet::Avx2 => "AVX2",
+        InstructionSet::Avx512 => "AVX-512",
     };
-    let (used, best) = (Instructions::best(), Instructions::Avx512.available());
+    let (used, best) = (InstructionSet::best(), InstructionSet::Avx512.available());
     match variable("GLIMT_SIMD") {
         Some(asked) => format!("{} by GLIMT_SIMD={asked}; it has {}", words(used), words(best)),
         None => words(used).to_owned(),

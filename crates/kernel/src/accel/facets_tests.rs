@@ -1,30 +1,30 @@
 //! Tests of facets: decided packet results must match single rays on every instruction set.
 
-use super::{Instructions, Loops};
+use super::{InstructionSet, SimdKernel};
 use crate::geometry::facets::Facets;
-use crate::geometry::rows::{HitRows, PACKET, RayRows};
+use crate::geometry::rows::{HitRows, PACKET_SIZE, RayRows};
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
-use crate::math::lanes::Folds;
+use crate::math::lanes::Simd;
 use crate::math::random::signed;
 
 /// Nearest hits, undecided rays, rays that hit any triangle but their own, and undecided ones among those.
 struct FacetQueries<'a> {
     facets: &'a Facets,
     rays: &'a [Ray],
-    except: &'a [u32; PACKET],
+    except: &'a [u32; PACKET_SIZE],
 }
 
-impl Loops for FacetQueries<'_> {
-    type Done = (HitRows, [u32; 3]);
+impl SimdKernel for FacetQueries<'_> {
+    type Output = (HitRows, [u32; 3]);
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Self::Done {
+    fn run(self, simd: impl Simd) -> Self::Output {
         let (rows, ends) = RayRows::new(self.rays);
         let (met, mut found) = (((1_u64 << self.rays.len()) - 1) as u32, HitRows::none());
-        let open = self.facets.closest(&rows, (met, &ends), &mut found, folds);
-        let [any, open_any] = self.facets.any(&rows, (met, &ends), self.except, folds);
+        let open = self.facets.closest(&rows, (met, &ends), &mut found, simd);
+        let [any, open_any] = self.facets.any(&rows, (met, &ends), self.except, simd);
         (found, [open, any, open_any])
     }
 }
@@ -114,10 +114,10 @@ fn decided_packets_match_single_rays() {
                 _ => Ray::new(start, on(&triangles[from], next) - start),
             }
         };
-        let rays: Vec<Ray> = (0..=round / 7 % PACKET).map(|_| ray(&mut next)).collect();
-        let except: [u32; PACKET] =
+        let rays: Vec<Ray> = (0..=round / 7 % PACKET_SIZE).map(|_| ray(&mut next)).collect();
+        let except: [u32; PACKET_SIZE] =
             std::array::from_fn(|i| if i % 3 == 0 { any(&mut next) as u32 } else { u32::MAX });
-        for instructions in Instructions::ALL {
+        for instructions in InstructionSet::ALL {
             let (found, [open, hits_any, open_any]) =
                 instructions.run(FacetQueries { facets: &facets, rays: &rays, except: &except });
             for (i, ray) in rays.iter().enumerate() {
@@ -152,11 +152,11 @@ fn nan_rays_are_undecided() {
             Ray::new(Vec3::new(a, 0.1, 0.0), Vec3::new(0.3, b, 0.2)),
             Ray::new(Vec3::splat(0.1), Vec3::new(a, b, a)),
         ] {
-            for instructions in Instructions::ALL {
+            for instructions in InstructionSet::ALL {
                 let (found, [open, any, open_any]) = instructions.run(FacetQueries {
                     facets: &facets,
                     rays: &[ray],
-                    except: &[u32::MAX; PACKET],
+                    except: &[u32::MAX; PACKET_SIZE],
                 });
                 let own = alone(&walls(Vec3::splat(-1.0), Vec3::ONE), &ray, u32::MAX);
                 assert!(open & 1 == 1 || found.get(0) == own, "{ray:?}");

@@ -19,14 +19,14 @@ mod watertight_rows_tests;
 pub use along::{Cell, Stretch};
 pub use bvh::{AnyTest, Bvh, ClosestTest};
 pub use kd_tree::KdTree;
-pub use wide_bvh::{Instructions, Loops, WideBvh};
+pub use wide_bvh::{InstructionSet, SimdKernel, WideBvh};
 
-pub use crate::geometry::rows::{Ends, PACKET};
+pub use crate::geometry::rows::{F32x16, PACKET_SIZE};
 
-/// Ends of at most [`PACKET`] rays.
+/// Ends of at most [`PACKET_SIZE`] rays.
 #[inline(always)]
-pub fn ends(rays: &[crate::geometry::Ray]) -> Ends {
-    let mut ends = [-1.0; PACKET];
+pub fn ends(rays: &[crate::geometry::Ray]) -> F32x16 {
+    let mut ends = [-1.0; PACKET_SIZE];
     for (end, ray) in ends.iter_mut().zip(rays) {
         *end = ray.t_max;
     }

@@ -1,12 +1,12 @@
 //! Tests of packet triangle intersection on every instruction set.
 
-use super::{Instructions, Loops};
-use crate::geometry::rows::{HitRows, PACKET, RayRows};
+use super::{InstructionSet, SimdKernel};
+use crate::geometry::rows::{HitRows, PACKET_SIZE, RayRows};
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::watertight_rows::ShearedRows;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
-use crate::math::lanes::Folds;
+use crate::math::lanes::Simd;
 use crate::math::random::signed;
 
 struct Tested<'a> {
@@ -14,17 +14,17 @@ struct Tested<'a> {
     triangles: &'a [[Vec3; 3]],
 }
 
-impl Loops for Tested<'_> {
-    type Done = (HitRows, u32);
+impl SimdKernel for Tested<'_> {
+    type Output = (HitRows, u32);
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> (HitRows, u32) {
+    fn run(self, simd: impl Simd) -> (HitRows, u32) {
         let (rows, ends) = RayRows::new(self.rays);
         let (rays, mut found, mut any) = (ShearedRows::new(&rows), HitRows::none(), 0);
         let (met, mut nearest) = ((1 << self.rays.len()) - 1, ends);
         for (number, corners) in (0..).zip(self.triangles) {
-            any |= rays.any((number, corners), met, &ends, folds);
-            rays.closest((number, corners), (met, &mut nearest), &mut found, folds);
+            any |= rays.any((number, corners), met, &ends, simd);
+            rays.closest((number, corners), (met, &mut nearest), &mut found, simd);
         }
         (found, any)
     }
@@ -55,7 +55,7 @@ fn packets_have_the_bits_of_single_rays() {
             let start = [Ray::NO_TRIANGLE, round as u32 / 2 % 8][round % 2];
             Ray { t_max, start, ..Ray::new(origin, target + aside - origin) }
         };
-        let rays: Vec<Ray> = (0..=round % PACKET).map(|_| ray(&mut next)).collect();
+        let rays: Vec<Ray> = (0..=round % PACKET_SIZE).map(|_| ray(&mut next)).collect();
         let alone: Vec<_> = rays
             .iter()
             .map(|ray| {
@@ -70,7 +70,7 @@ fn packets_have_the_bits_of_single_rays() {
                 best
             })
             .collect();
-        for instructions in Instructions::ALL {
+        for instructions in InstructionSet::ALL {
             let (found, any) = instructions.run(Tested { rays: &rays, triangles: &triangles });
             for (i, alone) in alone.iter().enumerate() {
                 assert_eq!(found.get(i), *alone, "{instructions:?}: {:?} {triangles:?}", rays[i]);

@@ -1,6 +1,6 @@
 //! Oriented boxes in double precision.
 
-use super::rows::{Ends, HitRows, RayRows, accept};
+use super::rows::{F32x16, HitRows, RayRows, accept};
 use super::surface::flat_axes;
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
@@ -56,7 +56,7 @@ impl Cuboid {
 
     /// [`Cuboid::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows) {
         let axes = [self.axes.x_axis, self.axes.y_axis, self.axes.z_axis];
         let half = self.half.to_array();
         for (lane, &end) in ends.iter().enumerate() {

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use super::axial::{AxialFrame, exact_t, hit};
 use super::local_form::{Extent, Ground, LocalForm};
-use super::rows::{Ends, HitRows, RayRows, accept};
+use super::rows::{F32x16, HitRows, RayRows, accept};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -41,7 +41,7 @@ impl Disk {
 
     /// [`Disk::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows) {
         let radius = self.radius * (1.0 + BORDER);
         for (lane, &end) in ends.iter().enumerate() {
             let line = self.frame.line(&rays.line(lane));

@@ -26,10 +26,10 @@
 //! - A ray that stays farther from a plane than the first two bounds, times |n·d|, certainly misses, however
 //!   grazing it is.
 
-use super::rows::{Ends, HitRows, PACKET, RayRows, Row};
+use super::rows::{F32x16, HitRows, PACKET_SIZE, RayRows};
 use super::watertight_rows::ShearedRows;
 use crate::math::float::UNIT_ROUNDOFF;
-use crate::math::lanes::{Folds, TRUE, Truths, set_lane, take, take_u32};
+use crate::math::lanes::{Mask, Simd, TRUE, select, select_u32, set_lane};
 use crate::math::{DVec3, Vec3};
 
 /// Maximum number of triangles.
@@ -95,27 +95,27 @@ pub struct Facets {
 /// Nearest candidates of the rays of a packet.
 struct Candidates {
     /// Lower bound on t of the nearest candidate, or ∞.
-    near: Row,
+    near: F32x16,
     /// Triangle index of the nearest candidate.
-    number: [u32; PACKET],
+    number: [u32; PACKET_SIZE],
     /// Lower bound on t of the other candidates.
-    next: Row,
+    next: F32x16,
     /// Rays whose candidates are unknown.
-    doubtful: Truths,
+    doubtful: Mask,
 }
 
 /// Error terms of a packet.
 struct Errors {
     /// [`PLANE`] term of each ray.
-    plane: Row,
+    plane: F32x16,
     /// R.
-    far: Row,
+    far: F32x16,
     /// [`PLANE`] and [`ACROSS`] terms of each ray, without the factors for its length and D/(2A).
-    across: Row,
+    across: F32x16,
     /// Bound on the length of the direction.
-    length: Row,
+    length: F32x16,
     /// Bound on t of a hit on any triangle.
-    end: Row,
+    end: F32x16,
 }
 
 impl Facets {
@@ -162,16 +162,16 @@ impl Facets {
     pub fn closest(
         &self,
         rays: &RayRows,
-        (met, ends): (u32, &Ends),
+        (met, ends): (u32, &F32x16),
         found: &mut HitRows,
-        folds: impl Folds,
+        simd: impl Simd,
     ) -> u32 {
-        let candidates = self.candidates(rays, ends, &[NONE; PACKET], folds);
-        let Tested { hit, undecided, hits } = self.test(rays, &candidates, (met, ends), folds);
-        take(&hit, &hits.t, &mut found.t);
-        take(&hit, &hits.u, &mut found.u);
-        take(&hit, &hits.v, &mut found.v);
-        take_u32(&hit, &candidates.number, &mut found.primitive);
+        let candidates = self.candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
+        let Tested { hit, undecided, hits } = self.test(rays, &candidates, (met, ends), simd);
+        select(&hit, &hits.t, &mut found.t);
+        select(&hit, &hits.u, &mut found.u);
+        select(&hit, &hits.v, &mut found.v);
+        select_u32(&hit, &candidates.number, &mut found.primitive);
         undecided
     }
 
@@ -181,20 +181,20 @@ impl Facets {
     pub fn any(
         &self,
         rays: &RayRows,
-        (met, ends): (u32, &Ends),
-        except: &[u32; PACKET],
-        folds: impl Folds,
+        (met, ends): (u32, &F32x16),
+        except: &[u32; PACKET_SIZE],
+        simd: impl Simd,
     ) -> [u32; 2] {
-        let candidates = self.candidates(rays, ends, except, folds);
+        let candidates = self.candidates(rays, ends, except, simd);
         let mut is_met = candidates.doubtful;
-        for i in 0..PACKET {
+        for i in 0..PACKET_SIZE {
             is_met[i] |= if candidates.near[i] < f32::INFINITY { TRUE } else { 0 };
         }
-        if folds.bits(&is_met) & met == 0 {
+        if simd.movemask(&is_met) & met == 0 {
             return [0; 2];
         }
-        let Tested { hit, undecided, .. } = self.test(rays, &candidates, (met, ends), folds);
-        [folds.bits(&hit) & met, undecided]
+        let Tested { hit, undecided, .. } = self.test(rays, &candidates, (met, ends), simd);
+        [simd.movemask(&hit) & met, undecided]
     }
 
     /// Finds the nearest candidates, excluding the triangle on which a ray starts and its triangle in
@@ -203,16 +203,16 @@ impl Facets {
     fn candidates(
         &self,
         rays: &RayRows,
-        ends: &Ends,
-        except: &[u32; PACKET],
-        folds: impl Folds,
+        ends: &F32x16,
+        except: &[u32; PACKET_SIZE],
+        simd: impl Simd,
     ) -> Candidates {
         let Errors { plane, far, across, length, end } = self.errors(rays);
         let mut found = Candidates {
-            near: [f32::INFINITY; PACKET],
-            number: [0; PACKET],
-            next: [f32::INFINITY; PACKET],
-            doubtful: [0; PACKET],
+            near: [f32::INFINITY; PACKET_SIZE],
+            number: [0; PACKET_SIZE],
+            next: [f32::INFINITY; PACKET_SIZE],
+            doubtful: [0; PACKET_SIZE],
         };
         let [ox, oy, oz] = &rays.origin;
         let [dx, dy, dz] = &rays.direction;
@@ -222,34 +222,46 @@ impl Facets {
             // Select with bit operations, as compilers would select between two addresses lane by lane.
             let [one, other] = facet.numbers;
             let between = one ^ other;
-            for i in 0..PACKET {
+            for i in 0..PACKET_SIZE {
                 // Intersect the plane.
-                let above = folds.about(-normal.x, ox[i], offset);
-                let above = folds.about(-normal.y, oy[i], above);
-                let above = folds.about(-normal.z, oz[i], above);
-                let falls = folds.about(normal.x, dx[i], folds.about(normal.y, dy[i], normal.z * dz[i]));
+                let above = simd.mul_add_relaxed(-normal.x, ox[i], offset);
+                let above = simd.mul_add_relaxed(-normal.y, oy[i], above);
+                let above = simd.mul_add_relaxed(-normal.z, oz[i], above);
+                let falls = simd.mul_add_relaxed(
+                    normal.x,
+                    dx[i],
+                    simd.mul_add_relaxed(normal.y, dy[i], normal.z * dz[i]),
+                );
                 let inverse = 1.0 / falls;
                 let t = above * inverse;
-                let x = folds.about(dx[i], t, ox[i]);
-                let y = folds.about(dy[i], t, oy[i]);
-                let z = folds.about(dz[i], t, oz[i]);
-                let u = folds.about(first.x, x, folds.about(first.y, y, folds.about(first.z, z, start[0])));
-                let v =
-                    folds.about(second.x, x, folds.about(second.y, y, folds.about(second.z, z, start[1])));
+                let x = simd.mul_add_relaxed(dx[i], t, ox[i]);
+                let y = simd.mul_add_relaxed(dy[i], t, oy[i]);
+                let z = simd.mul_add_relaxed(dz[i], t, oz[i]);
+                let u = simd.mul_add_relaxed(
+                    first.x,
+                    x,
+                    simd.mul_add_relaxed(first.y, y, simd.mul_add_relaxed(first.z, z, start[0])),
+                );
+                let v = simd.mul_add_relaxed(
+                    second.x,
+                    x,
+                    simd.mul_add_relaxed(second.y, y, simd.mul_add_relaxed(second.z, z, start[1])),
+                );
                 // Bound the errors.
                 let size = inverse.abs();
-                let distance = folds.about(far[i], folds.about(far[i], along[0], along[1]), plane[i]);
+                let distance =
+                    simd.mul_add_relaxed(far[i], simd.mul_add_relaxed(far[i], along[0], along[1]), plane[i]);
                 let error = distance * size;
-                let margin = slender * folds.about(size * length[i], across[i], plane[i]);
+                let margin = slender * simd.mul_add_relaxed(size * length[i], across[i], plane[i]);
                 // A facet that the ray may hit is a candidate, even if a bound is NaN.
                 let least = t - error;
                 let over = u + v - diagonal;
                 let is_outside = (u.abs() > half[0] + margin)
                     | (v.abs() > half[1] + margin)
-                    | (over > folds.about(2.0, margin, beyond))
+                    | (over > simd.mul_add_relaxed(2.0, margin, beyond))
                     | (t + error < 0.0)
                     | (least > ends[i]);
-                let is_far = above.abs() > folds.about(falls.abs(), end[i], distance);
+                let is_far = above.abs() > simd.mul_add_relaxed(falls.abs(), end[i], distance);
                 let is_sharp = margin < BLUNT;
                 // Decide which of the two triangles is hit.
                 let number = other ^ (between & if over < 0.0 { TRUE } else { 0 });
@@ -276,11 +288,11 @@ impl Facets {
         &self,
         rays: &RayRows,
         candidates: &Candidates,
-        (met, ends): (u32, &Ends),
-        folds: impl Folds,
+        (met, ends): (u32, &F32x16),
+        simd: impl Simd,
     ) -> Tested {
-        let mut corners = [[[0.0; PACKET]; 3]; 3];
-        for i in 0..PACKET {
+        let mut corners = [[[0.0; PACKET_SIZE]; 3]; 3];
+        for i in 0..PACKET_SIZE {
             let own = &self.corners[candidates.number[i] as usize];
             for corner in 0..3 {
                 set_lane(&mut corners[corner], i, own[corner]);
@@ -288,8 +300,8 @@ impl Facets {
         }
         let [a, b, c] = &corners;
         let hits = ShearedRows::new(rays).hits(&candidates.number, [a, b, c], ends);
-        let (mut hit, mut undecided) = ([0; PACKET], [0; PACKET]);
-        for i in 0..PACKET {
+        let (mut hit, mut undecided) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let is_any = candidates.near[i] < f32::INFINITY;
             let is_hit = (hits.hit[i] != 0) & is_any & (candidates.doubtful[i] == 0);
             let is_nearest = is_hit & (hits.t[i] < candidates.next[i]);
@@ -299,15 +311,15 @@ impl Facets {
             hit[i] = if is_nearest { TRUE } else { 0 };
             undecided[i] = if is_open | (candidates.doubtful[i] != 0) { TRUE } else { 0 };
         }
-        Tested { hit, undecided: folds.bits(&undecided) & met, hits }
+        Tested { hit, undecided: simd.movemask(&undecided) & met, hits }
     }
 
     /// Computes the error terms of the rays.
     #[inline(always)]
     fn errors(&self, rays: &RayRows) -> Errors {
-        let none = [0.0; PACKET];
+        let none = [0.0; PACKET_SIZE];
         let mut errors = Errors { plane: none, far: none, across: none, length: none, end: none };
-        for i in 0..PACKET {
+        for i in 0..PACKET_SIZE {
             let (mut most, mut far, mut length) = (0.0, 0.0, 0.0);
             for axis in 0..3 {
                 let (at, low, high) = (rays.origin[axis][i], self.low[axis], self.high[axis]);
@@ -337,7 +349,7 @@ impl Facets {
 /// Results of the watertight tests of candidates.
 struct Tested {
     /// Rays that certainly hit their candidate before all others.
-    hit: Truths,
+    hit: Mask,
     /// Bits of the undecided rays.
     undecided: u32,
     hits: super::watertight_rows::Hits,

@@ -29,7 +29,7 @@ pub use local_form::LocalForm;
 pub use ray::{Ray, RayF64};
 pub use surface::{AreaPoint, ShapeHit, SurfacePoint, SurfaceRequest};
 
-use crate::math::lanes::Folds;
+use crate::math::lanes::Simd;
 use crate::math::{DVec2, DVec3, Vec2};
 use cone::Cone;
 use cuboid::Cuboid;
@@ -38,7 +38,7 @@ use disk::Disk;
 use local_form::{Piece, parallelogram};
 use parallelogram::Parallelogram;
 use plane::Plane;
-use rows::{Ends, HitRows, RayRows};
+use rows::{F32x16, HitRows, RayRows};
 use sphere::Sphere;
 use surface_rows::{Exact as _, SurfaceRow};
 use torus::Torus;
@@ -98,14 +98,14 @@ impl Shape {
         &self,
         rows: &RayRows,
         met: u32,
-        ends: &Ends,
+        ends: &F32x16,
         found: &mut HitRows,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
         match self {
-            Self::Plane(plane) => plane.intersect_rows(rows, ends, found, folds),
-            Self::Quad(quad) => quad.intersect_rows(rows, ends, found, folds),
-            Self::Sphere(sphere) => sphere.intersect_rows(rows, ends, found, folds),
+            Self::Plane(plane) => plane.intersect_rows(rows, ends, found, simd),
+            Self::Quad(quad) => quad.intersect_rows(rows, ends, found, simd),
+            Self::Sphere(sphere) => sphere.intersect_rows(rows, ends, found, simd),
             Self::Box(cuboid) => cuboid.intersect_rows(rows, ends, found),
             Self::Triangle(triangle) => triangle.intersect_rows(rows, ends, found),
             Self::Disk(disk) => disk.intersect_rows(rows, ends, found),
@@ -114,7 +114,7 @@ impl Shape {
     }
 
     #[inline(never)]
-    fn one_by_one(&self, rays: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
+    fn one_by_one(&self, rays: &RayRows, met: u32, ends: &F32x16, found: &mut HitRows) {
         for lane in rows::lanes(met) {
             if let Some(hit) = self.intersect(&Ray { t_max: ends[lane], ..rays.ray(lane) }.to_f64()) {
                 found.put(lane, &hit);

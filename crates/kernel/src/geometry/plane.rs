@@ -1,11 +1,11 @@
 //! Infinite planes in double precision.
 
 use super::local_form::{Extent, Ground, LocalForm};
-use super::rows::{Ends, HitRows, PACKET, RayRows, accept, may_accept};
+use super::rows::{F32x16, HitRows, PACKET_SIZE, RayRows, accept, may_accept};
 use super::surface::flat_axes;
 use super::surface_rows::{Exact, ExactPoint, Mapped};
 use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
-use crate::math::lanes::{Folds, TRUE};
+use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// All points p with (p − point)·normal = 0.
@@ -35,18 +35,18 @@ impl Plane {
 
     /// [`Plane::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows, folds: impl Folds) {
-        let (mut above, mut along, mut may_hit) = ([0.0; PACKET], [0.0; PACKET], [0; PACKET]);
-        for lane in 0..PACKET {
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows, simd: impl Simd) {
+        let (mut above, mut along, mut may_hit) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [0; PACKET_SIZE]);
+        for lane in 0..PACKET_SIZE {
             let ray = rays.line(lane);
             above[lane] = self.normal.dot(self.point - ray.origin);
             along[lane] = self.normal.dot(ray.direction);
             may_hit[lane] = if may_accept(above[lane], along[lane], ends[lane]) { TRUE } else { 0 };
         }
-        if folds.bits(&may_hit) == 0 {
+        if simd.movemask(&may_hit) == 0 {
             return;
         }
-        for lane in 0..PACKET {
+        for lane in 0..PACKET_SIZE {
             let t = above[lane] / along[lane];
             let accepted = accept(t, ends[lane]);
             hits.t[lane] = if t < f64::from(f32::MAX) { accepted } else { f32::NAN };

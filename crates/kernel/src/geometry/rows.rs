@@ -2,27 +2,18 @@
 //! vectorize. Every lane gets the same bits as the scalar test of its ray.
 
 use super::{Ray, RayF64, ShapeHit};
-use crate::math::lanes::{Folds, LANES, TRUE};
+pub use crate::math::lanes::{F32x16, PACKET_SIZE};
+use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec3, Vec3};
-
-/// Number of rays in a packet.
-pub const PACKET: usize = LANES;
-
-/// One number per ray of a packet.
-pub type Row = [f32; PACKET];
-
-/// Upper end of each ray of a packet, in place of its `t_max`; negative for lanes without a ray or with a ray
-/// that is not traced.
-pub type Ends = Row;
 
 /// Bits of the lanes with a nonnegative end.
 #[inline(always)]
-pub fn traced(ends: &Ends, folds: impl Folds) -> u32 {
-    let mut traced = [0; PACKET];
-    for lane in 0..PACKET {
+pub fn traced(ends: &F32x16, simd: impl Simd) -> u32 {
+    let mut traced = [0; PACKET_SIZE];
+    for lane in 0..PACKET_SIZE {
         traced[lane] = if ends[lane] >= 0.0 { TRUE } else { 0 };
     }
-    folds.bits(&traced)
+    simd.movemask(&traced)
 }
 
 /// Indices of the set bits.
@@ -40,40 +31,40 @@ pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
 #[derive(Clone, Debug)]
 pub struct RayRows {
     /// Coordinates of the origins.
-    pub origin: [Row; 3],
+    pub origin: [F32x16; 3],
     /// Coordinates of the directions.
-    pub direction: [Row; 3],
+    pub direction: [F32x16; 3],
     /// [`Ray::start`] of each ray.
-    pub start: [u32; PACKET],
+    pub start: [u32; PACKET_SIZE],
 }
 
 impl RayRows {
     /// Creates a packet of rays that do not start on triangles.
     #[inline(always)]
-    pub fn of(origin: [Row; 3], direction: [Row; 3]) -> Self {
-        Self { origin, direction, start: [Ray::NO_TRIANGLE; PACKET] }
+    pub fn of(origin: [F32x16; 3], direction: [F32x16; 3]) -> Self {
+        Self { origin, direction, start: [Ray::NO_TRIANGLE; PACKET_SIZE] }
     }
 
     /// Sets the triangles on which the rays start.
     #[inline(always)]
-    pub fn leaving(self, start: [u32; PACKET]) -> Self {
+    pub fn leaving(self, start: [u32; PACKET_SIZE]) -> Self {
         Self { start, ..self }
     }
 
     /// Returns the ray in a lane, without an end.
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> Ray {
-        let of = |rows: &[Row; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
+        let of = |rows: &[F32x16; 3]| Vec3::new(rows[0][lane], rows[1][lane], rows[2][lane]);
         Ray::new(of(&self.origin), of(&self.direction)).leaving(self.start[lane])
     }
 
-    /// Packs up to [`PACKET`] rays and their ends.
+    /// Packs up to [`PACKET_SIZE`] rays and their ends.
     #[inline(always)]
-    pub fn new(rays: &[Ray]) -> (Self, Ends) {
-        let mut rows = Self::of([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
-        let mut ends = [-1.0; PACKET];
+    pub fn new(rays: &[Ray]) -> (Self, F32x16) {
+        let mut rows = Self::of([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
+        let mut ends = [-1.0; PACKET_SIZE];
         // Compile full packets separately, as the known length makes their loop faster.
-        match <&[Ray; PACKET]>::try_from(rays) {
+        match <&[Ray; PACKET_SIZE]>::try_from(rays) {
             Ok(full) => rows.fill(&mut ends, full),
             Err(_) => rows.fill(&mut ends, rays),
         }
@@ -81,8 +72,8 @@ impl RayRows {
     }
 
     #[inline(always)]
-    fn fill(&mut self, ends: &mut Ends, rays: &[Ray]) {
-        for (lane, ray) in rays.iter().enumerate().take(PACKET) {
+    fn fill(&mut self, ends: &mut F32x16, rays: &[Ray]) {
+        for (lane, ray) in rays.iter().enumerate().take(PACKET_SIZE) {
             for axis in 0..3 {
                 self.origin[axis][lane] = ray.origin[axis];
                 self.direction[axis][lane] = ray.direction[axis];
@@ -109,30 +100,35 @@ impl RayRows {
 #[derive(Clone, Debug)]
 pub struct HitRows {
     /// [`ShapeHit::t`], or NaN for a ray without a hit.
-    pub t: Row,
+    pub t: F32x16,
     /// [`ShapeHit::primitive`].
-    pub primitive: [u32; PACKET],
+    pub primitive: [u32; PACKET_SIZE],
     /// [`ShapeHit::u`].
-    pub u: Row,
+    pub u: F32x16,
     /// [`ShapeHit::v`].
-    pub v: Row,
+    pub v: F32x16,
 }
 
 impl HitRows {
     /// Hits for a packet in which no ray hits.
     #[inline(always)]
     pub fn none() -> Self {
-        Self { t: [f32::NAN; PACKET], primitive: [0; PACKET], u: [0.0; PACKET], v: [0.0; PACKET] }
+        Self {
+            t: [f32::NAN; PACKET_SIZE],
+            primitive: [0; PACKET_SIZE],
+            u: [0.0; PACKET_SIZE],
+            v: [0.0; PACKET_SIZE],
+        }
     }
 
     /// Bits of the rays with a hit.
     #[inline(always)]
-    pub fn any(&self, folds: impl Folds) -> u32 {
-        let mut any = [0; PACKET];
-        for lane in 0..PACKET {
+    pub fn any(&self, simd: impl Simd) -> u32 {
+        let mut any = [0; PACKET_SIZE];
+        for lane in 0..PACKET_SIZE {
             any[lane] = if self.t[lane].is_nan() { 0 } else { TRUE };
         }
-        folds.bits(&any)
+        simd.movemask(&any)
     }
 
     /// Stores a hit.

@@ -3,10 +3,10 @@
 use std::f64::consts::PI;
 
 use super::local_form::{Extent, Ground, LocalForm};
-use super::rows::{Ends, HitRows, PACKET, RayRows, accept};
+use super::rows::{F32x16, HitRows, PACKET_SIZE, RayRows, accept};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
-use crate::math::lanes::{Folds, TRUE};
+use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// All points at one distance from a center; the front is outside.
@@ -41,9 +41,9 @@ impl Sphere {
 
     /// [`Sphere::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows, folds: impl Folds) {
-        let (mut discriminants, mut may_hit) = ([0.0; PACKET], [0; PACKET]);
-        for lane in 0..PACKET {
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows, simd: impl Simd) {
+        let (mut discriminants, mut may_hit) = ([0.0; PACKET_SIZE], [0; PACKET_SIZE]);
+        for lane in 0..PACKET_SIZE {
             let ray = rays.line(lane);
             let to_origin = ray.origin - self.center;
             let a = ray.direction.length_squared();
@@ -52,10 +52,10 @@ impl Sphere {
             discriminants[lane] = self.radius * self.radius - foot.length_squared();
             may_hit[lane] = if (discriminants[lane] >= 0.0) & (ends[lane] >= 0.0) { TRUE } else { 0 };
         }
-        if folds.bits(&may_hit) == 0 {
+        if simd.movemask(&may_hit) == 0 {
             return;
         }
-        for lane in 0..PACKET {
+        for lane in 0..PACKET_SIZE {
             let ray = rays.line(lane);
             let to_origin = ray.origin - self.center;
             let a = ray.direction.length_squared();

@@ -1,28 +1,28 @@
 //! Packets of surface points, computed with SIMD loops for the most common shapes.
 
-use super::rows::{HitRows, PACKET, RayRows, lanes};
+use super::rows::{HitRows, PACKET_SIZE, RayRows, lanes};
 use super::surface::error;
 use super::{RayF64, Shape, ShapeHit, SurfacePoint};
-use crate::math::lanes::{Lanes3, set_lane, take, truths};
+use crate::math::lanes::{Vec3x16, mask_from_bits, select, set_lane};
 use crate::math::{DVec2, DVec3, Vec2};
 
 /// The parts of a packet of [`SurfacePoint`]s that lighting needs.
 #[derive(Clone, Debug)]
 pub struct SurfaceRow {
     /// Points in world coordinates.
-    pub point: Lanes3,
+    pub point: Vec3x16,
     /// Bounds on the errors of the points.
-    pub error: Lanes3,
+    pub error: Vec3x16,
     /// Unit geometric normals of the fronts.
-    pub normal: Lanes3,
+    pub normal: Vec3x16,
     /// Bits of the lanes whose shading normal and shadow point are set.
     pub smooth: u32,
     /// Unit interpolated normals on the same sides.
-    pub shading_normal: Lanes3,
+    pub shading_normal: Vec3x16,
     /// [`SurfacePoint::shadow_point`](super::SurfacePoint::shadow_point) of each lane.
-    pub shadow_point: Lanes3,
+    pub shadow_point: Vec3x16,
     /// Texture coordinates, if requested.
-    pub uv: [[f64; PACKET]; 2],
+    pub uv: [[f64; PACKET_SIZE]; 2],
 }
 
 /// A surface point before rounding to `f32`.
@@ -63,13 +63,13 @@ impl Default for SurfaceRow {
 impl SurfaceRow {
     /// A packet with all fields 0.
     pub const EMPTY: Self = Self {
-        point: [[0.0; PACKET]; 3],
-        error: [[0.0; PACKET]; 3],
-        normal: [[0.0; PACKET]; 3],
+        point: [[0.0; PACKET_SIZE]; 3],
+        error: [[0.0; PACKET_SIZE]; 3],
+        normal: [[0.0; PACKET_SIZE]; 3],
         smooth: 0,
-        shading_normal: [[0.0; PACKET]; 3],
-        shadow_point: [[0.0; PACKET]; 3],
-        uv: [[0.0; PACKET]; 2],
+        shading_normal: [[0.0; PACKET_SIZE]; 3],
+        shadow_point: [[0.0; PACKET_SIZE]; 3],
+        uv: [[0.0; PACKET_SIZE]; 2],
     };
 
     /// Computes the surface points of the hits selected by `of`, all on one shape. Returns false if the shape
@@ -95,7 +95,7 @@ impl SurfaceRow {
     /// [`SurfaceRow::fill_uv`] for a shape with a SIMD loop.
     #[inline(always)]
     pub(super) fn uv_from(&mut self, shape: &impl Mapped, rays: &RayRows, hits: &HitRows, of: u32) {
-        for lane in 0..PACKET {
+        for lane in 0..PACKET_SIZE {
             let uv = shape.uv(&rays.line(lane), &ShapeHit::at(hits.t[lane]));
             let is_own = of & 1 << lane != 0;
             self.uv[0][lane] = if is_own { uv.x } else { self.uv[0][lane] };
@@ -107,7 +107,7 @@ impl SurfaceRow {
     #[inline(always)]
     pub(super) fn fill_from(&mut self, shape: &impl Exact, rays: &RayRows, hits: &HitRows, of: u32) {
         let mut found = Self::EMPTY;
-        for lane in 0..PACKET {
+        for lane in 0..PACKET_SIZE {
             let hit = ShapeHit {
                 t: hits.t[lane],
                 primitive: hits.primitive[lane],
@@ -126,11 +126,11 @@ impl SurfaceRow {
     /// Copies the selected points, errors and normals from another packet.
     #[inline(always)]
     pub fn take(&mut self, of: u32, found: &Self) {
-        let of = truths(of);
+        let of = mask_from_bits(of);
         for axis in 0..3 {
-            take(&of, &found.point[axis], &mut self.point[axis]);
-            take(&of, &found.error[axis], &mut self.error[axis]);
-            take(&of, &found.normal[axis], &mut self.normal[axis]);
+            select(&of, &found.point[axis], &mut self.point[axis]);
+            select(&of, &found.error[axis], &mut self.error[axis]);
+            select(&of, &found.normal[axis], &mut self.normal[axis]);
         }
     }
 
@@ -138,10 +138,10 @@ impl SurfaceRow {
     #[inline(always)]
     pub fn take_smooth(&mut self, of: u32, found: &Self) {
         self.smooth |= of;
-        let of = truths(of);
+        let of = mask_from_bits(of);
         for axis in 0..3 {
-            take(&of, &found.shading_normal[axis], &mut self.shading_normal[axis]);
-            take(&of, &found.shadow_point[axis], &mut self.shadow_point[axis]);
+            select(&of, &found.shading_normal[axis], &mut self.shading_normal[axis]);
+            select(&of, &found.shadow_point[axis], &mut self.shadow_point[axis]);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Single triangles in double precision.
 
-use super::rows::{Ends, HitRows, RayRows, accept};
+use super::rows::{F32x16, HitRows, RayRows, accept};
 use super::surface_rows::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -39,7 +39,7 @@ impl Triangle {
 
     /// [`Triangle::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &Ends, hits: &mut HitRows) {
+    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows) {
         for (lane, &end) in ends.iter().enumerate() {
             let ray = rays.line(lane);
             let (a, b, c) = (self.a - ray.origin, self.b - ray.origin, self.c - ray.origin);

@@ -1,32 +1,32 @@
 //! Watertight intersection of mesh triangles with packets of rays in any directions. Performs the operations
 //! of [`ShearedRay::intersect`] in the same order, so the bits are equal.
 
-use super::rows::{Ends, HitRows, PACKET, RayRows, lanes};
+use super::rows::{F32x16, HitRows, PACKET_SIZE, RayRows, lanes};
 use super::watertight::{ILL_CONDITIONED, ShearedRay};
 use crate::math::Vec3;
 use crate::math::float::gamma;
-use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, Truths, take, take_u32};
+use crate::math::lanes::{Mask, Simd, TRUE, Vec3x16, select, select_u32};
 
 /// The rays of a packet, prepared for some triangles.
 pub struct ShearedRows<'a> {
     rays: &'a RayRows,
     /// Whether the longest axis of a ray is x, and whether it is y.
-    longest: [Truths; 2],
+    longest: [Mask; 2],
     /// Whether a ray points down its longest axis. The scalar test swaps the other axes, which only negates
     /// the edge functions.
-    is_down: Truths,
+    is_down: Mask,
     /// Shears of the axes following the longest one.
-    shear: Lanes3,
+    shear: Vec3x16,
 }
 
 /// Hits of a packet, with one triangle per ray.
 pub(super) struct Hits {
-    pub(super) hit: Truths,
+    pub(super) hit: Mask,
     /// Lanes that the scalar test must decide.
-    pub(super) doubtful: Truths,
-    pub(super) t: Lanes,
-    pub(super) u: Lanes,
-    pub(super) v: Lanes,
+    pub(super) doubtful: Mask,
+    pub(super) t: F32x16,
+    pub(super) u: F32x16,
+    pub(super) v: F32x16,
 }
 
 /// A triangle corner: one for all rays, or one per ray.
@@ -42,7 +42,7 @@ impl Corner for Vec3 {
     }
 }
 
-impl Corner for &Lanes3 {
+impl Corner for &Vec3x16 {
     #[inline(always)]
     fn along(self, axis: usize, lane: usize) -> f32 {
         self[axis][lane]
@@ -53,9 +53,9 @@ impl<'a> ShearedRows<'a> {
     /// Prepares a packet.
     #[inline(always)]
     pub fn new(rays: &'a RayRows) -> Self {
-        let (mut longest, mut is_down) = ([[0; PACKET]; 2], [0; PACKET]);
-        let mut shear = [[0.0; PACKET]; 3];
-        for i in 0..PACKET {
+        let (mut longest, mut is_down) = ([[0; PACKET_SIZE]; 2], [0; PACKET_SIZE]);
+        let mut shear = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
             let [x, y, z] = [rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]];
             let [size_x, size_y, size_z] = [x.abs(), y.abs(), z.abs()];
             let is_x = (size_x > size_y) & (size_x > size_z);
@@ -98,23 +98,23 @@ impl<'a> ShearedRows<'a> {
     pub fn closest(
         &self,
         (number, corners): (u32, &[Vec3; 3]),
-        (met, ends): (u32, &mut Ends),
+        (met, ends): (u32, &mut F32x16),
         found: &mut HitRows,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
-        let hits = self.hits(&[number; PACKET], *corners, ends);
-        let mut is_nearer = [0; PACKET];
-        for i in 0..PACKET {
+        let hits = self.hits(&[number; PACKET_SIZE], *corners, ends);
+        let mut is_nearer = [0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             // A hit at the end of a ray counts, but not at the same t as a hit on an earlier triangle.
             let is_tie = !found.t[i].is_nan() & (hits.t[i] == found.t[i]);
             is_nearer[i] = if is_tie { 0 } else { hits.hit[i] };
         }
-        take(&is_nearer, &hits.t, ends);
-        take(&is_nearer, &hits.t, &mut found.t);
-        take(&is_nearer, &hits.u, &mut found.u);
-        take(&is_nearer, &hits.v, &mut found.v);
-        take_u32(&is_nearer, &[number; PACKET], &mut found.primitive);
-        let doubtful = folds.bits(&hits.doubtful) & met;
+        select(&is_nearer, &hits.t, ends);
+        select(&is_nearer, &hits.t, &mut found.t);
+        select(&is_nearer, &hits.u, &mut found.u);
+        select(&is_nearer, &hits.v, &mut found.v);
+        select_u32(&is_nearer, &[number; PACKET_SIZE], &mut found.primitive);
+        let doubtful = simd.movemask(&hits.doubtful) & met;
         if doubtful != 0 {
             self.decide(doubtful, (number, corners), ends, found);
         }
@@ -122,17 +122,23 @@ impl<'a> ShearedRows<'a> {
 
     /// Bits of the rays in `met` that hit a triangle; all other rays have negative ends.
     #[inline(always)]
-    pub fn any(&self, (number, corners): (u32, &[Vec3; 3]), met: u32, ends: &Ends, folds: impl Folds) -> u32 {
-        let hits = self.hits(&[number; PACKET], *corners, ends);
-        let doubtful = folds.bits(&hits.doubtful) & met;
-        let hit = folds.bits(&hits.hit) & met;
+    pub fn any(&self, (number, corners): (u32, &[Vec3; 3]), met: u32, ends: &F32x16, simd: impl Simd) -> u32 {
+        let hits = self.hits(&[number; PACKET_SIZE], *corners, ends);
+        let doubtful = simd.movemask(&hits.doubtful) & met;
+        let hit = simd.movemask(&hits.hit) & met;
         if doubtful == 0 { hit } else { hit | self.decided(doubtful, corners, ends) }
     }
 
     /// [`ShearedRows::closest`] for the given rays, one at a time.
     #[cold]
     #[inline(never)]
-    fn decide(&self, these: u32, (number, corners): (u32, &[Vec3; 3]), ends: &mut Ends, found: &mut HitRows) {
+    fn decide(
+        &self,
+        these: u32,
+        (number, corners): (u32, &[Vec3; 3]),
+        ends: &mut F32x16,
+        found: &mut HitRows,
+    ) {
         for i in lanes(these) {
             let Some(hit) = self.alone(i, corners, ends[i]) else { continue };
             if found.t[i].is_nan() || hit.t < found.t[i] {
@@ -145,7 +151,7 @@ impl<'a> ShearedRows<'a> {
     /// [`ShearedRows::any`] for the given rays, one at a time.
     #[cold]
     #[inline(never)]
-    fn decided(&self, these: u32, corners: &[Vec3; 3], ends: &Ends) -> u32 {
+    fn decided(&self, these: u32, corners: &[Vec3; 3], ends: &F32x16) -> u32 {
         lanes(these).filter(|&i| self.alone(i, corners, ends[i]).is_some()).fold(0, |hit, i| hit | 1 << i)
     }
 
@@ -156,9 +162,9 @@ impl<'a> ShearedRows<'a> {
 
     /// A corner in each ray's sheared coordinates.
     #[inline(always)]
-    fn sheared(&self, corner: impl Corner) -> Lanes3 {
-        let mut seen = [[0.0; PACKET]; 3];
-        for i in 0..PACKET {
+    fn sheared(&self, corner: impl Corner) -> Vec3x16 {
+        let mut seen = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
             let [x, y, z] = [0, 1, 2].map(|axis| corner.along(axis, i) - self.rays.origin[axis][i]);
             let (is_x, is_y) = (self.longest[0][i] != 0, self.longest[1][i] != 0);
             let along = if is_x {
@@ -192,16 +198,21 @@ impl<'a> ShearedRows<'a> {
     /// [`ShearedRay::intersect`] for a packet, with one triangle per ray. Rays that start on their triangle
     /// do not hit it.
     #[inline(always)]
-    pub(super) fn hits(&self, numbers: &[u32; PACKET], corners: [impl Corner; 3], ends: &Ends) -> Hits {
+    pub(super) fn hits(
+        &self,
+        numbers: &[u32; PACKET_SIZE],
+        corners: [impl Corner; 3],
+        ends: &F32x16,
+    ) -> Hits {
         let [a, b, c] = [self.sheared(corners[0]), self.sheared(corners[1]), self.sheared(corners[2])];
         let mut hits = Hits {
-            hit: [0; PACKET],
-            doubtful: [0; PACKET],
-            t: [0.0; PACKET],
-            u: [0.0; PACKET],
-            v: [0.0; PACKET],
+            hit: [0; PACKET_SIZE],
+            doubtful: [0; PACKET_SIZE],
+            t: [0.0; PACKET_SIZE],
+            u: [0.0; PACKET_SIZE],
+            v: [0.0; PACKET_SIZE],
         };
-        for i in 0..PACKET {
+        for i in 0..PACKET_SIZE {
             let ([ax, ay, az], [bx, by, bz]) = ([a[0][i], a[1][i], a[2][i]], [b[0][i], b[1][i], b[2][i]]);
             let [cx, cy, cz] = [c[0][i], c[1][i], c[2][i]];
             let (wa, wb, wc) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);

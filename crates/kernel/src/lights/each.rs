@@ -11,7 +11,7 @@ use super::sample::Source;
 use super::{Light, Lights};
 use crate::geometry::rows::lanes;
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
 /// Samples a row of convex emitters, with a light for each lane.
 macro_rules! row_of_wholes {
@@ -22,7 +22,7 @@ macro_rules! row_of_wholes {
                 emitter.sample(lane($points, $i), [$u[0][$i], $u[1][$i]]);
             (direction, target, light.radiance * factor)
         });
-        for $i in 0..LANES {
+        for $i in 0..PACKET_SIZE {
             row.sources.set($i, Source::Object($all[$i].1.object));
         }
         row
@@ -35,20 +35,20 @@ impl Lights {
     #[inline(always)]
     pub fn sample_each(
         &self,
-        picked: &[u32; LANES],
-        (points, normals): (&Lanes3, &Lanes3),
+        picked: &[u32; PACKET_SIZE],
+        (points, normals): (&Vec3x16, &Vec3x16),
         used: u32,
-        u: &[Lanes; 2],
-    ) -> (LightRow, Lanes, u64) {
-        let mut lights = [self.get(picked[0]); LANES];
-        for i in 1..LANES {
+        u: &[F32x16; 2],
+    ) -> (LightRow, F32x16, u64) {
+        let mut lights = [self.get(picked[0]); PACKET_SIZE];
+        for i in 1..PACKET_SIZE {
             lights[i] = self.get(picked[i]);
         }
         let mut row = LightRow::dark(Source::Nothing);
         let mut left = used;
         // Sample the lights of each kind side by side. Lanes of other kinds get one of these lights as well, without effect.
         while left != 0 {
-            let first = left.trailing_zeros() as usize % LANES;
+            let first = left.trailing_zeros() as usize % PACKET_SIZE;
             let mut of = 0;
             let found = if let Some(filler) = lights[first].as_point() {
                 let lights = alike((&lights, left), &mut of, Light::as_point, filler);
@@ -62,7 +62,7 @@ impl Lights {
             } else if let Some(filler) = quad(lights[first]) {
                 let quads = alike((&lights, left), &mut of, quad, filler);
                 let mut row = row_of_wholes!(i => quads, points, u);
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     if let Some((_, Some(two))) = quads[i].1.shape.as_quad() {
                         row.sources.part[i] = two.part(lane(points, i), lane(&row.targets, i));
                     }
@@ -85,8 +85,8 @@ impl Lights {
             }
             left &= !of;
         }
-        let mut inverse = [0.0; LANES];
-        for i in 0..LANES {
+        let mut inverse = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             inverse[i] = lights[i].inverse_density(lane(&row.directions, i), lane(&row.weights, i));
         }
         // Take the pdfs of plain lamps.
@@ -125,13 +125,13 @@ fn facets(light: &Light) -> Option<(&Facets, &AreaLight)> {
 /// Lights of one kind, and a bit of `left` for each lane that has one; the other lanes get the filler.
 #[inline(always)]
 fn alike<'a, T: Copy>(
-    (lights, left): (&[&'a Light; LANES], u32),
+    (lights, left): (&[&'a Light; PACKET_SIZE], u32),
     of: &mut u32,
     kind: impl Fn(&'a Light) -> Option<T>,
     filler: T,
-) -> [T; LANES] {
-    let mut all = [filler; LANES];
-    for i in 0..LANES {
+) -> [T; PACKET_SIZE] {
+    let mut all = [filler; PACKET_SIZE];
+    for i in 0..PACKET_SIZE {
         if let Some(own) = kind(lights[i]) {
             all[i] = own;
             *of |= left & 1 << i;

@@ -7,7 +7,7 @@ use super::row::LightRow;
 use super::sample::{LightHit, LightSample, Middle, Source};
 use super::tree::LightBounds;
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
 
 /// A light of any kind.
 // Most lights of a scene are shapes; they lie side by side.
@@ -63,7 +63,7 @@ impl Light {
 
     /// [`Light::sample`] for the points whose bits are set, each by its own numbers; without an emission texture.
     #[inline(always)]
-    pub fn sample_row(&self, points: &Lanes3, normals: &Lanes3, used: u32, u: &[Lanes; 2]) -> LightRow {
+    pub fn sample_row(&self, points: &Vec3x16, normals: &Vec3x16, used: u32, u: &[F32x16; 2]) -> LightRow {
         match self {
             Self::Point(light) => light.sample_row(points),
             Self::Spot(light) => light.sample_row(points),
@@ -76,15 +76,15 @@ impl Light {
     /// Inverse pdfs in sr of samples of this light. 0 if nothing arrives, and for a light without extent, which no other
     /// technique finds.
     #[inline(always)]
-    pub fn inverse_densities(&self, samples: &LightRow) -> Lanes {
-        let mut inverse = [0.0; LANES];
+    pub fn inverse_densities(&self, samples: &LightRow) -> F32x16 {
+        let mut inverse = [0.0; PACKET_SIZE];
         match self {
             Self::Point(_) | Self::Spot(_) => {}
-            Self::Directional(light) => inverse = [light.inverse_density(); LANES],
+            Self::Directional(light) => inverse = [light.inverse_density(); PACKET_SIZE],
             Self::Environment(_) => inverse = samples.of_sky,
             Self::Area(light) => {
                 let of_radiance = 1.0 / light.radiance.max_element();
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     inverse[i] = lane(&samples.weights, i).max_element() * of_radiance;
                 }
             }

@@ -2,32 +2,32 @@
 
 use super::sample::{End, LightSample, Source};
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane, take, take_u32, truths};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, mask_from_bits, select, select_u32, set_lane};
 
 /// Samples of the light of one lamp at some points: [`LightSample`]s side by side.
 #[derive(Clone, Debug)]
 pub struct LightRow {
     /// Unit directions to the light.
-    pub directions: Lanes3,
+    pub directions: Vec3x16,
     /// Sampled points.
-    pub targets: Lanes3,
+    pub targets: Vec3x16,
     /// [`LightSample::weight`]; 0 if nothing arrives.
-    pub weights: Lanes3,
+    pub weights: Vec3x16,
     /// Objects that the shadow rays ignore.
     pub sources: SourceRow,
     /// A bit for each sample whose light comes from beyond everything.
     pub beyond: u32,
     /// Inverse pdfs in sr, for an environment alone; those of other lights are computed on request.
-    pub(super) of_sky: Lanes,
+    pub(super) of_sky: F32x16,
 }
 
 /// [`Source`]s side by side.
 #[derive(Clone, Debug)]
 pub struct SourceRow {
     /// The object; [`SourceRow::NONE`] for nothing.
-    pub object: [u32; LANES],
+    pub object: [u32; PACKET_SIZE],
     /// The primitive; [`SourceRow::NONE`] for all of the object.
-    pub part: [u32; LANES],
+    pub part: [u32; PACKET_SIZE],
     /// Whether any of them is an object.
     pub is_any: bool,
 }
@@ -43,7 +43,7 @@ impl SourceRow {
     #[inline(always)]
     pub fn of(source: Source) -> Self {
         let (object, part) = numbers(source);
-        Self { object: [object; LANES], part: [part; LANES], is_any: object != Self::NONE }
+        Self { object: [object; PACKET_SIZE], part: [part; PACKET_SIZE], is_any: object != Self::NONE }
     }
 
     /// Takes a lane of another row.
@@ -87,7 +87,7 @@ fn numbers(source: Source) -> (u32, u32) {
 macro_rules! row_of {
     ($source:expr, $i:ident => $sample:expr) => {{
         let mut row = $crate::lights::row::LightRow::dark($source);
-        for $i in 0..$crate::math::lanes::LANES {
+        for $i in 0..$crate::math::lanes::PACKET_SIZE {
             let (direction, target, weight) = $sample;
             $crate::math::lanes::set_lane(&mut row.directions, $i, direction);
             $crate::math::lanes::set_lane(&mut row.targets, $i, target);
@@ -116,14 +116,14 @@ impl LightRow {
     /// Takes the samples of another row in the lanes whose bits are set.
     #[inline(always)]
     pub(super) fn take_lanes(&mut self, bits: u32, other: &Self) {
-        let of = truths(bits);
+        let of = mask_from_bits(bits);
         for axis in 0..3 {
-            take(&of, &other.directions[axis], &mut self.directions[axis]);
-            take(&of, &other.targets[axis], &mut self.targets[axis]);
-            take(&of, &other.weights[axis], &mut self.weights[axis]);
+            select(&of, &other.directions[axis], &mut self.directions[axis]);
+            select(&of, &other.targets[axis], &mut self.targets[axis]);
+            select(&of, &other.weights[axis], &mut self.weights[axis]);
         }
-        take_u32(&of, &other.sources.object, &mut self.sources.object);
-        take_u32(&of, &other.sources.part, &mut self.sources.part);
+        select_u32(&of, &other.sources.object, &mut self.sources.object);
+        select_u32(&of, &other.sources.part, &mut self.sources.part);
         self.sources.is_any |= other.sources.is_any;
         self.beyond = self.beyond & !bits | other.beyond & bits;
     }
@@ -131,12 +131,12 @@ impl LightRow {
     #[inline(always)]
     pub(super) fn dark(source: Source) -> Self {
         Self {
-            directions: [[0.0; LANES]; 3],
-            targets: [[0.0; LANES]; 3],
-            weights: [[0.0; LANES]; 3],
+            directions: [[0.0; PACKET_SIZE]; 3],
+            targets: [[0.0; PACKET_SIZE]; 3],
+            weights: [[0.0; PACKET_SIZE]; 3],
             sources: SourceRow::of(source),
             beyond: 0,
-            of_sky: [0.0; LANES],
+            of_sky: [0.0; PACKET_SIZE],
         }
     }
 
@@ -152,12 +152,12 @@ impl LightRow {
 
     /// A row from the samples of the points whose bits are set.
     pub(super) fn one_by_one(
-        points: &Lanes3,
+        points: &Vec3x16,
         used: u32,
         sample: impl Fn(usize, Vec3) -> Option<LightSample>,
     ) -> Self {
         let mut row = Self::dark(Source::Nothing);
-        for i in (0..LANES).filter(|i| used & 1 << i != 0) {
+        for i in (0..PACKET_SIZE).filter(|i| used & 1 << i != 0) {
             if let Some(sample) = sample(i, lane(points, i)) {
                 row.put(i, &sample);
             }

@@ -13,7 +13,7 @@ use crate::geometry::torus::Torus;
 use crate::geometry::triangle::Triangle;
 use crate::geometry::{Ray, Shape, ShapeHit};
 use crate::lights::delta::{Falloff, PointLight};
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
 use crate::math::{DVec3, Vec2, Vec3};
 use crate::sampling::{Decision, PixelSampler};
 
@@ -73,11 +73,11 @@ fn rows_hold_the_samples_of_their_points() {
     };
     for shape in shapes() {
         for (_, light) in lights_of(&shape).iter() {
-            let points: Lanes3 = std::array::from_fn(|_| std::array::from_fn(|_| next() * 6.0 - 3.0));
-            let normals: Lanes3 = [[0.0; LANES], [1.0; LANES], [0.0; LANES]];
-            let u: [Lanes; 2] = std::array::from_fn(|_| std::array::from_fn(|_| next()));
+            let points: Vec3x16 = std::array::from_fn(|_| std::array::from_fn(|_| next() * 6.0 - 3.0));
+            let normals: Vec3x16 = [[0.0; PACKET_SIZE], [1.0; PACKET_SIZE], [0.0; PACKET_SIZE]];
+            let u: [F32x16; 2] = std::array::from_fn(|_| std::array::from_fn(|_| next()));
             let row = light.sample_row(&points, &normals, u32::MAX, &u);
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let alone = light.sample(lane(&points, i), lane(&normals, i), [u[0][i], u[1][i]]);
                 let weight = lane(&row.weights, i);
                 let Some(alone) = alone else {
@@ -109,19 +109,19 @@ fn lights_that_each_point_picked_give_the_samples_of_each_alone() {
     let mut seen = 0;
     for round in 0..200_u32 {
         let at = |i: usize, decision| PixelSampler::new(5, round, i as u32, 0).pair(1, decision);
-        let picked: [u32; LANES] =
+        let picked: [u32; PACKET_SIZE] =
             std::array::from_fn(|i| (at(i, Decision::Pick).x * all.len() as f32) as u32);
         let used = 0xffff & !(round * 37 % 97);
-        let u: [Lanes; 2] = [
+        let u: [F32x16; 2] = [
             std::array::from_fn(|i| at(i, Decision::Picked).x),
             std::array::from_fn(|i| at(i, Decision::Picked).y),
         ];
-        let points: Lanes3 = std::array::from_fn(|axis| {
-            std::array::from_fn(|i| 6.0 * at(axis * LANES + i, Decision::Lobe).x - 3.0)
+        let points: Vec3x16 = std::array::from_fn(|axis| {
+            std::array::from_fn(|i| 6.0 * at(axis * PACKET_SIZE + i, Decision::Lobe).x - 3.0)
         });
-        let normals: Lanes3 = [[0.0; LANES], [1.0; LANES], [0.0; LANES]];
+        let normals: Vec3x16 = [[0.0; PACKET_SIZE], [1.0; PACKET_SIZE], [0.0; PACKET_SIZE]];
         let (row, inverse, _) = lights.sample_each(&picked, (&points, &normals), used, &u);
-        for i in (0..LANES).filter(|i| used & 1 << i != 0) {
+        for i in (0..PACKET_SIZE).filter(|i| used & 1 << i != 0) {
             let light = &all[picked[i] as usize];
             let alone = light.sample(lane(&points, i), lane(&normals, i), [u[0][i], u[1][i]]);
             let Some(alone) = alone else {

@@ -16,10 +16,10 @@ use std::sync::Arc;
 use super::footprint::TexturePoint;
 use super::texture::Texture;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Truths};
+use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16};
 
 /// Texture coordinates, side by side.
-pub type UvRow = [[f64; LANES]; 2];
+pub type UvRow = [[f64; PACKET_SIZE]; 2];
 
 /// Lobes that a view shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,24 +53,24 @@ pub enum LobeSet {
 #[derive(Clone, Debug)]
 pub struct BsdfValues {
     /// f in sr⁻¹ of the shown lobes.
-    pub f: Lanes3,
+    pub f: Vec3x16,
     /// Two numbers for each surface that f, pdf and the parts of f share; each kind has its own.
-    pub(super) shared: [Lanes; 2],
+    pub(super) shared: [F32x16; 2],
 }
 
 /// Directions in which paths go on, on either side of surfaces.
 #[derive(Clone, Debug)]
 pub struct SideSamples {
     /// Unit directions.
-    pub directions: Lanes3,
+    pub directions: Vec3x16,
     /// Their pdfs in sr⁻¹; 0 if nothing arrives from there.
-    pub densities: Lanes,
+    pub densities: F32x16,
     /// f·cosθ of the lobe over the pdf.
-    pub shares: Lanes,
+    pub shares: F32x16,
     /// Factors on `shares` for what is shown.
-    pub shown: Lanes,
+    pub shown: F32x16,
     /// Directions on the other side than the row's own light.
-    pub beyond: Truths,
+    pub beyond: Mask,
 }
 
 /// Directions at a surface.
@@ -199,19 +199,19 @@ pub trait RoughRow: Clone {
     fn copy(&mut self, i: usize, other: &Self, from: usize);
 
     /// Evaluates the shown lobes for light from these directions.
-    fn f(&self, directions: &Lanes3) -> BsdfValues;
+    fn f(&self, directions: &Vec3x16) -> BsdfValues;
 
     /// The parts of f: of the wide lobes, and of the narrow lobes.
-    fn parts(&self, directions: &Lanes3, values: &BsdfValues) -> [Lanes3; 2];
+    fn parts(&self, directions: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2];
 
     /// f in sr⁻¹ of all lobes, whatever lobes are shown, by the largest components of their colours.
-    fn grey(&self, values: &BsdfValues) -> Lanes;
+    fn grey(&self, values: &BsdfValues) -> F32x16;
 
     /// Pdfs in sr⁻¹ of directions among the samples of lobes, with these normals for the cosine.
-    fn pdf(&self, lobes: LobeSet, normals: &Lanes3, directions: &Lanes3, values: &BsdfValues) -> Lanes;
+    fn pdf(&self, lobes: LobeSet, normals: &Vec3x16, directions: &Vec3x16, values: &BsdfValues) -> F32x16;
 
     /// Samples a unit direction for each surface; `choices` choose the lobes and `u` the directions in them, all in [0, 1).
-    fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3;
+    fn sample(&self, lobes: LobeSet, normals: &Vec3x16, choices: &F32x16, u: &[F32x16; 2]) -> Vec3x16;
 
     /// Whether any surface may have a narrow lobe; without one, [`RoughRow::sample`] ignores the choices.
     fn has_narrow_lobes(&self) -> bool;
@@ -223,7 +223,7 @@ pub trait RoughRow: Clone {
     #[inline(always)]
     fn narrow_lobes(&self) -> u32 {
         let mut narrow = 0;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             narrow |= u32::from(self.has_narrow_lobe(i)) << i;
         }
         narrow
@@ -254,10 +254,10 @@ pub trait MaterialRow: RoughRow {
         material: &Self::Material,
         uv: Option<&UvRow>,
         shown: &[(u32, ShownLobes)],
-        folds: impl Folds,
+        simd: impl Simd,
     ) -> u32;
 
     /// Sets shading normals on the viewer's side, and directions from the viewer; in these lanes only, if any are given. All normals
     /// are replaced by those of [`RoughRow::turned`].
-    fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3);
+    fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16);
 }

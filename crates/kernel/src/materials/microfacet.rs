@@ -12,7 +12,7 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use crate::math::Vec3;
 use crate::math::elementary::sin_cos;
 use crate::math::frame::Frame;
-use crate::math::lanes::{LANES, Lanes3, Truths, lane, set_lane, take};
+use crate::math::lanes::{Mask, PACKET_SIZE, Vec3x16, lane, select, set_lane};
 
 /// Least α: of narrower lobes, directions in `f32` have no digits.
 pub const LEAST_ALPHA: f32 = 1e-3;
@@ -53,13 +53,13 @@ pub fn facing_one(normal: Vec3, to_eye: Vec3) -> Vec3 {
 /// surfaces of the row that `of` names, or to all: [`MaterialRow::orient`](super::bsdf::MaterialRow::orient) of microfacets.
 #[inline(always)]
 pub fn turn_to_viewers(
-    of: Option<&Truths>,
-    normals: &mut Lanes3,
-    directions: &Lanes3,
-    own_normals: &mut Lanes3,
-    to_eyes: &mut Lanes3,
+    of: Option<&Mask>,
+    normals: &mut Vec3x16,
+    directions: &Vec3x16,
+    own_normals: &mut Vec3x16,
+    to_eyes: &mut Vec3x16,
 ) {
-    for i in 0..LANES {
+    for i in 0..PACKET_SIZE {
         let to_eye = -lane(directions, i);
         set_lane(to_eyes, i, to_eye);
         let turned = facing(lane(normals, i), to_eye);
@@ -68,7 +68,7 @@ pub fn turn_to_viewers(
     match of {
         Some(of) => {
             for axis in 0..3 {
-                take(of, &normals[axis], &mut own_normals[axis]);
+                select(of, &normals[axis], &mut own_normals[axis]);
             }
         }
         None => *own_normals = *normals,

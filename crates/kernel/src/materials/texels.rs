@@ -1,7 +1,7 @@
 //! Texels of an image, stored as compactly as in its file.
 
 use crate::math::color::{LINEAR_OF_SRGB8, srgb8_to_linear};
-use crate::math::lanes::{LANES, Lanes3, set_lane};
+use crate::math::lanes::{PACKET_SIZE, Vec3x16, set_lane};
 use crate::math::{DVec3, DVec4, Vec3, Vec4};
 
 /// An image in memory, rows from top to bottom, RGB.
@@ -110,7 +110,7 @@ impl Texels {
     /// Linear values at indices of the data, side by side. Written in place: rows are larger than compilers like to
     /// return.
     #[inline(always)]
-    pub fn fill_row(&self, places: &[usize; LANES], values: &mut Lanes3) {
+    pub fn fill_row(&self, places: &[usize; PACKET_SIZE], values: &mut Vec3x16) {
         self.decode(places, |i, value| set_lane(values, i, value));
     }
 

@@ -7,7 +7,7 @@ use super::mipmaps::Mipmaps;
 use super::texels::{Texels, unweighted};
 use crate::choice;
 use crate::math::elementary::{exp2, log2};
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::transform::sin_cos_degrees;
 use crate::math::{DVec2, Vec2, Vec3, Vec4};
 
@@ -129,9 +129,9 @@ impl Moved {
     }
 
     /// Repeated and moved coordinates, side by side.
-    fn row(&self, uv: &[[f64; LANES]; 2], repeat: DVec2) -> [[f64; LANES]; 2] {
+    fn row(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> [[f64; PACKET_SIZE]; 2] {
         let mut row = *uv;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let moved = self.point(DVec2::new(uv[0][i], uv[1][i]) * repeat);
             (row[0][i], row[1][i]) = (moved.x, moved.y);
         }
@@ -266,7 +266,7 @@ impl Texture {
 
     /// [`Texture::lookup`] side by side, for a texture without mip levels.
     #[inline(always)]
-    pub fn lookup_row(&self, uv: &[[f64; LANES]; 2]) -> Lanes3 {
+    pub fn lookup_row(&self, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         let mut row = match &self.moved {
             None => self.repeated_row(uv, self.repeat.as_dvec2()),
             Some(moved) => self.moved_row(moved, uv),
@@ -283,23 +283,23 @@ impl Texture {
     /// [`Texture::lookup_row`] of a texture whose coordinates are moved.
     #[cold]
     #[inline(never)]
-    fn moved_row(&self, moved: &Moved, uv: &[[f64; LANES]; 2]) -> Lanes3 {
+    fn moved_row(&self, moved: &Moved, uv: &[[f64; PACKET_SIZE]; 2]) -> Vec3x16 {
         self.repeated_row(&moved.row(uv, self.repeat.as_dvec2()), DVec2::ONE)
     }
 
     /// [`Texture::lookup_row`] at coordinates times a factor.
     #[inline(always)]
-    fn repeated_row(&self, uv: &[[f64; LANES]; 2], repeat: DVec2) -> Lanes3 {
+    fn repeated_row(&self, uv: &[[f64; PACKET_SIZE]; 2], repeat: DVec2) -> Vec3x16 {
         let (texels, size) = (&*self.texels, size(&self.texels));
         let folded = [self.wrap.fold_row(&uv[0], repeat.x), self.wrap.fold_row(&uv[1], repeat.y)];
         let extent = extent(texels);
-        let (mut first, mut part) = ([[0; LANES]; 2], [[0.0; LANES]; 2]);
+        let (mut first, mut part) = ([[0; PACKET_SIZE]; 2], [[0.0; PACKET_SIZE]; 2]);
         let shift = match self.filter {
             TextureFilter::Nearest => 0.0,
             TextureFilter::Bilinear | TextureFilter::Mipmap => 0.5,
         };
         for axis in 0..2 {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let x = folded[axis][i] * size[axis] - shift;
                 first[axis][i] = x.floor() as i32;
                 part[axis][i] = x - x.floor();
@@ -307,7 +307,7 @@ impl Texture {
         }
         let columns = self.wrap.index_row(&first[0], 0, extent[0]);
         let rows = self.wrap.index_row(&first[1], 0, extent[1]);
-        let mut colors = [[0.0; LANES]; 3];
+        let mut colors = [[0.0; PACKET_SIZE]; 3];
         if shift == 0.0 {
             texels.fill_row(&places(&columns, &rows, extent), &mut colors);
             return colors;
@@ -318,12 +318,12 @@ impl Texture {
         }
         let right = self.wrap.index_row(&first[0], 1, extent[0]);
         let upper = self.wrap.index_row(&first[1], 1, extent[1]);
-        let mut corners = [[[0.0; LANES]; 3]; 4];
+        let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
         texels.fill_row(&places(&columns, &rows, extent), &mut corners[0]);
         texels.fill_row(&places(&right, &rows, extent), &mut corners[1]);
         texels.fill_row(&places(&columns, &upper, extent), &mut corners[2]);
         texels.fill_row(&places(&right, &upper, extent), &mut corners[3]);
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let corner = |number: usize| lane(&corners[number], i);
             let lower = corner(0).lerp(corner(1), part[0][i]);
             let upper = corner(2).lerp(corner(3), part[0][i]);
@@ -457,9 +457,9 @@ fn place(column: i32, row: i32, [width, height]: [i32; 2]) -> usize {
 
 /// [`place`] of each texel of a row.
 #[inline(always)]
-fn places(columns: &[i32; LANES], rows: &[i32; LANES], extent: [i32; 2]) -> [usize; LANES] {
-    let mut places = [0; LANES];
-    for i in 0..LANES {
+fn places(columns: &[i32; PACKET_SIZE], rows: &[i32; PACKET_SIZE], extent: [i32; 2]) -> [usize; PACKET_SIZE] {
+    let mut places = [0; PACKET_SIZE];
+    for i in 0..PACKET_SIZE {
         places[i] = place(columns[i], rows[i], extent);
     }
     places
@@ -479,11 +479,11 @@ fn size(texels: &Texels) -> Vec2 {
 impl Wrap {
     /// Folds coordinates, repeated so often, into [0, 1].
     #[inline(always)]
-    fn fold_row(self, x: &[f64; LANES], repeat: f64) -> Lanes {
-        let mut folded = [0.0; LANES];
+    fn fold_row(self, x: &[f64; PACKET_SIZE], repeat: f64) -> F32x16 {
+        let mut folded = [0.0; PACKET_SIZE];
         macro_rules! by {
             ($wrap:expr) => {
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     folded[i] = $wrap.fold(finite(x[i] * repeat)) as f32;
                 }
             };
@@ -498,11 +498,11 @@ impl Wrap {
 
     /// [`Wrap::index`] of numbers, each plus `more`.
     #[inline(always)]
-    fn index_row(self, numbers: &[i32; LANES], more: i32, size: i32) -> [i32; LANES] {
-        let mut indices = [0; LANES];
+    fn index_row(self, numbers: &[i32; PACKET_SIZE], more: i32, size: i32) -> [i32; PACKET_SIZE] {
+        let mut indices = [0; PACKET_SIZE];
         macro_rules! by {
             ($wrap:expr) => {
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     indices[i] = $wrap.index(numbers[i] + more, size);
                 }
             };
@@ -645,7 +645,7 @@ mod tests {
         let at = TexturePoint::sharp(DVec2::new(0.3, 0.6));
         assert_eq!(texture.lookup(&at), plain.lookup(&at) * factor);
         assert_eq!((texture.mean(), texture.slopes(&at)), (plain.mean() * factor, plain.slopes(&at)));
-        let uv = [[0.3; LANES], [0.6; LANES]];
+        let uv = [[0.3; PACKET_SIZE], [0.6; PACKET_SIZE]];
         let [row, before] = [&texture, &plain].map(|one| lane(&one.lookup_row(&uv), 3));
         assert_eq!(row, before * factor);
     }
@@ -719,7 +719,7 @@ mod tests {
                             let u = std::array::from_fn(|i| number(first + i));
                             let v = std::array::from_fn(|i| number(first + 5 * i));
                             let row = texture.lookup_row(&[u, v]);
-                            for i in 0..LANES {
+                            for i in 0..PACKET_SIZE {
                                 let alone = texture.lookup(&TexturePoint::sharp(DVec2::new(u[i], v[i])));
                                 assert_eq!(lane(&row, i), alone, "{filter:?} {wrap:?} {} {}", u[i], v[i]);
                             }

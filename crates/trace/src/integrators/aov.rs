@@ -7,7 +7,7 @@ use super::transport::vertex::Vertex;
 use super::{FirstHit, RayCounters};
 use crate::control::Cancelled;
 use crate::geometry::SurfacePoint;
-use crate::math::lanes::PlainFolds;
+use crate::math::lanes::PortableSimd;
 use crate::math::{DVec2, Vec3};
 
 /// Writes the AOV `quantity` at the first hit of each camera ray in the queue; black where there is no hit.

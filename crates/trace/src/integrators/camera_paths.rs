@@ -36,7 +36,7 @@ use crate::materials::{Bsdf, Coated, GlassPoint, Mirror, Pane, Rough, RoughBsdf}
 use crate::math::Vec3;
 use crate::math::lanes::lane as lane_of;
 use crate::scene::description::Shadows;
-use crate::world::{Hit, PACKET};
+use crate::world::{Hit, PACKET_SIZE};
 
 /// A path splits only if the weaker branch contributes at least this much; otherwise one branch is chosen at random.
 const MIN_SPLIT: f32 = 0.01;
@@ -73,11 +73,11 @@ pub fn trace(
     wavefront.begin_bounce();
     wavefront.direct.begin_bounce(slots.len(), tile.pixel_spread > 0.0);
     // Trace and shade the camera rays, which are the first bounce.
-    for start in slots.clone().step_by(CAMERA_ROWS * PACKET) {
+    for start in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
         tile.camera_rows(start..slots.end, camera);
-        for (first, row) in (start..).step_by(PACKET).zip(&*camera) {
+        for (first, row) in (start..).step_by(PACKET_SIZE).zip(&*camera) {
             negative(first, row.negative);
-            let count = (slots.end - first).min(PACKET as u32) as usize;
+            let count = (slots.end - first).min(PACKET_SIZE as u32) as usize;
             wavefront.shade_packet(PacketSource::Camera(row, first, count, first - slots.start))?;
         }
     }
@@ -92,11 +92,11 @@ pub fn trace(
             // Find all hits first, so that each packet hits one object.
             tile.closest_hits(rays, hits)?;
             object_order.sort(hits);
-            for places in object_order.indices().chunks(PACKET) {
+            for places in object_order.indices().chunks(PACKET_SIZE) {
                 wavefront.shade_packet(PacketSource::Traced(rays, hits, places))?;
             }
         } else {
-            for (paths, first) in rays.chunks(PACKET).zip((0..).step_by(PACKET)) {
+            for (paths, first) in rays.chunks(PACKET_SIZE).zip((0..).step_by(PACKET_SIZE)) {
                 wavefront.shade_packet(PacketSource::Paths(paths, first))?;
             }
         }

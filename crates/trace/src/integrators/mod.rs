@@ -32,7 +32,7 @@ use std::ops::Range;
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{NegativeLobes, Pixels, TileSamples};
 use crate::math::Vec3;
-use crate::world::{PACKET, World};
+use crate::world::{PACKET_SIZE, World};
 use behavior::PathBehavior;
 pub use behavior::receivers;
 pub use counters::RayCounters;
@@ -123,7 +123,7 @@ pub fn render_tile_with_photons(
 
 /// Sets `marked` for each slot from `first` on to the corresponding bit.
 fn mark(marked: &mut [bool], first: u32, bits: u32) {
-    for (lane, marked) in marked.iter_mut().skip(first as usize).take(PACKET).enumerate() {
+    for (lane, marked) in marked.iter_mut().skip(first as usize).take(PACKET_SIZE).enumerate() {
         *marked = bits & 1 << lane != 0;
     }
 }

@@ -2,10 +2,10 @@
 //! the bits of those by the mesh's tree.
 
 use super::MeshInstance;
-use crate::accel::{Ends, PACKET};
+use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::geometry::watertight_rows::ShearedRows;
-use crate::math::lanes::{Folds, lane, set_lane};
+use crate::math::lanes::{Simd, lane, set_lane};
 
 /// Most triangles of such a mesh: for more, the tree skips so many that it is faster.
 const FEW: usize = 16;
@@ -23,14 +23,14 @@ impl MeshInstance {
         &self,
         rows: &RayRows,
         met: u32,
-        ends: &Ends,
+        ends: &F32x16,
         found: &mut HitRows,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
         let (mesh, local, mut ends) = (&self.tree.loaded().mesh, self.local_rows(rows), *ends);
         let rays = ShearedRows::new(&local);
         for number in 0..mesh.triangles.len() as u32 {
-            rays.closest((number, &mesh.corners(number)), (met, &mut ends), found, folds);
+            rays.closest((number, &mesh.corners(number)), (met, &mut ends), found, simd);
         }
     }
 
@@ -40,22 +40,22 @@ impl MeshInstance {
         &self,
         rows: &RayRows,
         met: u32,
-        ends: &Ends,
-        except: Option<(u32, &[u32; PACKET])>,
-        folds: impl Folds,
+        ends: &F32x16,
+        except: Option<(u32, &[u32; PACKET_SIZE])>,
+        simd: impl Simd,
     ) -> u32 {
         let (mesh, local) = (&self.tree.loaded().mesh, self.local_rows(rows));
         let (rays, mut hit) = (ShearedRows::new(&local), 0);
         for number in 0..mesh.triangles.len() as u32 {
             let mut asked = met & !hit;
             if let Some((own, parts)) = except {
-                for i in 0..PACKET {
+                for i in 0..PACKET_SIZE {
                     let is_own = own & 1 << i != 0 && parts[i] == number;
                     asked &= !(u32::from(is_own) << i);
                 }
             }
             if asked != 0 {
-                hit |= rays.any((number, &mesh.corners(number)), asked, ends, folds);
+                hit |= rays.any((number, &mesh.corners(number)), asked, ends, simd);
             }
         }
         hit
@@ -66,7 +66,7 @@ impl MeshInstance {
     fn local_rows(&self, rows: &RayRows) -> RayRows {
         let RayRows { mut origin, mut direction, mut start } = *rows;
         if self.is_moved {
-            for i in 0..PACKET {
+            for i in 0..PACKET_SIZE {
                 let at = self.transform.inverse_point(lane(&origin, i).as_dvec3()).as_vec3();
                 set_lane(&mut origin, i, at);
                 let towards = self.transform.inverse_vector(lane(&direction, i).as_dvec3()).as_vec3();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::accel::{Bvh, Instructions};
+use crate::accel::{Bvh, InstructionSet};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::lights::Source;
@@ -41,7 +41,7 @@ pub struct Geometry {
     isolated: Isolated,
     /// How far objects are moved; empty if none is.
     lifts: Vec<DVec3>,
-    instructions: Instructions,
+    instructions: InstructionSet,
 }
 
 /// Small meshes under one tree, and the tree that rays visit in place of that over all objects.
@@ -89,7 +89,7 @@ impl Geometry {
         let unbounded =
             (0_u32..).zip(&bounds).filter(|(_, bounds)| bounds.is_none()).map(|(id, _)| id).collect();
         let boxes: Vec<Aabb> = bounds.into_iter().map(|bounds| bounds.unwrap_or(Aabb::EMPTY)).collect();
-        let (tree, instructions) = (Bvh::build(&boxes, token)?, Instructions::best());
+        let (tree, instructions) = (Bvh::build(&boxes, token)?, InstructionSet::best());
         let merged = merged.map(|meshes| -> Result<_, Cancelled> {
             let each = (0..).zip(&boxes).map(|(id, own)| if meshes.has(id) { Aabb::EMPTY } else { *own });
             let with_all: Vec<Aabb> = each.chain([meshes.bounds()]).collect();
@@ -182,13 +182,13 @@ impl Geometry {
 
     /// The geometry, with packets traced by other instructions.
     #[cfg(test)]
-    pub(super) fn with(mut self, instructions: Instructions) -> Self {
+    pub(super) fn with(mut self, instructions: InstructionSet) -> Self {
         self.instructions = instructions;
         self
     }
 
     /// Instructions that trace packets.
-    pub fn instructions(&self) -> Instructions {
+    pub fn instructions(&self) -> InstructionSet {
         self.instructions
     }
 

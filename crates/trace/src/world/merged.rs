@@ -6,13 +6,13 @@
 
 use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
-use crate::accel::{Ends, Instructions, Loops, PACKET};
+use crate::accel::{F32x16, InstructionSet, PACKET_SIZE, SimdKernel};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::facets::{self, Facets};
 use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, TRUE};
+use crate::math::lanes::{Simd, TRUE};
 
 /// Most triangles of a mesh that is merged: a larger one is worth its own tree, and an edit that moves it then rebuilds
 /// nothing.
@@ -157,9 +157,9 @@ impl MergedMeshes {
     #[inline(never)]
     pub fn closest_rows(
         &self,
-        by: Instructions,
+        by: InstructionSet,
         rows: &RayRows,
-        (met, ends): (u32, &Ends),
+        (met, ends): (u32, &F32x16),
         found: &mut HitRows,
     ) {
         let Some(facets) = &self.facets else { return self.closest_by_tree(rows, met, ends, found) };
@@ -174,7 +174,7 @@ impl MergedMeshes {
     /// The nearest hits of these rays, one by one.
     #[cold]
     #[inline(never)]
-    fn closest_of_each(&self, rows: &RayRows, these: u32, ends: &Ends, found: &mut HitRows) {
+    fn closest_of_each(&self, rows: &RayRows, these: u32, ends: &F32x16, found: &mut HitRows) {
         for lane in lanes(these) {
             if let Some(hit) = self.tree.closest(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
                 found.put(lane, &hit);
@@ -183,8 +183,8 @@ impl MergedMeshes {
     }
 
     #[inline(never)]
-    fn closest_by_tree(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
-        let mut hits = [None; PACKET];
+    fn closest_by_tree(&self, rows: &RayRows, met: u32, ends: &F32x16, found: &mut HitRows) {
+        let mut hits = [None; PACKET_SIZE];
         self.tree.closest_packet(&rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
@@ -198,13 +198,13 @@ impl MergedMeshes {
     #[inline(never)]
     pub fn any_rows(
         &self,
-        by: Instructions,
+        by: InstructionSet,
         rows: &RayRows,
-        (met, ends): (u32, &Ends),
-        except: Option<&[u32; PACKET]>,
+        (met, ends): (u32, &F32x16),
+        except: Option<&[u32; PACKET_SIZE]>,
     ) -> u32 {
         let Some(facets) = &self.facets else { return self.any_by_tree(rows, met, ends, except) };
-        let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET]);
+        let own = except.unwrap_or(&[Self::NO_TRIANGLE; PACKET_SIZE]);
         let size = self.bounds().extent();
         match by.run(Any { facets, size, rows, met, ends, except: own }) {
             Some([hit, 0]) => hit,
@@ -216,7 +216,7 @@ impl MergedMeshes {
     /// A bit for each of these rays that hits any triangle but its own of `except`, one by one.
     #[cold]
     #[inline(never)]
-    fn any_of_each(&self, rows: &RayRows, these: u32, ends: &Ends, except: &[u32; PACKET]) -> u32 {
+    fn any_of_each(&self, rows: &RayRows, these: u32, ends: &F32x16, except: &[u32; PACKET_SIZE]) -> u32 {
         let is_hit = |&lane: &usize| {
             let own = (except[lane] != Self::NO_TRIANGLE).then_some(except[lane]);
             self.tree.any(&Ray { t_max: ends[lane], ..rows.ray(lane) }, own)
@@ -225,7 +225,13 @@ impl MergedMeshes {
     }
 
     #[inline(never)]
-    fn any_by_tree(&self, rows: &RayRows, met: u32, ends: &Ends, except: Option<&[u32; PACKET]>) -> u32 {
+    fn any_by_tree(
+        &self,
+        rows: &RayRows,
+        met: u32,
+        ends: &F32x16,
+        except: Option<&[u32; PACKET_SIZE]>,
+    ) -> u32 {
         let rays = rays(rows, met);
         let Some(numbers) = except else { return self.tree.any_packet(&rays, ends, &[]) };
         let own = numbers.map(|number| (number != Self::NO_TRIANGLE).then_some(number));
@@ -242,20 +248,20 @@ impl MergedMeshes {
 /// Whether the rays in `met` start near each other, by the size of a box, and go similar ways: then they visit fewer triangles by
 /// the tree than by facets.
 #[inline(always)]
-fn are_alike(rows: &RayRows, met: u32, size: Vec3, folds: impl Folds) -> bool {
-    let first = met.trailing_zeros() as usize % PACKET;
+fn are_alike(rows: &RayRows, met: u32, size: Vec3, simd: impl Simd) -> bool {
+    let first = met.trailing_zeros() as usize % PACKET_SIZE;
     let near = size.element_sum() * ALIKE;
     let along = (0..3).map(|axis| rows.direction[axis][first].abs()).sum::<f32>() * ALIKE;
     let from = [0, 1, 2].map(|axis| rows.origin[axis][first]);
     let way = [0, 1, 2].map(|axis| rows.direction[axis][first]);
     let ([ox, oy, oz], [dx, dy, dz]) = (&rows.origin, &rows.direction);
-    let mut differs = [0; PACKET];
-    for lane in 0..PACKET {
+    let mut differs = [0; PACKET_SIZE];
+    for lane in 0..PACKET_SIZE {
         let apart = (ox[lane] - from[0]).abs() + (oy[lane] - from[1]).abs() + (oz[lane] - from[2]).abs();
         let aside = (dx[lane] - way[0]).abs() + (dy[lane] - way[1]).abs() + (dz[lane] - way[2]).abs();
         differs[lane] = if (apart <= near) & (aside <= along) { 0 } else { TRUE };
     }
-    folds.bits(&differs) & met == 0
+    simd.movemask(&differs) & met == 0
 }
 
 /// Greatest distance of the starts of rays, by the size of all triangles, and of their directions, by their length.
@@ -267,20 +273,20 @@ struct Nearest<'a> {
     size: Vec3,
     rows: &'a RayRows,
     met: u32,
-    ends: &'a Ends,
+    ends: &'a F32x16,
     found: &'a mut HitRows,
 }
 
-impl Loops for Nearest<'_> {
-    type Done = Option<u32>;
+impl SimdKernel for Nearest<'_> {
+    type Output = Option<u32>;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Option<u32> {
+    fn run(self, simd: impl Simd) -> Option<u32> {
         let Self { facets, size, rows, met, ends, found } = self;
-        if are_alike(rows, met, size, folds) {
+        if are_alike(rows, met, size, simd) {
             return None;
         }
-        Some(facets.closest(rows, (met, ends), found, folds))
+        Some(facets.closest(rows, (met, ends), found, simd))
     }
 }
 
@@ -290,27 +296,27 @@ struct Any<'a> {
     size: Vec3,
     rows: &'a RayRows,
     met: u32,
-    ends: &'a Ends,
-    except: &'a [u32; PACKET],
+    ends: &'a F32x16,
+    except: &'a [u32; PACKET_SIZE],
 }
 
-impl Loops for Any<'_> {
-    type Done = Option<[u32; 2]>;
+impl SimdKernel for Any<'_> {
+    type Output = Option<[u32; 2]>;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Option<[u32; 2]> {
+    fn run(self, simd: impl Simd) -> Option<[u32; 2]> {
         let Self { facets, size, rows, met, ends, except } = self;
-        if are_alike(rows, met, size, folds) {
+        if are_alike(rows, met, size, simd) {
             return None;
         }
-        Some(facets.any(rows, (met, ends), except, folds))
+        Some(facets.any(rows, (met, ends), except, simd))
     }
 }
 
 /// The rays of a packet; a lane that is not in `met` gets the first ray that is, which goes in a similar direction.
 #[inline]
-fn rays(rows: &RayRows, met: u32) -> [Ray; PACKET] {
-    let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET); PACKET];
+fn rays(rows: &RayRows, met: u32) -> [Ray; PACKET_SIZE] {
+    let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET_SIZE); PACKET_SIZE];
     for lane in lanes(met & met.wrapping_sub(1)) {
         rays[lane] = rows.ray(lane);
     }

@@ -6,7 +6,7 @@ use super::mesh_facet::{ASIDE, Facet, PlacedMesh};
 use super::mesh_rows::uv_between;
 use super::mesh_tree::MeshTree;
 use super::placement::{Placement, Unmoved};
-use crate::accel::{Ends, PACKET};
+use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::materials::UvSet;
@@ -63,8 +63,8 @@ impl MeshInstance {
 
     /// `scene_number` of the triangles of a row; any numbers for lanes without one.
     #[inline(always)]
-    pub fn scene_numbers(&self, triangles: &[u32; PACKET]) -> [u32; PACKET] {
-        let Some(first) = self.first else { return [Ray::NO_TRIANGLE; PACKET] };
+    pub fn scene_numbers(&self, triangles: &[u32; PACKET_SIZE]) -> [u32; PACKET_SIZE] {
+        let Some(first) = self.first else { return [Ray::NO_TRIANGLE; PACKET_SIZE] };
         triangles.map(|triangle| first.wrapping_add(triangle))
     }
 
@@ -256,8 +256,8 @@ impl MeshInstance {
 
     /// The nearest hits of the rays in `met`; the others end below 0.
     #[inline(never)]
-    pub(super) fn closest_rows(&self, rows: &RayRows, met: u32, ends: &Ends, found: &mut HitRows) {
-        let mut hits = [None; PACKET];
+    pub(super) fn closest_rows(&self, rows: &RayRows, met: u32, ends: &F32x16, found: &mut HitRows) {
+        let mut hits = [None; PACKET_SIZE];
         self.tree.triangles().closest_packet(&self.local_rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
@@ -272,12 +272,12 @@ impl MeshInstance {
         &self,
         rows: &RayRows,
         met: u32,
-        ends: &Ends,
-        except: Option<(u32, &[u32; PACKET])>,
+        ends: &F32x16,
+        except: Option<(u32, &[u32; PACKET_SIZE])>,
     ) -> u32 {
         let local = self.local_rays(rows, met);
         let Some((own, numbers)) = except else { return self.tree.triangles().any_packet(&local, ends, &[]) };
-        let mut parts = [None; PACKET];
+        let mut parts = [None; PACKET_SIZE];
         lanes(own).for_each(|lane| parts[lane] = Some(numbers[lane]));
         self.tree.triangles().any_packet(&local, ends, &parts)
     }
@@ -285,13 +285,13 @@ impl MeshInstance {
     /// The rays of a packet that are in `met`, in the mesh's coordinates; other lanes get the first of these rays, which goes in a
     /// similar direction.
     #[inline]
-    fn local_rays(&self, rows: &RayRows, met: u32) -> [Ray; PACKET] {
+    fn local_rays(&self, rows: &RayRows, met: u32) -> [Ray; PACKET_SIZE] {
         let local = |lane: usize| {
-            let ray = rows.ray(lane % PACKET);
+            let ray = rows.ray(lane % PACKET_SIZE);
             let ray = ray.leaving(self.own_number(ray.start));
             if self.is_moved { self.moved(&ray) } else { ray }
         };
-        let mut rays = [local(met.trailing_zeros() as usize); PACKET];
+        let mut rays = [local(met.trailing_zeros() as usize); PACKET_SIZE];
         for lane in lanes(met & met.wrapping_sub(1)) {
             rays[lane] = local(lane);
         }

@@ -3,11 +3,11 @@
 use super::MeshInstance;
 use super::mesh_facet::PlacedMesh;
 use super::placement::{Placement, Unmoved};
-use crate::accel::PACKET;
+use crate::accel::PACKET_SIZE;
 use crate::geometry::rows::{HitRows, RayRows, lanes};
 use crate::geometry::surface_rows::SurfaceRow;
 use crate::materials::UvSet;
-use crate::math::lanes::{Folds, Lanes3, TRUE, lane, set_lane};
+use crate::math::lanes::{Simd, TRUE, Vec3x16, lane, set_lane};
 use crate::math::{Vec2, Vec3};
 
 impl MeshInstance {
@@ -21,13 +21,13 @@ impl MeshInstance {
         hits: &HitRows,
         of: u32,
         asked_uvs: Option<UvSet>,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
         let at = (rays, hits);
         if self.is_moved {
-            self.fill_placed(self.placed(&self.transform), surface, at, of, asked_uvs, folds);
+            self.fill_placed(self.placed(&self.transform), surface, at, of, asked_uvs, simd);
         } else {
-            self.fill_placed(self.placed(Unmoved), surface, at, of, asked_uvs, folds);
+            self.fill_placed(self.placed(Unmoved), surface, at, of, asked_uvs, simd);
         }
     }
 
@@ -39,20 +39,20 @@ impl MeshInstance {
         (rays, hits): (&RayRows, &HitRows),
         of: u32,
         asked_uvs: Option<UvSet>,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
         let mesh = &self.tree.loaded().mesh;
         // The other lanes get a triangle as well, without effect.
-        let filler = hits.primitive[of.trailing_zeros() as usize % PACKET];
-        let mut vertices = [[0; 3]; PACKET];
-        for i in 0..PACKET {
+        let filler = hits.primitive[of.trailing_zeros() as usize % PACKET_SIZE];
+        let mut vertices = [[0; 3]; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let triangle = if of & 1 << i != 0 { hits.primitive[i] } else { filler };
             vertices[i] = mesh.triangles[triangle as usize];
         }
         let corners = of_vertices(&vertices, &mesh.positions);
         let corners_of = |i: usize| [lane(&corners[0], i), lane(&corners[1], i), lane(&corners[2], i)];
-        let (mut found, mut doubtful) = (SurfaceRow::EMPTY, [0; PACKET]);
-        for i in 0..PACKET {
+        let (mut found, mut doubtful) = (SurfacePacket::EMPTY, [0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
             set_lane(&mut found.point, i, facet.point);
             set_lane(&mut found.error, i, facet.error);
@@ -60,7 +60,7 @@ impl MeshInstance {
             doubtful[i] = if facet.is_doubtful() { TRUE } else { 0 };
         }
         // Few are beside an edge, or of a huge triangle.
-        let doubtful = folds.bits(&doubtful) & of;
+        let doubtful = simd.bits(&doubtful) & of;
         for i in lanes(doubtful) {
             let uv = [hits.u[i], hits.v[i]];
             let [point, error] =
@@ -72,11 +72,11 @@ impl MeshInstance {
         if self.smooth {
             let normals = of_vertices(&vertices, self.tree.normals());
             let normals_of = |i: usize| [lane(&normals[0], i), lane(&normals[1], i), lane(&normals[2], i)];
-            for i in 0..PACKET {
+            for i in 0..PACKET_SIZE {
                 let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
                 set_lane(&mut found.shading_normal, i, placed.shading_normal(&facet, &normals_of(i)));
             }
-            for i in 0..PACKET {
+            for i in 0..PACKET_SIZE {
                 let facet = placed.facet(corners_of(i), [hits.u[i], hits.v[i]]);
                 let direction = lane(&rays.direction, i).as_dvec3();
                 let lifted = placed.shadow_point(&facet, &normals_of(i), direction);
@@ -92,7 +92,7 @@ impl MeshInstance {
         }
         if let Some(set) = asked_uvs {
             let all = self.uvs(set);
-            for i in 0..PACKET {
+            for i in 0..PACKET_SIZE {
                 let uvs = match all {
                     [] => [Vec2::ZERO, Vec2::X, Vec2::Y],
                     uvs => vertices[i].map(|vertex| uvs[vertex as usize]),
@@ -114,9 +114,9 @@ pub(super) fn uv_between([a, b, c]: [Vec2; 3], barycentric: Vec3) -> Vec2 {
 
 /// Attributes of the first, the second and the third vertices of triangles.
 #[inline(always)]
-fn of_vertices(vertices: &[[u32; 3]; PACKET], all: &[Vec3]) -> [Lanes3; 3] {
-    let mut each = [[[0.0; PACKET]; 3]; 3];
-    for i in 0..PACKET {
+fn of_vertices(vertices: &[[u32; 3]; PACKET_SIZE], all: &[Vec3]) -> [Vec3x16; 3] {
+    let mut each = [[[0.0; PACKET_SIZE]; 3]; 3];
+    for i in 0..PACKET_SIZE {
         for corner in 0..3 {
             set_lane(&mut each[corner], i, all[vertices[i][corner] as usize]);
         }
@@ -129,7 +129,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::accel::{Instructions, Loops};
+    use crate::accel::{InstructionSet, SimdKernel};
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
     use crate::geometry::mesh::TriangleMesh;
@@ -148,14 +148,14 @@ mod tests {
         set: UvSet,
     }
 
-    impl Loops for Filling<'_> {
-        type Done = SurfaceRow;
+    impl SimdKernel for Filling<'_> {
+        type Output = SurfaceRow;
 
         #[inline(always)]
-        fn run(self, folds: impl Folds) -> SurfaceRow {
+        fn run(self, simd: impl Simd) -> SurfaceRow {
             let mut surface = SurfaceRow::EMPTY;
             let (rows, _) = RayRows::new(self.rays);
-            self.mesh.fill_surfaces(&mut surface, &rows, self.hits, self.of, Some(self.set), folds);
+            self.mesh.fill_surfaces(&mut surface, &rows, self.hits, self.of, Some(self.set), simd);
             surface
         }
     }
@@ -256,24 +256,24 @@ mod tests {
         let number = |x: f32| (x * 0.5 + 0.5).clamp(0.0, 0.999);
         for mesh in meshes() {
             for round in 0..40_u32 {
-                let rays: Vec<Ray> = (0..PACKET)
+                let rays: Vec<Ray> = (0..PACKET_SIZE)
                     .map(|_| Ray::new(Vec3::splat(9.0), Vec3::new(next(), next(), next()).normalize()))
                     .collect();
                 let mut hits = HitRows::none();
-                for i in 0..PACKET {
+                for i in 0..PACKET_SIZE {
                     let (u, v) = (number(next()), number(next()));
                     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
                     let primitive = (number(next()) * 20.0) as u32;
                     hits.put(i, &ShapeHit { t: 1.0, primitive, u, v });
                 }
                 let of = round.wrapping_mul(0x9e37_79b9) >> 16 | 1 << (round % 16);
-                for (instructions, set) in Instructions::ALL
+                for (instructions, set) in InstructionSet::ALL
                     .into_iter()
                     .flat_map(|one| [UvSet::First, UvSet::Second].map(|set| (one, set)))
                 {
                     let row = instructions.run(Filling { mesh: &mesh, rays: &rays, hits: &hits, of, set });
                     assert_eq!(row.smooth, if mesh.smooth { of } else { 0 });
-                    for i in (0..PACKET).filter(|i| of & 1 << i != 0) {
+                    for i in (0..PACKET_SIZE).filter(|i| of & 1 << i != 0) {
                         let hit = hits.get(i).expect("a hit");
                         let alone = mesh.surface(&rays[i].to_f64(), &hit, SurfaceRequest::ALL);
                         let bits = |v: Vec3| v.to_array().map(f32::to_bits);

@@ -31,7 +31,7 @@ mod triangle_tree;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-pub use crate::accel::{Cell, Loops, PACKET, Stretch};
+pub use crate::accel::{Cell, PACKET_SIZE, SimdKernel, Stretch};
 pub use bodies::{Bodies, OpenGlass};
 pub use camera::Camera;
 pub use contact::{Meeting, Near, NearMemory, Sides};
@@ -178,11 +178,16 @@ impl World {
 
     /// Indices of the materials at some lanes of a row that hit one object; any index for other lanes.
     #[inline(always)]
-    pub fn row_of_materials(&self, object: u32, of: u32, primitives: &[u32; PACKET]) -> [u32; PACKET] {
+    pub fn row_of_materials(
+        &self,
+        object: u32,
+        of: u32,
+        primitives: &[u32; PACKET_SIZE],
+    ) -> [u32; PACKET_SIZE] {
         match self.object_materials[object as usize] {
-            ObjectMaterial::One(index) => [index; PACKET],
+            ObjectMaterial::One(index) => [index; PACKET_SIZE],
             ObjectMaterial::OfFile { first, fallback } => {
-                let mut materials = [fallback; PACKET];
+                let mut materials = [fallback; PACKET_SIZE];
                 for lane in lanes(of) {
                     let own = self.geometry.file_material(object, primitives[lane]);
                     materials[lane] = own.map_or(fallback, |own| first + own);

@@ -1,12 +1,12 @@
 //! Objects of a scene: shapes and meshes.
 
 use super::mesh_instance::MeshInstance;
-use crate::accel::{Ends, PACKET};
+use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::rows::{HitRows, RayRows};
 use crate::geometry::sphere::Sphere;
 use crate::geometry::{Aabb, Ray, RayF64, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::lights::{Ball, Outline};
-use crate::math::lanes::Folds;
+use crate::math::lanes::Simd;
 
 /// An object that rays can hit.
 #[derive(Clone, Debug)]
@@ -41,13 +41,13 @@ impl Object {
         &self,
         rows: &RayRows,
         met: u32,
-        ends: &Ends,
+        ends: &F32x16,
         found: &mut HitRows,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
         match self {
-            Self::Shape(shape) => shape.intersect_rows(rows, met, ends, found, folds),
-            Self::Mesh(mesh) if mesh.has_few() => mesh.closest_of_few(rows, met, ends, found, folds),
+            Self::Shape(shape) => shape.intersect_rows(rows, met, ends, found, simd),
+            Self::Mesh(mesh) if mesh.has_few() => mesh.closest_of_few(rows, met, ends, found, simd),
             Self::Mesh(mesh) => mesh.closest_rows(rows, met, ends, found),
         }
     }
@@ -59,18 +59,18 @@ impl Object {
         &self,
         rows: &RayRows,
         met: u32,
-        ends: &Ends,
-        except: Option<(u32, &[u32; PACKET])>,
-        folds: impl Folds,
+        ends: &F32x16,
+        except: Option<(u32, &[u32; PACKET_SIZE])>,
+        simd: impl Simd,
     ) -> u32 {
         let shape = match self {
             Self::Shape(shape) => shape,
-            Self::Mesh(mesh) if mesh.has_few() => return mesh.any_of_few(rows, met, ends, except, folds),
+            Self::Mesh(mesh) if mesh.has_few() => return mesh.any_of_few(rows, met, ends, except, simd),
             Self::Mesh(mesh) => return mesh.any_rows(rows, met, ends, except),
         };
         let mut found = HitRows::none();
-        shape.intersect_rows(rows, met, ends, &mut found, folds);
-        let mut hit = found.any(folds);
+        shape.intersect_rows(rows, met, ends, &mut found, simd);
+        let mut hit = found.any(simd);
         if let Some((own, parts)) = except {
             for (lane, &part) in parts.iter().enumerate() {
                 let bit = own & 1 << lane;

@@ -2,16 +2,16 @@
 
 use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
-use crate::accel::{AnyTest, ClosestTest, Ends, Loops, PACKET};
+use crate::accel::{AnyTest, ClosestTest, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
 use crate::geometry::rows::{HitRows, RayRows, lanes, traced};
 use crate::lights::{Source, SourceRow};
-use crate::math::lanes::{Folds, TRUE, take, take_u32};
+use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
 impl Geometry {
-    /// [`Geometry::closest`] for at most [`PACKET`] rays, into as many places.
+    /// [`Geometry::closest`] for at most [`PACKET_SIZE`] rays, into as many places.
     pub fn closest_packet(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        debug_assert!(rays.len() <= PACKET && rays.len() == hits.len());
+        debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
         self.instructions().run(Closest { geometry: self, rays, hits });
     }
 
@@ -21,13 +21,13 @@ impl Geometry {
     pub fn closest_rows(
         &self,
         rows: &RayRows,
-        ends: &mut Ends,
+        ends: &mut F32x16,
         traced: u32,
-        folds: impl Folds,
-    ) -> (HitRows, [u32; PACKET]) {
+        simd: impl Simd,
+    ) -> (HitRows, [u32; PACKET_SIZE]) {
         let mut nearest =
-            Nearest { geometry: self, rows, hits: HitRows::none(), object: [NONE; PACKET], folds };
-        self.visited().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, folds);
+            Nearest { geometry: self, rows, hits: HitRows::none(), object: [NONE; PACKET_SIZE], simd };
+        self.visited().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, simd);
         (nearest.hits, nearest.object)
     }
 
@@ -37,12 +37,12 @@ impl Geometry {
     pub fn occluded_rows(
         &self,
         rows: &RayRows,
-        ends: &Ends,
+        ends: &F32x16,
         traced: u32,
         sources: &SourceRow,
-        folds: impl Folds,
+        simd: impl Simd,
     ) -> u32 {
-        folds.call(OccludedRows { geometry: self, rows, ends, traced, sources })
+        simd.call(OccludedRows { geometry: self, rows, ends, traced, sources })
     }
 }
 
@@ -57,13 +57,13 @@ impl Geometry {
             sources.part[lane] == SourceRow::NONE
                 && self.is_whole_merged(Source::Object(sources.object[lane]))
         };
-        (0..PACKET).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
+        (0..PACKET_SIZE).filter(|&lane| is_whole(lane)).fold(0, |bits, lane| bits | 1 << lane)
     }
 
     /// [`Geometry::occluded`], one ray after the other.
     #[cold]
     #[inline(never)]
-    fn occluded_by_each(&self, rows: &RayRows, ends: &Ends, traced: u32, sources: &SourceRow) -> u32 {
+    fn occluded_by_each(&self, rows: &RayRows, ends: &F32x16, traced: u32, sources: &SourceRow) -> u32 {
         let is_occluded =
             |&lane: &usize| self.occluded(&Ray { t_max: ends[lane], ..rows.ray(lane) }, sources.source(lane));
         lanes(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
@@ -74,23 +74,23 @@ impl Geometry {
 struct OccludedRows<'a> {
     geometry: &'a Geometry,
     rows: &'a RayRows,
-    ends: &'a Ends,
+    ends: &'a F32x16,
     traced: u32,
     sources: &'a SourceRow,
 }
 
-impl Loops for OccludedRows<'_> {
-    type Done = u32;
+impl SimdKernel for OccludedRows<'_> {
+    type Output = u32;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> u32 {
+    fn run(self, simd: impl Simd) -> u32 {
         let Self { geometry, rows, ends, traced, sources } = self;
         let by_each = traced & geometry.to_whole_merged(sources);
         if by_each != 0 {
             return geometry.occluded_by_each(rows, ends, traced, sources);
         }
-        let mut blockers = Blockers::new(geometry, rows, sources, folds);
-        geometry.visited().any_packet(rows, ends, traced, geometry.unbounded(), &mut blockers, folds)
+        let mut blockers = Blockers::new(geometry, rows, sources, simd);
+        geometry.visited().any_packet(rows, ends, traced, geometry.unbounded(), &mut blockers, simd)
     }
 }
 
@@ -101,15 +101,15 @@ struct Closest<'a> {
     hits: &'a mut [Option<Hit>],
 }
 
-impl Loops for Closest<'_> {
-    type Done = ();
+impl SimdKernel for Closest<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) {
+    fn run(self, simd: impl Simd) {
         let (rows, mut ends) = RayRows::new(self.rays);
-        let traced = traced(&ends, folds);
-        let (hits, object) = self.geometry.closest_rows(&rows, &mut ends, traced, folds);
-        for (lane, hit) in self.hits.iter_mut().enumerate().take(PACKET) {
+        let traced = traced(&ends, simd);
+        let (hits, object) = self.geometry.closest_rows(&rows, &mut ends, traced, simd);
+        for (lane, hit) in self.hits.iter_mut().enumerate().take(PACKET_SIZE) {
             *hit = hits.get(lane).map(|shape| Hit { shape, object: object[lane] });
         }
     }
@@ -123,15 +123,15 @@ struct Nearest<'a, F> {
     geometry: &'a Geometry,
     rows: &'a RayRows,
     hits: HitRows,
-    object: [u32; PACKET],
-    folds: F,
+    object: [u32; PACKET_SIZE],
+    simd: F,
 }
 
-impl<F: Folds> ClosestTest for Nearest<'_, F> {
+impl<F: Simd> ClosestTest for Nearest<'_, F> {
     #[inline(always)]
-    fn test(&mut self, id: u32, met: u32, ends: &mut Ends) {
+    fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
         let mut found = HitRows::none();
-        let (these, mut objects) = (of_these(met, ends), [id; PACKET]);
+        let (these, mut objects) = (of_these(met, ends), [id; PACKET_SIZE]);
         match self.geometry.merged(id) {
             Some(merged) => {
                 let by = self.geometry.instructions();
@@ -140,29 +140,29 @@ impl<F: Folds> ClosestTest for Nearest<'_, F> {
             }
             None => {
                 let object = &self.geometry.objects()[id as usize];
-                object.closest_rows(self.rows, met, &these, &mut found, self.folds);
+                object.closest_rows(self.rows, met, &these, &mut found, self.simd);
             }
         }
-        let mut nearer = [0; PACKET];
-        for lane in 0..PACKET {
+        let mut nearer = [0; PACKET_SIZE];
+        for lane in 0..PACKET_SIZE {
             let (t, end) = (found.t[lane], ends[lane]);
             let is_nearer = (t < end) | ((t == end) & (objects[lane] < self.object[lane]));
             nearer[lane] = if is_nearer { TRUE } else { 0 };
         }
-        take(&nearer, &found.t, ends);
-        take(&nearer, &found.t, &mut self.hits.t);
-        take(&nearer, &found.u, &mut self.hits.u);
-        take(&nearer, &found.v, &mut self.hits.v);
-        take_u32(&nearer, &found.primitive, &mut self.hits.primitive);
-        take_u32(&nearer, &objects, &mut self.object);
+        select(&nearer, &found.t, ends);
+        select(&nearer, &found.t, &mut self.hits.t);
+        select(&nearer, &found.u, &mut self.hits.u);
+        select(&nearer, &found.v, &mut self.hits.v);
+        select_u32(&nearer, &found.primitive, &mut self.hits.primitive);
+        select_u32(&nearer, &objects, &mut self.object);
     }
 }
 
 /// Returns the objects of hits of merged meshes, and renumbers their triangles by object.
 #[inline(always)]
-fn numbered_by_object(merged: &MergedMeshes, found: &mut HitRows) -> [u32; PACKET] {
-    let mut objects = [NONE; PACKET];
-    for lane in 0..PACKET {
+fn numbered_by_object(merged: &MergedMeshes, found: &mut HitRows) -> [u32; PACKET_SIZE] {
+    let mut objects = [NONE; PACKET_SIZE];
+    for lane in 0..PACKET_SIZE {
         // Rays without a hit get the first triangle, without effect.
         let is_hit = !found.t[lane].is_nan();
         let of = merged.triangle(if is_hit { found.primitive[lane] } else { 0 });
@@ -178,33 +178,33 @@ pub(super) struct Blockers<'a, F> {
     sources: &'a SourceRow,
     /// Rays whose light is a part of an object.
     in_part: u32,
-    folds: F,
+    simd: F,
 }
 
-impl<'a, F: Folds> Blockers<'a, F> {
+impl<'a, F: Simd> Blockers<'a, F> {
     /// The test for the rays of a packet, each with its light.
     #[inline(always)]
-    pub(super) fn new(geometry: &'a Geometry, rows: &'a RayRows, sources: &'a SourceRow, folds: F) -> Self {
-        Self { geometry, rows, sources, in_part: in_part(sources, folds), folds }
+    pub(super) fn new(geometry: &'a Geometry, rows: &'a RayRows, sources: &'a SourceRow, simd: F) -> Self {
+        Self { geometry, rows, sources, in_part: in_part(sources, simd), simd }
     }
 }
 
-impl<F: Folds> AnyTest for Blockers<'_, F> {
+impl<F: Simd> AnyTest for Blockers<'_, F> {
     #[inline(always)]
-    fn test(&mut self, id: u32, met: u32, ends: &Ends) -> u32 {
+    fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
         if let Some(merged) = self.geometry.merged(id) {
             let these = of_these(met, ends);
             if self.in_part & met == 0 {
                 return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), None);
             }
-            let mut own = [MergedMeshes::NO_TRIANGLE; PACKET];
+            let mut own = [MergedMeshes::NO_TRIANGLE; PACKET_SIZE];
             for lane in lanes(self.in_part & met) {
                 let number = merged.number(self.sources.object[lane], self.sources.part[lane]);
                 own[lane] = number.unwrap_or(MergedMeshes::NO_TRIANGLE);
             }
             return merged.any_rows(self.geometry.instructions(), self.rows, (met, &these), Some(&own));
         }
-        let own = own_bits(self.sources, id, self.folds);
+        let own = own_bits(self.sources, id, self.simd);
         let (whole, in_part) = (own & !self.in_part, own & self.in_part);
         let met = met & !whole;
         if met == 0 {
@@ -212,41 +212,41 @@ impl<F: Folds> AnyTest for Blockers<'_, F> {
         }
         let object = &self.geometry.objects()[id as usize];
         let except = if in_part == 0 { None } else { Some((in_part, &self.sources.part)) };
-        object.any_rows(self.rows, met, &of_these(met, ends), except, self.folds)
+        object.any_rows(self.rows, met, &of_these(met, ends), except, self.simd)
     }
 }
 
 /// A bit for each ray whose light is a part of an object.
 #[inline(always)]
-fn in_part(sources: &SourceRow, folds: impl Folds) -> u32 {
+fn in_part(sources: &SourceRow, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
-    let mut in_part = [0; PACKET];
-    for lane in 0..PACKET {
+    let mut in_part = [0; PACKET_SIZE];
+    for lane in 0..PACKET_SIZE {
         in_part[lane] = if sources.part[lane] == SourceRow::NONE { 0 } else { TRUE };
     }
-    folds.bits(&in_part)
+    simd.movemask(&in_part)
 }
 
 /// A bit for each ray whose light is an object or a part of it.
 #[inline(always)]
-fn own_bits(sources: &SourceRow, id: u32, folds: impl Folds) -> u32 {
+fn own_bits(sources: &SourceRow, id: u32, simd: impl Simd) -> u32 {
     if !sources.is_any {
         return 0;
     }
-    let mut own = [0; PACKET];
-    for lane in 0..PACKET {
+    let mut own = [0; PACKET_SIZE];
+    for lane in 0..PACKET_SIZE {
         own[lane] = if sources.object[lane] == id { TRUE } else { 0 };
     }
-    folds.bits(&own)
+    simd.movemask(&own)
 }
 
 /// The ends of the rays of `met`; the others end below 0.
 #[inline(always)]
-fn of_these(met: u32, ends: &Ends) -> Ends {
-    let mut own = [-1.0; PACKET];
-    for lane in 0..PACKET {
+fn of_these(met: u32, ends: &F32x16) -> F32x16 {
+    let mut own = [-1.0; PACKET_SIZE];
+    for lane in 0..PACKET_SIZE {
         own[lane] = if met & 1 << lane != 0 { ends[lane] } else { -1.0 };
     }
     own
@@ -257,7 +257,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::accel::Instructions;
+    use crate::accel::InstructionSet;
     use crate::assets::LoadedMesh;
     use crate::control::CancelToken;
     use crate::geometry::Shape;
@@ -308,7 +308,7 @@ mod tests {
     #[test]
     fn a_packet_sees_what_its_rays_see_alone() {
         for accel in [Accel::Bvh, Accel::BvhHigh, Accel::KdTree] {
-            for instructions in Instructions::ALL {
+            for instructions in InstructionSet::ALL {
                 assert_packets(&geometry(accel).with(instructions));
             }
         }
@@ -320,13 +320,13 @@ mod tests {
         sources: &'a SourceRow,
     }
 
-    impl Loops for Occluded<'_> {
-        type Done = u32;
+    impl SimdKernel for Occluded<'_> {
+        type Output = u32;
 
         #[inline(always)]
-        fn run(self, folds: impl Folds) -> u32 {
+        fn run(self, simd: impl Simd) -> u32 {
             let (rows, ends) = RayRows::new(self.rays);
-            self.geometry.occluded_rows(&rows, &ends, traced(&ends, folds), self.sources, folds)
+            self.geometry.occluded_rows(&rows, &ends, traced(&ends, simd), self.sources, simd)
         }
     }
 
@@ -341,7 +341,7 @@ mod tests {
                 let to = target + Vec3::new(next(), next(), next()) * spread;
                 if i % 2 == 0 { Ray::segment(eye, to) } else { Ray::new(eye, to - eye) }
             };
-            let mut rays: Vec<Ray> = (0..=i % PACKET).map(|_| ray()).collect();
+            let mut rays: Vec<Ray> = (0..=i % PACKET_SIZE).map(|_| ray()).collect();
             // Leave out what some of them would hit.
             for ray in rays.iter_mut().step_by(4) {
                 let start = geometry.closest(ray).map_or(7, |hit| geometry.triangle_number(&hit));

@@ -1,7 +1,7 @@
 //! Every shape against rays side by side, by every instruction set: the bits are those of each ray alone.
 
 use super::*;
-use crate::accel::{Instructions, Loops};
+use crate::accel::{InstructionSet, SimdKernel};
 use crate::geometry::cuboid::Cuboid;
 use crate::geometry::cylinder::Cylinder;
 use crate::geometry::disk::Disk;
@@ -87,23 +87,23 @@ struct Both<'a> {
     object: &'a Object,
     rays: &'a [Ray],
     met: u32,
-    except: (u32, &'a [u32; PACKET]),
+    except: (u32, &'a [u32; PACKET_SIZE]),
 }
 
-impl Loops for Both<'_> {
-    type Done = (HitRows, u32, u32);
+impl SimdKernel for Both<'_> {
+    type Output = (HitRows, u32, u32);
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Self::Done {
+    fn run(self, simd: impl Simd) -> Self::Output {
         let Self { object, rays, met, except } = self;
         let (rows, mut ends) = RayRows::new(rays);
         for (lane, end) in ends.iter_mut().enumerate() {
             *end = if met & 1 << lane != 0 { *end } else { -1.0 };
         }
         let mut found = HitRows::none();
-        object.closest_rows(&rows, met, &ends, &mut found, folds);
-        let any_part = object.any_rows(&rows, met, &ends, None, folds);
-        (found, any_part, object.any_rows(&rows, met, &ends, Some(except), folds))
+        object.closest_rows(&rows, met, &ends, &mut found, simd);
+        let any_part = object.any_rows(&rows, met, &ends, None, simd);
+        (found, any_part, object.any_rows(&rows, met, &ends, Some(except), simd))
     }
 }
 
@@ -113,17 +113,17 @@ fn bits(hit: ShapeHit) -> [u32; 4] {
 }
 
 /// Compares a packet with its rays alone; returns how many hit.
-fn assert_packet(object: &Object, rays: &[Ray], met: u32, except: (u32, &[u32; PACKET])) -> usize {
+fn assert_packet(object: &Object, rays: &[Ray], met: u32, except: (u32, &[u32; PACKET_SIZE])) -> usize {
     let met = met & ((1 << rays.len()) - 1);
     let alone = |lane: usize| {
         let is_traced = rays.get(lane).is_some() && met & 1 << lane != 0;
         is_traced.then(|| object.closest(&rays[lane], &rays[lane].to_f64())).flatten()
     };
     let mut hits = 0;
-    for instructions in Instructions::ALL {
+    for instructions in InstructionSet::ALL {
         let (found, any_part, other_part) = instructions.run(Both { object, rays, met, except });
         hits = 0;
-        for lane in 0..PACKET {
+        for lane in 0..PACKET_SIZE {
             let alone = alone(lane);
             let what = || format!("{instructions:?}, {lane} of {rays:?} at {object:?}");
             assert_eq!(found.get(lane).map(bits), alone.map(bits), "{}", what());
@@ -146,7 +146,7 @@ fn rays_side_by_side_get_the_bits_that_they_get_alone() {
             for i in 0..2000 {
                 let kind = random.below(6);
                 let mut rays: Vec<_> =
-                    (0..=i % PACKET).map(|lane| random.ray(kind.min(lane + kind / 2), scale)).collect();
+                    (0..=i % PACKET_SIZE).map(|lane| random.ray(kind.min(lane + kind / 2), scale)).collect();
                 let met = [0xffff, random.below(1 << 16) as u32][random.below(2)];
                 let parts = std::array::from_fn(|_| random.below(6) as u32);
                 let except = (random.below(1 << 16) as u32, &parts);

@@ -4,15 +4,15 @@
 //! box of an object which light may pass, are followed from one such surface to the next.
 
 use super::packet::Blockers;
-use super::{Geometry, Hit, Loops, PACKET, World};
-use crate::accel::{AnyTest, Ends};
+use super::{Geometry, Hit, PACKET_SIZE, SimdKernel, World};
+use crate::accel::{AnyTest, F32x16};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::rows::{RayRows, lanes};
 use crate::geometry::{Ray, SurfaceRequest};
 use crate::lights::{Source, SourceRow};
 use crate::materials::{Footprint, Material};
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, Lanes3, set_lane};
+use crate::math::lanes::{Simd, Vec3x16, set_lane};
 
 /// Relative difference of distances that are equal within rounding.
 const SAME_PLACE: f32 = 1e-4;
@@ -52,7 +52,7 @@ pub struct Weakened {
     /// A bit for each ray on which nothing is left.
     pub occluded: u32,
     /// The part that is left on the others.
-    pub left: Lanes3,
+    pub left: Vec3x16,
     /// Texture look-ups.
     pub lookups: u64,
 }
@@ -68,7 +68,7 @@ impl World {
     /// end.
     #[cold]
     #[inline(never)]
-    pub fn weakened_rows(&self, rows: &RayRows, ends: &Ends, traced: u32, sources: &SourceRow) -> Weakened {
+    pub fn weakened_rows(&self, rows: &RayRows, ends: &F32x16, traced: u32, sources: &SourceRow) -> Weakened {
         self.geometry.instructions().run(Weakening { world: self, rows, ends, traced, sources })
     }
 
@@ -139,26 +139,26 @@ impl World {
 struct Weakening<'a> {
     world: &'a World,
     rows: &'a RayRows,
-    ends: &'a Ends,
+    ends: &'a F32x16,
     traced: u32,
     sources: &'a SourceRow,
 }
 
-impl Loops for Weakening<'_> {
-    type Done = Weakened;
+impl SimdKernel for Weakening<'_> {
+    type Output = Weakened;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Weakened {
+    fn run(self, simd: impl Simd) -> Weakened {
         let Self { world, rows, ends, traced, sources } = self;
-        let mut weakened = Weakened { occluded: 0, left: [[1.0; PACKET]; 3], lookups: 0 };
+        let mut weakened = Weakened { occluded: 0, left: [[1.0; PACKET_SIZE]; 3], lookups: 0 };
         let Some(passable) = &world.passable else { return weakened };
         // Find the rays that nothing stops.
         let geometry: &Geometry = &world.geometry;
         let each_mesh = passable.is_any_merged || traced & geometry.to_whole_merged(sources) != 0;
         let tree = if each_mesh { geometry.tree() } else { geometry.visited() };
-        let blockers = Blockers::new(geometry, rows, sources, folds);
+        let blockers = Blockers::new(geometry, rows, sources, simd);
         let mut solid = Solid { blockers, passable, near: 0 };
-        weakened.occluded = tree.any_packet(rows, ends, traced, geometry.unbounded(), &mut solid, folds);
+        weakened.occluded = tree.any_packet(rows, ends, traced, geometry.unbounded(), &mut solid, simd);
         // Follow those that come near surfaces which light may pass.
         for lane in lanes(traced & !weakened.occluded & solid.near) {
             let ray = Ray { t_max: ends[lane], ..rows.ray(lane) };
@@ -178,9 +178,9 @@ struct Solid<'a, F> {
     near: u32,
 }
 
-impl<F: Folds> AnyTest for Solid<'_, F> {
+impl<F: Simd> AnyTest for Solid<'_, F> {
     #[inline(always)]
-    fn test(&mut self, id: u32, met: u32, ends: &Ends) -> u32 {
+    fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32 {
         if self.passable.has(id) {
             self.near |= met;
             return 0;

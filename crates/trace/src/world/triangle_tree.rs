@@ -1,7 +1,7 @@
 //! Trees of either kind over triangles; both give the same hits, bit for bit.
 
 use crate::accel::wide_bvh::Quality;
-use crate::accel::{Cell, Ends, KdTree, Stretch, WideBvh};
+use crate::accel::{Cell, F32x16, KdTree, Stretch, WideBvh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -90,8 +90,8 @@ impl TriangleTree {
         }
     }
 
-    /// The nearest hits of at most [`PACKET`](crate::accel::PACKET) rays up to their ends.
-    pub fn closest_packet(&self, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) {
+    /// The nearest hits of at most [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays up to their ends.
+    pub fn closest_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
         match self {
             Self::Boxes(tree) => tree.closest_packet(rays, ends, hits),
             Self::Planes(tree) => {
@@ -103,9 +103,9 @@ impl TriangleTree {
         }
     }
 
-    /// A bit for each of at most [`PACKET`](crate::accel::PACKET) rays that hits any triangle up to its end, but its own of
+    /// A bit for each of at most [`PACKET_SIZE`](crate::accel::PACKET_SIZE) rays that hits any triangle up to its end, but its own of
     /// `except`, which may be empty.
-    pub fn any_packet(&self, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> u32 {
+    pub fn any_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
         match self {
             Self::Boxes(tree) => tree.any_packet(rays, ends, except),
             Self::Planes(tree) => {

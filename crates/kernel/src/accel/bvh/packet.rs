@@ -5,53 +5,53 @@
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
 use arrayvec::ArrayVec;
-use glimt_base::folded;
+use glimt_base::reduce;
 
 use super::top_node::Beam;
 use super::{Bvh, Child, DEEP_STACK};
-use crate::accel::{Ends, PACKET};
+use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
 use crate::geometry::aabb::SLAB_PAD;
-use crate::geometry::rows::{RayRows, Row, lanes};
-use crate::math::lanes::{Folds, TRUE};
+use crate::geometry::rows::{RayRows, lanes};
+use crate::math::lanes::{Simd, TRUE};
 
 /// Callback that finds the nearest hits of a packet.
 pub trait ClosestTest {
     /// Tests a primitive against the rays in `met` and shortens the ends of those that hit it. Primitives
     /// exactly at a ray's end are still tested, so that ties can be broken by id.
-    fn test(&mut self, id: u32, met: u32, ends: &mut Ends);
+    fn test(&mut self, id: u32, met: u32, ends: &mut F32x16);
 }
 
 /// Callback that finds any hits of a packet.
 pub trait AnyTest {
     /// Returns the bits of the rays in `met` that hit a primitive.
-    fn test(&mut self, id: u32, met: u32, ends: &Ends) -> u32;
+    fn test(&mut self, id: u32, met: u32, ends: &F32x16) -> u32;
 }
 
 /// A packet prepared for the slab test.
 struct SlabPacket<'a> {
-    origin: &'a [Row; 3],
-    inverse: [Row; 3],
+    origin: &'a [F32x16; 3],
+    inverse: [F32x16; 3],
 }
 
 /// Interval of distances in which each ray is inside a box; empty if `near` > `far`.
 struct Stretches {
-    near: Row,
-    far: Row,
+    near: F32x16,
+    far: F32x16,
 }
 
 impl<'a> SlabPacket<'a> {
     #[inline(always)]
-    fn new(rays: &'a RayRows, folds: impl Folds) -> Self {
+    fn new(rays: &'a RayRows, simd: impl Simd) -> Self {
         let [x, y, z] = &rays.direction;
-        let inverse = [folds.reciprocals(x), folds.reciprocals(y), folds.reciprocals(z)];
+        let inverse = [simd.reciprocals(x), simd.reciprocals(y), simd.reciprocals(z)];
         Self { origin: &rays.origin, inverse }
     }
 
     #[inline(always)]
-    fn enter(&self, bounds: &Aabb, ends: &Ends) -> Stretches {
+    fn enter(&self, bounds: &Aabb, ends: &F32x16) -> Stretches {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
-        let mut stretches = Stretches { near: [0.0; PACKET], far: [0.0; PACKET] };
+        let mut stretches = Stretches { near: [0.0; PACKET_SIZE], far: [0.0; PACKET_SIZE] };
         for (lane, &end) in ends.iter().enumerate() {
             let (mut near, mut far) = (0.0_f32, end * SLAB_PAD);
             for axis in 0..3 {
@@ -75,33 +75,33 @@ impl Stretches {
     /// 0 and ignore NaN.
     #[inline(always)]
     fn first(&self) -> f32 {
-        let mut entries = [0; PACKET];
-        for lane in 0..PACKET {
+        let mut entries = [0; PACKET_SIZE];
+        for lane in 0..PACKET_SIZE {
             let (near, far) = (self.near[lane], self.far[lane]);
             entries[lane] = if near <= far { near.to_bits() } else { f32::INFINITY.to_bits() };
         }
-        f32::from_bits(folded!(entries, <))
+        f32::from_bits(reduce!(entries, <))
     }
 }
 
 /// Bits of the rays that hit a box before their end.
 #[inline(always)]
-fn met(stretches: &Stretches, folds: impl Folds) -> u32 {
-    let mut met = [0; PACKET];
-    for lane in 0..PACKET {
+fn met(stretches: &Stretches, simd: impl Simd) -> u32 {
+    let mut met = [0; PACKET_SIZE];
+    for lane in 0..PACKET_SIZE {
         met[lane] = if stretches.near[lane] <= stretches.far[lane] { TRUE } else { 0 };
     }
-    folds.bits(&met)
+    simd.movemask(&met)
 }
 
 /// Largest end of all rays, negative if no ray is traced. Compares bits as in [`Stretches::first`].
 #[inline(always)]
-fn greatest(ends: &Ends) -> f32 {
-    let mut all = [0; PACKET];
-    for lane in 0..PACKET {
+fn greatest(ends: &F32x16) -> f32 {
+    let mut all = [0; PACKET_SIZE];
+    for lane in 0..PACKET_SIZE {
         all[lane] = ends[lane].to_bits() as i32;
     }
-    f32::from_bits(folded!(all, >) as u32)
+    f32::from_bits(reduce!(all, >) as u32)
 }
 
 /// Traversal stack: a lower bound on the entry distance, the rays that may hit the child, and the child.
@@ -109,15 +109,15 @@ type Waiting = ArrayVec<(f32, u32, Child), DEEP_STACK>;
 
 /// Subtrees of the top node still to be visited, with the nearest last.
 struct Near {
-    entry: Row,
-    order: [u8; PACKET],
+    entry: F32x16,
+    order: [u8; PACKET_SIZE],
     count: usize,
 }
 
 impl Near {
     #[inline(always)]
-    fn sorted((met, entry): (u32, Row)) -> Self {
-        let mut near = Self { entry, order: [0; PACKET], count: 0 };
+    fn sorted((met, entry): (u32, F32x16)) -> Self {
+        let mut near = Self { entry, order: [0; PACKET_SIZE], count: 0 };
         for i in lanes(met) {
             let mut place = near.count;
             while place > 0 && entry[usize::from(near.order[place - 1])] < entry[i] {
@@ -142,11 +142,11 @@ impl Bvh {
     /// Finds the subtrees of the top node that the packet may hit, with lower bounds on their entry
     /// distances.
     #[inline(always)]
-    fn top_met(&self, slabs: &SlabPacket<'_>, ends: &Ends, traced: u32, folds: impl Folds) -> (u32, Row) {
+    fn top_met(&self, slabs: &SlabPacket<'_>, ends: &F32x16, traced: u32, simd: impl Simd) -> (u32, F32x16) {
         if traced == 0 {
-            return (0, [0.0; PACKET]);
+            return (0, [0.0; PACKET_SIZE]);
         }
-        self.top.met(&Beam::around(slabs.origin, &slabs.inverse, (ends, traced), folds), folds)
+        self.top.met(&Beam::around(slabs.origin, &slabs.inverse, (ends, traced), simd), simd)
     }
 
     /// Visits the leaves that any ray of the packet may hit, roughly front to back, after the primitives
@@ -155,15 +155,15 @@ impl Bvh {
     pub fn closest_packet(
         &self,
         rays: &RayRows,
-        ends: &mut Ends,
+        ends: &mut F32x16,
         traced: u32,
         outside: &[u32],
         closest: &mut impl ClosestTest,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
-        let slabs = SlabPacket::new(rays, folds);
+        let slabs = SlabPacket::new(rays, simd);
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let mut near = Near::sorted(self.top_met(&slabs, ends, traced, folds));
+        let mut near = Near::sorted(self.top_met(&slabs, ends, traced, simd));
         let mut stack = Waiting::new();
         loop {
             for &id in leaf {
@@ -182,7 +182,7 @@ impl Bvh {
                             return;
                         }
                         let (bounds, child) = self.top.subtree(i);
-                        (entry, met(&slabs.enter(&bounds, ends), folds), child)
+                        (entry, met(&slabs.enter(&bounds, ends), simd), child)
                     }
                 };
                 if entry > end || in_it == 0 {
@@ -195,7 +195,7 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 let (left, right) = (slabs.enter(&node.bounds[0], ends), slabs.enter(&node.bounds[1], ends));
-                let (left_met, right_met) = (met(&left, folds), met(&right, folds));
+                let (left_met, right_met) = (met(&left, simd), met(&right, simd));
                 if left_met == 0 || right_met == 0 {
                     let side = usize::from(left_met == 0);
                     stack.push((0.0, left_met | right_met, node.child[side]));
@@ -217,16 +217,16 @@ impl Bvh {
     pub fn any_packet(
         &self,
         rays: &RayRows,
-        ends: &Ends,
+        ends: &F32x16,
         traced: u32,
         outside: &[u32],
         any: &mut impl AnyTest,
-        folds: impl Folds,
+        simd: impl Simd,
     ) -> u32 {
-        let slabs = SlabPacket::new(rays, folds);
+        let slabs = SlabPacket::new(rays, simd);
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let (mut subtrees, _) = self.top_met(&slabs, ends, traced, folds);
+        let (mut subtrees, _) = self.top_met(&slabs, ends, traced, simd);
         let mut stack = Waiting::new();
         loop {
             for &id in leaf {
@@ -243,9 +243,10 @@ impl Bvh {
                     Some((_, in_it, child)) => (in_it, child),
                     None if subtrees == 0 => return traced & !free,
                     None => {
-                        let (bounds, child) = self.top.subtree(subtrees.trailing_zeros() as usize % PACKET);
+                        let (bounds, child) =
+                            self.top.subtree(subtrees.trailing_zeros() as usize % PACKET_SIZE);
                         subtrees &= subtrees - 1;
-                        (met(&slabs.enter(&bounds, ends), folds), child)
+                        (met(&slabs.enter(&bounds, ends), simd), child)
                     }
                 };
                 if in_it & free == 0 {
@@ -258,7 +259,7 @@ impl Bvh {
                 }
                 let node = &self.nodes[child.first as usize];
                 for (bounds, child) in node.bounds.iter().zip(node.child) {
-                    let met = met(&slabs.enter(bounds, ends), folds);
+                    let met = met(&slabs.enter(bounds, ends), simd);
                     if met & free != 0 {
                         stack.push((0.0, met, child));
                     }

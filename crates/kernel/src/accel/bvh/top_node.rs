@@ -6,20 +6,19 @@
 
 use super::build::Reference;
 use super::{Bvh, Child, Node};
-use crate::accel::{Ends, PACKET};
+use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
 use crate::geometry::aabb::SLAB_PAD;
-use crate::geometry::rows::Row;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, PlainFolds, TRUE};
+use crate::math::lanes::{PortableSimd, Simd, TRUE};
 
-/// Up to [`PACKET`] subtrees that contain all primitives and replace the upper levels. Small scenes fit
+/// Up to [`PACKET_SIZE`] subtrees that contain all primitives and replace the upper levels. Small scenes fit
 /// entirely into the top node.
 #[derive(Clone, Debug)]
 pub(super) struct TopNode {
-    min: [Row; 3],
-    max: [Row; 3],
-    child: [Child; PACKET],
+    min: [F32x16; 3],
+    max: [F32x16; 3],
+    child: [Child; PACKET_SIZE],
     /// Bits of the subtrees in use.
     used: u32,
 }
@@ -27,9 +26,9 @@ pub(super) struct TopNode {
 impl TopNode {
     /// Top node of an empty tree.
     pub(super) const EMPTY: Self = Self {
-        min: [[f32::INFINITY; PACKET]; 3],
-        max: [[f32::NEG_INFINITY; PACKET]; 3],
-        child: [Child::NONE; PACKET],
+        min: [[f32::INFINITY; PACKET_SIZE]; 3],
+        max: [[f32::NEG_INFINITY; PACKET_SIZE]; 3],
+        child: [Child::NONE; PACKET_SIZE],
         used: 0,
     };
 
@@ -62,28 +61,28 @@ impl TopNode {
     /// A subtree and its bounding box.
     #[inline(always)]
     pub(super) fn subtree(&self, i: usize) -> (Aabb, Child) {
-        let corner = |rows: &[Row; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
+        let corner = |rows: &[F32x16; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
         (Aabb { min: corner(&self.min), max: corner(&self.max) }, self.child[i])
     }
 
     /// Bits of the subtrees whose box overlaps `other`.
     #[inline]
     pub(super) fn meeting(&self, other: &Aabb) -> u32 {
-        let mut met = [TRUE; PACKET];
+        let mut met = [TRUE; PACKET_SIZE];
         for axis in 0..3 {
             let (least, greatest) = (other.min[axis], other.max[axis]);
-            for i in 0..PACKET {
+            for i in 0..PACKET_SIZE {
                 let meets = (self.min[axis][i] <= greatest) & (least <= self.max[axis][i]);
                 met[i] = if meets { met[i] } else { 0 };
             }
         }
-        PlainFolds.bits(&met) & self.used
+        PortableSimd.movemask(&met) & self.used
     }
 
     /// Bits of the subtrees that the rays of a beam may hit, with a lower bound on the entry distances.
     #[inline(always)]
-    pub(super) fn met(&self, beam: &Beam, folds: impl Folds) -> (u32, Row) {
-        let (mut near, mut far) = ([0.0_f32; PACKET], [beam.end * SLAB_PAD; PACKET]);
+    pub(super) fn met(&self, beam: &Beam, simd: impl Simd) -> (u32, F32x16) {
+        let (mut near, mut far) = ([0.0_f32; PACKET_SIZE], [beam.end * SLAB_PAD; PACKET_SIZE]);
         for axis in 0..3 {
             let [low, high] = beam.inverse[axis];
             let is_up = (low > 0.0) & (high < f32::INFINITY);
@@ -95,7 +94,7 @@ impl TopNode {
                 if is_up { (&self.min[axis], &self.max[axis]) } else { (&self.max[axis], &self.min[axis]) };
             let [start, end] = beam.origin[axis];
             let (start, end) = if is_up { (start, end) } else { (end, start) };
-            for i in 0..PACKET {
+            for i in 0..PACKET_SIZE {
                 let (to_first, to_last) = (first[i] - end, last[i] - start);
                 let (a, b) = (to_first * low, to_first * high);
                 let entry = if a < b { a } else { b };
@@ -105,18 +104,18 @@ impl TopNode {
                 far[i] = if exit < far[i] { exit } else { far[i] };
             }
         }
-        let mut met = [0; PACKET];
-        for i in 0..PACKET {
+        let mut met = [0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             met[i] = if near[i] <= far[i] { TRUE } else { 0 };
         }
-        (folds.bits(&met) & self.used, near)
+        (simd.movemask(&met) & self.used, near)
     }
 }
 
 /// Index of the largest box whose subtree may be opened. `may_open` receives the child and the number of free
 /// slots.
 fn largest(open: &[(Aabb, Child)], may_open: impl Fn(Child, usize) -> bool) -> Option<usize> {
-    let room = PACKET - open.len();
+    let room = PACKET_SIZE - open.len();
     let each = open.iter().enumerate().filter(|(_, (_, child))| may_open(*child, room));
     each.max_by(|(_, (a, _)), (_, (b, _))| a.half_area().total_cmp(&b.half_area())).map(|(place, _)| place)
 }
@@ -135,16 +134,16 @@ impl Beam {
     /// Bounds the rays in `traced`, which must not be empty.
     #[inline(always)]
     pub(super) fn around(
-        origin: &[Row; 3],
-        inverse: &[Row; 3],
-        (ends, traced): (&Ends, u32),
-        folds: impl Folds,
+        origin: &[F32x16; 3],
+        inverse: &[F32x16; 3],
+        (ends, traced): (&F32x16, u32),
+        simd: impl Simd,
     ) -> Self {
         let [x, y, z] = origin;
-        let origin = [folds.span(x, traced), folds.span(y, traced), folds.span(z, traced)];
+        let origin = [simd.min_max(x, traced), simd.min_max(y, traced), simd.min_max(z, traced)];
         let [x, y, z] = inverse;
-        let inverse = [folds.span(x, traced), folds.span(y, traced), folds.span(z, traced)];
-        Self { origin, inverse, end: folds.span(ends, traced)[1] }
+        let inverse = [simd.min_max(x, traced), simd.min_max(y, traced), simd.min_max(z, traced)];
+        Self { origin, inverse, end: simd.min_max(ends, traced)[1] }
     }
 }
 
@@ -170,13 +169,13 @@ mod tests {
     struct Seen(Vec<u32>);
 
     impl ClosestTest for Seen {
-        fn test(&mut self, id: u32, met: u32, _: &mut Ends) {
+        fn test(&mut self, id: u32, met: u32, _: &mut F32x16) {
             self.0[id as usize] |= met;
         }
     }
 
     impl AnyTest for Seen {
-        fn test(&mut self, id: u32, met: u32, _: &Ends) -> u32 {
+        fn test(&mut self, id: u32, met: u32, _: &F32x16) -> u32 {
             self.0[id as usize] |= met;
             0
         }
@@ -195,7 +194,7 @@ mod tests {
             };
             let boxes: Vec<Aabb> = (0..count).map(|_| cell(&mut next)).collect();
             let tree = Bvh::build(&boxes, &CancelToken::new()).expect("nobody cancels");
-            assert_eq!(tree.is_flat(), count <= PACKET, "{count}");
+            assert_eq!(tree.is_flat(), count <= PACKET_SIZE, "{count}");
             let (mut tested, mut met) = (0, 0);
             for round in 0..600 {
                 let (from, to) = (Vec3::new(next(), next(), next()) * 6.0, Vec3::new(next(), next(), next()));
@@ -209,16 +208,16 @@ mod tests {
                         _ => Ray::segment(from, to * 3.0 + jitter),
                     }
                 };
-                let rays: Vec<Ray> = (0..=round % PACKET).map(|_| ray()).collect();
+                let rays: Vec<Ray> = (0..=round % PACKET_SIZE).map(|_| ray()).collect();
                 let (rows, mut ends) = RayRows::new(&rays);
                 // Leave some rays untraced.
                 for lane in (0..rays.len()).filter(|lane| round % 5 == 0 && lane % 3 == 1) {
                     ends[lane] = -1.0;
                 }
                 let (mut closest, mut any) = (Seen(vec![0; count]), Seen(vec![0; count]));
-                let traced = traced(&ends, PlainFolds);
-                tree.closest_packet(&rows, &mut ends, traced, &[], &mut closest, PlainFolds);
-                tree.any_packet(&rows, &ends, traced, &[], &mut any, PlainFolds);
+                let traced = traced(&ends, PortableSimd);
+                tree.closest_packet(&rows, &mut ends, traced, &[], &mut closest, PortableSimd);
+                tree.any_packet(&rows, &ends, traced, &[], &mut any, PortableSimd);
                 for (id, bounds) in boxes.iter().enumerate() {
                     for lane in lanes((1 << rays.len()) - 1).filter(|&lane| ends[lane] >= 0.0) {
                         let slabs = SlabRay::new(rays[lane].origin, rays[lane].direction);
@@ -232,7 +231,7 @@ mod tests {
             }
             assert!(met > 0 || count == 0, "{count}: the rays hit something");
             assert!(
-                count > PACKET || tested == met,
+                count > PACKET_SIZE || tested == met,
                 "{count}: {tested} tests for {met}: in single-box leaves, no test is superfluous"
             );
         }

@@ -12,9 +12,9 @@ use crate::geometry::rows::lanes;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 
-pub use simd::{Instructions, Loops, pages};
+pub use simd::{InstructionSet, SimdKernel, pages};
 
-use crate::accel::{Cell, Ends, PACKET, Stretch};
+use crate::accel::{Cell, F32x16, PACKET_SIZE, Stretch};
 
 use node::{Node, TrianglePack};
 
@@ -25,7 +25,7 @@ pub struct WideBvh {
     nodes: Vec<Node>,
     packs: Vec<TrianglePack>,
     bounds: Aabb,
-    instructions: Instructions,
+    instructions: InstructionSet,
     quality: Quality,
 }
 
@@ -63,17 +63,17 @@ impl WideBvh {
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
         let build::Built { nodes, packs, bounds } = build::build(count, corners, quality, token)?;
-        Ok(Self { nodes, packs, bounds, instructions: Instructions::best(), quality })
+        Ok(Self { nodes, packs, bounds, instructions: InstructionSet::best(), quality })
     }
 
     /// Sets the instruction set for traversal. Falls back to the best one that the processor has.
-    pub fn with(mut self, instructions: Instructions) -> Self {
+    pub fn with(mut self, instructions: InstructionSet) -> Self {
         self.instructions = instructions.available();
         self
     }
 
     /// Instruction set used for traversal.
-    pub fn instructions(&self) -> Instructions {
+    pub fn instructions(&self) -> InstructionSet {
         self.instructions
     }
 
@@ -139,10 +139,10 @@ impl WideBvh {
         !self.nodes.is_empty() && simd::any(self, ray, except)
     }
 
-    /// [`WideBvh::closest`] for at most [`PACKET`] rays up to their ends. Faster for rays in similar
+    /// [`WideBvh::closest`] for at most [`PACKET_SIZE`] rays up to their ends. Faster for rays in similar
     /// directions, such as those of neighboring pixels.
-    pub fn closest_packet(&self, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) {
-        debug_assert!(rays.len() <= PACKET && rays.len() == hits.len());
+    pub fn closest_packet(&self, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) {
+        debug_assert!(rays.len() <= PACKET_SIZE && rays.len() == hits.len());
         hits.fill(None);
         if !self.nodes.is_empty() && !simd::closest_packet(self, rays, ends, hits) {
             for (lane, hit) in hits.iter_mut().enumerate().filter(|&(lane, _)| ends[lane] >= 0.0) {
@@ -151,10 +151,10 @@ impl WideBvh {
         }
     }
 
-    /// [`WideBvh::any`] for at most [`PACKET`] rays up to their ends. Returns the bits of the rays that hit.
+    /// [`WideBvh::any`] for at most [`PACKET_SIZE`] rays up to their ends. Returns the bits of the rays that hit.
     /// `except` has one entry per ray, or is empty.
-    pub fn any_packet(&self, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> u32 {
-        debug_assert!(rays.len() <= PACKET && (except.is_empty() || rays.len() == except.len()));
+    pub fn any_packet(&self, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> u32 {
+        debug_assert!(rays.len() <= PACKET_SIZE && (except.is_empty() || rays.len() == except.len()));
         if self.nodes.is_empty() {
             return 0;
         }
@@ -165,7 +165,7 @@ impl WideBvh {
             let ray = Ray { t_max: ends[lane], ..rays[lane] };
             u32::from(self.any(&ray, except.get(lane).copied().flatten())) << lane
         };
-        if self.instructions == Instructions::Portable {
+        if self.instructions == InstructionSet::Portable {
             return (0..rays.len()).filter(|&lane| ends[lane] >= 0.0).map(alone).sum();
         }
         let mut bits = 0;
@@ -255,7 +255,7 @@ const SMALL_GROUP: usize = 8;
 
 /// Calls `take` for each group of rays whose directions have the same signs and the same longest axis, with
 /// their ends and their number. All other rays get negative ends.
-fn for_each_group(rays: &[Ray], ends: &Ends, mut take: impl FnMut(&Ends, usize)) {
+fn for_each_group(rays: &[Ray], ends: &F32x16, mut take: impl FnMut(&F32x16, usize)) {
     let way = |ray: &Ray| {
         let [x, y, z] = ray.direction.to_array().map(f32::abs);
         let longest = if x > y && x > z {
@@ -267,12 +267,12 @@ fn for_each_group(rays: &[Ray], ends: &Ends, mut take: impl FnMut(&Ends, usize))
         };
         ray.direction.cmplt(Vec3::ZERO).bitmask() | longest << 3
     };
-    let mut ways = [u32::MAX; PACKET];
+    let mut ways = [u32::MAX; PACKET_SIZE];
     for (lane, ray) in rays.iter().enumerate().filter(|&(lane, _)| ends[lane] >= 0.0) {
         ways[lane] = way(ray);
     }
     while let Some(&own) = ways.iter().find(|&&way| way != u32::MAX) {
-        let (mut group, mut count) = ([-1.0; PACKET], 0);
+        let (mut group, mut count) = ([-1.0; PACKET_SIZE], 0);
         for (lane, way) in ways.iter_mut().enumerate().filter(|(_, way)| **way == own) {
             group[lane] = ends[lane];
             count += 1;
@@ -308,7 +308,7 @@ mod tests {
             |mesh: &[[Vec3; 3]]| [Quality::Medium, Quality::High].map(|quality| built_with(quality, mesh));
         for (number, mesh) in meshes().iter().enumerate() {
             for (tree, instructions) in
-                of_each(mesh).iter().flat_map(|tree| Instructions::ALL.map(|one| (tree, one)))
+                of_each(mesh).iter().flat_map(|tree| InstructionSet::ALL.map(|one| (tree, one)))
             {
                 let tree = tree.clone().with(instructions);
                 for ray in rays(mesh) {
@@ -328,7 +328,7 @@ mod tests {
     /// Packets of all sizes, some with similar directions and some without.
     fn packets(mesh: &[[Vec3; 3]]) -> Vec<Vec<Ray>> {
         let mut next = random(17);
-        let mut packets: Vec<Vec<Ray>> = rays(mesh).chunks(PACKET).map(<[Ray]>::to_vec).collect();
+        let mut packets: Vec<Vec<Ray>> = rays(mesh).chunks(PACKET_SIZE).map(<[Ray]>::to_vec).collect();
         for i in 0..600 {
             let origin = Vec3::new(next(), next(), next()) * 15.0;
             let triangle = mesh.get(i * 7 % mesh.len().max(1)).copied().unwrap_or([Vec3::ZERO; 3]);
@@ -340,7 +340,7 @@ mod tests {
                 let ray = Ray::new(start, target - start);
                 if k.is_multiple_of(5) { Ray { t_max: 1.0, ..ray } } else { ray }
             };
-            packets.push((0..1 + i % PACKET).map(ray).collect());
+            packets.push((0..1 + i % PACKET_SIZE).map(ray).collect());
         }
         packets
     }
@@ -349,7 +349,7 @@ mod tests {
     fn packets_match_single_rays() {
         for (number, mesh) in meshes().iter().enumerate() {
             let mut tree = built(mesh);
-            for instructions in Instructions::ALL {
+            for instructions in InstructionSet::ALL {
                 tree = tree.with(instructions);
                 for rays in packets(mesh) {
                     let mut found = vec![None; rays.len()];
@@ -388,21 +388,21 @@ mod tests {
     #[test]
     fn coherent_rays_are_traced_as_packets() {
         let mesh = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
-        let rays: Vec<_> = (0..PACKET)
+        let rays: Vec<_> = (0..PACKET_SIZE)
             .map(|i| Ray::new(Vec3::new(0.1 + 0.02 * i as f32, 0.2, 1.0), Vec3::new(0.01, 0.02, -1.0)))
             .collect();
         let apart = [rays[0], Ray { direction: -rays[0].direction, ..rays[0] }];
-        for instructions in Instructions::ALL {
+        for instructions in InstructionSet::ALL {
             let tree = built(&mesh).with(instructions);
-            let are_vectors = tree.instructions() != Instructions::Portable;
-            let mut hits = [None; PACKET];
+            let are_vectors = tree.instructions() != InstructionSet::Portable;
+            let mut hits = [None; PACKET_SIZE];
             assert_eq!(
                 simd::closest_packet(&tree, &rays, &ends(&rays), &mut hits),
                 are_vectors,
                 "{instructions:?}"
             );
-            assert_eq!(hits.iter().flatten().count(), if are_vectors { PACKET } else { 0 });
-            let all = (1 << PACKET) - 1;
+            assert_eq!(hits.iter().flatten().count(), if are_vectors { PACKET_SIZE } else { 0 });
+            let all = (1 << PACKET_SIZE) - 1;
             assert_eq!(simd::any_packet(&tree, &rays, &ends(&rays), &[]), are_vectors.then_some(all));
             assert!(!simd::closest_packet(&tree, &apart, &ends(&apart), &mut hits[..2]), "{instructions:?}");
             assert_eq!(simd::any_packet(&tree, &apart, &ends(&apart), &[]), None, "{instructions:?}");
@@ -421,7 +421,7 @@ mod tests {
         for direction in [Vec3::Z, Vec3::Z * 1e-20, Vec3::new(-0.0, 0.0, 1e-20), Vec3::Z * 1e-30] {
             let ray = Ray::new(at, direction);
             let expected = brute(&mesh, &ray);
-            for instructions in Instructions::ALL {
+            for instructions in InstructionSet::ALL {
                 let tree = tree.clone().with(instructions);
                 assert_eq!(bits(tree.closest(&ray)), bits(expected), "{instructions:?}, {direction:?}");
                 assert_eq!(tree.any(&ray, None), expected.is_some(), "{instructions:?}, {direction:?}");
@@ -435,7 +435,7 @@ mod tests {
         let mesh = [[Vec3::ZERO, Vec3::X, Vec3::Y]];
         let tree = built(&mesh);
         let ray = Ray::new(Vec3::new(0.2, 0.2, 1.0), Vec3::NEG_Z);
-        for instructions in Instructions::ALL {
+        for instructions in InstructionSet::ALL {
             let tree = tree.clone().with(instructions);
             assert!(tree.any(&ray, None) && !tree.any(&ray, Some(0)));
         }

@@ -10,7 +10,7 @@ use super::row::{LightRow, row_of};
 use super::sample::{End, LightSample, Source};
 use super::tree::LightBounds;
 use crate::math::Vec3;
-use crate::math::lanes::{Lanes3, lane};
+use crate::math::lanes::{Vec3x16, lane};
 
 /// A light without extent.
 pub trait DeltaLight {
@@ -45,7 +45,7 @@ pub trait DeltaLight {
 
     /// [`DeltaLight::sample`] for points side by side.
     #[inline(always)]
-    fn sample_row(&self, points: &Lanes3) -> LightRow {
+    fn sample_row(&self, points: &Vec3x16) -> LightRow {
         let target = self.brightest().position.as_vec3();
         row_of!(Source::Nothing, i => {
             let (direction, weight) = self.arriving(lane(points, i));

@@ -8,7 +8,7 @@ use crate::lights::sample::{End, LightSample, Source};
 use crate::lights::tree::bounds::{EmissionCone, LightBounds, Space, strength};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
-use crate::math::lanes::Lanes;
+use crate::math::lanes::F32x16;
 use crate::sampling::warp;
 
 /// Light that comes from one direction everywhere, or from a disc of directions of the same radiance.
@@ -49,7 +49,7 @@ impl DirectionalLight {
 
     /// [`DirectionalLight::sample`] side by side.
     #[inline(always)]
-    pub fn sample_row(&self, u: &[Lanes; 2]) -> LightRow {
+    pub fn sample_row(&self, u: &[F32x16; 2]) -> LightRow {
         row_beyond!(i => self.arriving([u[0][i], u[1][i]]))
     }
 

@@ -9,7 +9,7 @@ use crate::lights::row::LightRow;
 use crate::lights::sample::{End, LightSample, Source};
 use crate::lights::tree::bounds::{EmissionCone, LightBounds, Space, strength};
 use crate::math::frame::Frame;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::warp;
 
@@ -53,14 +53,14 @@ impl Environment {
 
     /// [`Environment::arriving`] for directions side by side.
     #[inline(always)]
-    pub fn arriving_row(&self, directions: &Lanes3) -> (Lanes3, Lanes) {
+    pub fn arriving_row(&self, directions: &Vec3x16) -> (Vec3x16, F32x16) {
         match self {
             Self::Constant(Vec3 { x, y, z }) => {
-                ([[*x; LANES], [*y; LANES], [*z; LANES]], [HEMISPHERE; LANES])
+                ([[*x; PACKET_SIZE], [*y; PACKET_SIZE], [*z; PACKET_SIZE]], [HEMISPHERE; PACKET_SIZE])
             }
             Self::Map { sky, factor, turn } => {
                 let (mut colors, densities) = sky.lookup_row(directions, *turn);
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
                 }
@@ -71,11 +71,11 @@ impl Environment {
 
     /// Samples of the environment for surfaces of these normals, side by side.
     #[inline(always)]
-    pub fn sample_row(&self, normals: &Lanes3, u: &[Lanes; 2]) -> LightRow {
+    pub fn sample_row(&self, normals: &Vec3x16, u: &[F32x16; 2]) -> LightRow {
         let (directions, mut weights, densities) = match self {
             Self::Constant(_) => {
-                let mut directions = [[0.0; LANES]; 3];
-                for i in 0..LANES {
+                let mut directions = [[0.0; PACKET_SIZE]; 3];
+                for i in 0..PACKET_SIZE {
                     let frame = Frame::from_normal(lane(normals, i));
                     set_lane(&mut directions, i, frame.to_world(warp::cone([u[0][i], u[1][i]], 1.0)));
                 }
@@ -84,15 +84,15 @@ impl Environment {
             }
             Self::Map { sky, factor, turn } => {
                 let (directions, mut colors, densities) = sky.sample_row(u, *turn);
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     let color = lane(&colors, i) * *factor;
                     set_lane(&mut colors, i, color);
                 }
                 (directions, colors, densities)
             }
         };
-        let mut inverse_densities = [0.0; LANES];
-        for i in 0..LANES {
+        let mut inverse_densities = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             // The pdf is 0 in the corner of a cell that is dark but for its neighbours.
             inverse_densities[i] = if densities[i] > 0.0 { 1.0 / densities[i] } else { 0.0 };
             let weight = lane(&weights, i) * inverse_densities[i];

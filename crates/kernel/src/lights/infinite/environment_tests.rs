@@ -96,7 +96,7 @@ fn samples_have_the_density_that_their_directions_have() {
             let expected = radiance * (1.0 / density);
             off += u32::from(!((sample.weight - expected).length() <= 2e-3 * expected.length()));
             assert!((sample.direction.length() - 1.0).abs() < 1e-6);
-            let row = environment.sample_row(&[[0.0; LANES]; 3], &random(i).map(|u| [u; LANES]));
+            let row = environment.sample_row(&[[0.0; PACKET_SIZE]; 3], &random(i).map(|u| [u; PACKET_SIZE]));
             assert_eq!(lane(&row.directions, 3), sample.direction);
             assert_eq!(lane(&row.weights, 3), sample.weight);
             found += 1;

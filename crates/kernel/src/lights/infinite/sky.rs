@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::materials::texels::Texels;
 use crate::math::color::luminance;
 use crate::math::elementary::{atan2, sin_cos};
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::{DVec3, Vec3};
 use crate::sampling::grid::{Grid, InGrid};
 use crate::sampling::warp;
@@ -138,11 +138,11 @@ impl SkyMap {
 
     /// [`SkyMap::sample`] side by side: unit directions, colours and pdfs. Look-ups lie between loops without branches.
     #[inline(always)]
-    pub fn sample_row(&self, u: &[Lanes; 2], turn: f32) -> (Lanes3, Lanes3, Lanes) {
-        let (mut columns, mut rows, mut rest) = ([0; LANES], [0; LANES], [[0.0; LANES]; 2]);
-        let (mut tops, mut extents) = ([0.0; LANES], [0.0; LANES]);
-        let mut densities = [0.0; LANES];
-        for i in 0..LANES {
+    pub fn sample_row(&self, u: &[F32x16; 2], turn: f32) -> (Vec3x16, Vec3x16, F32x16) {
+        let (mut columns, mut rows, mut rest) = ([0; PACKET_SIZE], [0; PACKET_SIZE], [[0.0; PACKET_SIZE]; 2]);
+        let (mut tops, mut extents) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        let mut densities = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let at = self.cells.sample([u[0][i], u[1][i]]);
             (columns[i], rows[i]) = (at.column as u32, at.row as u32);
             (rest[0][i], rest[1][i]) = (at.rest[0], at.rest[1]);
@@ -151,8 +151,8 @@ impl SkyMap {
             densities[i] = self.density(at.column as u32, at.row as u32);
         }
         let corners = self.corner_rows(&columns, &rows);
-        let [mut directions, mut colors] = [[[0.0; LANES]; 3]; 2];
-        for i in 0..LANES {
+        let [mut directions, mut colors] = [[[0.0; PACKET_SIZE]; 3]; 2];
+        for i in 0..PACKET_SIZE {
             let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
             let luminances = luminances(&corners);
             let along = warp::bilinear([rest[0][i], rest[1][i]], &luminances);
@@ -168,23 +168,23 @@ impl SkyMap {
 
     /// [`SkyMap::lookup`] side by side.
     #[inline(always)]
-    pub fn lookup_row(&self, directions: &Lanes3, turn: f32) -> (Lanes3, Lanes) {
-        let (mut columns, mut rows) = ([0; LANES], [0; LANES]);
-        let (mut between, mut angles) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
+    pub fn lookup_row(&self, directions: &Vec3x16, turn: f32) -> (Vec3x16, F32x16) {
+        let (mut columns, mut rows) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
+        let (mut between, mut angles) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let (x, y) = self.coordinates(lane(directions, i), turn);
             (columns[i], rows[i]) = self.cell(x, y);
             between[i] = x - columns[i] as i32 as f32;
             angles[i] = y - rows[i] as i32 as f32;
         }
         let corners = self.corner_rows(&columns, &rows);
-        let (mut heights, mut densities) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
+        let (mut heights, mut densities) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             densities[i] = self.density(columns[i], rows[i]);
             heights[i] = self.part_of_height(rows[i], directions[1][i]);
         }
-        let mut colors = [[0.0; LANES]; 3];
-        for i in 0..LANES {
+        let mut colors = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
             let corners = [0, 1, 2, 3].map(|corner| lane(&corners[corner], i));
             set_lane(&mut colors, i, color(&corners, [between[i], angles[i]]));
             densities[i] *= share(&luminances(&corners), [between[i], heights[i]]);
@@ -245,15 +245,15 @@ impl SkyMap {
 
     /// The texels around cells. Each loop waits only once for memory that is not in the cache.
     #[inline(always)]
-    fn corner_rows(&self, columns: &[u32; LANES], rows: &[u32; LANES]) -> [Lanes3; 4] {
-        let mut places = [[0; LANES]; 4];
-        for i in 0..LANES {
+    fn corner_rows(&self, columns: &[u32; PACKET_SIZE], rows: &[u32; PACKET_SIZE]) -> [Vec3x16; 4] {
+        let mut places = [[0; PACKET_SIZE]; 4];
+        for i in 0..PACKET_SIZE {
             let own = self.corner_places(columns[i], rows[i]);
             for corner in 0..4 {
                 places[corner][i] = own[corner];
             }
         }
-        let mut corners = [[[0.0; LANES]; 3]; 4];
+        let mut corners = [[[0.0; PACKET_SIZE]; 3]; 4];
         for corner in 0..4 {
             self.texels.fill_row(&places[corner], &mut corners[corner]);
         }

@@ -7,7 +7,7 @@ use super::{LightTree, NOWHERE};
 use crate::control::{CancelToken, Cancelled};
 use crate::math::DVec3;
 use crate::math::float::power_of_two_below;
-use crate::math::lanes::LANES;
+use crate::math::lanes::PACKET_SIZE;
 
 impl LightTree {
     /// A tree over these lights, which an index names; lights without bounds emit nothing. `None` if no light emits.
@@ -63,7 +63,7 @@ impl Builder<'_> {
     fn node(&mut self, leaves: &mut [Leaf], before: u32) -> Result<u32, Cancelled> {
         let number = self.nodes.len() as u32;
         self.nodes.push(Node::empty(self.leaves));
-        let is_over_lights = leaves.len() <= LANES;
+        let is_over_lights = leaves.len() <= PACKET_SIZE;
         let groups = groups(leaves, self.token)?;
         let mut node = Node::empty(self.leaves);
         let (mut rest, mut first) = (leaves, before);
@@ -89,20 +89,20 @@ impl Builder<'_> {
 /// nodes are full.
 fn groups(leaves: &mut [Leaf], token: &CancelToken) -> Result<Vec<usize>, Cancelled> {
     token.check()?;
-    if leaves.len() <= LANES {
+    if leaves.len() <= PACKET_SIZE {
         return Ok(vec![1; leaves.len()]);
     }
-    let mut unit = LANES;
-    while unit * LANES < leaves.len() {
-        unit *= LANES;
+    let mut unit = PACKET_SIZE;
+    while unit * PACKET_SIZE < leaves.len() {
+        unit *= PACKET_SIZE;
     }
-    let mut groups: Vec<Group> = Vec::with_capacity(LANES);
+    let mut groups: Vec<Group> = Vec::with_capacity(PACKET_SIZE);
     let mut start = 0;
     for own in leaves.chunk_by(|a, b| a.bounds.space == b.bounds.space) {
         groups.push(Group::new(start, own));
         start += own.len();
     }
-    while groups.len() < LANES {
+    while groups.len() < PACKET_SIZE {
         let dearest = (0..groups.len()).filter(|&i| groups[i].count > unit);
         let Some(dearest) = dearest.max_by(|&a, &b| groups[a].cost.total_cmp(&groups[b].cost)) else { break };
         let Group { start, count, .. } = groups[dearest];

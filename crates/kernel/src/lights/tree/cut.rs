@@ -7,7 +7,7 @@ use arrayvec::ArrayVec;
 use super::node::{Child, Expected, Receiver};
 use super::{LightTree, NOWHERE, Pick, ROOT, Shares, Way, below, target};
 use crate::math::Vec3;
-use crate::math::lanes::Lanes;
+use crate::math::lanes::F32x16;
 
 /// A cut, for picks at one point after the other.
 pub struct Cut<'a> {
@@ -18,7 +18,7 @@ pub struct Cut<'a> {
     /// Numbers of the nodes.
     nodes: ArrayVec<u32, { Cut::MOST }>,
     /// Importance of their children; 0 for those that are nodes of the cut themselves.
-    importance: ArrayVec<Lanes, { Cut::MOST }>,
+    importance: ArrayVec<F32x16, { Cut::MOST }>,
     /// Cumulative importance up to each node.
     sums: ArrayVec<f64, { Cut::MOST }>,
 }
@@ -168,7 +168,7 @@ impl<'a> Cut<'a> {
 
 /// The sum of a row, in one order on all machines.
 #[inline(always)]
-fn total(importance: &Lanes) -> f64 {
+fn total(importance: &F32x16) -> f64 {
     let mut row = *importance;
     for i in 0..8 {
         row[i] += row[i + 8];

@@ -2,25 +2,25 @@
 
 use super::node::{Child, Node, ReceiverRow};
 use super::{LightTree, ROOT};
-use crate::math::lanes::{LANES, Lanes};
+use crate::math::lanes::{F32x16, PACKET_SIZE};
 
 /// Importance of each light of a tree with one node, for several points.
 pub struct FlatShares<'a> {
     node: &'a Node,
     /// Importance by child, then by point.
-    importance: [Lanes; LANES],
+    importance: [F32x16; PACKET_SIZE],
     /// Sums over the children.
-    totals: [f64; LANES],
+    totals: [f64; PACKET_SIZE],
 }
 
 /// Lights that points picked.
 pub struct FlatPicks {
     /// Indices of the lights among the children.
-    children: [u32; LANES],
+    children: [u32; PACKET_SIZE],
     /// Numbers of the lights.
-    pub lights: [u32; LANES],
+    pub lights: [u32; PACKET_SIZE],
     /// Probabilities of the picks; 0 if no light arrives.
-    pub probabilities: Lanes,
+    pub probabilities: F32x16,
 }
 
 impl LightTree {
@@ -40,10 +40,10 @@ impl LightTree {
 impl<'a> FlatShares<'a> {
     #[inline(always)]
     fn new(node: &'a Node, receivers: &ReceiverRow, has_lobes: bool) -> Self {
-        let (mut importance, mut totals) = ([[0.0; LANES]; LANES], [0.0; LANES]);
-        for child in 0..node.count as usize % (LANES + 1) {
+        let (mut importance, mut totals) = ([[0.0; PACKET_SIZE]; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for child in 0..node.count as usize % (PACKET_SIZE + 1) {
             importance[child] = node.expected_of(child, receivers, has_lobes);
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 totals[i] += f64::from(importance[child][i]);
             }
         }
@@ -52,25 +52,25 @@ impl<'a> FlatShares<'a> {
 
     /// Picks a light for each point, by numbers in [0, 1).
     #[inline(always)]
-    pub fn pick(&self, u: &[f64; LANES]) -> FlatPicks {
-        let mut targets = [0.0; LANES];
-        for i in 0..LANES {
+    pub fn pick(&self, u: &[f64; PACKET_SIZE]) -> FlatPicks {
+        let mut targets = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             // Stay below the total, so that rounding leads to no child after the last one with importance.
             let (target, last) = (u[i] * self.totals[i], before(self.totals[i]));
             targets[i] = if target < last { target } else { last };
         }
-        let (mut sums, mut children, mut values) = ([0.0; LANES], [0; LANES], [0.0; LANES]);
-        for child in 0..self.node.count as usize % (LANES + 1) {
-            for i in 0..LANES {
+        let (mut sums, mut children, mut values) = ([0.0; PACKET_SIZE], [0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for child in 0..self.node.count as usize % (PACKET_SIZE + 1) {
+            for i in 0..PACKET_SIZE {
                 let is_reached = sums[i] <= targets[i];
                 children[i] = if is_reached { child as u32 } else { children[i] };
                 values[i] = if is_reached { self.importance[child][i] } else { values[i] };
                 sums[i] += f64::from(self.importance[child][i]);
             }
         }
-        let mut lights = [0; LANES];
-        for i in 0..LANES {
-            lights[i] = match self.node.children[children[i] as usize % LANES] {
+        let mut lights = [0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            lights[i] = match self.node.children[children[i] as usize % PACKET_SIZE] {
                 Child::Light(light) => light,
                 Child::Node(_) => 0,
             };
@@ -80,18 +80,18 @@ impl<'a> FlatShares<'a> {
 
     /// The probabilities that other picks have by these shares.
     #[inline(always)]
-    pub fn probabilities(&self, picks: &FlatPicks) -> Lanes {
-        let mut values = [0.0; LANES];
-        for i in 0..LANES {
-            values[i] = self.importance[picks.children[i] as usize % LANES][i];
+    pub fn probabilities(&self, picks: &FlatPicks) -> F32x16 {
+        let mut values = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
+            values[i] = self.importance[picks.children[i] as usize % PACKET_SIZE][i];
         }
         self.shares(&values)
     }
 
     #[inline(always)]
-    fn shares(&self, values: &Lanes) -> Lanes {
-        let mut shares = [0.0; LANES];
-        for i in 0..LANES {
+    fn shares(&self, values: &F32x16) -> F32x16 {
+        let mut shares = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let share = (f64::from(values[i]) / self.totals[i]) as f32;
             shares[i] = if self.totals[i] > 0.0 { share } else { 0.0 };
         }

@@ -13,7 +13,7 @@ pub use cut::Cut;
 pub use flat::{FlatPicks, FlatShares};
 pub use node::{Child, Lobe, Node, Receiver, ReceiverRow};
 
-use crate::math::lanes::{LANES, Lanes};
+use crate::math::lanes::{F32x16, PACKET_SIZE};
 
 /// A tree over lights.
 #[derive(Clone, Debug, PartialEq)]
@@ -141,16 +141,16 @@ impl Way {
 
 /// Cumulative importance of children.
 #[derive(Clone, Copy)]
-struct Shares([f64; LANES]);
+struct Shares([f64; PACKET_SIZE]);
 
 impl Shares {
-    const NONE: Self = Self([0.0; LANES]);
+    const NONE: Self = Self([0.0; PACKET_SIZE]);
 
     /// Sums by steps of 1, 2, 4 and 8 places, each for all children side by side.
     #[inline(always)]
-    fn new(importance: &Lanes) -> Self {
-        let mut sums = [0.0; LANES];
-        for i in 0..LANES {
+    fn new(importance: &F32x16) -> Self {
+        let mut sums = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             sums[i] = f64::from(importance[i]);
         }
         sums = with_those_before::<1>(&sums);
@@ -162,21 +162,21 @@ impl Shares {
     /// The probability of a child.
     #[inline(always)]
     fn share(&self, child: usize) -> f32 {
-        let (before, total) = (if child == 0 { 0.0 } else { self.0[child - 1] }, self.0[LANES - 1]);
+        let (before, total) = (if child == 0 { 0.0 } else { self.0[child - 1] }, self.0[PACKET_SIZE - 1]);
         if total > 0.0 { ((self.0[child] - before) / total) as f32 } else { 0.0 }
     }
 
     /// Sum over all children.
     #[inline(always)]
     fn total(&self) -> f64 {
-        self.0[LANES - 1]
+        self.0[PACKET_SIZE - 1]
     }
 
     /// The child whose share contains a part of the total, which is below the total.
     #[inline(always)]
     fn find(&self, target: f64) -> usize {
         let mut child = 0;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             child += usize::from(self.0[i] <= target);
         }
         child
@@ -192,10 +192,10 @@ impl Shares {
 
 /// The sum of each number and the one so many places before it.
 #[inline(always)]
-fn with_those_before<const STEP: usize>(sums: &[f64; LANES]) -> [f64; LANES] {
-    let mut before = [0.0; LANES];
-    before[STEP..].copy_from_slice(&sums[..LANES - STEP]);
-    for i in 0..LANES {
+fn with_those_before<const STEP: usize>(sums: &[f64; PACKET_SIZE]) -> [f64; PACKET_SIZE] {
+    let mut before = [0.0; PACKET_SIZE];
+    before[STEP..].copy_from_slice(&sums[..PACKET_SIZE - STEP]);
+    for i in 0..PACKET_SIZE {
         before[i] += sums[i];
     }
     before

@@ -2,7 +2,7 @@
 
 use super::bounds::{Edge, LightBounds, Space};
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 
 /// A node of a tree, with its children.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,9 +13,9 @@ pub struct Node {
     /// the computations take account of all of this.
     is_plain: bool,
     /// Contents of the children.
-    pub children: [Child; LANES],
+    pub children: [Child; PACKET_SIZE],
     /// The number of leaves before each child, in the order of the tree; that of the whole tree for an unused child.
-    pub first: [u32; LANES],
+    pub first: [u32; PACKET_SIZE],
     /// Number of children.
     pub count: u32,
 }
@@ -24,38 +24,38 @@ pub struct Node {
 #[derive(Clone, Debug, PartialEq)]
 struct BoundsRow {
     /// Centres of the bounding spheres.
-    center: Lanes3,
+    center: Vec3x16,
     /// Radii of the spheres, with the rounding errors of the centres.
-    radius: Lanes,
+    radius: F32x16,
     /// 1 if the sphere is in the scene, 0 if it is among directions.
-    is_place: Lanes,
+    is_place: F32x16,
     /// 1 if light falls off with distance, else 0.
-    weakens: Lanes,
+    weakens: F32x16,
     /// Power in a unit of about the tree's power; 0 in an unused lane.
-    power: Lanes,
+    power: F32x16,
     /// Inverse of four times the radii.
-    spread: Lanes,
+    spread: F32x16,
     /// Axes of the cones of emission.
-    axis: Lanes3,
+    axis: Vec3x16,
     /// Cosines of their half angles.
-    cos: Lanes,
-    sin: Lanes,
+    cos: F32x16,
+    sin: F32x16,
     /// Cosine of the angle from the cone at which emission ends.
-    end: Lanes,
+    end: F32x16,
 }
 
 impl BoundsRow {
     const EMPTY: Self = Self {
-        center: [[0.0; LANES]; 3],
-        radius: [0.0; LANES],
-        is_place: [0.0; LANES],
-        weakens: [0.0; LANES],
-        power: [0.0; LANES],
-        spread: [1.0; LANES],
-        axis: [[0.0; LANES]; 3],
-        cos: [-1.0; LANES],
-        sin: [0.0; LANES],
-        end: [1.0; LANES],
+        center: [[0.0; PACKET_SIZE]; 3],
+        radius: [0.0; PACKET_SIZE],
+        is_place: [0.0; PACKET_SIZE],
+        weakens: [0.0; PACKET_SIZE],
+        power: [0.0; PACKET_SIZE],
+        spread: [1.0; PACKET_SIZE],
+        axis: [[0.0; PACKET_SIZE]; 3],
+        cos: [-1.0; PACKET_SIZE],
+        sin: [0.0; PACKET_SIZE],
+        end: [1.0; PACKET_SIZE],
     };
 
     /// The bounds of one lane, in all lanes.
@@ -63,22 +63,22 @@ impl BoundsRow {
     fn splat(&self, i: usize) -> Self {
         Self {
             center: splat3(lane(&self.center, i)),
-            radius: [self.radius[i]; LANES],
-            is_place: [self.is_place[i]; LANES],
-            weakens: [self.weakens[i]; LANES],
-            power: [self.power[i]; LANES],
-            spread: [self.spread[i]; LANES],
+            radius: [self.radius[i]; PACKET_SIZE],
+            is_place: [self.is_place[i]; PACKET_SIZE],
+            weakens: [self.weakens[i]; PACKET_SIZE],
+            power: [self.power[i]; PACKET_SIZE],
+            spread: [self.spread[i]; PACKET_SIZE],
             axis: splat3(lane(&self.axis, i)),
-            cos: [self.cos[i]; LANES],
-            sin: [self.sin[i]; LANES],
-            end: [self.end[i]; LANES],
+            cos: [self.cos[i]; PACKET_SIZE],
+            sin: [self.sin[i]; PACKET_SIZE],
+            end: [self.end[i]; PACKET_SIZE],
         }
     }
 }
 
 #[inline(always)]
-fn splat3(v: Vec3) -> Lanes3 {
-    [[v.x; LANES], [v.y; LANES], [v.z; LANES]]
+fn splat3(v: Vec3) -> Vec3x16 {
+    [[v.x; PACKET_SIZE], [v.y; PACKET_SIZE], [v.z; PACKET_SIZE]]
 }
 
 /// A child of a node.
@@ -136,25 +136,25 @@ impl Receiver {
 #[derive(Clone, Debug)]
 pub struct ReceiverRow {
     /// Positions.
-    pub point: Lanes3,
+    pub point: Vec3x16,
     /// Unit normals.
-    pub normal: Lanes3,
+    pub normal: Vec3x16,
     lobes: LobeRow,
 }
 
 /// [`Lobe`]s, side by side.
 #[derive(Clone, Debug)]
 struct LobeRow {
-    axis: Lanes3,
-    shininess: Lanes,
-    peak: Lanes,
-    diffuse: Lanes,
+    axis: Vec3x16,
+    shininess: F32x16,
+    peak: F32x16,
+    diffuse: F32x16,
 }
 
 impl ReceiverRow {
     /// Receivers of which only positions and normals are known.
     #[inline(always)]
-    pub fn plain(point: &Lanes3, normal: &Lanes3) -> Self {
+    pub fn plain(point: &Vec3x16, normal: &Vec3x16) -> Self {
         Self { point: *point, normal: *normal, lobes: LobeRow::NONE }
     }
 
@@ -173,9 +173,9 @@ impl ReceiverRow {
         if let Some(Lobe { axis, shininess, peak, diffuse }) = receiver.lobe {
             row.lobes = LobeRow {
                 axis: splat3(axis),
-                shininess: [shininess; LANES],
-                peak: [peak; LANES],
-                diffuse: [diffuse; LANES],
+                shininess: [shininess; PACKET_SIZE],
+                peak: [peak; PACKET_SIZE],
+                diffuse: [diffuse; PACKET_SIZE],
             };
         }
         row
@@ -184,8 +184,12 @@ impl ReceiverRow {
 
 impl LobeRow {
     /// Lobes of no surface.
-    const NONE: Self =
-        Self { axis: [[0.0; LANES]; 3], shininess: [0.0; LANES], peak: [0.0; LANES], diffuse: [1.0; LANES] };
+    const NONE: Self = Self {
+        axis: [[0.0; PACKET_SIZE]; 3],
+        shininess: [0.0; PACKET_SIZE],
+        peak: [0.0; PACKET_SIZE],
+        diffuse: [1.0; PACKET_SIZE],
+    };
 
     /// Upper bound on, and estimate of, a lobe's response to light within an angle of a direction: cosⁿ δ lies below
     /// (1 + n(1 − cos δ)/8)⁻⁸, which is no narrower than a lobe of a few lamps and never 0.
@@ -203,9 +207,9 @@ impl LobeRow {
 /// Expected contributions of children at a point.
 pub struct Expected {
     /// Importance in a unit of the tree; 0 only if the child certainly contributes nothing.
-    pub importance: Lanes,
+    pub importance: F32x16,
     /// Squares of the sines of half the angles that the spheres subtend; 1 inside.
-    pub nearness: Lanes,
+    pub nearness: F32x16,
 }
 
 impl Node {
@@ -214,8 +218,8 @@ impl Node {
         Self {
             bounds: BoundsRow::EMPTY,
             is_plain: true,
-            children: [Child::Light(u32::MAX); LANES],
-            first: [leaves; LANES],
+            children: [Child::Light(u32::MAX); PACKET_SIZE],
+            first: [leaves; PACKET_SIZE],
             count: 0,
         }
     }
@@ -255,14 +259,14 @@ impl Node {
 
     /// [`Node::expected`] of one child for points of surfaces, side by side.
     #[inline(always)]
-    pub fn expected_of(&self, child: usize, receivers: &ReceiverRow, has_lobes: bool) -> Lanes {
+    pub fn expected_of(&self, child: usize, receivers: &ReceiverRow, has_lobes: bool) -> F32x16 {
         expected(&self.bounds.splat(child), receivers, self.is_plain, has_lobes).importance
     }
 
     /// The child that a leaf is under, by its place in the order of the tree.
     pub fn child_over(&self, place: u32) -> usize {
         let after = self.first[1..].iter().position(|&first| first > place);
-        after.unwrap_or(LANES - 1)
+        after.unwrap_or(PACKET_SIZE - 1)
     }
 }
 
@@ -285,27 +289,27 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
     let ReceiverRow { point, normal, lobes } = receivers;
     let mut offset = bounds.center;
     for axis in 0..3 {
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let start = if IS_PLAIN { point[axis][i] } else { point[axis][i] * bounds.is_place[i] };
             offset[axis][i] = bounds.center[axis][i] - start;
         }
     }
     // Compute squared distances, not below the squared radius, and the components along the normal.
-    let [mut square, mut least, mut along] = [[0.0; LANES]; 3];
-    for i in 0..LANES {
+    let [mut square, mut least, mut along] = [[0.0; PACKET_SIZE]; 3];
+    for i in 0..PACKET_SIZE {
         square[i] = lane(&offset, i).length_squared();
         least[i] = at_least(bounds.radius[i] * bounds.radius[i], LEAST);
         along[i] = lane(normal, i).dot(lane(&offset, i));
     }
     let mut inverse = square;
-    for i in 0..LANES {
+    for i in 0..PACKET_SIZE {
         inverse[i] = at_least(square[i], least[i]);
     }
     inverse_roots(&mut inverse);
     // `towards` is positive if θ − β < 90°, and above 1 if θ < β, with β half of the angle that the sphere subtends. From
     // inside there is light in every direction.
-    let [mut sin, mut towards, mut mean] = [[0.0; LANES]; 3];
-    for i in 0..LANES {
+    let [mut sin, mut towards, mut mean] = [[0.0; PACKET_SIZE]; 3];
+    for i in 0..PACKET_SIZE {
         sin[i] = bounds.radius[i] * inverse[i];
         let straight = along[i] * inverse[i];
         let sum = straight + sin[i];
@@ -316,20 +320,20 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         let cut = above * above * bounds.spread[i] * at_least(square[i], least[i]) * inverse[i];
         mean[i] = if straight > sin[i] { straight } else { cut };
     }
-    let (mut value, mut away) = ([0.0; LANES], [1.0; LANES]);
+    let (mut value, mut away) = ([0.0; PACKET_SIZE], [1.0; PACKET_SIZE]);
     if IS_PLAIN {
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             value[i] = bounds.power[i] * cosine(mean[i]) * (inverse[i] * inverse[i]);
         }
     } else {
-        let [mut cos, mut without] = [[0.0; LANES]; 2];
-        for i in 0..LANES {
+        let [mut cos, mut without] = [[0.0; PACKET_SIZE]; 2];
+        for i in 0..PACKET_SIZE {
             cos[i] = -lane(&bounds.axis, i).dot(lane(&offset, i)) * inverse[i];
             without[i] = at_least(1.0 - cos[i] * cos[i], LEAST);
         }
         let rest = without;
         inverse_roots(&mut without);
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let beyond = cos[i] * bounds.cos[i] + rest[i] * without[i] * bounds.sin[i];
             let is_within = (cos[i] >= bounds.cos[i]) | (square[i] <= least[i]);
             away[i] = (if is_within { 1.0 } else { beyond }) + sin[i];
@@ -338,12 +342,12 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
         }
     }
     if HAS_LOBE {
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             value[i] *= lobes.value(i, lane(&lobes.axis, i).dot(lane(&offset, i)) * inverse[i], sin[i]);
         }
     }
-    let (mut importance, mut nearness) = ([0.0; LANES], [0.0; LANES]);
-    for i in 0..LANES {
+    let (mut importance, mut nearness) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+    for i in 0..PACKET_SIZE {
         let value = at_most(at_least(value[i], LEAST), MOST);
         let arrives = (towards[i] > -LEAST_COSINE)
             & (IS_PLAIN | (away[i] > bounds.end[i] - LEAST_COSINE))
@@ -356,8 +360,8 @@ fn expected_as<const IS_PLAIN: bool, const HAS_LOBE: bool>(
 /// 1/√x of numbers from [`LEAST`] on, within a few units of the last place, by Newton's method: a root and a division of sixteen
 /// numbers would take longer than all other work on children.
 #[inline(always)]
-fn inverse_roots(x: &mut Lanes) {
-    for i in 0..LANES {
+fn inverse_roots(x: &mut F32x16) {
+    for i in 0..PACKET_SIZE {
         let x = &mut x[i];
         let square = at_most(*x, GREATEST);
         let half = 0.5 * square;
@@ -391,7 +395,7 @@ mod tests {
     #[test]
     fn inverse_roots_are_those_of_a_division() {
         for exponent in -35..37 {
-            let mut x: Lanes = std::array::from_fn(|i| (1.0 + 0.6 * i as f32) * 10_f32.powi(exponent));
+            let mut x: F32x16 = std::array::from_fn(|i| (1.0 + 0.6 * i as f32) * 10_f32.powi(exponent));
             let expected = x.map(|x| (1.0 / f64::from(at_most(x, GREATEST)).sqrt()) as f32);
             inverse_roots(&mut x);
             for (root, expected) in x.iter().zip(expected) {

@@ -371,7 +371,7 @@ fn points_side_by_side_pick_from_one_node_as_each_does_alone() {
         let tree = tree_of(&lights);
         assert!(tree.is_flat());
         for round in 0..60 {
-            let receivers: [Receiver; LANES] = std::array::from_fn(|i| {
+            let receivers: [Receiver; PACKET_SIZE] = std::array::from_fn(|i| {
                 let (point, normal) = place(&mut next);
                 let (_, axis) = place(&mut next);
                 let lobe = Lobe { axis, shininess: 20.0 * next(), peak: 3.0 * next(), diffuse: 1.0 };
@@ -386,7 +386,7 @@ fn points_side_by_side_pick_from_one_node_as_each_does_alone() {
                 receiver.lobe.iter().for_each(|lobe| row.set_lobe(i, lobe));
             }
             let shares = tree.flat_shares(&row, round % 2 == 0).expect("one node");
-            let numbers: [f64; LANES] = std::array::from_fn(|_| f64::from(next()));
+            let numbers: [f64; PACKET_SIZE] = std::array::from_fn(|_| f64::from(next()));
             let picks = shares.pick(&numbers);
             assert_eq!(shares.probabilities(&picks), picks.probabilities);
             for (i, receiver) in receivers.iter().enumerate() {
@@ -404,7 +404,7 @@ fn points_side_by_side_pick_from_one_node_as_each_does_alone() {
                 // Sums in another order may make a number fall on the next light.
                 picked += u32::from(alone.light == picks.lights[i]);
             }
-            let greatest = shares.pick(&[1.0_f64.next_down(); LANES]);
+            let greatest = shares.pick(&[1.0_f64.next_down(); PACKET_SIZE]);
             for (i, receiver) in receivers.iter().enumerate() {
                 let own = tree.probability(receiver, greatest.lights[i]);
                 assert_eq!(greatest.probabilities[i] > 0.0, own > 0.0, "the last light that arrives");

@@ -1,23 +1,23 @@
 //! Functions of rows, in the place that calls them or once for each instruction set, as [`RoughRow::IS_COPIED`] says.
 
 use crate::materials::bsdf::{BsdfValues, LobeSet, RoughRow};
-use crate::math::lanes::{Folds, Lanes, Lanes3, Loops};
+use crate::math::lanes::{F32x16, Simd, SimdKernel, Vec3x16};
 
 /// The functions of [`RoughRow`] that are large, for all kinds.
 pub(super) trait RoughCalls: RoughRow {
     /// [`RoughRow::f`].
     #[inline(always)]
-    fn call_f(&self, directions: &Lanes3, folds: impl Folds) -> BsdfValues {
-        if Self::IS_COPIED { self.f(directions) } else { folds.call(Evaluation { row: self, directions }) }
+    fn call_f(&self, directions: &Vec3x16, simd: impl Simd) -> BsdfValues {
+        if Self::IS_COPIED { self.f(directions) } else { simd.call(Evaluation { row: self, directions }) }
     }
 
     /// [`RoughRow::parts`].
     #[inline(always)]
-    fn call_parts(&self, directions: &Lanes3, values: &BsdfValues, folds: impl Folds) -> [Lanes3; 2] {
+    fn call_parts(&self, directions: &Vec3x16, values: &BsdfValues, simd: impl Simd) -> [Vec3x16; 2] {
         if Self::IS_COPIED {
             self.parts(directions, values)
         } else {
-            folds.call(Division { row: self, directions, values })
+            simd.call(Division { row: self, directions, values })
         }
     }
 
@@ -26,15 +26,15 @@ pub(super) trait RoughCalls: RoughRow {
     fn call_pdf(
         &self,
         lobes: LobeSet,
-        normals: &Lanes3,
-        directions: &Lanes3,
+        normals: &Vec3x16,
+        directions: &Vec3x16,
         values: &BsdfValues,
-        folds: impl Folds,
-    ) -> Lanes {
+        simd: impl Simd,
+    ) -> F32x16 {
         if Self::IS_COPIED {
             self.pdf(lobes, normals, directions, values)
         } else {
-            folds.call(Density { row: self, lobes, normals, directions, values })
+            simd.call(Density { row: self, lobes, normals, directions, values })
         }
     }
 
@@ -43,15 +43,15 @@ pub(super) trait RoughCalls: RoughRow {
     fn call_sample(
         &self,
         lobes: LobeSet,
-        normals: &Lanes3,
-        choices: &Lanes,
-        u: &[Lanes; 2],
-        folds: impl Folds,
-    ) -> Lanes3 {
+        normals: &Vec3x16,
+        choices: &F32x16,
+        u: &[F32x16; 2],
+        simd: impl Simd,
+    ) -> Vec3x16 {
         if Self::IS_COPIED {
             self.sample(lobes, normals, choices, u)
         } else {
-            folds.call(Sampling { row: self, lobes, normals, choices, u })
+            simd.call(Sampling { row: self, lobes, normals, choices, u })
         }
     }
 }
@@ -61,14 +61,14 @@ impl<R: RoughRow> RoughCalls for R {}
 /// A call of [`RoughRow::f`].
 struct Evaluation<'a, R> {
     row: &'a R,
-    directions: &'a Lanes3,
+    directions: &'a Vec3x16,
 }
 
-impl<R: RoughRow> Loops for Evaluation<'_, R> {
-    type Done = BsdfValues;
+impl<R: RoughRow> SimdKernel for Evaluation<'_, R> {
+    type Output = BsdfValues;
 
     #[inline(always)]
-    fn run(self, _: impl Folds) -> BsdfValues {
+    fn run(self, _: impl Simd) -> BsdfValues {
         self.row.f(self.directions)
     }
 }
@@ -76,15 +76,15 @@ impl<R: RoughRow> Loops for Evaluation<'_, R> {
 /// A call of [`RoughRow::parts`].
 struct Division<'a, R> {
     row: &'a R,
-    directions: &'a Lanes3,
+    directions: &'a Vec3x16,
     values: &'a BsdfValues,
 }
 
-impl<R: RoughRow> Loops for Division<'_, R> {
-    type Done = [Lanes3; 2];
+impl<R: RoughRow> SimdKernel for Division<'_, R> {
+    type Output = [Vec3x16; 2];
 
     #[inline(always)]
-    fn run(self, _: impl Folds) -> [Lanes3; 2] {
+    fn run(self, _: impl Simd) -> [Vec3x16; 2] {
         self.row.parts(self.directions, self.values)
     }
 }
@@ -93,16 +93,16 @@ impl<R: RoughRow> Loops for Division<'_, R> {
 struct Density<'a, R> {
     row: &'a R,
     lobes: LobeSet,
-    normals: &'a Lanes3,
-    directions: &'a Lanes3,
+    normals: &'a Vec3x16,
+    directions: &'a Vec3x16,
     values: &'a BsdfValues,
 }
 
-impl<R: RoughRow> Loops for Density<'_, R> {
-    type Done = Lanes;
+impl<R: RoughRow> SimdKernel for Density<'_, R> {
+    type Output = F32x16;
 
     #[inline(always)]
-    fn run(self, _: impl Folds) -> Lanes {
+    fn run(self, _: impl Simd) -> F32x16 {
         self.row.pdf(self.lobes, self.normals, self.directions, self.values)
     }
 }
@@ -111,16 +111,16 @@ impl<R: RoughRow> Loops for Density<'_, R> {
 struct Sampling<'a, R> {
     row: &'a R,
     lobes: LobeSet,
-    normals: &'a Lanes3,
-    choices: &'a Lanes,
-    u: &'a [Lanes; 2],
+    normals: &'a Vec3x16,
+    choices: &'a F32x16,
+    u: &'a [F32x16; 2],
 }
 
-impl<R: RoughRow> Loops for Sampling<'_, R> {
-    type Done = Lanes3;
+impl<R: RoughRow> SimdKernel for Sampling<'_, R> {
+    type Output = Vec3x16;
 
     #[inline(always)]
-    fn run(self, _: impl Folds) -> Lanes3 {
+    fn run(self, _: impl Simd) -> Vec3x16 {
         self.row.sample(self.lobes, self.normals, self.choices, self.u)
     }
 }

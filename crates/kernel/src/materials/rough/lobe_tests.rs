@@ -1,7 +1,7 @@
 //! Checks of lobes of microfacets, for the tests of each kind: against a reference in `f64`, of samples against pdfs, and of albedos.
 
 use crate::materials::bsdf::{LobeSet, Place, RoughRow, ShownLobes, SideSamples};
-use crate::math::lanes::{LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::random::unit as random;
 use crate::math::{DVec3, Vec3};
 
@@ -57,12 +57,12 @@ impl Light {
 }
 
 /// Choices of lobes and numbers for directions, in rows: a grid of `side` × `side` cells.
-fn grid(side: u32) -> impl Iterator<Item = (Lanes, [Lanes; 2])> {
+fn grid(side: u32) -> impl Iterator<Item = (F32x16, [F32x16; 2])> {
     let mut next = random(5);
-    (0..side * side).step_by(LANES).map(move |first| {
-        let (mut choices, mut u): (Lanes, [Lanes; 2]) = ([0.0; LANES], [[0.0; LANES]; 2]);
+    (0..side * side).step_by(PACKET_SIZE).map(move |first| {
+        let (mut choices, mut u): (F32x16, [F32x16; 2]) = ([0.0; PACKET_SIZE], [[0.0; PACKET_SIZE]; 2]);
         let place = |i: u32, next: f32| ((i as f32 + next) / side as f32).min(1.0 - f32::EPSILON);
-        for i in 0..LANES as u32 {
+        for i in 0..PACKET_SIZE as u32 {
             let number = first + i;
             // Golden ratio: the choices are spread over the cells as well.
             let choice = (f64::from(number) * 0.618_033_988_749_894_9).fract();
@@ -104,7 +104,7 @@ impl<R: RoughRow> Subject<R> {
     pub fn lit(point: &R::Point, alphas: [f32; 2], to_eye: DVec3, light: Light) -> Self {
         let mut row = R::EMPTY;
         row.reset();
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let normal = Vec3::Z * light.side() as f32;
             let place = Place { normal, to_eye: to_eye.as_vec3(), tangent: TANGENT };
             row.put(i, point, ShownLobes::ALL, &place);
@@ -113,8 +113,8 @@ impl<R: RoughRow> Subject<R> {
     }
 
     /// Normals on the side of the light.
-    fn normals(&self) -> Lanes3 {
-        [[0.0; LANES], [0.0; LANES], [self.light.side() as f32; LANES]]
+    fn normals(&self) -> Vec3x16 {
+        [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [self.light.side() as f32; PACKET_SIZE]]
     }
 
     /// The height of a direction above the surface, on the side of the light.
@@ -125,8 +125,8 @@ impl<R: RoughRow> Subject<R> {
     /// f, its wide part and the pdf for light from these directions.
     pub fn values(&self, lobes: LobeSet, directions: &[DVec3]) -> Vec<(DVec3, DVec3, f64)> {
         let mut all = Vec::new();
-        for some in directions.chunks(LANES) {
-            let mut rows = [[0.0; LANES], [0.0; LANES], [1.0; LANES]];
+        for some in directions.chunks(PACKET_SIZE) {
+            let mut rows = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]];
             for (i, direction) in some.iter().enumerate() {
                 set_lane(&mut rows, i, direction.as_vec3());
             }
@@ -152,7 +152,7 @@ impl<R: RoughRow> Subject<R> {
     pub fn samples(&self, lobes: LobeSet, side: u32) -> Vec<DVec3> {
         let rows = grid(side).map(|(choices, u)| self.row.sample(lobes, &self.normals(), &choices, &u));
         let mut all: Vec<DVec3> =
-            rows.flat_map(|row| (0..LANES).map(move |i| lane(&row, i).as_dvec3())).collect();
+            rows.flat_map(|row| (0..PACKET_SIZE).map(move |i| lane(&row, i).as_dvec3())).collect();
         all.truncate((side * side) as usize);
         all
     }
@@ -161,7 +161,7 @@ impl<R: RoughRow> Subject<R> {
     pub fn side_samples(
         &self,
         side: u32,
-        sample: impl Fn(&R, &Lanes, &[Lanes; 2]) -> SideSamples,
+        sample: impl Fn(&R, &F32x16, &[F32x16; 2]) -> SideSamples,
     ) -> Vec<SideSample> {
         let rows = grid(side).map(|(choices, u)| sample(&self.row, &choices, &u));
         let one = |row: &SideSamples, i: usize| SideSample {
@@ -171,7 +171,7 @@ impl<R: RoughRow> Subject<R> {
             is_beyond: row.beyond[i] != 0,
         };
         let mut all: Vec<SideSample> =
-            rows.flat_map(|row| (0..LANES).map(|i| one(&row, i)).collect::<Vec<_>>()).collect();
+            rows.flat_map(|row| (0..PACKET_SIZE).map(|i| one(&row, i)).collect::<Vec<_>>()).collect();
         all.truncate((side * side) as usize);
         all
     }
@@ -188,10 +188,11 @@ impl<R: RoughRow> Subject<R> {
         for number in 0..side * side {
             let [x, y] =
                 [number % side, number / side].map(|i| ((i as f32 + next()) / side as f32).min(0.999_999_9));
-            let choices = std::array::from_fn(|i| ((i as f32 + next()) / LANES as f32).min(0.999_999_9));
-            let u = [[x; LANES], [y; LANES]];
+            let choices =
+                std::array::from_fn(|i| ((i as f32 + next()) / PACKET_SIZE as f32).min(0.999_999_9));
+            let u = [[x; PACKET_SIZE], [y; PACKET_SIZE]];
             let directions = self.row.sample(LobeSet::All, &self.normals(), &choices, &u);
-            samples.extend((0..LANES).map(|i| lane(&directions, i).as_dvec3()));
+            samples.extend((0..PACKET_SIZE).map(|i| lane(&directions, i).as_dvec3()));
         }
         self.mean_of(&samples)
     }
@@ -229,7 +230,7 @@ impl<R: RoughRow> Subject<R> {
             .half_vectors(rings, 192)
             .map(|(direction, weight)| (direction, weight * self.height(direction)))
             .collect::<Vec<_>>()
-            .chunks(LANES)
+            .chunks(PACKET_SIZE)
             .map(|some| {
                 let directions: Vec<DVec3> = some.iter().map(|one| one.0).collect();
                 let values = self.values(LobeSet::All, &directions);
@@ -308,10 +309,10 @@ impl<R: RoughRow> Subject<R> {
         let mut next = random(23);
         let mut counts = vec![0.0; (CELLS * CELLS + 1) as usize];
         let total = 400 * 400;
-        for _ in 0..total / LANES {
+        for _ in 0..total / PACKET_SIZE {
             let mut numbers = || std::array::from_fn(|_| next());
             let directions = self.row.sample(lobes, &self.normals(), &numbers(), &[numbers(), numbers()]);
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let direction = lane(&directions, i).as_dvec3();
                 let [y, turn] = self.place(direction);
                 let cell = |part: f64| ((part * f64::from(CELLS)) as u32).min(CELLS - 1);
@@ -396,14 +397,14 @@ pub fn check_neighbours<R: RoughRow>(points: &[R::Point]) {
 
 /// [`check_neighbours`] with other light.
 pub fn check_neighbours_lit<R: RoughRow>(points: &[R::Point], lit: Light) {
-    let normals = [[0.0; LANES], [0.0; LANES], [lit.side() as f32; LANES]];
+    let normals = [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [lit.side() as f32; PACKET_SIZE]];
     let mut next = random(31);
     for first in 0..points.len() {
-        let to_eye: [Vec3; LANES] = std::array::from_fn(|_| {
+        let to_eye: [Vec3; PACKET_SIZE] = std::array::from_fn(|_| {
             direction(f64::from(0.05 + 0.95 * next()), f64::from(next()) * TAU).as_vec3()
         });
-        let mut light = [[0.0; LANES]; 3];
-        for i in 0..LANES {
+        let mut light = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
             let way = direction(f64::from(next()), f64::from(next()) * TAU);
             set_lane(&mut light, i, DVec3::new(way.x, way.y, way.z * lit.side()).as_vec3());
         }
@@ -412,7 +413,7 @@ pub fn check_neighbours_lit<R: RoughRow>(points: &[R::Point], lit: Light) {
         let row = |of: &dyn Fn(usize) -> bool| {
             let mut row = R::EMPTY;
             row.reset();
-            for i in (0..LANES).filter(|i| of(*i)) {
+            for i in (0..PACKET_SIZE).filter(|i| of(*i)) {
                 let place =
                     Place { normal: Vec3::Z * lit.side() as f32, to_eye: to_eye[i], tangent: TANGENT };
                 row.put(i, &points[(first + i) % points.len()], ShownLobes::ALL, &place);
@@ -434,7 +435,7 @@ pub fn check_neighbours_lit<R: RoughRow>(points: &[R::Point], lit: Light) {
             bits
         };
         let all = row(&|_| true);
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             assert_eq!(
                 numbers(&all, i),
                 numbers(&row(&|other| other == i), i),

@@ -22,7 +22,7 @@ use crate::materials::bsdf::{
 use crate::materials::footprint::TexturePoint;
 use crate::materials::texture::Texture;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, Lanes, Lanes3, Truths};
+use crate::math::lanes::{F32x16, Mask, Simd, Vec3x16};
 use calls::RoughCalls;
 use frosted::GlassRow;
 use metal::{BrushedMetalRow, RoundMetalRow};
@@ -234,17 +234,17 @@ macro_rules! kinds {
                 material: &Rough,
                 uv: Option<&UvRow>,
                 shown: &[(u32, ShownLobes)],
-                folds: impl Folds,
+                simd: impl Simd,
             ) -> u32 {
                 $(if let (Self::$kind(row), Rough::$kind(material)) = (&mut *self, material) {
-                    return row.fill(material, uv, shown, folds);
+                    return row.fill(material, uv, shown, simd);
                 })+
                 0
             }
 
             /// [`MaterialRow::orient`].
             #[inline(always)]
-            pub fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
+            pub fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
                 match self {
                     $(Self::$kind(row) => row.orient(of, normals, directions),)+
                     $(Self::$part(_) => {}),+
@@ -264,10 +264,10 @@ macro_rules! kinds {
 
             /// [`RoughRow::f`].
             #[inline(always)]
-            pub fn f(&self, directions: &Lanes3, folds: impl Folds) -> BsdfValues {
+            pub fn f(&self, directions: &Vec3x16, simd: impl Simd) -> BsdfValues {
                 match self {
-                    $(Self::$kind(row) => row.call_f(directions, folds),)+
-                    $(Self::$part(row) => row.call_f(directions, folds)),+
+                    $(Self::$kind(row) => row.call_f(directions, simd),)+
+                    $(Self::$part(row) => row.call_f(directions, simd)),+
                 }
             }
 
@@ -275,19 +275,19 @@ macro_rules! kinds {
             #[inline(always)]
             pub fn parts(
                 &self,
-                directions: &Lanes3,
+                directions: &Vec3x16,
                 values: &BsdfValues,
-                folds: impl Folds,
-            ) -> [Lanes3; 2] {
+                simd: impl Simd,
+            ) -> [Vec3x16; 2] {
                 match self {
-                    $(Self::$kind(row) => row.call_parts(directions, values, folds),)+
-                    $(Self::$part(row) => row.call_parts(directions, values, folds)),+
+                    $(Self::$kind(row) => row.call_parts(directions, values, simd),)+
+                    $(Self::$part(row) => row.call_parts(directions, values, simd)),+
                 }
             }
 
             /// [`RoughRow::grey`].
             #[inline(always)]
-            pub fn grey(&self, values: &BsdfValues) -> Lanes {
+            pub fn grey(&self, values: &BsdfValues) -> F32x16 {
                 match self {
                     $(Self::$kind(row) => row.grey(values),)+
                     $(Self::$part(row) => row.grey(values)),+
@@ -299,14 +299,14 @@ macro_rules! kinds {
             pub fn pdf(
                 &self,
                 lobes: LobeSet,
-                normals: &Lanes3,
-                directions: &Lanes3,
+                normals: &Vec3x16,
+                directions: &Vec3x16,
                 values: &BsdfValues,
-                folds: impl Folds,
-            ) -> Lanes {
+                simd: impl Simd,
+            ) -> F32x16 {
                 match self {
-                    $(Self::$kind(row) => row.call_pdf(lobes, normals, directions, values, folds),)+
-                    $(Self::$part(row) => row.call_pdf(lobes, normals, directions, values, folds)),+
+                    $(Self::$kind(row) => row.call_pdf(lobes, normals, directions, values, simd),)+
+                    $(Self::$part(row) => row.call_pdf(lobes, normals, directions, values, simd)),+
                 }
             }
 
@@ -315,14 +315,14 @@ macro_rules! kinds {
             pub fn sample(
                 &self,
                 lobes: LobeSet,
-                normals: &Lanes3,
-                choices: &Lanes,
-                u: &[Lanes; 2],
-                folds: impl Folds,
-            ) -> Lanes3 {
+                normals: &Vec3x16,
+                choices: &F32x16,
+                u: &[F32x16; 2],
+                simd: impl Simd,
+            ) -> Vec3x16 {
                 match self {
-                    $(Self::$kind(row) => row.call_sample(lobes, normals, choices, u, folds),)+
-                    $(Self::$part(row) => row.call_sample(lobes, normals, choices, u, folds)),+
+                    $(Self::$kind(row) => row.call_sample(lobes, normals, choices, u, simd),)+
+                    $(Self::$part(row) => row.call_sample(lobes, normals, choices, u, simd)),+
                 }
             }
 
@@ -440,10 +440,10 @@ impl BsdfRow {
     /// Samples a direction for each surface, on either of its sides, by the numbers of [`RoughRow::sample`]. `None` for kinds that
     /// have no such samples.
     #[inline(always)]
-    pub fn sample_sides(&self, choices: &Lanes, u: &[Lanes; 2], folds: impl Folds) -> Option<SideSamples> {
+    pub fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> Option<SideSamples> {
         match self {
-            Self::GlassReflection(row) => Some(row.call_sides(choices, u, folds)),
-            Self::GlassTransmission(row) => Some(row.call_sides(choices, u, folds)),
+            Self::GlassReflection(row) => Some(row.call_sides(choices, u, simd)),
+            Self::GlassTransmission(row) => Some(row.call_sides(choices, u, simd)),
             Self::Phong(_)
             | Self::Metal(_)
             | Self::BrushedMetal(_)

@@ -2,7 +2,7 @@
 
 use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
-use crate::geometry::rows::{Ends, RayRows, lanes};
+use crate::geometry::rows::{F32x16, RayRows, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, absorption};
 use crate::integrators::transport::tile::TileContext;
@@ -11,10 +11,10 @@ use crate::lights::{EmissionTexture, Light, LightRow, Middle, Source, SourceRow}
 use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
 use crate::math::color::luminance;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane, truths};
+use crate::math::lanes::{PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
 use crate::sampling::Decision;
 use crate::scene::description::Shadows;
-use crate::world::Loops;
+use crate::world::SimdKernel;
 
 /// Samples all lights at the vertices in `used`. `MIS` is false where only light samples find lights, so that no
 /// weights are computed.
@@ -53,23 +53,23 @@ impl std::ops::AddAssign for LightRayCounts {
 /// Direct light reflected toward the viewer at a packet of vertices.
 pub struct ReflectedLight {
     /// Reflected radiance, before the throughput of the paths.
-    pub light: Lanes3,
+    pub light: Vec3x16,
     pub rays: LightRayCounts,
 }
 
 /// Sums over light samples.
 pub struct LightSums {
     /// Reflected light that is unoccluded.
-    pub light: Lanes3,
+    pub light: Vec3x16,
     /// Reflected light if nothing were occluded.
-    pub total: Lanes,
+    pub total: F32x16,
     pub rays: LightRayCounts,
 }
 
 impl LightSums {
     pub const ZERO: Self = Self {
-        light: [[0.0; LANES]; 3],
-        total: [0.0; LANES],
+        light: [[0.0; PACKET_SIZE]; 3],
+        total: [0.0; PACKET_SIZE],
         rays: LightRayCounts { shadow: 0, scattered: 0, lookups: 0 },
     };
 
@@ -77,7 +77,7 @@ impl LightSums {
     #[inline(always)]
     pub fn into_reflected(mut self, aov: LightAov) -> ReflectedLight {
         if aov == LightAov::LitFraction {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let share = if self.total[i] > 0.0 { self.light[0][i] / self.total[i] } else { 0.0 };
                 set_lane(&mut self.light, i, Vec3::splat(share));
             }
@@ -88,17 +88,17 @@ impl LightSums {
 
 /// Light of one source that depends on a single shadow ray.
 struct PendingLight {
-    light: Lanes3,
+    light: Vec3x16,
     active: u32,
 }
 
-impl<const MIS: bool> Loops for SampleAllLights<'_, MIS> {
-    type Done = LightSums;
+impl<const MIS: bool> SimdKernel for SampleAllLights<'_, MIS> {
+    type Output = LightSums;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> LightSums {
+    fn run(self, simd: impl Simd) -> LightSums {
         let mut sums = LightSums::ZERO;
-        self.sample_all(&mut sums, folds);
+        self.sample_all(&mut sums, simd);
         sums
     }
 }
@@ -106,7 +106,7 @@ impl<const MIS: bool> Loops for SampleAllLights<'_, MIS> {
 impl<const MIS: bool> SampleAllLights<'_, MIS> {
     /// Adds the reflected light of all lights.
     #[inline(always)]
-    fn sample_all(&self, sums: &mut LightSums, folds: impl Folds) {
+    fn sample_all(&self, sums: &mut LightSums, simd: impl Simd) {
         let render = &self.tile.settings.render;
         let takes = |light: &Light| !self.only_infinite || light.is_beyond();
         let mut sampler = None;
@@ -115,7 +115,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 continue;
             }
             // If a single shadow ray decides for the whole light, defer the sum until it is traced.
-            let mut pending = PendingLight { light: [[0.0; LANES]; 3], active: 0 };
+            let mut pending = PendingLight { light: [[0.0; PACKET_SIZE]; 3], active: 0 };
             let is_deferred = match render.shadows {
                 Shadows::Soft => false,
                 Shadows::Hard => light.middle().is_some(),
@@ -132,10 +132,10 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     Some(sampler) if !is_single => {
                         sampler.pairs(&self.row.path, Decision::Light(number), repetition, count)
                     }
-                    Some(_) | None => [[0.0; LANES]; 2],
+                    Some(_) | None => [[0.0; PACKET_SIZE]; 2],
                 };
                 let samples = light.sample_row(&self.row.from, &self.row.normal, self.used, &u);
-                let (mut values, active, response) = self.contributions(&samples, 1.0 / count as f32, folds);
+                let (mut values, active, response) = self.contributions(&samples, 1.0 / count as f32, simd);
                 // Multiply by the emission texture.
                 if let Some(pattern) = light.emission_texture() {
                     values = self.textured(pattern, &samples, active, values);
@@ -146,7 +146,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                     let leaves_gloss = self.tile.lobes_find_sky && light.is_from_all_around();
                     let of_light = if leaves_gloss && self.competing.are_lobes() {
                         // Pretend a vanishing light-sampling pdf, so that lobe rays account for all of the light.
-                        [f32::MAX; LANES]
+                        [f32::MAX; PACKET_SIZE]
                     } else {
                         light.inverse_densities(&samples)
                     };
@@ -156,14 +156,14 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                         (&samples, &response),
                         values,
                         (&of_light, competing),
-                        folds,
+                        simd,
                     );
                 }
-                self.add(&samples, &values, active, sums, is_deferred.then_some(&mut pending), folds);
+                self.add(&samples, &values, active, sums, is_deferred.then_some(&mut pending), simd);
             }
             // Trace the single ray to the center of the light.
             if pending.active != 0 {
-                self.add_pending(light.middle(), &pending, sums, folds);
+                self.add_pending(light.middle(), &pending, sums, simd);
             }
         }
     }
@@ -175,8 +175,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         &self,
         interior_lists: &InteriorLists,
         samples: &LightRow,
-        mut values: Lanes3,
-    ) -> Lanes3 {
+        mut values: Vec3x16,
+    ) -> Vec3x16 {
         for i in lanes(self.used) {
             let way = lane(&samples.targets, i) - lane(&self.row.from, i);
             let is_beyond = samples.beyond & 1 << i != 0;
@@ -196,8 +196,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         pattern: &EmissionTexture,
         samples: &LightRow,
         active: u32,
-        mut values: Lanes3,
-    ) -> Lanes3 {
+        mut values: Vec3x16,
+    ) -> Vec3x16 {
         for i in lanes(active) {
             let (target, direction) = (lane(&samples.targets, i), lane(&samples.directions, i));
             let color = pattern.at(target, samples.sources.part[i], direction);
@@ -218,16 +218,16 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn add(
         &self,
         samples: &LightRow,
-        values: &Lanes3,
+        values: &Vec3x16,
         active: u32,
         sums: &mut LightSums,
         pending: Option<&mut PendingLight>,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
         if active == 0 {
             return;
         }
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let is_active = active & 1 << i != 0;
             sums.total[i] += if is_active { values[0][i] } else { 0.0 };
         }
@@ -235,9 +235,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             pending.active |= active;
             add_where(active, values, &mut pending.light);
         } else {
-            let traced = active & !self.row.below_horizon(&samples.directions, folds);
+            let traced = active & !self.row.below_horizon(&samples.directions, simd);
             let (rays, ends) = self.shadow_rays(samples, traced);
-            self.add_unoccluded((&rays, &ends, traced), &samples.sources, values, sums, folds);
+            self.add_unoccluded((&rays, &ends, traced), &samples.sources, values, sums, simd);
         }
     }
 
@@ -248,7 +248,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         middle: Option<(Middle, Source)>,
         pending: &PendingLight,
         sums: &mut LightSums,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
         let is_untraced = self.tile.settings.render.shadows == Shadows::Off;
         if is_untraced && self.aov == LightAov::TraversalCost {
@@ -259,8 +259,8 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             return add_where(pending.active, &pending.light, &mut sums.light);
         };
         // Aim a ray at the center of the light.
-        let (mut direction, mut ends) = ([[0.0; LANES]; 3], [-1.0; LANES]);
-        for i in 0..LANES {
+        let (mut direction, mut ends) = ([[0.0; PACKET_SIZE]; 3], [-1.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let from = lane(&self.row.from, i);
             let ray = match middle {
                 Middle::At(middle) => Ray::segment(from, middle),
@@ -269,12 +269,12 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             set_lane(&mut direction, i, ray.direction);
             ends[i] = ray.t_max;
         }
-        let traced = pending.active & !self.row.below_horizon(&direction, folds);
-        for i in 0..LANES {
+        let traced = pending.active & !self.row.below_horizon(&direction, simd);
+        for i in 0..PACKET_SIZE {
             ends[i] = if traced & 1 << i != 0 { ends[i] } else { -1.0 };
         }
-        let rays = RayRows::of(self.row.from, direction).leaving(self.row.starts(&direction));
-        self.add_unoccluded((&rays, &ends, traced), &SourceRow::of(source), &pending.light, sums, folds);
+        let rays = RayPacket::of(self.row.from, direction).leaving(self.row.starts(&direction));
+        self.add_unoccluded((&rays, &ends, traced), &SourceRow::of(source), &pending.light, sums, simd);
     }
 
     /// Traces the shadow rays in `traced` and adds the light of those that are unoccluded; other rays have a `t_max`
@@ -282,11 +282,11 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(always)]
     pub fn add_unoccluded(
         &self,
-        (rays, ends, traced): (&RayRows, &Ends, u32),
+        (rays, ends, traced): (&RayRows, &F32x16, u32),
         sources: &SourceRow,
-        values: &Lanes3,
+        values: &Vec3x16,
         sums: &mut LightSums,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
         sums.rays.shadow += u64::from(traced.count_ones());
         if self.aov == LightAov::TraversalCost {
@@ -295,7 +295,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         if self.tile.world.has_passable() {
             return self.add_attenuated((rays, ends, traced), sources, values, sums);
         }
-        let occluded = self.tile.world.geometry.occluded_rows(rays, ends, traced, sources, folds);
+        let occluded = self.tile.world.geometry.occluded_rows(rays, ends, traced, sources, simd);
         add_where(traced & !occluded, values, &mut sums.light);
     }
 
@@ -304,9 +304,9 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(never)]
     fn add_attenuated(
         &self,
-        (rays, ends, traced): (&RayRows, &Ends, u32),
+        (rays, ends, traced): (&RayRows, &F32x16, u32),
         sources: &SourceRow,
-        values: &Lanes3,
+        values: &Vec3x16,
         sums: &mut LightSums,
     ) {
         let weakened = self.tile.world.weakened_rows(rays, ends, traced, sources);
@@ -326,19 +326,19 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         &self,
         samples: &LightRow,
         share: f32,
-        folds: impl Folds,
-    ) -> (Lanes3, u32, Response) {
-        let response = self.row.response(&samples.directions, folds);
+        simd: impl Simd,
+    ) -> (Vec3x16, u32, Response) {
+        let response = self.row.response(&samples.directions, simd);
         let Response { bsdf: BsdfValues { f, .. }, cosines } = &response;
         let mut arriving = samples.weights;
         if self.aov == LightAov::LitFraction {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let light = Vec3::splat(luminance(lane(&samples.weights, i)));
                 set_lane(&mut arriving, i, light);
             }
         }
-        let (mut values, mut active) = (*f, [0; LANES]);
-        for i in 0..LANES {
+        let (mut values, mut active) = (*f, [0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let value = lane(f, i) * lane(&arriving, i) * (cosines[i] * share);
             set_lane(&mut values, i, value);
             let brings = (cosines[i] > 0.0) & ((value.x != 0.0) | (value.y != 0.0) | (value.z != 0.0));
@@ -347,14 +347,14 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         if let Some(interior_lists) = self.interior_lists.filter(|_| self.aov != LightAov::LitFraction) {
             values = self.attenuate_by_glass(interior_lists, samples, values);
         }
-        (values, folds.bits(&active) & self.used, response)
+        (values, simd.movemask(&active) & self.used, response)
     }
 
     /// The shadow rays to the samples in `active`; in other lanes, `t_max` is below 0.
     #[inline(always)]
-    pub fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayRows, Ends) {
-        let (mut direction, mut ends) = (samples.directions, [-1.0; LANES]);
-        for i in 0..LANES {
+    pub fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayRows, F32x16) {
+        let (mut direction, mut ends) = (samples.directions, [-1.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let ray = Ray::segment(lane(&self.row.from, i), lane(&samples.targets, i));
             set_lane(&mut direction, i, ray.direction);
             ends[i] = if active & 1 << i != 0 { ray.t_max } else { -1.0 };
@@ -372,10 +372,10 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 #[inline(never)]
 pub fn add_traversal_cost(
     tile: &TileContext<'_>,
-    rays: &RayRows,
+    rays: &RayPacket,
     ends: &Ends,
     traced: u32,
-    sums: &mut Lanes3,
+    sums: &mut Vec3x16,
 ) {
     for i in lanes(traced) {
         let work = tile.world.geometry.work(&Ray { t_max: ends[i], ..rays.ray(i) });
@@ -386,10 +386,10 @@ pub fn add_traversal_cost(
 
 /// Adds the values in the lanes of `bits`, which are selected with bit masks as in [`take`](crate::math::lanes::take).
 #[inline(always)]
-pub fn add_where(bits: u32, values: &Lanes3, sums: &mut Lanes3) {
-    let of = truths(bits);
+pub fn add_where(bits: u32, values: &Vec3x16, sums: &mut Vec3x16) {
+    let of = mask_from_bits(bits);
     for axis in 0..3 {
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             sums[axis][i] += f32::from_bits(values[axis][i].to_bits() & of[i]);
         }
     }

@@ -9,10 +9,10 @@ use crate::integrators::view::LightAov;
 use crate::lights::{LightRow, LightTree, Lobe, Middle, Picks, Receiver, ReceiverRow, Selection};
 use crate::materials::bsdf::NarrowLobe;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, Lanes, lane, set_lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, lane, set_lane};
 use crate::sampling::{Decision, SamplerRow};
 use crate::scene::description::Shadows;
-use crate::world::Loops;
+use crate::world::SimdKernel;
 
 /// Samples lights picked from a tree at a packet of vertices.
 pub struct SampleLightTree<'a, const MIS: bool> {
@@ -28,27 +28,27 @@ pub struct SampleLightTree<'a, const MIS: bool> {
 #[derive(Clone)]
 struct LightPicks {
     /// Indices of the lights.
-    lights: [u32; LANES],
+    lights: [u32; PACKET_SIZE],
     /// Reciprocals of the expected number of samples; 0 without a pick.
-    shares: Lanes,
+    shares: F32x16,
     /// The same ignoring glossy lobes. MIS weights use it, as rays that hit the light do not know the vertex's lobe.
-    weighed: Lanes,
+    weighed: F32x16,
 }
 
 /// Number of samples whose lights are picked together.
 const PICK_BLOCK: u32 = 8;
 
-impl<const MIS: bool> Loops for SampleLightTree<'_, MIS> {
-    type Done = LightSums;
+impl<const MIS: bool> SimdKernel for SampleLightTree<'_, MIS> {
+    type Output = LightSums;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> LightSums {
+    fn run(self, simd: impl Simd) -> LightSums {
         let Self { lighting, selection, number, pool } = self;
         let sampler = lighting.row.sampler(lighting.tile);
         let mut sums = LightSums::ZERO;
         // Sample all infinite lights, if the tree excludes them.
         if selection.leaves_beyond {
-            sums = folds.call(SampleAllLights { only_infinite: true, ..lighting });
+            sums = simd.call(SampleAllLights { only_infinite: true, ..lighting });
         }
         let samples = lighting.tile.settings.render.shadow_samples;
         let (each, tree) = (selection.picks.count, selection.tree);
@@ -59,7 +59,7 @@ impl<const MIS: bool> Loops for SampleLightTree<'_, MIS> {
             let picks = lighting.picks(selection, &sampler, first..(first + PICK_BLOCK).min(samples));
             for (k, pick) in (first * each..).zip(&picks) {
                 let mut sink = PickSink { tree, row: number, pool: pool.as_deref_mut(), sums: &mut sums };
-                lighting.sample_pick(pick, &sampler, (k, samples * each), &mut sink, folds);
+                lighting.sample_pick(pick, &sampler, (k, samples * each), &mut sink, simd);
             }
         }
         sums
@@ -76,12 +76,12 @@ struct PickSink<'a> {
 }
 
 impl LightPicks {
-    const EMPTY: Self = Self { lights: [0; LANES], shares: [0.0; LANES], weighed: [0.0; LANES] };
+    const EMPTY: Self = Self { lights: [0; PACKET_SIZE], shares: [0.0; PACKET_SIZE], weighed: [0.0; PACKET_SIZE] };
 
     /// Replaces probabilities with the reciprocals of expected sample counts, or 0 for a probability of 0.
     #[inline(always)]
     fn invert(&mut self, count: f32, is_weighed: bool) {
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let is_picked = self.shares[i] > 0.0;
             let [share, weighed] = [self.shares[i], self.weighed[i]].map(|share| 1.0 / (share * count));
             self.shares[i] = if is_picked { share } else { 0.0 };
@@ -91,13 +91,13 @@ impl LightPicks {
 
     /// The lights, and the mask of vertices that picked one. Other vertices get an arbitrary light, without effect.
     #[inline(always)]
-    fn lights(&self) -> ([u32; LANES], u32) {
+    fn lights(&self) -> ([u32; PACKET_SIZE], u32) {
         let (mut lights, shares, mut used) = (self.lights, &self.shares, 0);
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             used |= u32::from(shares[i] > 0.0) << i;
         }
-        let filler = lights[used.trailing_zeros() as usize % LANES];
-        for i in 0..LANES {
+        let filler = lights[used.trailing_zeros() as usize % PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             lights[i] = if shares[i] > 0.0 { lights[i] } else { filler };
         }
         (lights, used)
@@ -113,7 +113,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn picks(
         &self,
         Selection { tree, picks: way, .. }: Selection<'_>,
-        sampler: &SamplerRow<LANES>,
+        sampler: &SamplerRow<PACKET_SIZE>,
         samples: Range<u32>,
     ) -> Vec<LightPicks> {
         let row = self.row;
@@ -121,19 +121,19 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let group = way.count as usize;
         let (first, end) = (samples.start * way.count, samples.end * way.count);
         // Sort the random numbers of each group of picks.
-        let mut numbers = vec![[0.0; LANES]; (end - first) as usize];
+        let mut numbers = vec![[0.0; PACKET_SIZE]; (end - first) as usize];
         for k in first..end {
             let u = sampler.pairs(&row.path, Decision::Pick, k, count);
             let place = (k - first) as usize / group * group;
             // One pick of each group is in each part of [0, 1), so that they are sorted. Both numbers of a pair are the
             // digits of one number: a light among many has a small probability.
-            let (mut parts, mut digits) = ([0; LANES], [0.0; LANES]);
-            for i in 0..LANES {
+            let (mut parts, mut digits) = ([0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+            for i in 0..PACKET_SIZE {
                 let part = (u[0][i] * way.count as f32) as i32 as u32;
                 parts[i] = if part < way.count { part } else { way.count - 1 };
                 digits[i] = f64::from(u[0][i]) + f64::from(u[1][i]) * LOW_DIGITS;
             }
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 numbers[place + parts[i] as usize][i] = digits[i];
             }
         }
@@ -152,7 +152,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Picks from a tree with a single node, for all vertices at once.
     #[inline(always)]
-    fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; LANES]], picks: &mut [LightPicks]) {
+    fn pick_flat(&self, tree: &LightTree, numbers: &[[f64; PACKET_SIZE]], picks: &mut [LightPicks]) {
         let row = self.row;
         // Estimate the light from each source at each vertex, with and without glossy lobes.
         let plain = ReceiverRow::plain(&row.from, &row.normal);
@@ -174,7 +174,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
                 None => picked.probabilities,
             };
             pick.shares = picked.probabilities;
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let is_used = self.used & 1 << i != 0;
                 pick.shares[i] = if is_used { pick.shares[i] } else { 0.0 };
             }
@@ -183,7 +183,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Picks from a tree of any size, one vertex at a time.
     #[inline(always)]
-    fn pick_by_cuts(&self, tree: &LightTree, way: Picks, numbers: &[[f64; LANES]], picks: &mut [LightPicks]) {
+    fn pick_by_cuts(&self, tree: &LightTree, way: Picks, numbers: &[[f64; PACKET_SIZE]], picks: &mut [LightPicks]) {
         let (row, group) = (self.row, way.count as usize);
         let (mut cut, mut without) = (way.cut(tree), MIS.then(|| way.cut(tree)));
         for i in lanes(self.used) {
@@ -225,10 +225,10 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn sample_pick(
         &self,
         pick: &LightPicks,
-        sampler: &SamplerRow<LANES>,
+        sampler: &SamplerRow<PACKET_SIZE>,
         (number, count): (u32, u32),
         sink: &mut PickSink<'_>,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
         let PickSink { tree, row: row_number, pool, sums } = sink;
         let (row, render) = (self.row, &self.tile.settings.render);
@@ -238,25 +238,24 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let at = (&row.from, &row.normal);
         let (mut samples, mut inverse, lookups) = self.tile.world.lights.sample_each(&lights, at, used, &u);
         sums.rays.lookups += lookups;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let weight = lane(&samples.weights, i) * pick.shares[i];
             set_lane(&mut samples.weights, i, weight);
             inverse[i] *= pick.weighed[i];
         }
         // Compute the unoccluded contributions.
-        let (mut values, active, response) = self.contributions(&samples, 1.0, folds);
+        let (mut values, active, response) = self.contributions(&samples, 1.0, simd);
         let active = active & used;
         if MIS {
             // Each group of picks has its own pdf, and all requested BSDF samples compete with every group.
             let competing =
                 self.competing.rays_per_sample(render.shadow_samples) * render.shadow_samples as f32;
-            values =
-                self.competing.weighted(row, (&samples, &response), values, (&inverse, competing), folds);
+            values = self.competing.weighted(row, (&samples, &response), values, (&inverse, competing), simd);
         }
         if active == 0 {
             return;
         }
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let is_active = active & 1 << i != 0;
             sums.total[i] += if is_active { values[0][i] } else { 0.0 };
         }
@@ -268,25 +267,25 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             Shadows::Soft => {}
         }
         // Trace the shadow rays, or queue them with others to the same lights.
-        let traced = active & !row.below_horizon(&samples.directions, folds);
+        let traced = active & !row.below_horizon(&samples.directions, simd);
         let (rays, ends) = self.shadow_rays(&samples, traced);
         match pool {
             Some(pool) if self.aov != LightAov::TraversalCost => {
                 sums.rays.shadow += u64::from(traced.count_ones());
-                let mut places = [0; LANES];
-                for i in 0..LANES {
+                let mut places = [0; PACKET_SIZE];
+                for i in 0..PACKET_SIZE {
                     places[i] = tree.place_of(lights[i]);
                 }
                 pool.push(*row_number, (rays, ends, traced), &samples.sources, &values, &places);
             }
             Some(_) | None => {
-                self.add_unoccluded((&rays, &ends, traced), &samples.sources, &values, sums, folds);
+                self.add_unoccluded((&rays, &ends, traced), &samples.sources, &values, sums, simd);
             }
         }
     }
 
     /// Aims rays at the centers of lights that have one.
-    fn aim_at_centers(&self, samples: &mut LightRow, lights: &[u32; LANES], active: u32) {
+    fn aim_at_centers(&self, samples: &mut LightRow, lights: &[u32; PACKET_SIZE], active: u32) {
         for i in lanes(active) {
             let Some((middle, source)) = self.tile.world.lights.get(lights[i]).middle() else { continue };
             let direction = match middle {

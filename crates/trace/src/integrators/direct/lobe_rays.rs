@@ -9,10 +9,10 @@ use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, lane, set_lane};
+use crate::math::lanes::{PACKET_SIZE, Simd, lane, set_lane};
 use crate::sampling::Decision;
 use crate::scene::description::Shadows;
-use crate::world::{Hit, Loops};
+use crate::world::{Hit, SimdKernel};
 
 /// Traces rays in the glossy lobes of the vertices in `sharp`, one per light sample: a narrow lobe finds in a large
 /// light what light samples hardly ever hit.
@@ -27,11 +27,11 @@ pub struct LobeRays<'a> {
     pub arrived: ReflectedLight,
 }
 
-impl Loops for LobeRays<'_> {
-    type Done = ReflectedLight;
+impl SimdKernel for LobeRays<'_> {
+    type Output = ReflectedLight;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> ReflectedLight {
+    fn run(self, simd: impl Simd) -> ReflectedLight {
         let Self { tile, row, sharp, aov, interior_lists, mut arrived } = self;
         let count = tile.settings.render.shadow_samples;
         let sampler = row.sampler(tile);
@@ -43,18 +43,18 @@ impl Loops for LobeRays<'_> {
         for repetition in 0..count {
             // Sample a direction in each lobe.
             let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);
-            let mut choices = [0.0; LANES];
+            let mut choices = [0.0; PACKET_SIZE];
             if row.bsdf.sends_rays() {
                 [choices, _] = sampler.pairs(&row.path, Decision::Lobe, repetition, count);
             }
-            let wi = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u, folds);
-            let Response { bsdf, cosines } = row.response(&wi, folds);
-            let pdfs = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &wi, &bsdf, folds);
-            let [_, narrow] = row.bsdf.parts(&wi, &bsdf, folds);
+            let wi = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u, simd);
+            let Response { bsdf, cosines } = row.response(&wi, simd);
+            let pdfs = row.bsdf.pdf(LobeSet::Narrow, &row.normal, &wi, &bsdf, simd);
+            let [_, narrow] = row.bsdf.parts(&wi, &bsdf, simd);
             // Select the rays above the horizon.
-            let mut sent = sharp & !row.below_horizon(&wi, folds);
-            let mut ends = [-1.0; LANES];
-            for i in 0..LANES {
+            let mut sent = sharp & !row.below_horizon(&wi, simd);
+            let mut ends = [-1.0; PACKET_SIZE];
+            for i in 0..PACKET_SIZE {
                 let bit = 1 << i;
                 sent &= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) { !0 } else { !bit };
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
@@ -74,7 +74,7 @@ impl Loops for LobeRays<'_> {
                 }
                 continue;
             }
-            let (hits, objects) = tile.world.geometry.closest_rows(&rays, &mut ends, sent, folds);
+            let (hits, objects) = tile.world.geometry.closest_rows(&rays, &mut ends, sent, simd);
             // Count the work of the rays, if the view shows it.
             if aov == LightAov::TraversalCost {
                 for i in lanes(sent) {

@@ -9,7 +9,7 @@ use crate::lights::{LightHit, LightRow, Side, Source};
 use crate::materials::Footprint;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, lane, set_lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
 use crate::world::{Hit, MOST_STRAIGHT};
 
 /// The technique that competes with light samples.
@@ -57,10 +57,10 @@ impl CompetingTechnique {
         self,
         row: &VertexBatch,
         (samples, response): (&LightRow, &Response),
-        mut values: Lanes3,
-        (of_light, competing): (&Lanes, f32),
-        folds: impl Folds,
-    ) -> Lanes3 {
+        mut values: Vec3x16,
+        (of_light, competing): (&F32x16, f32),
+        simd: impl Simd,
+    ) -> Vec3x16 {
         // Weight each sample against the lobes from which BSDF samples are drawn.
         let (lobes, start) = match self {
             Self::Nothing => return values,
@@ -68,23 +68,23 @@ impl CompetingTechnique {
             Self::NarrowPaths => (LobeSet::Narrow, !0),
             Self::Lobes(sharp) => (LobeSet::Narrow, sharp),
         };
-        let pdfs = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf, folds);
-        let mut weights = [1.0; LANES];
-        for i in 0..LANES {
+        let pdfs = row.bsdf.pdf(lobes, &row.normal, &samples.directions, &response.bsdf, simd);
+        let mut weights = [1.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let weight = weight(pdfs[i] * of_light[i] * competing);
             weights[i] = if start & 1 << i != 0 { weight } else { 1.0 };
         }
         // Apply the weights to the light reflected by those lobes.
         match lobes {
             LobeSet::All => {
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     let value = lane(&values, i) * weights[i];
                     set_lane(&mut values, i, value);
                 }
             }
             LobeSet::Narrow => {
-                let [wide, narrow] = row.bsdf.parts(&samples.directions, &response.bsdf, folds);
-                for i in 0..LANES {
+                let [wide, narrow] = row.bsdf.parts(&samples.directions, &response.bsdf, simd);
+                for i in 0..PACKET_SIZE {
                     let left = weight_narrow_part(lane(&wide, i), lane(&narrow, i), weights[i]);
                     let value = lane(&values, i) * left;
                     set_lane(&mut values, i, value);

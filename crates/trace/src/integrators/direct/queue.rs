@@ -23,9 +23,9 @@ use crate::lights::{Source, SourceRow};
 use crate::materials::RoughKind;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, Lanes3, lane};
+use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane};
 use crate::scene::description::Shadows;
-use crate::world::{Geometry, Loops};
+use crate::world::{Geometry, SimdKernel};
 
 /// Vertices that await direct lighting. The result for a vertex does not depend on which vertices share its packet.
 #[derive(Default)]
@@ -202,7 +202,7 @@ impl DirectLightQueue {
         tile: &TileContext<'_>,
         aov: LightAov,
         (continuation, depth): (Option<Continuation>, u32),
-        gather: impl Fn(&VertexBatch) -> Option<Lanes3>,
+        gather: impl Fn(&VertexBatch) -> Option<Vec3x16>,
         next: &mut Vec<PathRay>,
     ) -> Result<LightRayCounts, Cancelled> {
         let mut rays = LightRayCounts::default();
@@ -356,7 +356,7 @@ impl DirectLightQueue {
     }
 
     /// Adds a packet's reflected light to its paths; a path has two vertices at a transmissive surface.
-    fn store(&mut self, number: usize, aov: LightAov, arrived: &Lanes3) {
+    fn store(&mut self, number: usize, aov: LightAov, arrived: &Vec3x16) {
         let row = &self.rows[number];
         let light = match aov {
             LightAov::Radiance(_) | LightAov::LitFraction => row.times_throughput(arrived),
@@ -364,7 +364,7 @@ impl DirectLightQueue {
         };
         match row.consecutive_start() {
             Some(first) => {
-                let own = &mut self.arrived[first as usize..][..LANES];
+                let own = &mut self.arrived[first as usize..][..PACKET_SIZE];
                 for (i, own) in own.iter_mut().enumerate() {
                     *own += lane(&light, i);
                 }
@@ -405,37 +405,37 @@ struct LiftOrigins<'a> {
     row: &'a mut VertexBatch,
 }
 
-impl Loops for LiftOrigins<'_> {
-    type Done = ();
+impl SimdKernel for LiftOrigins<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) {
+    fn run(self, simd: impl Simd) {
         let Self { geometry, row } = self;
         // Make rays from the facets to the points above them.
         let mut direction = row.lifted;
         for axis in 0..3 {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 direction[axis][i] = row.lifted[axis][i] - row.from[axis][i];
             }
         }
-        let mut ends = [-1.0; LANES];
-        for i in 0..LANES {
+        let mut ends = [-1.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
         let rays = RayRows::of(row.from, direction).leaving(row.start);
         // Find the occluded rays.
         let blocked = {
-            let (traced, nothing) = (traced(&ends, folds), SourceRow::of(Source::Nothing));
-            geometry.occluded_rows(&rays, &ends, traced, &nothing, folds)
+            let (traced, nothing) = (traced(&ends, simd), SourceRow::of(Source::Nothing));
+            geometry.occluded_rows(&rays, &ends, traced, &nothing, simd)
         };
         // Move the other origins.
         let lifted = row.may_lift & !blocked;
         row.has_horizon &= !lifted;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             row.start[i] = if lifted & 1 << i != 0 { Ray::NO_TRIANGLE } else { row.start[i] };
         }
         for axis in 0..3 {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let (from, to) = (row.from[axis][i], row.lifted[axis][i]);
                 row.from[axis][i] = if lifted & 1 << i != 0 { to } else { from };
             }

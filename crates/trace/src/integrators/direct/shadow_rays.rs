@@ -2,12 +2,12 @@
 //! whereas the rays of one packet diverge.
 
 use super::all_lights::{LightSums, add_where, transmitted};
-use crate::geometry::rows::{Ends, RayRows, lanes};
+use crate::geometry::rows::{Ends, RayPacket, lanes};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::lights::{Source, SourceRow};
-use crate::math::lanes::{Folds, LANES, Lanes3, lane, set_lane};
-use crate::world::{Loops, World};
+use crate::math::lanes::{PACKET_SIZE, Simd, Vec3x16, lane, set_lane};
+use crate::world::{SimdKernel, World};
 
 /// Shadow rays of a packet of vertices, and their contributions.
 struct QueuedShadowRays {
@@ -18,7 +18,7 @@ struct QueuedShadowRays {
     /// Mask of rays to trace.
     traced: u32,
     sources: SourceRow,
-    values: Lanes3,
+    values: Vec3x16,
 }
 
 /// Pending shadow rays.
@@ -49,12 +49,12 @@ impl ShadowRayQueue {
     pub fn push(
         &mut self,
         row: u32,
-        (rays, ends, traced): (RayRows, Ends, u32),
+        (rays, ends, traced): (RayRows, F32x16, u32),
         sources: &SourceRow,
-        values: &Lanes3,
-        places: &[u32; LANES],
+        values: &Vec3x16,
+        places: &[u32; PACKET_SIZE],
     ) {
-        let number = self.rows.len() as u32 * LANES as u32;
+        let number = self.rows.len() as u32 * PACKET_SIZE as u32;
         self.order.extend(lanes(traced).map(|i| (places[i], number + i as u32)));
         self.rows.push(QueuedShadowRays {
             row,
@@ -118,18 +118,18 @@ struct TraceShadowRays<'a> {
     rays: &'a [u32],
 }
 
-impl Loops for TraceShadowRays<'_> {
-    type Done = ();
+impl SimdKernel for TraceShadowRays<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) {
+    fn run(self, simd: impl Simd) {
         let Self { world, aov, rows, rays } = self;
-        for rays in rays.chunks(LANES) {
-            let mut packet = RayRows::of([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-            let mut ends = [-1.0; LANES];
+        for rays in rays.chunks(PACKET_SIZE) {
+            let mut packet = RayPacket::of([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
+            let mut ends = [-1.0; PACKET_SIZE];
             let mut sources = SourceRow::of(Source::Nothing);
             for (to, &ray) in rays.iter().enumerate() {
-                let (row, from) = (&rows[ray as usize / LANES], ray as usize % LANES);
+                let (row, from) = (&rows[ray as usize / PACKET_SIZE], ray as usize % PACKET_SIZE);
                 for axis in 0..3 {
                     packet.origin[axis][to] = row.rays.origin[axis][from];
                     packet.direction[axis][to] = row.rays.direction[axis][from];
@@ -142,11 +142,11 @@ impl Loops for TraceShadowRays<'_> {
             let occluded = if world.has_passable() {
                 attenuate(world, aov, (&packet, &ends, traced), &sources, (rows, rays))
             } else {
-                world.geometry.occluded_rows(&packet, &ends, traced, &sources, folds)
+                world.geometry.occluded_rows(&packet, &ends, traced, &sources, simd)
             };
             for to in lanes(occluded) {
                 let ray = rays[to] as usize;
-                rows[ray / LANES].traced &= !(1 << (ray % LANES));
+                rows[ray / PACKET_SIZE].traced &= !(1 << (ray % PACKET_SIZE));
             }
         }
     }
@@ -159,14 +159,14 @@ impl Loops for TraceShadowRays<'_> {
 fn attenuate(
     world: &World,
     aov: LightAov,
-    (packet, ends, traced): (&RayRows, &Ends, u32),
+    (packet, ends, traced): (&RayPacket, &Ends, u32),
     sources: &SourceRow,
     (rows, rays): (&mut [QueuedShadowRays], &[u32]),
 ) -> u32 {
     let weakened = world.weakened_rows(packet, ends, traced, sources);
     for from in lanes(traced & !weakened.occluded) {
         let left = transmitted(lane(&weakened.left, from), aov);
-        let (row, to) = (&mut rows[rays[from] as usize / LANES], rays[from] as usize % LANES);
+        let (row, to) = (&mut rows[rays[from] as usize / PACKET_SIZE], rays[from] as usize % PACKET_SIZE);
         let value = lane(&row.values, to) * left;
         set_lane(&mut row.values, to, value);
     }

@@ -26,14 +26,14 @@ use crate::integrators::transport::walk::{
     Interaction, Interface, MAX_HIDDEN, NullInteraction, OpaqueHit, PathStepper, opacity_at, walk,
 };
 use crate::integrators::view::LightAov;
-use crate::integrators::{PACKET, RayCounters};
+use crate::integrators::{PACKET_SIZE, RayCounters};
 use crate::lights::{Emitted, Numbers, PhotonSource, Start};
 use crate::materials::bsdf::LobeSet;
 use crate::materials::{Bsdf, Coated, Pane, Rough, RoughBsdf};
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, lane, set_lane};
+use crate::math::lanes::{Simd, lane, set_lane};
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
-use crate::world::{BodyInParts, Hit, Loops, World};
+use crate::world::{BodyInParts, Hit, SimdKernel, World};
 
 /// Squared difference below which directions are equal within rounding.
 const SAME: f32 = 1e-8;
@@ -89,7 +89,7 @@ impl PhotonTracing<'_> {
         wavefront.emit(count, &mut rays);
         let (mut row, mut surfaces) = (VertexBatch::EMPTY, SurfaceRow::EMPTY);
         while !rays.is_empty() {
-            for packet in rays.chunks(PACKET) {
+            for packet in rays.chunks(PACKET_SIZE) {
                 self.tile.token.check()?;
                 wavefront.intersect(packet, &mut row, &mut surfaces);
             }
@@ -224,7 +224,7 @@ impl PhotonWavefront<'_> {
         let tracing = self.tracing;
         let tile = tracing.tile;
         let has_planes = tile.world.geometry.has_unbounded();
-        for begin in (0..count).step_by(PACKET) {
+        for begin in (0..count).step_by(PACKET_SIZE) {
             let numbers = tile.world.geometry.instructions().run(EmissionNumbers { tile, first: begin });
             for (i, numbers) in numbers.iter().enumerate().take((count - begin) as usize) {
                 // Emit a photon, and start it in front of all infinite planes that it may pass.
@@ -478,8 +478,8 @@ impl PhotonWavefront<'_> {
     fn russian_roulette(&mut self) {
         let tile = self.tracing.tile;
         let mut kept = 0;
-        for begin in (0..self.next.len()).step_by(PACKET) {
-            let end = self.next.len().min(begin + PACKET);
+        for begin in (0..self.next.len()).step_by(PACKET_SIZE) {
+            let end = self.next.len().min(begin + PACKET_SIZE);
             let risks = tile
                 .world
                 .geometry
@@ -522,15 +522,15 @@ struct EmissionNumbers<'a> {
     first: u32,
 }
 
-impl Loops for EmissionNumbers<'_> {
-    type Done = [Numbers; PACKET];
+impl SimdKernel for EmissionNumbers<'_> {
+    type Output = [Numbers; PACKET_SIZE];
 
     #[inline(always)]
-    fn run(self, _: impl Folds) -> Self::Done {
+    fn run(self, _: impl Simd) -> Self::Output {
         let slots = std::array::from_fn(|i| self.first + i as u32);
         let (xs, ys, samples) = self.tile.block.samples_of(&slots);
         let sampler = SamplerRow::new(self.tile.settings.render.seed, &xs, &ys, &samples);
-        let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET], decision, 0, 1);
+        let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET_SIZE], decision, 0, 1);
         let (light, aim) = (pairs(Decision::Lamp), pairs(Decision::Aim));
         let (position, direction) = (pairs(Decision::Start), pairs(Decision::Sent));
         std::array::from_fn(|i| Numbers {
@@ -548,13 +548,13 @@ struct RouletteNumbers<'a> {
     rays: &'a [PathRay],
 }
 
-impl Loops for RouletteNumbers<'_> {
-    type Done = [f32; PACKET];
+impl SimdKernel for RouletteNumbers<'_> {
+    type Output = [f32; PACKET_SIZE];
 
     #[inline(always)]
-    fn run(self, _: impl Folds) -> Self::Done {
-        let (mut slots, mut paths) = ([0; PACKET], [0; PACKET]);
-        for (i, ray) in self.rays.iter().enumerate().take(PACKET) {
+    fn run(self, _: impl Simd) -> Self::Output {
+        let (mut slots, mut paths) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
+        for (i, ray) in self.rays.iter().enumerate().take(PACKET_SIZE) {
             (slots[i], paths[i]) = (ray.slot, ray.path);
         }
         let (xs, ys, samples) = self.tile.block.samples_of(&slots);

@@ -7,14 +7,14 @@ use super::occlusion::is_occluded;
 use super::reservoir::PhotonPosition;
 use super::trials::inverse_coverage;
 use crate::geometry::rows::lanes;
-use crate::integrators::PACKET;
+use crate::integrators::PACKET_SIZE;
 use crate::integrators::transport::batch::VertexBatch;
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::{LightAov, PathClasses};
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, Lanes3, set_lane};
+use crate::math::lanes::{Simd, Vec3x16, set_lane};
 use crate::sampling::Decision;
-use crate::world::Loops;
+use crate::world::SimdKernel;
 
 /// Probability of a lookup at a vertex that the camera does not see: a path has many such vertices, and photons there
 /// contribute little noise.
@@ -37,14 +37,14 @@ pub struct GatherPhotons<'a> {
     pub aov: LightAov,
 }
 
-impl Loops for GatherPhotons<'_> {
-    type Done = Lanes3;
+impl SimdKernel for GatherPhotons<'_> {
+    type Output = Vec3x16;
 
     /// The gathered light reflected toward the viewer, before the throughput of the paths.
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Lanes3 {
+    fn run(self, simd: impl Simd) -> Vec3x16 {
         let Self { tile, row, maps, depth, aov } = self;
-        let mut sums = [[0.0; PACKET]; 3];
+        let mut sums = [[0.0; PACKET_SIZE]; 3];
         let [looks, choices] = row.sampler(tile).pairs(&row.path, Decision::Gather, 0, 1);
         let Some(most_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let PathClasses { caustic, indirect, .. } = aov.path_classes();
@@ -75,7 +75,7 @@ impl Loops for GatherPhotons<'_> {
                 if gathers && looks[i] < chance {
                     // Rescale the random number for reuse.
                     let random = [choices[i], looks[i] / chance];
-                    let (light, photon) = kernel_sum((row, i), (map, &look), aov, random, folds);
+                    let (light, photon) = kernel_sum((row, i), (map, &look), aov, random, simd);
                     sum += light * (coverage_factor(tile, (row, i), &look, photon, map.radius()) / chance);
                 }
             }
@@ -118,18 +118,18 @@ fn kernel_sum(
     (map, look): (&PhotonMap, &GatherPoint),
     aov: LightAov,
     random: [f32; 2],
-    folds: impl Folds,
+    simd: impl Simd,
 ) -> (Vec3, Option<PhotonPosition>) {
     if aov == LightAov::TraversalCost {
-        return (Vec3::splat(map.count_near(look, folds) as f32), None);
+        return (Vec3::splat(map.count_near(look, simd) as f32), None);
     }
     let is_flat = row.has_facet & 1 << i == 0;
     match row.bsdf.even(i).filter(|_| is_flat) {
         Some(f) => {
-            let (irradiance, photon) = map.irradiance(look, random, folds);
+            let (irradiance, photon) = map.irradiance(look, random, simd);
             (f * irradiance, photon)
         }
-        None => reflected_kernel_sum((row, i), (map, look), random, folds),
+        None => reflected_kernel_sum((row, i), (map, look), random, simd),
     }
 }
 
@@ -139,10 +139,10 @@ fn reflected_kernel_sum(
     (row, i): (&VertexBatch, usize),
     (map, look): (&PhotonMap, &GatherPoint),
     random: [f32; 2],
-    folds: impl Folds,
+    simd: impl Simd,
 ) -> (Vec3, Option<PhotonPosition>) {
     let (mut sum, mut total, mut left, mut chosen) = (Vec3::ZERO, 0.0, random[0], None);
-    map.visit(look, folds, |photon, density| {
+    map.visit(look, simd, |photon, density| {
         let f = row.bsdf.f_at(i, photon.direction);
         let light = f * photon.flux * (density * row.photon_weight(i, photon.direction));
         sum += light;

@@ -7,7 +7,7 @@ use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::rows::lanes;
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane};
+use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
 
 /// A photon that landed on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,18 +31,18 @@ const POLL_INTERVAL: usize = 1 << 16;
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 struct PhotonBlock {
-    point: Lanes3,
+    point: Vec3x16,
     normal: Packed,
     direction: Packed,
-    flux: Lanes3,
+    flux: Vec3x16,
 }
 
 /// A block without photons, whose positions are at infinity.
 const EMPTY: PhotonBlock = PhotonBlock {
-    point: [[f32::INFINITY; LANES]; 3],
-    normal: [0; LANES],
-    direction: [0; LANES],
-    flux: [[0.0; LANES]; 3],
+    point: [[f32::INFINITY; PACKET_SIZE]; 3],
+    normal: [0; PACKET_SIZE],
+    direction: [0; PACKET_SIZE],
+    flux: [[0.0; PACKET_SIZE]; 3],
 };
 
 /// Photons in a hashed grid.
@@ -57,7 +57,7 @@ pub struct PhotonMap {
     starts: Vec<u32>,
     count: usize,
     blocks: Vec<PhotonBlock>,
-    depths: Vec<[u32; LANES]>,
+    depths: Vec<[u32; PACKET_SIZE]>,
     /// The largest depth.
     most_depth: u32,
 }
@@ -165,12 +165,12 @@ impl PhotonMap {
             }
         }
         // Store them in blocks.
-        let rows = photons.len().div_ceil(LANES);
+        let rows = photons.len().div_ceil(PACKET_SIZE);
         let (mut blocks, mut depths) = (Vec::with_capacity(rows), Vec::with_capacity(rows));
         for order in order.chunks(POLL_INTERVAL) {
             token.check()?;
-            for order in order.chunks(LANES) {
-                let (mut block, mut depth) = (EMPTY, [0; LANES]);
+            for order in order.chunks(PACKET_SIZE) {
+                let (mut block, mut depth) = (EMPTY, [0; PACKET_SIZE]);
                 for (i, &number) in order.iter().enumerate() {
                     depth[i] = block.put(i, &photons[number as usize]);
                 }
@@ -184,7 +184,7 @@ impl PhotonMap {
 
     /// All photons, in bucket order.
     pub fn photons(&self) -> impl Iterator<Item = Photon> + '_ {
-        (0..self.count).map(|number| self.photon(number / LANES, number % LANES))
+        (0..self.count).map(|number| self.photon(number / PACKET_SIZE, number % PACKET_SIZE))
     }
 
     /// Returns a photon; its directions were stored with limited precision.
@@ -227,18 +227,18 @@ impl PhotonMap {
         &self,
         look: &GatherPoint,
         random: [f32; 2],
-        folds: impl Folds,
+        simd: impl Simd,
     ) -> (Vec3, Option<PhotonPosition>) {
-        let mut sums = [[0.0; LANES]; 3];
+        let mut sums = [[0.0; PACKET_SIZE]; 3];
         let mut choices = LaneReservoirs::new(random[0]);
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks(*range) {
-                let Some(weights) = self.weights(look, *range, block, folds) else { continue };
+                let Some(weights) = self.weights(look, *range, block, simd) else { continue };
                 let flux = &self.blocks[block].flux;
-                let mut brought = [0.0; LANES];
+                let mut brought = [0.0; PACKET_SIZE];
                 for axis in 0..3 {
-                    for i in 0..LANES {
+                    for i in 0..PACKET_SIZE {
                         let weighed = flux[axis][i] * weights[i];
                         sums[axis][i] += weighed;
                         brought[i] += weighed;
@@ -260,13 +260,13 @@ impl PhotonMap {
 
     /// Number of photons in the kernel around a point.
     #[inline(always)]
-    pub fn count_near(&self, look: &GatherPoint, folds: impl Folds) -> u32 {
+    pub fn count_near(&self, look: &GatherPoint, simd: impl Simd) -> u32 {
         let mut count = 0;
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks(*range) {
-                let Some(weights) = self.weights(look, *range, block, folds) else { continue };
-                count += above_zero(&weights, folds).count_ones();
+                let Some(weights) = self.weights(look, *range, block, simd) else { continue };
+                count += above_zero(&weights, simd).count_ones();
             }
         }
         count
@@ -275,13 +275,13 @@ impl PhotonMap {
     /// Visits the photons around a point with their weights in m⁻², the values of the Epanechnikov kernel, whose
     /// integral over the tangent plane is 1 (Silverman, *Density Estimation for Statistics and Data Analysis*, 1986).
     #[inline(always)]
-    pub fn visit(&self, look: &GatherPoint, folds: impl Folds, mut visit: impl FnMut(&Photon, f32)) {
+    pub fn visit(&self, look: &GatherPoint, simd: impl Simd, mut visit: impl FnMut(&Photon, f32)) {
         let peak = self.peak();
         let ranges = self.ranges(look);
         for range in &ranges.of[..ranges.count] {
             for block in blocks(*range) {
-                let Some(weights) = self.weights(look, *range, block, folds) else { continue };
-                for i in lanes(above_zero(&weights, folds)) {
+                let Some(weights) = self.weights(look, *range, block, simd) else { continue };
+                for i in lanes(above_zero(&weights, simd)) {
                     visit(&self.photon(block, i), peak * weights[i]);
                 }
             }
@@ -330,17 +330,17 @@ impl PhotonMap {
         look: &GatherPoint,
         range: [u32; 2],
         number: usize,
-        folds: impl Folds,
-    ) -> Option<Lanes> {
+        simd: impl Simd,
+    ) -> Option<F32x16> {
         // Weight the photons within the kernel by their distance.
         let GatherPoint { point, normal, most_depth } = *look;
         let block = &self.blocks[number];
         let radius_squared = self.radius * self.radius;
         let (reach, share) = (REACH * self.radius, 1.0 / radius_squared);
         let [xs, ys, zs] = &block.point;
-        let (mut near, mut weights) = ([0; LANES], [0.0; LANES]);
-        let first = (number * LANES) as u32;
-        for i in 0..LANES {
+        let (mut near, mut weights) = ([0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        let first = (number * PACKET_SIZE) as u32;
+        for i in 0..PACKET_SIZE {
             let (dx, dy, dz) = (xs[i] - point.x, ys[i] - point.y, zs[i] - point.z);
             let above = dx * normal.x + dy * normal.y + dz * normal.z;
             let along = dx * dx + dy * dy + dz * dz - above * above;
@@ -351,12 +351,12 @@ impl PhotonMap {
             let left = 1.0 - along * share;
             weights[i] = if left < 1.0 { left } else { 1.0 };
         }
-        if folds.bits(&near) == 0 {
+        if simd.movemask(&near) == 0 {
             return None;
         }
         // Reject photons on other surfaces and photons from behind.
         let (own, from) = (packed::lanes(&block.normal), packed::lanes(&block.direction));
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let cosine = own[0][i] * normal.x + own[1][i] * normal.y + own[2][i] * normal.z;
             let squared = own[0][i] * own[0][i] + own[1][i] * own[1][i] + own[2][i] * own[2][i];
             let arriving = from[0][i] * normal.x + from[1][i] * normal.y + from[2][i] * normal.z;
@@ -369,11 +369,11 @@ impl PhotonMap {
         // Reject photons with too many bounces.
         if most_depth < self.most_depth {
             let depths = &self.depths[number];
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 near[i] &= if depths[i] <= most_depth { TRUE } else { 0 };
             }
         }
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             weights[i] = f32::from_bits(weights[i].to_bits() & near[i]);
         }
         Some(weights)
@@ -394,22 +394,22 @@ impl PhotonBlock {
 /// The blocks of a nonempty range.
 #[inline(always)]
 fn blocks([start, end]: [u32; 2]) -> std::ops::Range<usize> {
-    start as usize / LANES..(end as usize).div_ceil(LANES)
+    start as usize / PACKET_SIZE..(end as usize).div_ceil(PACKET_SIZE)
 }
 
 /// Mask of lanes above 0.
 #[inline(always)]
-fn above_zero(weights: &Lanes, folds: impl Folds) -> u32 {
-    let mut above: Truths = [0; LANES];
-    for i in 0..LANES {
+fn above_zero(weights: &F32x16, simd: impl Simd) -> u32 {
+    let mut above: Mask = [0; PACKET_SIZE];
+    for i in 0..PACKET_SIZE {
         above[i] = if weights[i] > 0.0 { TRUE } else { 0 };
     }
-    folds.bits(&above)
+    simd.movemask(&above)
 }
 
 /// The sum of all lanes, added in halves.
 #[inline(always)]
-fn sum_lanes(mut row: Lanes) -> f32 {
+fn sum_lanes(mut row: F32x16) -> f32 {
     for i in 0..8 {
         row[i] += row[i + 8];
     }
@@ -440,7 +440,7 @@ fn bucket(x: i32, y: i32, z: i32, mask: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::lanes::PlainFolds;
+    use crate::math::lanes::PortableSimd;
     use crate::math::random::signed as random;
 
     fn photon(point: Vec3, normal: Vec3) -> Photon {
@@ -474,7 +474,7 @@ mod tests {
                     let mut found = Vec::new();
                     map.visit(
                         &GatherPoint { point, normal, most_depth: 1 },
-                        PlainFolds,
+                        PortableSimd,
                         |photon, density| {
                             found.push((photon.point.to_array(), density));
                         },

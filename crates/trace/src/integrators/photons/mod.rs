@@ -39,7 +39,7 @@ mod packed;
 mod reservoir;
 mod trials;
 
-use crate::math::lanes::PlainFolds;
+use crate::math::lanes::PortableSimd;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

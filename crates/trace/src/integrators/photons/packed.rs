@@ -2,10 +2,10 @@
 //! Floating-Point Normal Vectors*, 2010).
 
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes3};
+use crate::math::lanes::{PACKET_SIZE, Vec3x16};
 
 /// Sixteen encoded directions.
-pub type Packed = [u32; LANES];
+pub type Packed = [u32; PACKET_SIZE];
 
 /// Half the side length of the square.
 const SIDE: f32 = 32767.0;
@@ -27,9 +27,9 @@ pub fn unit(packed: u32) -> Vec3 {
 
 /// Decodes vectors without normalizing them; their lengths are between SIDE/√3 and SIDE.
 #[inline(always)]
-pub fn lanes(packed: &Packed) -> Lanes3 {
-    let mut vectors = [[0.0; LANES]; 3];
-    for i in 0..LANES {
+pub fn lanes(packed: &Packed) -> Vec3x16 {
+    let mut vectors = [[0.0; PACKET_SIZE]; 3];
+    for i in 0..PACKET_SIZE {
         let [x, y, z] = vector(packed[i]);
         (vectors[0][i], vectors[1][i], vectors[2][i]) = (x, y, z);
     }
@@ -62,7 +62,7 @@ mod tests {
         for direction in some.into_iter().filter_map(Vec3::try_normalize) {
             let packed = pack(direction);
             assert!((unit(packed) - direction).length() < 7e-5, "{direction}: {}", unit(packed));
-            let long = lanes(&[packed; LANES]);
+            let long = lanes(&[packed; PACKET_SIZE]);
             let first = Vec3::new(long[0][0], long[1][0], long[2][0]);
             assert!((first.normalize() - direction).length() < 7e-5, "{direction}: {first}");
         }

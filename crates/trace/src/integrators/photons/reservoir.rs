@@ -2,7 +2,7 @@
 //! kernel, so that the expected light is right.
 
 use crate::math::Vec3;
-use crate::math::lanes::{LANES, Lanes};
+use crate::math::lanes::{F32x16, PACKET_SIZE};
 
 /// Largest number below 1.
 const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
@@ -21,27 +21,27 @@ pub struct PhotonPosition {
 /// choices, as it can be rescaled after each choice.
 #[derive(Clone, Copy, Debug)]
 pub struct LaneReservoirs {
-    random: Lanes,
-    totals: Lanes,
-    chosen: [u32; LANES],
+    random: F32x16,
+    totals: F32x16,
+    chosen: [u32; PACKET_SIZE],
 }
 
 impl LaneReservoirs {
     /// Creates reservoirs from a random number in [0, 1).
     #[inline(always)]
     pub fn new(random: f32) -> Self {
-        let mut randoms = [0.0; LANES];
+        let mut randoms = [0.0; PACKET_SIZE];
         for (i, own) in randoms.iter_mut().enumerate() {
-            let turned = random + i as f32 * (1.0 / LANES as f32);
+            let turned = random + i as f32 * (1.0 / PACKET_SIZE as f32);
             *own = if turned < 1.0 { turned } else { turned - 1.0 };
         }
-        Self { random: randoms, totals: [0.0; LANES], chosen: [0; LANES] }
+        Self { random: randoms, totals: [0.0; PACKET_SIZE], chosen: [0; PACKET_SIZE] }
     }
 
     /// Offers item `number` with nonnegative weights.
     #[inline(always)]
-    pub fn offer(&mut self, number: u32, weights: &Lanes) {
-        for i in 0..LANES {
+    pub fn offer(&mut self, number: u32, weights: &F32x16) {
+        for i in 0..PACKET_SIZE {
             self.totals[i] += weights[i];
             let part = if weights[i] > 0.0 { weights[i] / self.totals[i] } else { 0.0 };
             let takes = self.random[i] < part;
@@ -59,7 +59,7 @@ impl LaneReservoirs {
     pub fn chosen(&self, random: f32) -> Option<(u32, usize)> {
         let mut left = random * self.totals.iter().sum::<f32>();
         let mut last = None;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             if self.totals[i] > 0.0 {
                 last = Some((self.chosen[i], i));
                 if left < self.totals[i] {
@@ -81,11 +81,11 @@ mod tests {
     fn items_are_chosen_in_proportion_to_weight() {
         const ITEMS: usize = 5;
         let mut next = unit(5);
-        let mut weights = [[0.0; LANES]; ITEMS];
+        let mut weights = [[0.0; PACKET_SIZE]; ITEMS];
         weights.as_flattened_mut().iter_mut().for_each(|weight| *weight = (next() * 3.0 - 1.0).max(0.0));
         weights[1][3] = 9.0;
         let total: f32 = weights.as_flattened().iter().sum();
-        let mut counts = [[0_u32; LANES]; ITEMS];
+        let mut counts = [[0_u32; PACKET_SIZE]; ITEMS];
         const DRAWS: u32 = 400_000;
         for _ in 0..DRAWS {
             let mut choices = LaneReservoirs::new(next());

@@ -8,7 +8,7 @@ use crate::integrators::view::{Components, LightAov};
 use crate::materials::bsdf::{BsdfValues, Place};
 use crate::materials::{BsdfRow, RoughKind};
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane, truths};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
 use crate::sampling::SamplerRow;
 use crate::scene::description::Shadows;
 
@@ -18,22 +18,22 @@ pub struct VertexBatch {
     /// Mask of lanes with a vertex.
     pub used: u32,
     /// Origins of light samples and shadow rays.
-    pub from: Lanes3,
+    pub from: Vec3x16,
     /// Triangles at the origins; see [`VertexBatch::starts`].
-    pub start: [u32; LANES],
+    pub start: [u32; PACKET_SIZE],
     /// Horizon normals: in the lanes whose bits are set, nothing behind them is visible.
-    pub horizon: Lanes3,
+    pub horizon: Vec3x16,
     pub has_horizon: u32,
     /// Origins above the facets, from which lights in all directions are visible, and the `t_max` of the rays to them.
     /// They apply in the lanes whose bits are set, if those rays are unoccluded.
-    pub lifted: Lanes3,
-    pub lift_end: Lanes,
+    pub lifted: Vec3x16,
+    pub lift_end: F32x16,
     pub may_lift: u32,
     /// Surface points, and geometric normals on the viewer's side, in the lanes whose bits are set; in other lanes
     /// `from` and `normal` serve as both.
-    pub point: Lanes3,
+    pub point: Vec3x16,
     /// [`VertexBatch::point`].
-    pub facet: Lanes3,
+    pub facet: Vec3x16,
     /// [`VertexBatch::point`].
     pub has_facet: u32,
     /// Mask of vertices that the camera sees, directly or through mirrors and glass.
@@ -41,25 +41,25 @@ pub struct VertexBatch {
     /// Mask of vertices whose path comes from a surface with a glossy lobe.
     pub after_gloss: u32,
     /// Shading normals.
-    pub normal: Lanes3,
+    pub normal: Vec3x16,
     /// Interpolated normals before perturbation, and their cosines with the perturbed ones; [`UNPERTURBED`] where they
     /// are equal.
-    pub smooth_normal: Lanes3,
-    pub shading_normal_cosine: Lanes,
+    pub smooth_normal: Vec3x16,
+    pub shading_normal_cosine: F32x16,
     /// BSDFs, all of the same kind.
     pub bsdf: BsdfRow,
     /// Throughputs of the paths.
-    pub throughput: Lanes3,
+    pub throughput: Vec3x16,
     /// Sample slots of the paths.
-    pub slot: [u32; LANES],
+    pub slot: [u32; PACKET_SIZE],
     /// Numbers of the paths.
-    pub path: [u32; LANES],
+    pub path: [u32; PACKET_SIZE],
     /// Indices of the paths in the bounce's queue.
-    pub place: [u32; LANES],
+    pub place: [u32; PACKET_SIZE],
     /// [`PathState::roulette_throughput`](super::ray::PathState::roulette_throughput) of the paths.
-    pub roulette_throughput: Lanes,
+    pub roulette_throughput: F32x16,
     /// Indices of the glass around the vertices.
-    pub interiors: [u32; LANES],
+    pub interiors: [u32; PACKET_SIZE],
     /// Whether any vertex has a perturbed normal.
     pub is_perturbed: bool,
     /// Whether no light sample is visible from any of the vertices.
@@ -67,9 +67,9 @@ pub struct VertexBatch {
     /// Whether the vertices represent both sides of their surfaces.
     pub has_two_sides: bool,
     /// Ray origins on the other side and indices of the glass around them, if `has_two_sides`.
-    pub beyond: Lanes3,
+    pub beyond: Vec3x16,
     /// [`VertexBatch::beyond`].
-    pub interiors_beyond: [u32; LANES],
+    pub interiors_beyond: [u32; PACKET_SIZE],
 }
 
 /// Marks a vertex whose two normals are equal, in place of their cosine.
@@ -101,10 +101,10 @@ impl VertexBatch {
 
     /// The samplers of the vertices.
     #[inline(always)]
-    pub fn sampler(&self, tile: &TileContext<'_>) -> SamplerRow<LANES> {
+    pub fn sampler(&self, tile: &TileContext<'_>) -> SamplerRow<PACKET_SIZE> {
         let (block, slots) = (tile.block, &self.slot);
         let mut is_run = true;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             is_run &= slots[i] == slots[0] + i as u32;
         }
         let (xs, ys, samples) = if is_run { block.samples_from(slots[0]) } else { block.samples_of(slots) };
@@ -114,33 +114,33 @@ impl VertexBatch {
     /// A packet without vertices.
     pub const EMPTY: Self = Self {
         used: 0,
-        from: [[0.0; LANES]; 3],
-        start: [Ray::NO_TRIANGLE; LANES],
-        horizon: [[0.0; LANES]; 3],
+        from: [[0.0; PACKET_SIZE]; 3],
+        start: [Ray::NO_TRIANGLE; PACKET_SIZE],
+        horizon: [[0.0; PACKET_SIZE]; 3],
         has_horizon: 0,
-        lifted: [[0.0; LANES]; 3],
-        lift_end: [0.0; LANES],
+        lifted: [[0.0; PACKET_SIZE]; 3],
+        lift_end: [0.0; PACKET_SIZE],
         may_lift: 0,
-        point: [[0.0; LANES]; 3],
-        facet: [[0.0; LANES]; 3],
+        point: [[0.0; PACKET_SIZE]; 3],
+        facet: [[0.0; PACKET_SIZE]; 3],
         has_facet: 0,
         only_specular_before: 0,
         after_gloss: 0,
-        normal: [[0.0; LANES]; 3],
-        smooth_normal: [[0.0; LANES]; 3],
-        shading_normal_cosine: [UNPERTURBED; LANES],
+        normal: [[0.0; PACKET_SIZE]; 3],
+        smooth_normal: [[0.0; PACKET_SIZE]; 3],
+        shading_normal_cosine: [UNPERTURBED; PACKET_SIZE],
         bsdf: BsdfRow::EMPTY,
-        throughput: [[0.0; LANES]; 3],
-        slot: [0; LANES],
-        path: [0; LANES],
-        place: [0; LANES],
-        roulette_throughput: [0.0; LANES],
-        interiors: [0; LANES],
+        throughput: [[0.0; PACKET_SIZE]; 3],
+        slot: [0; PACKET_SIZE],
+        path: [0; PACKET_SIZE],
+        place: [0; PACKET_SIZE],
+        roulette_throughput: [0.0; PACKET_SIZE],
+        interiors: [0; PACKET_SIZE],
         is_perturbed: false,
         is_dark: false,
         has_two_sides: false,
-        beyond: [[0.0; LANES]; 3],
-        interiors_beyond: [0; LANES],
+        beyond: [[0.0; PACKET_SIZE]; 3],
+        interiors_beyond: [0; PACKET_SIZE],
     };
 
     /// Empties the packet; normals count as unperturbed.
@@ -150,7 +150,7 @@ impl VertexBatch {
         (self.has_facet, self.only_specular_before, self.after_gloss) = (0, 0, 0);
         (self.is_perturbed, self.is_dark, self.has_two_sides) = (false, false, false);
         self.bsdf.reset();
-        self.shading_normal_cosine = [UNPERTURBED; LANES];
+        self.shading_normal_cosine = [UNPERTURBED; PACKET_SIZE];
     }
 
     /// Whether the packet holds vertices with this kind of BSDF, dark or not, and two-sided or not.
@@ -247,27 +247,27 @@ impl VertexBatch {
 
     /// Evaluates the BSDFs and cosines for light from the directions `wi`.
     #[inline(always)]
-    pub fn response(&self, wi: &Lanes3, folds: impl Folds) -> Response {
-        let mut cosines = [0.0; LANES];
-        for i in 0..LANES {
+    pub fn response(&self, wi: &Vec3x16, simd: impl Simd) -> Response {
+        let mut cosines = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             cosines[i] = lane(&self.normal, i).dot(lane(wi, i));
         }
         if self.is_perturbed {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let smooth = lane(&self.smooth_normal, i).dot(lane(wi, i));
                 cosines[i] *= terminator(cosines[i], smooth, self.shading_normal_cosine[i]);
             }
         }
-        Response { bsdf: self.bsdf.f(wi, folds), cosines }
+        Response { bsdf: self.bsdf.f(wi, simd), cosines }
     }
 
     /// Shadow-terminator factors for light from the directions `wi`, on the viewer's side where `sides` is 1 and on the
     /// other side where it is −1. Not above 0 if no light arrives.
     #[inline(always)]
-    pub fn terminator_factors(&self, wi: &Lanes3, sides: &Lanes) -> Lanes {
-        let mut left = [1.0; LANES];
+    pub fn terminator_factors(&self, wi: &Vec3x16, sides: &F32x16) -> F32x16 {
+        let mut left = [1.0; PACKET_SIZE];
         if self.is_perturbed {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let direction = lane(wi, i) * sides[i];
                 let cosine = lane(&self.normal, i).dot(direction);
                 let smooth = lane(&self.smooth_normal, i).dot(direction);
@@ -279,14 +279,14 @@ impl VertexBatch {
 
     /// [`Ray::start`] of rays from the vertices in the directions `wi`; rays that go behind their facet have none.
     #[inline(always)]
-    pub fn starts(&self, wi: &Lanes3) -> [u32; LANES] {
+    pub fn starts(&self, wi: &Vec3x16) -> [u32; PACKET_SIZE] {
         // Vertices on shapes are not on triangles.
         if self.start.iter().fold(!0, |all, start| all & start) == Ray::NO_TRIANGLE {
             return self.start;
         }
-        let apart = truths(self.has_facet);
+        let apart = mask_from_bits(self.has_facet);
         let mut starts = self.start;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let (facet, normal) = (lane(&self.facet, i), lane(&self.normal, i));
             let choose = |facet: f32, normal: f32| if apart[i] != 0 { facet } else { normal };
             let Vec3 { x, y, z } = lane(wi, i);
@@ -334,10 +334,10 @@ impl VertexBatch {
 
     /// Multiplies light at the vertices by the throughputs of the paths.
     #[inline(always)]
-    pub fn times_throughput(&self, light: &Lanes3) -> Lanes3 {
+    pub fn times_throughput(&self, light: &Vec3x16) -> Vec3x16 {
         let mut radiance = *light;
         for axis in 0..3 {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 radiance[axis][i] = light[axis][i] * self.throughput[axis][i];
             }
         }
@@ -348,7 +348,7 @@ impl VertexBatch {
     #[inline(always)]
     pub fn consecutive_start(&self) -> Option<u32> {
         let mut is_run = self.used == ALL;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             is_run &= self.place[i] == self.place[0].wrapping_add(i as u32);
         }
         is_run.then_some(self.place[0])
@@ -361,15 +361,15 @@ impl VertexBatch {
 
     /// Mask of vertices whose direction is below their horizon.
     #[inline(always)]
-    pub fn below_horizon(&self, wi: &Lanes3, folds: impl Folds) -> u32 {
-        let mut hidden = [0; LANES];
+    pub fn below_horizon(&self, wi: &Vec3x16, simd: impl Simd) -> u32 {
+        let mut hidden = [0; PACKET_SIZE];
         if self.has_horizon != 0 {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let cosine = lane(&self.horizon, i).dot(lane(wi, i));
                 hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
             }
         }
-        folds.bits(&hidden) & self.has_horizon
+        simd.bits(&hidden) & self.has_horizon
     }
 }
 
@@ -378,11 +378,11 @@ pub struct Response {
     /// BSDF values.
     pub bsdf: BsdfValues,
     /// Cosines times the terminator factors; not above 0 if no light arrives.
-    pub cosines: Lanes,
+    pub cosines: F32x16,
 }
 
 /// Mask of all lanes.
-pub const ALL: u32 = ((1_u64 << LANES) - 1) as u32;
+pub const ALL: u32 = ((1_u64 << PACKET_SIZE) - 1) as u32;
 
 /// Shadow-terminator factor: softens the edge of the lit region of perturbed normals; 0 behind the unperturbed surface,
 /// 1 without perturbation (Chiang, Li, Burley, *Taming the Shadow Terminator*, 2019).

@@ -7,12 +7,12 @@ use super::interiors::{Interior, InteriorList};
 use super::ray::{PathRay, PathState};
 use super::tile::TileContext;
 use crate::geometry::Ray;
-use crate::geometry::rows::{RayRows, Row};
-use crate::math::lanes::{Folds, set_lane};
+use crate::geometry::rows::{F32x16, RayRows};
+use crate::math::lanes::{Simd, set_lane};
 use crate::math::{DVec2, Vec2, Vec3};
 use crate::sampling::filter::FilterSample;
 use crate::sampling::{CAMERA_PATH, Decision, SamplerRow, warp};
-use crate::world::{Loops, PACKET};
+use crate::world::{PACKET_SIZE, SimdKernel};
 
 /// Number of camera-ray packets generated in one loop, which hides the latency of each packet's random numbers.
 pub const CAMERA_ROWS: usize = 8;
@@ -37,11 +37,11 @@ impl TileContext<'_> {
     ) {
         queue.clear();
         let mut rows = Vec::new();
-        for first in slots.clone().step_by(CAMERA_ROWS * PACKET) {
+        for first in slots.clone().step_by(CAMERA_ROWS * PACKET_SIZE) {
             self.camera_rows(first..slots.end, &mut rows);
-            for (first, row) in (first..).step_by(PACKET).zip(&rows) {
+            for (first, row) in (first..).step_by(PACKET_SIZE).zip(&rows) {
                 negative(first, row.negative);
-                let slots = first..slots.end.min(first + PACKET as u32);
+                let slots = first..slots.end.min(first + PACKET_SIZE as u32);
                 queue.extend(slots.zip(0..).map(|(slot, lane)| self.camera_path(row.rays.ray(lane), slot)));
             }
         }
@@ -50,7 +50,7 @@ impl TileContext<'_> {
     /// Replaces the content of `rows` with camera rays for the first slots, at most [`CAMERA_ROWS`] packets.
     pub fn camera_rows(&self, slots: Range<u32>, rows: &mut Vec<CameraRow>) {
         rows.clear();
-        let count = slots.len().div_ceil(PACKET).min(CAMERA_ROWS);
+        let count = slots.len().div_ceil(PACKET_SIZE).min(CAMERA_ROWS);
         self.world.geometry.instructions().run(GenerateCameraRays {
             tile: self,
             first: slots.start,
@@ -84,7 +84,7 @@ impl TileContext<'_> {
     /// compiled for each instruction set.
     #[inline(always)]
     fn camera_row(&self, first: u32) -> CameraRow {
-        let paths = [CAMERA_PATH; PACKET];
+        let paths = [CAMERA_PATH; PACKET_SIZE];
         let (settings, camera) = (self.settings, &self.world.camera);
         let (xs, ys, samples) = self.block.samples_from(first);
         let sampler = SamplerRow::new(settings.render.seed, &xs, &ys, &samples);
@@ -94,25 +94,25 @@ impl TileContext<'_> {
         settings.render.filter.sample_row(&mut in_pixel, |lane, sample: FilterSample| {
             negative |= u32::from(sample.is_negative) << lane;
         });
-        let mut places = [[0.0; PACKET]; 2];
-        for lane in 0..PACKET {
+        let mut places = [[0.0; PACKET_SIZE]; 2];
+        for lane in 0..PACKET_SIZE {
             let corner = DVec2::new(f64::from(xs[lane]), f64::from(ys[lane])) + DVec2::splat(0.5);
             let place = corner + DVec2::new(f64::from(in_pixel[0][lane]), f64::from(in_pixel[1][lane]));
             let place = settings.pixel_to_camera(place);
             (places[0][lane], places[1][lane]) = (place.x, place.y);
         }
         // Generate rays through them, from points on the lens if it has an aperture.
-        let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
+        let (mut origin, mut direction) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         if settings.dof && camera.aperture > 0.0 {
             let lens = sample_lens(sampler.pairs(&paths, Decision::Lens, 0, 1));
-            for lane in 0..PACKET {
+            for lane in 0..PACKET_SIZE {
                 let place = DVec2::new(places[0][lane], places[1][lane]);
                 let ray = camera.ray(place, Vec2::new(lens[0][lane], lens[1][lane]));
                 set_lane(&mut origin, lane, ray.origin);
                 set_lane(&mut direction, lane, ray.direction);
             }
         } else {
-            for lane in 0..PACKET {
+            for lane in 0..PACKET_SIZE {
                 let ray = camera.middle_ray(DVec2::new(places[0][lane], places[1][lane]));
                 set_lane(&mut origin, lane, ray.origin);
                 set_lane(&mut direction, lane, ray.direction);
@@ -130,13 +130,13 @@ struct GenerateCameraRays<'a> {
     rows: &'a mut Vec<CameraRow>,
 }
 
-impl Loops for GenerateCameraRays<'_> {
-    type Done = ();
+impl SimdKernel for GenerateCameraRays<'_> {
+    type Output = ();
 
     #[inline(always)]
-    fn run(self, _: impl Folds) {
+    fn run(self, _: impl Simd) {
         for number in 0..self.count as u32 {
-            self.rows.push(self.tile.camera_row(self.first + number * PACKET as u32));
+            self.rows.push(self.tile.camera_row(self.first + number * PACKET_SIZE as u32));
         }
     }
 }
@@ -145,7 +145,7 @@ impl Loops for GenerateCameraRays<'_> {
 #[inline(always)]
 fn sample_lens([u, v]: [Row; 2]) -> [Row; 2] {
     let mut points = [u, v];
-    for lane in 0..PACKET {
+    for lane in 0..PACKET_SIZE {
         let point = warp::disk(Vec2::new(u[lane], v[lane]));
         (points[0][lane], points[1][lane]) = (point.x, point.y);
     }
@@ -165,13 +165,13 @@ mod tests {
             let block = SampleBlock { pixels: tile.into(), samples };
             for first in [0, 1, 2, 15, 33] {
                 let (xs, ys, samples) = block.samples_from(first);
-                for lane in 0..PACKET {
+                for lane in 0..PACKET_SIZE {
                     let place = block.sample_of(first + lane as u32);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + {lane}");
                 }
                 let slots = std::array::from_fn(|lane| first + 7 * lane as u32);
                 let (xs, ys, samples) = block.samples_of(&slots);
-                for lane in 0..PACKET {
+                for lane in 0..PACKET_SIZE {
                     let place = block.sample_of(slots[lane]);
                     assert_eq!((xs[lane], ys[lane], samples[lane]), place, "{first} + 7 * {lane}");
                 }

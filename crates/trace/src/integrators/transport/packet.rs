@@ -15,11 +15,11 @@ use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::view::LightAov;
 use crate::materials::Rough;
 use crate::materials::bsdf::ShownLobes;
-use crate::math::lanes::{Folds, Lanes, Lanes3, TRUE, lane, set_lane, take, take_u32, truths};
+use crate::math::lanes::{F32x16, Simd, TRUE, Vec3x16, lane, mask_from_bits, select, select_u32, set_lane};
 use crate::math::{DVec2, Vec3};
 use crate::sampling::CAMERA_PATH;
 use crate::scene::description::Shadows;
-use crate::world::{Hit, Loops, Object, PACKET, PlainMaterial};
+use crate::world::{Hit, Object, PACKET_SIZE, PlainMaterial, SimdKernel};
 
 /// Where the rays of a packet are.
 #[derive(Clone, Copy)]
@@ -66,7 +66,7 @@ impl PacketSource<'_> {
 /// can be evaluated in packets, and all plain surfaces of the packet have the same kind of BSDF.
 pub struct PacketHits {
     hits: HitRows,
-    object: [u32; PACKET],
+    object: [u32; PACKET_SIZE],
     /// Mask of rays that hit anything.
     pub any: u32,
     /// Mask of plain surfaces.
@@ -78,7 +78,7 @@ pub struct PacketHits {
     /// Number of texture lookups for plain surfaces.
     pub lookups: u64,
     /// [`Environment::arriving_row`](crate::lights::infinite::Environment::arriving_row), if any ray leaves the scene.
-    sky: (Lanes3, Lanes),
+    sky: (Vec3x16, F32x16),
 }
 
 impl PacketHits {
@@ -95,7 +95,7 @@ impl PacketHits {
         }
         let (point, normal) = (lane(&surfaces.point, i), lane(&surfaces.normal, i));
         let is_smooth = surfaces.smooth & bit != 0;
-        let smooth = |of: &Lanes3, flat: Vec3| if is_smooth { lane(of, i) } else { flat };
+        let smooth = |of: &Vec3x16, flat: Vec3| if is_smooth { lane(of, i) } else { flat };
         let (u, v) = (self.hits.u[i], self.hits.v[i]);
         Some(SurfacePoint {
             point,
@@ -127,7 +127,7 @@ impl PacketHits {
 }
 
 impl TileContext<'_> {
-    /// Intersects at most [`PACKET`] rays. Plain surfaces are stored in the vertex packet, ready for direct lighting if
+    /// Intersects at most [`PACKET_SIZE`] rays. Plain surfaces are stored in the vertex packet, ready for direct lighting if
     /// `are_lit`; its `used` mask has those that reflect light. Other surfaces are stored in the surface packet where
     /// this is supported.
     pub fn intersect(
@@ -186,17 +186,17 @@ struct PlainSurfaces {
     lookups: u64,
 }
 
-impl Loops for PacketIntersection<'_> {
-    type Done = PacketHits;
+impl SimdKernel for PacketIntersection<'_> {
+    type Output = PacketHits;
 
     #[inline(always)]
-    fn run(mut self, folds: impl Folds) -> PacketHits {
+    fn run(mut self, simd: impl Simd) -> PacketHits {
         let (tile, rays) = (self.tile, self.rays);
         let world = tile.world;
         self.row.reset();
         // Gather the rays into a packet.
         let (of_paths, traced);
-        let mut ends = [-1.0; PACKET];
+        let mut ends = [-1.0; PACKET_SIZE];
         let rows = match rays {
             PacketSource::Camera(row, _, count, _) => {
                 ends[..count].fill(f32::INFINITY);
@@ -204,15 +204,15 @@ impl Loops for PacketIntersection<'_> {
                 &row.rays
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => {
-                let (mut origin, mut direction) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
-                let mut start = [Ray::NO_TRIANGLE; PACKET];
-                for lane in 0..PACKET {
+                let (mut origin, mut direction) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
+                let mut start = [Ray::NO_TRIANGLE; PACKET_SIZE];
+                for lane in 0..PACKET_SIZE {
                     let Some(path) = rays.queued_path(lane) else { break };
                     set_lane(&mut origin, lane, path.ray.origin);
                     set_lane(&mut direction, lane, path.ray.direction);
                     (start[lane], ends[lane]) = (path.ray.start, path.ray.t_max);
                 }
-                traced = rows::traced(&ends, folds);
+                traced = rows::traced(&ends, simd);
                 of_paths = RayRows::of(origin, direction).leaving(start);
                 &of_paths
             }
@@ -220,18 +220,18 @@ impl Loops for PacketIntersection<'_> {
         // Intersect them, or use the known hits.
         let (hits, object) = match rays {
             PacketSource::Camera(..) | PacketSource::Paths(..) => {
-                world.geometry.closest_rows(rows, &mut ends, traced, folds)
+                world.geometry.closest_rows(rows, &mut ends, traced, simd)
             }
             PacketSource::Traced(_, known, places) => known_hits(known, places),
         };
         // Select the rays in air, whose surfaces may be plain.
         *self.surface = SurfaceRow::EMPTY;
-        let any = hits.any(folds);
+        let any = hits.any(simd);
         let (mut in_air, mut only_specular_before, mut after_gloss) = (any, !0, 0);
         match rays {
             PacketSource::Camera(..) => in_air = if world.is_eye_in_air() { any } else { 0 },
             PacketSource::Paths(..) | PacketSource::Traced(..) => {
-                for lane in 0..PACKET {
+                for lane in 0..PACKET_SIZE {
                     let Some(path) = rays.queued_path(lane) else { break };
                     in_air &= if path.interiors.is_air() { !0 } else { !(1 << lane) };
                     only_specular_before &= if path.state.only_specular_before { !0 } else { !(1 << lane) };
@@ -241,20 +241,20 @@ impl Loops for PacketIntersection<'_> {
         }
         // Compute the plain surfaces and their BSDFs.
         (self.row.only_specular_before, self.row.after_gloss) = (only_specular_before, after_gloss);
-        let plain = self.fill_plain(rows, (&hits, &object), in_air, folds);
+        let plain = self.fill_plain(rows, (&hits, &object), in_air, simd);
         // Set the positions and normals of the plain vertices.
         let lifts = match tile.settings.render.shadows {
             Shadows::Off => LiftMode::All,
             Shadows::Hard | Shadows::Soft => LiftMode::IfFree(only_specular_before),
         };
         let front =
-            if plain.all == 0 { 0 } else { self.row.set_positions(&rays, rows, self.surface, lifts, folds) };
+            if plain.all == 0 { 0 } else { self.row.set_positions(&rays, rows, self.surface, lifts, simd) };
         // Compute the other surfaces, and the environment for rays that leave the scene.
-        let found = tile.fill_other_surfaces(self.surface, rows, (&hits, &object), any & !plain.all, folds);
+        let found = tile.fill_other_surfaces(self.surface, rows, (&hits, &object), any & !plain.all, simd);
         let all = ((1_u64 << rays.count()) - 1) as u32;
         let sky = match world.lights.environment() {
             Some(environment) if any & all != all => environment.arriving_row(&rows.direction),
-            Some(_) | None => ([[0.0; PACKET]; 3], [0.0; PACKET]),
+            Some(_) | None => ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]),
         };
         let (shining, lookups) = (plain.shining & (front | plain.two_sided), plain.lookups);
         PacketHits { hits, object, any, plain: plain.all, shining, found, lookups, sky }
@@ -267,14 +267,14 @@ impl PacketIntersection<'_> {
     fn fill_plain(
         &mut self,
         rows: &RayRows,
-        (hits, object): (&HitRows, &[u32; PACKET]),
+        (hits, object): (&HitRows, &[u32; PACKET_SIZE]),
         mut left: u32,
-        folds: impl Folds,
+        simd: impl Simd,
     ) -> PlainSurfaces {
         let Self { tile, aov, are_lit, row, surface, .. } = self;
         let mut plain = PlainSurfaces { all: 0, shining: 0, two_sided: 0, lookups: 0 };
         while left != 0 {
-            let (id, of_object) = group_first(object, left, folds);
+            let (id, of_object) = group_first(object, left, simd);
             left &= !of_object;
             if tile.world.is_colored(id) {
                 continue;
@@ -282,10 +282,10 @@ impl PacketIntersection<'_> {
             // Skip materials that are not plain. The first plain one decides the kind of all BSDFs.
             let materials = tile.world.row_of_materials(id, of_object, &hits.primitive);
             let (mut of, mut asked_uvs) = (0, None);
-            let mut groups = ArrayVec::<(&Rough, bool, u32), PACKET>::new();
+            let mut groups = ArrayVec::<(&Rough, bool, u32), PACKET_SIZE>::new();
             let mut waiting = of_object;
             while waiting != 0 {
-                let (material, alike) = group_first(&materials, waiting, folds);
+                let (material, alike) = group_first(&materials, waiting, simd);
                 waiting &= !alike;
                 let Some((material, rough)) = tile.plain(material as usize) else { continue };
                 if plain.all | of == 0 {
@@ -310,7 +310,7 @@ impl PacketIntersection<'_> {
             // Compute the surfaces.
             match &tile.world.geometry.objects()[id as usize] {
                 Object::Shape(shape) => {
-                    row.set_starts(of, &[Ray::NO_TRIANGLE; PACKET]);
+                    row.set_starts(of, &[Ray::NO_TRIANGLE; PACKET_SIZE]);
                     if !surface.fill(shape, rows, hits, of) {
                         (plain.shining, plain.two_sided) = (plain.shining & !of, plain.two_sided & !of);
                         continue;
@@ -321,7 +321,7 @@ impl PacketIntersection<'_> {
                 }
                 Object::Mesh(mesh) => {
                     row.set_starts(of, &mesh.scene_numbers(&hits.primitive));
-                    mesh.fill_surfaces(surface, rows, hits, of, asked_uvs, folds);
+                    mesh.fill_surfaces(surface, rows, hits, of, asked_uvs, simd);
                 }
             }
             plain.all |= of;
@@ -330,7 +330,7 @@ impl PacketIntersection<'_> {
                 plain.lookups += if has_uv { u64::from(of.count_ones()) } else { 0 };
                 let shown = [(of, aov.lobes()), (of & !row.only_specular_before, ShownLobes::ALL)];
                 let shown = if *aov == LightAov::ALL { &shown[..1] } else { &shown };
-                let black = row.bsdf.fill(rough, has_uv.then_some(&surface.uv), shown, folds);
+                let black = row.bsdf.fill(rough, has_uv.then_some(&surface.uv), shown, simd);
                 row.used |= of & !black;
             }
         }
@@ -340,20 +340,20 @@ impl PacketIntersection<'_> {
 
 /// The index in the first lane of `left`, and the mask of lanes in `left` that have the same index.
 #[inline(always)]
-fn group_first(indices: &[u32; PACKET], left: u32, folds: impl Folds) -> (u32, u32) {
-    let index = indices[left.trailing_zeros() as usize % PACKET];
-    let mut of = [0; PACKET];
-    for lane in 0..PACKET {
+fn group_first(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32, u32) {
+    let index = indices[left.trailing_zeros() as usize % PACKET_SIZE];
+    let mut of = [0; PACKET_SIZE];
+    for lane in 0..PACKET_SIZE {
         of[lane] = if indices[lane] == index { TRUE } else { 0 };
     }
-    (index, folds.bits(&of) & left)
+    (index, simd.movemask(&of) & left)
 }
 
 /// Gathers the known hits at the given queue indices into a packet.
 #[inline(always)]
-fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitRows, [u32; PACKET]) {
-    let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET]);
-    for (lane, &place) in places.iter().enumerate().take(PACKET) {
+fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitRows, [u32; PACKET_SIZE]) {
+    let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET_SIZE]);
+    for (lane, &place) in places.iter().enumerate().take(PACKET_SIZE) {
         if let Some(hit) = &known[place as usize] {
             hits.put(lane, &hit.shape);
             object[lane] = hit.object;
@@ -369,13 +369,13 @@ impl TileContext<'_> {
         &self,
         surface: &mut SurfaceRow,
         rows: &RayRows,
-        (hits, object): (&HitRows, &[u32; PACKET]),
+        (hits, object): (&HitRows, &[u32; PACKET_SIZE]),
         mut left: u32,
-        folds: impl Folds,
+        simd: impl Simd,
     ) -> u32 {
         let mut found = 0;
         while left != 0 {
-            let (id, of_object) = group_first(object, left, folds);
+            let (id, of_object) = group_first(object, left, simd);
             left &= !of_object;
             let thing = &self.world.geometry.objects()[id as usize];
             // A single hit on a shape is cheaper to evaluate on its own.
@@ -385,7 +385,7 @@ impl TileContext<'_> {
             let materials = self.world.row_of_materials(id, of_object, &hits.primitive);
             let (mut of, mut waiting) = (0, of_object);
             while waiting != 0 {
-                let (material, alike) = group_first(&materials, waiting, folds);
+                let (material, alike) = group_first(&materials, waiting, simd);
                 waiting &= !alike;
                 of |= if self.fits_surface_row(material as usize) { alike } else { 0 };
             }
@@ -395,7 +395,7 @@ impl TileContext<'_> {
             let is_filled = match thing {
                 Object::Shape(shape) => surface.fill(shape, rows, hits, of),
                 Object::Mesh(mesh) => {
-                    mesh.fill_surfaces(surface, rows, hits, of, None, folds);
+                    mesh.fill_surfaces(surface, rows, hits, of, None, simd);
                     true
                 }
             };
@@ -417,23 +417,23 @@ enum LiftMode {
 impl VertexBatch {
     /// Sets [`VertexBatch::start`] for the lanes in `of`.
     #[inline(always)]
-    fn set_starts(&mut self, of: u32, starts: &[u32; PACKET]) {
-        take_u32(&truths(of), starts, &mut self.start);
+    fn set_starts(&mut self, of: u32, starts: &[u32; PACKET_SIZE]) {
+        select_u32(&mask_from_bits(of), starts, &mut self.start);
     }
 
     /// Sets shading normals and lifted origins in the lanes of smooth surfaces.
     #[inline(always)]
     fn set_smooth_normals(
         &mut self,
-        rays: &RayRows,
-        surface: &SurfaceRow,
+        rays: &RayPacket,
+        surface: &SurfacePacket,
         lifts: LiftMode,
-        folds: impl Folds,
+        simd: impl Simd,
     ) {
         // Turn both normals toward the viewer.
-        let (mut normals, mut facets) = ([[0.0; PACKET]; 3], [[0.0; PACKET]; 3]);
-        let (mut ends, mut above, mut bent) = ([0.0; PACKET], [0; PACKET], [0; PACKET]);
-        for i in 0..PACKET {
+        let (mut normals, mut facets) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
+        let (mut ends, mut above, mut bent) = ([0.0; PACKET_SIZE], [0; PACKET_SIZE], [0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let (geometric, direction) = (lane(&surface.normal, i), lane(&rays.direction, i));
             let shading = lane(&surface.shading_normal, i);
             let is_perturbed =
@@ -444,36 +444,36 @@ impl VertexBatch {
             set_lane(&mut facets, i, geometric * side);
         }
         // Find the lifted points above the facets.
-        for i in 0..PACKET {
+        for i in 0..PACKET_SIZE {
             let (from, to) = (lane(&self.from, i), lane(&surface.shadow_point, i));
             let (is_above, end) = lift_segment(from, to, lane(&facets, i), lane(&surface.error, i));
             above[i] = if is_above { TRUE } else { 0 };
             ends[i] = end;
         }
         // Decide which vertices are lifted now, and which only if the segment is unoccluded.
-        let of = truths(surface.smooth);
-        let above = folds.bits(&above) & surface.smooth;
+        let of = mask_from_bits(surface.smooth);
+        let above = simd.bits(&above) & surface.smooth;
         let rises = match lifts {
-            LiftMode::All => truths(above),
+            LiftMode::All => mask_from_bits(above),
             LiftMode::IfFree(only_specular_before) => {
-                self.has_horizon |= folds.bits(&bent) & surface.smooth;
+                self.has_horizon |= simd.bits(&bent) & surface.smooth;
                 self.may_lift |= above & only_specular_before;
-                [0; PACKET]
+                [0; PACKET_SIZE]
             }
         };
         self.bsdf.orient(Some(&of), &mut normals, &rays.direction);
         for axis in 0..3 {
-            take(&of, &facets[axis], &mut self.horizon[axis]);
-            take(&of, &facets[axis], &mut self.facet[axis]);
-            take(&of, &surface.point[axis], &mut self.point[axis]);
-            take(&of, &normals[axis], &mut self.smooth_normal[axis]);
-            take(&of, &surface.shadow_point[axis], &mut self.lifted[axis]);
-            take(&rises, &surface.shadow_point[axis], &mut self.from[axis]);
-            take(&of, &normals[axis], &mut self.normal[axis]);
+            select(&of, &facets[axis], &mut self.horizon[axis]);
+            select(&of, &facets[axis], &mut self.facet[axis]);
+            select(&of, &surface.point[axis], &mut self.point[axis]);
+            select(&of, &normals[axis], &mut self.smooth_normal[axis]);
+            select(&of, &surface.shadow_point[axis], &mut self.lifted[axis]);
+            select(&rises, &surface.shadow_point[axis], &mut self.from[axis]);
+            select(&of, &normals[axis], &mut self.normal[axis]);
         }
-        take_u32(&rises, &[Ray::NO_TRIANGLE; PACKET], &mut self.start);
+        select_u32(&rises, &[Ray::NO_TRIANGLE; PACKET_SIZE], &mut self.start);
         take(&of, &ends, &mut self.lift_end);
-        take(&of, &[UNPERTURBED; PACKET], &mut self.shading_normal_cosine);
+        take(&of, &[UNPERTURBED; PACKET_SIZE], &mut self.shading_normal_cosine);
         self.has_facet |= surface.smooth;
     }
 
@@ -485,12 +485,12 @@ impl VertexBatch {
         rays: &RayRows,
         surface: &SurfaceRow,
         lifts: LiftMode,
-        folds: impl Folds,
+        simd: impl Simd,
     ) -> u32 {
         // Place the vertices on the facets, on the viewer's side.
-        let mut front = [0; PACKET];
-        self.interiors = [0; PACKET];
-        for i in 0..PACKET {
+        let mut front = [0; PACKET_SIZE];
+        self.interiors = [0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let (normal, direction) = (lane(&surface.normal, i), lane(&rays.direction, i));
             let cosine = normal.dot(direction);
             front[i] = if cosine < 0.0 { TRUE } else { 0 };
@@ -502,20 +502,20 @@ impl VertexBatch {
         self.bsdf.orient(None, &mut self.normal, &rays.direction);
         // Replace the normals of smooth surfaces.
         if surface.smooth != 0 {
-            self.set_smooth_normals(rays, surface, lifts, folds);
+            self.set_smooth_normals(rays, surface, lifts, simd);
         }
         // Copy the state of the paths.
         match paths {
             PacketSource::Camera(_, slot, ..) => {
-                self.throughput = [[1.0; PACKET]; 3];
-                self.path = [CAMERA_PATH + 1; PACKET];
-                self.roulette_throughput = [1.0; PACKET];
-                for i in 0..PACKET {
+                self.throughput = [[1.0; PACKET_SIZE]; 3];
+                self.path = [CAMERA_PATH + 1; PACKET_SIZE];
+                self.roulette_throughput = [1.0; PACKET_SIZE];
+                for i in 0..PACKET_SIZE {
                     self.slot[i] = slot + i as u32;
                 }
             }
             PacketSource::Paths(..) | PacketSource::Traced(..) => {
-                for i in 0..PACKET {
+                for i in 0..PACKET_SIZE {
                     let Some(path) = paths.queued_path(i) else { break };
                     set_lane(&mut self.throughput, i, path.throughput);
                     self.roulette_throughput[i] = path.state.roulette_throughput;
@@ -523,9 +523,9 @@ impl VertexBatch {
                 }
             }
         }
-        for i in 0..PACKET {
+        for i in 0..PACKET_SIZE {
             self.place[i] = paths.queue_index(i);
         }
-        folds.bits(&front)
+        simd.movemask(&front)
     }
 }

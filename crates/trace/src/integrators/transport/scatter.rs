@@ -10,9 +10,9 @@ use crate::geometry::Ray;
 use crate::geometry::rows::lanes;
 use crate::materials::bsdf::{LobeSet, SideSamples};
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, lane, set_lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
 use crate::sampling::Decision;
-use crate::world::Loops;
+use crate::world::SimdKernel;
 
 /// How the paths of a bounce continue.
 #[derive(Clone, Copy, Debug)]
@@ -79,19 +79,19 @@ pub struct Scattered {
     /// Mask of paths that continue.
     alive: u32,
     /// Unit directions.
-    wi: Lanes3,
+    wi: Vec3x16,
     /// [`Ray::start`] of the rays.
-    starts: [u32; LANES],
+    starts: [u32; PACKET_SIZE],
     /// Mask of paths that continue on the other side of their surface.
     beyond: u32,
     /// Mask of vertices with a narrow lobe.
     narrow: u32,
     /// Pdfs of the directions in sr⁻¹.
-    pdfs: Lanes,
+    pdfs: F32x16,
     /// Factors on the throughputs.
-    factors: Lanes3,
+    factors: Vec3x16,
     /// New values of [`PathState::roulette_throughput`].
-    roulette_throughput: Lanes,
+    roulette_throughput: F32x16,
 }
 
 impl SampleBsdf<'_> {
@@ -131,28 +131,28 @@ impl SampleBsdf<'_> {
     }
 }
 
-impl Loops for SampleBsdf<'_> {
-    type Done = Scattered;
+impl SimdKernel for SampleBsdf<'_> {
+    type Output = Scattered;
 
     #[inline(always)]
-    fn run(self, folds: impl Folds) -> Scattered {
+    fn run(self, simd: impl Simd) -> Scattered {
         let Self { tile, row, used, continuation } = self;
         let sampler = row.sampler(tile);
         // Sample a direction at each vertex.
         let u = sampler.pairs(&row.path, Decision::Direction, 0, 1);
         let are_narrow = row.bsdf.has_narrow_lobes();
         let [lobe, _] =
-            if are_narrow { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; LANES]; 2] };
-        let sides = if row.has_two_sides { row.bsdf.sample_sides(&lobe, &u, folds) } else { None };
+            if are_narrow { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; PACKET_SIZE]; 2] };
+        let sides = if row.has_two_sides { row.bsdf.sample_sides(&lobe, &u, simd) } else { None };
         let mut scattered = match sides {
-            Some(sides) => self.sample_both_sides(&sides, folds),
-            None => self.sample_one_side(&lobe, &u, folds),
+            Some(sides) => self.sample_both_sides(&sides, simd),
+            None => self.sample_one_side(&lobe, &u, simd),
         };
         scattered.alive &= used;
         // Apply Russian roulette.
         if continuation.uses_roulette {
             let [risk, _] = sampler.pairs(&row.path, Decision::Roulette, 0, 1);
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let chance = continuation.survival_probability(scattered.roulette_throughput[i]);
                 let bit = 1 << i;
                 scattered.alive &= if risk[i] < chance { !0 } else { !bit };
@@ -168,21 +168,21 @@ impl Loops for SampleBsdf<'_> {
 impl SampleBsdf<'_> {
     /// Samples directions on the viewer's side of the vertices.
     #[inline(always)]
-    fn sample_one_side(&self, lobe: &Lanes, u: &[Lanes; 2], folds: impl Folds) -> Scattered {
+    fn sample_one_side(&self, lobe: &F32x16, u: &[F32x16; 2], simd: impl Simd) -> Scattered {
         let Self { row, continuation, .. } = *self;
-        let wi = row.bsdf.sample(continuation.lobes, &row.normal, lobe, u, folds);
+        let wi = row.bsdf.sample(continuation.lobes, &row.normal, lobe, u, simd);
         // Evaluate the BSDF and the pdf.
-        let Response { bsdf, cosines } = row.response(&wi, folds);
-        let pdfs = row.bsdf.pdf(continuation.lobes, &row.normal, &wi, &bsdf, folds);
+        let Response { bsdf, cosines } = row.response(&wi, simd);
+        let pdfs = row.bsdf.pdf(continuation.lobes, &row.normal, &wi, &bsdf, simd);
         let grey = row.bsdf.grey(&bsdf);
-        let mut roulette_throughput = [0.0; LANES];
+        let mut roulette_throughput = [0.0; PACKET_SIZE];
         let f = match continuation.lobes {
             LobeSet::All => bsdf.f,
-            LobeSet::Narrow => row.bsdf.parts(&wi, &bsdf, folds)[1],
+            LobeSet::Narrow => row.bsdf.parts(&wi, &bsdf, simd)[1],
         };
         let mut factors = f;
         let mut alive = 0_u32;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let share = cosines[i] / pdfs[i];
             roulette_throughput[i] = row.roulette_throughput[i] * grey[i] * share;
             let factor = lane(&f, i) * share;
@@ -192,7 +192,7 @@ impl SampleBsdf<'_> {
             alive |= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) & brings { bit } else { 0 };
         }
         // Drop directions below the horizon.
-        alive &= !row.below_horizon(&wi, folds);
+        alive &= !row.below_horizon(&wi, simd);
         let starts = row.starts(&wi);
         let narrow = row.bsdf.narrow_lobes();
         Scattered { alive, wi, starts, beyond: 0, narrow, pdfs, factors, roulette_throughput }
@@ -200,18 +200,18 @@ impl SampleBsdf<'_> {
 
     /// Uses directions that were sampled on both sides of the surfaces.
     #[inline(always)]
-    fn sample_both_sides(&self, samples: &SideSamples, folds: impl Folds) -> Scattered {
+    fn sample_both_sides(&self, samples: &SideSamples, simd: impl Simd) -> Scattered {
         let row = self.row;
         let SideSamples { directions: wi, densities: pdfs, shares, shown, beyond } = samples;
         // Apply the terminator factors of perturbed normals, on the side of each direction.
-        let mut sides = [1.0; LANES];
-        for i in 0..LANES {
+        let mut sides = [1.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             sides[i] = if beyond[i] == 0 { 1.0 } else { -1.0 };
         }
         let left = row.terminator_factors(wi, &sides);
-        let (mut factors, mut roulette_throughput) = ([[0.0; LANES]; 3], [0.0; LANES]);
+        let (mut factors, mut roulette_throughput) = ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
         let mut alive = 0_u32;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             let share = shares[i] * left[i];
             roulette_throughput[i] = row.roulette_throughput[i] * share;
             let factor = share * shown[i];
@@ -219,17 +219,17 @@ impl SampleBsdf<'_> {
             alive |= if (pdfs[i] > 0.0) & (factor > 0.0) { 1 << i } else { 0 };
         }
         // Drop directions behind the facets. Rays whose origins are known on both sides do not start on a triangle.
-        let mut hidden = [0; LANES];
-        for i in 0..LANES {
+        let mut hidden = [0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let cosine = lane(&row.horizon, i).dot(lane(wi, i)) * sides[i];
             hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
         }
-        alive &= !(folds.bits(&hidden) & row.has_horizon);
+        alive &= !(simd.bits(&hidden) & row.has_horizon);
         Scattered {
             alive,
             wi: *wi,
-            starts: [Ray::NO_TRIANGLE; LANES],
-            beyond: folds.bits(beyond),
+            starts: [Ray::NO_TRIANGLE; PACKET_SIZE],
+            beyond: simd.bits(beyond),
             narrow: row.bsdf.narrow_lobes(),
             pdfs: *pdfs,
             factors,

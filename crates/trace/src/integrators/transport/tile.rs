@@ -11,7 +11,7 @@ use crate::lights::Receivers;
 use crate::lights::infinite::Environment;
 use crate::sampling::PixelSampler;
 use crate::scene::description::Shadows;
-use crate::world::{PACKET, World};
+use crate::world::{PACKET_SIZE, World};
 
 /// Context of a tile: the world, the settings, and the samples to render.
 pub struct TileContext<'a> {
@@ -92,13 +92,13 @@ impl SampleBlock {
 
     /// Columns, rows and sample indices of slots; arbitrary for a slot without a sample.
     #[inline(always)]
-    pub fn samples_of(&self, slots: &[u32; PACKET]) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
-        let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
+    pub fn samples_of(&self, slots: &[u32; PACKET_SIZE]) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
+        let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
         let Pixels { rect, part } = self.pixels;
         let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(rect.width));
         // Compute pixel indices within the shard.
-        let mut index = [0; PACKET];
-        for lane in 0..PACKET {
+        let mut index = [0; PACKET_SIZE];
+        for lane in 0..PACKET_SIZE {
             let pixel = by_samples.quotient(slots[lane]);
             index[lane] = pixel;
             let first = pixel.wrapping_mul(self.samples.len() as u32);
@@ -108,7 +108,7 @@ impl SampleBlock {
         if part != Part::All {
             index = index.map(|pixel| part.index(pixel, rect));
         }
-        for lane in 0..PACKET {
+        for lane in 0..PACKET_SIZE {
             let y = by_width.quotient(index[lane]);
             xs[lane] = rect.x.wrapping_add(index[lane].wrapping_sub(y.wrapping_mul(rect.width)));
             ys[lane] = rect.y.wrapping_add(y);
@@ -118,20 +118,20 @@ impl SampleBlock {
 
     /// Columns, rows and sample indices of the slots from `first` on, even past the last one.
     #[inline(always)]
-    pub fn samples_from(&self, first: u32) -> ([u32; PACKET], [u32; PACKET], [u32; PACKET]) {
-        let [mut xs, mut ys, mut samples] = [[0; PACKET]; 3];
+    pub fn samples_from(&self, first: u32) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
+        let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
         let (mut x, mut y, mut sample) = self.sample_of(first);
-        if self.samples.end - sample >= PACKET as u32 {
-            for lane in 0..PACKET {
+        if self.samples.end - sample >= PACKET_SIZE as u32 {
+            for lane in 0..PACKET_SIZE {
                 samples[lane] = sample + lane as u32;
             }
-            return ([x; PACKET], [y; PACKET], samples);
+            return ([x; PACKET_SIZE], [y; PACKET_SIZE], samples);
         }
         if self.pixels.part != Part::All {
             return self.samples_of(&array::from_fn(|lane| first + lane as u32));
         }
         let rect = self.pixels.rect;
-        for lane in 0..PACKET {
+        for lane in 0..PACKET_SIZE {
             (xs[lane], ys[lane], samples[lane]) = (x, y, sample);
             sample += 1;
             if sample == self.samples.end {

@@ -4,7 +4,7 @@ use super::ray::PathRay;
 use super::tile::TileContext;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::world::{Hit, PACKET};
+use crate::world::{Hit, PACKET_SIZE};
 
 /// Number of rays between two polls of the token.
 const POLL_INTERVAL: usize = 256;
@@ -16,8 +16,9 @@ impl TileContext<'_> {
         hits.resize(rays.len(), None);
         for (paths, hits) in rays.chunks(POLL_INTERVAL).zip(hits.chunks_mut(POLL_INTERVAL)) {
             self.token.check()?;
-            for (paths, hits) in paths.chunks(PACKET).zip(hits.chunks_mut(PACKET)) {
-                let rays: [Ray; PACKET] = std::array::from_fn(|lane| paths[lane.min(paths.len() - 1)].ray);
+            for (paths, hits) in paths.chunks(PACKET_SIZE).zip(hits.chunks_mut(PACKET_SIZE)) {
+                let rays: [Ray; PACKET_SIZE] =
+                    std::array::from_fn(|lane| paths[lane.min(paths.len() - 1)].ray);
                 self.world.geometry.closest_packet(&rays[..paths.len()], hits);
             }
         }

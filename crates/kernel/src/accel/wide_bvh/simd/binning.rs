@@ -1,7 +1,7 @@
 //! SIMD inner loops of construction, with a whole box per register. They compute the same numbers as the
 //! scalar code in `build::split`.
 
-use super::Instructions;
+use super::InstructionSet;
 use crate::accel::reference::{Bounds, Reference};
 use crate::accel::wide_bvh::build::split::{Bins, Histogram};
 
@@ -9,7 +9,7 @@ use crate::accel::wide_bvh::build::split::{Bins, Histogram};
 /// the instructions.
 pub fn count<const N: usize>(references: &[Reference], bins: &Bins, into: &mut Histogram<N>) -> bool {
     #[cfg(target_arch = "x86_64")]
-    if Instructions::best() >= Instructions::Avx2 {
+    if InstructionSet::best() >= InstructionSet::Avx2 {
         // SAFETY: the processor has AVX2.
         unsafe { avx2::count(references, bins, into) };
         return true;
@@ -26,7 +26,7 @@ pub fn partition<const AXIS: usize>(
     bins: &Bins,
 ) -> Option<(usize, [Bounds; 2])> {
     #[cfg(target_arch = "x86_64")]
-    if Instructions::best() >= Instructions::Avx2 {
+    if InstructionSet::best() >= InstructionSet::Avx2 {
         // SAFETY: the processor has AVX2.
         return Some(unsafe { avx2::partition::<AXIS>(references, bin, bins) });
     }

@@ -5,11 +5,11 @@
 
 #[allow(unsafe_code)]
 pub mod binning;
+#[allow(unsafe_code)]
+mod dispatch;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod lanes;
-#[allow(unsafe_code)]
-mod loops;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
 mod packet;
@@ -30,15 +30,15 @@ mod triangle;
 
 use std::sync::LazyLock;
 
-pub use loops::Loops;
+pub use dispatch::SimdKernel;
 
 use super::WideBvh;
-use crate::accel::Ends;
+use crate::accel::F32x16;
 use crate::geometry::{Ray, ShapeHit};
 
 /// Instruction set for traversal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Instructions {
+pub enum InstructionSet {
     /// Plain Rust, for any processor.
     Portable,
     /// 256-bit vectors on x86-64.
@@ -47,54 +47,54 @@ pub enum Instructions {
     Avx512,
 }
 
-impl Instructions {
+impl InstructionSet {
     /// All instruction sets, slowest first.
     pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
 
     /// The fastest instruction set of this processor. For comparisons, the environment variable
     /// `GLIMT_SIMD=portable` or `avx2` selects a slower one.
     pub fn best() -> Self {
-        static BEST: LazyLock<Instructions> =
+        static BEST: LazyLock<InstructionSet> =
             LazyLock::new(|| match std::env::var("GLIMT_SIMD").as_deref() {
-                Ok("portable") => Instructions::Portable,
-                Ok("avx2") => Instructions::Avx2.available(),
-                _ => Instructions::Avx512.available(),
+                Ok("portable") => InstructionSet::Portable,
+                Ok("avx2") => InstructionSet::Avx2.available(),
+                _ => InstructionSet::Avx512.available(),
             });
         *BEST
     }
 
     /// This instruction set, or the best one that the processor has if it lacks it.
     pub fn available(self) -> Self {
-        static AVAILABLE: LazyLock<Instructions> = LazyLock::new(available);
+        static AVAILABLE: LazyLock<InstructionSet> = LazyLock::new(available);
         self.min(*AVAILABLE)
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-fn available() -> Instructions {
+fn available() -> InstructionSet {
     use std::arch::is_x86_feature_detected as has;
     if !(has!("avx2") && has!("fma")) {
-        Instructions::Portable
+        InstructionSet::Portable
     } else if has!("avx512f") && has!("avx512vl") && has!("avx512dq") && has!("avx512bw") {
-        Instructions::Avx512
+        InstructionSet::Avx512
     } else {
-        Instructions::Avx2
+        InstructionSet::Avx2
     }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
-fn available() -> Instructions {
-    Instructions::Portable
+fn available() -> InstructionSet {
+    InstructionSet::Portable
 }
 
 /// [`WideBvh::closest`] for a nonempty tree.
 #[allow(unsafe_code)]
 pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     match tree.instructions {
-        Instructions::Portable => portable::closest(tree, ray),
+        InstructionSet::Portable => portable::closest(tree, ray),
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: a tree only has an instruction set that the processor has (`Instructions::available`).
-        Instructions::Avx2 | Instructions::Avx512 => unsafe { single::closest(tree, ray) },
+        // SAFETY: a tree only has an instruction set that the processor has (`InstructionSet::available`).
+        InstructionSet::Avx2 | InstructionSet::Avx512 => unsafe { single::closest(tree, ray) },
         #[cfg(not(target_arch = "x86_64"))]
         _ => portable::closest(tree, ray),
     }
@@ -104,10 +104,10 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
 #[allow(unsafe_code)]
 pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     match tree.instructions {
-        Instructions::Portable => portable::any(tree, ray, except),
+        InstructionSet::Portable => portable::any(tree, ray, except),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Instructions::Avx2 | Instructions::Avx512 => unsafe { single::any(tree, ray, except) },
+        InstructionSet::Avx2 | InstructionSet::Avx512 => unsafe { single::any(tree, ray, except) },
         #[cfg(not(target_arch = "x86_64"))]
         _ => portable::any(tree, ray, except),
     }
@@ -115,14 +115,14 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
 
 /// [`WideBvh::closest_packet`] for a nonempty tree. Returns whether the packet was traced.
 #[allow(unsafe_code)]
-pub fn closest_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
+pub fn closest_packet(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
     match tree.instructions {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Instructions::Avx2 => unsafe { packet::closest_avx2(tree, rays, ends, hits) },
+        InstructionSet::Avx2 => unsafe { packet::closest_avx2(tree, rays, ends, hits) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Instructions::Avx512 => unsafe { packet::closest_avx512(tree, rays, ends, hits) },
+        InstructionSet::Avx512 => unsafe { packet::closest_avx512(tree, rays, ends, hits) },
         _ => false,
     }
 }
@@ -130,14 +130,14 @@ pub fn closest_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Opt
 /// [`WideBvh::any_packet`] for a nonempty tree: the bits of the rays that hit, or `None` if the packet was
 /// not traced.
 #[allow(unsafe_code)]
-pub fn any_packet(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
+pub fn any_packet(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     match tree.instructions {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Instructions::Avx2 => unsafe { packet::any_avx2(tree, rays, ends, except) },
+        InstructionSet::Avx2 => unsafe { packet::any_avx2(tree, rays, ends, except) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Instructions::Avx512 => unsafe { packet::any_avx512(tree, rays, ends, except) },
+        InstructionSet::Avx512 => unsafe { packet::any_avx512(tree, rays, ends, except) },
         _ => None,
     }
 }

@@ -3,7 +3,7 @@
 
 use std::arch::x86_64::*;
 
-use super::lanes::{F4, F8, Lanes};
+use super::lanes::{F4, F8, SimdVector};
 use super::triangle::{self, Hits};
 use crate::accel::wide_bvh::node::{Node, TrianglePack};
 use crate::geometry::aabb::{FAR_PAD, TRIANGLE_ERROR};
@@ -190,7 +190,7 @@ impl Lines {
             near = to_near.max(near);
             far = to_far.min(far);
         }
-        (near, F8::bits(near.le(far)))
+        (near, F8::movemask(near.le(far)))
     }
 
     /// Tests the triangles of a pack, except the one on which the ray starts.

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::lanes::{F4, F8, Lanes};
+use super::lanes::{F4, F8, SimdVector};
 use super::portable::nearer;
 use super::ray::{Lines, may_hit};
 use super::stack::{Stack, entry, key};

@@ -1,7 +1,7 @@
 //! SIMD watertight triangle test. Performs the operations of `ShearedRay::intersect` in the same order and
 //! without fused products, so the bits are equal.
 
-use super::lanes::Lanes;
+use super::lanes::SimdVector;
 use crate::geometry::watertight::ILL_CONDITIONED;
 use crate::math::float::gamma;
 
@@ -9,7 +9,7 @@ use crate::math::float::gamma;
 pub type Corners<V> = [[V; 3]; 3];
 
 /// Hits of a ray.
-pub struct Hits<V: Lanes> {
+pub struct Hits<V: SimdVector> {
     /// Bits of the lanes that are hit.
     pub hit: u32,
     /// Bits of the lanes that must be tested again in higher precision: an edge function is exactly 0, the
@@ -24,7 +24,7 @@ pub struct Hits<V: Lanes> {
 /// through a triangle. With `is_single`, also skips them for triangles behind the origin or past the end of
 /// the ray, which is the case for most packs.
 #[inline(always)]
-pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: bool) -> Hits<V> {
+pub fn hits<V: SimdVector>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: bool) -> Hits<V> {
     let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = *corners;
     let (wa, wb, wc) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
     let zero = ax.like(0.0);
@@ -39,7 +39,7 @@ pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: boo
     } else {
         zero.le(zero)
     };
-    if V::bits(V::without(candidate, outside)) == 0 {
+    if V::movemask(V::without(candidate, outside)) == 0 {
         return none;
     }
     let inverse = ax.like(1.0).over(determinant);
@@ -48,8 +48,8 @@ pub fn hits<V: Lanes>(corners: &Corners<V>, shear_z: V, t_max: V, is_single: boo
     let (error, reach) = distance_error(corners, shear_z, inverse);
     let needle = (reach * reach.like(ILL_CONDITIONED)).lt(error);
     let at_start = t.abs().le(error);
-    let doubtful = V::bits(V::without(needle | at_start | on_edge, outside));
-    let hit = V::bits(V::without(ahead, outside)) & !doubtful;
+    let doubtful = V::movemask(V::without(needle | at_start | on_edge, outside));
+    let hit = V::movemask(V::without(ahead, outside)) & !doubtful;
     Hits { hit, doubtful, t, u: wb * inverse, v: wc * inverse }
 }
 
@@ -61,7 +61,7 @@ const UNITS: f32 = 1.05 * 0.5 * f32::EPSILON / ILL_CONDITIONED;
 /// [`distance_error`] is at most 30·s·(s + d) units of rounding of the reach, divided by the determinant. A
 /// determinant whose inverse may be infinite counts as a needle. `along` is t times the determinant.
 #[inline(always)]
-fn may_count<V: Lanes>(corners: &Corners<V>, determinant: V, shear_z: V, along: V, t_max: V) -> V::Mask {
+fn may_count<V: SimdVector>(corners: &Corners<V>, determinant: V, shear_z: V, along: V, t_max: V) -> V::Mask {
     let (sum, deepest) = (greatest(corners, 0) + greatest(corners, 1), greatest(corners, 2));
     let bound = sum * ((sum + deepest) * sum.like(30.0 * UNITS)) + sum.like(1e-37);
     let (size, reach) = (determinant.abs(), deepest * (shear_z.abs() * sum.like(ILL_CONDITIONED)));
@@ -72,7 +72,7 @@ fn may_count<V: Lanes>(corners: &Corners<V>, determinant: V, shear_z: V, along: 
 
 /// SIMD version of `ShearedRay::distance_error`.
 #[inline(always)]
-fn distance_error<V: Lanes>(corners: &Corners<V>, shear_z: V, inverse_determinant: V) -> (V, V) {
+fn distance_error<V: SimdVector>(corners: &Corners<V>, shear_z: V, inverse_determinant: V) -> (V, V) {
     let (x, y, depth) = (greatest(corners, 0), greatest(corners, 1), greatest(corners, 2));
     let z = depth * shear_z.abs();
     let error_z = shear_z.like(gamma(3)) * z;
@@ -85,7 +85,7 @@ fn distance_error<V: Lanes>(corners: &Corners<V>, shear_z: V, inverse_determinan
 
 /// Largest absolute value of a coordinate.
 #[inline(always)]
-fn greatest<V: Lanes>(corners: &Corners<V>, axis: usize) -> V {
+fn greatest<V: SimdVector>(corners: &Corners<V>, axis: usize) -> V {
     corners[0][axis].abs().max(corners[1][axis].abs()).max(corners[2][axis].abs())
 }
 
@@ -128,16 +128,16 @@ mod tests {
             let along = (wa * az + wb * bz + wc * cz) * shear_z;
             let t = along * inverse;
             let (error, reach) = distance_error(&corners, shear_z, inverse);
-            let is_needle = F4::bits((reach * like.like(ILL_CONDITIONED)).lt(error)) != 0;
-            let is_at_start = F4::bits(t.abs().le(error)) != 0;
+            let is_needle = F4::movemask((reach * like.like(ILL_CONDITIONED)).lt(error)) != 0;
+            let is_at_start = F4::movemask(t.abs().le(error)) != 0;
             // End the ray before the triangle, at it, behind it, or nowhere.
             let mut distance = [0.0; 4];
             t.store(&mut distance);
             let part = [0.5, 1.0, 1.0 + f32::EPSILON, 2.0, f32::INFINITY][round % 5];
             let end = like.like((distance[0] * part).max(0.0));
-            let passes = F4::bits(may_count(&corners, determinant, shear_z, along, end)) != 0;
-            let is_ahead = F4::bits(like.lt(t) & t.le(end)) != 0;
-            let is_beyond = F4::bits(end.lt(t)) != 0;
+            let passes = F4::movemask(may_count(&corners, determinant, shear_z, along, end)) != 0;
+            let is_ahead = F4::movemask(like.lt(t) & t.le(end)) != 0;
+            let is_beyond = F4::movemask(end.lt(t)) != 0;
             assert!(passes || !(is_ahead || is_needle || is_at_start), "{scalar:?}");
             beyond += u32::from(is_beyond && !passes);
             if is_beyond {

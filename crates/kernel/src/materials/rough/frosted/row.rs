@@ -6,26 +6,26 @@ use crate::materials::fresnel::{dielectric_either, transmittance};
 use crate::materials::microfacet::{Half, Leg, facet, facing_one, mirrored_at, refracted_at};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Loops, TRUE, lane, set_lane};
+use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, SimdKernel, TRUE, Vec3x16, lane, set_lane};
 
 /// Surfaces of rough glass, side by side: their reflection, or their transmission. The values of f that are shared are f of the lobe,
 /// whatever is shown, twice.
 #[derive(Clone, Debug)]
 pub struct GlassRow<const THROUGH: bool> {
     /// Unit normals that face the viewer.
-    normal: Lanes3,
+    normal: Vec3x16,
     /// Unit directions to the viewer.
-    to_eye: Lanes3,
+    to_eye: Vec3x16,
     /// [`GlassPoint::near`].
-    near: Lanes,
+    near: F32x16,
     /// [`GlassPoint::far`].
-    far: Lanes,
+    far: F32x16,
     /// [`GlassPoint::alpha`].
-    alpha: Lanes,
+    alpha: F32x16,
     /// 1 where the lobe is shown, else 0.
-    shown: Lanes,
+    shown: F32x16,
     /// f in sr⁻¹ that is shown in place of the lobe.
-    unit: Lanes,
+    unit: F32x16,
 }
 
 /// Factor on the lobe for what is shown, and f in its place.
@@ -76,20 +76,20 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
     #[inline(always)]
     pub(in super::super) fn call_sides(
         &self,
-        choices: &Lanes,
-        u: &[Lanes; 2],
-        folds: impl Folds,
+        choices: &F32x16,
+        u: &[F32x16; 2],
+        simd: impl Simd,
     ) -> SideSamples {
-        folds.call(SideSampling { row: self, choices, u })
+        simd.call(SideSampling { row: self, choices, u })
     }
 
     /// Samples a facet of each surface, and by chance its reflection or its refraction. All formulas are by the facet's normal, which
     /// is the half vector of both directions.
     #[inline(always)]
-    pub(super) fn sample_sides(&self, choices: &Lanes, u: &[Lanes; 2]) -> SideSamples {
-        let (mut directions, mut beyond) = ([[0.0; LANES]; 3], [0; LANES]);
-        let (mut densities, mut shares) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
+    pub(super) fn sample_sides(&self, choices: &F32x16, u: &[F32x16; 2]) -> SideSamples {
+        let (mut directions, mut beyond) = ([[0.0; PACKET_SIZE]; 3], [0; PACKET_SIZE]);
+        let (mut densities, mut shares) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let (normal, to_eye, alpha) = (lane(&self.normal, i), lane(&self.to_eye, i), self.alpha[i]);
             let half = facet(&Frame::from_normal(normal), to_eye, [alpha; 2], [u[0][i], u[1][i]]);
             let indices = [self.near[i], self.far[i]];
@@ -133,15 +133,15 @@ impl<const THROUGH: bool> GlassRow<THROUGH> {
 /// A call of [`GlassRow::sample_sides`].
 struct SideSampling<'a, const THROUGH: bool> {
     row: &'a GlassRow<THROUGH>,
-    choices: &'a Lanes,
-    u: &'a [Lanes; 2],
+    choices: &'a F32x16,
+    u: &'a [F32x16; 2],
 }
 
-impl<const THROUGH: bool> Loops for SideSampling<'_, THROUGH> {
-    type Done = SideSamples;
+impl<const THROUGH: bool> SimdKernel for SideSampling<'_, THROUGH> {
+    type Output = SideSamples;
 
     #[inline(always)]
-    fn run(self, _: impl Folds) -> SideSamples {
+    fn run(self, _: impl Simd) -> SideSamples {
         self.row.sample_sides(self.choices, self.u)
     }
 }
@@ -155,13 +155,13 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
     const SENDS_RAYS: bool = true;
 
     const EMPTY: Self = Self {
-        normal: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
-        to_eye: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
-        near: [1.0; LANES],
-        far: [1.5; LANES],
-        alpha: [1.0; LANES],
-        shown: [0.0; LANES],
-        unit: [0.0; LANES],
+        normal: [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]],
+        to_eye: [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]],
+        near: [1.0; PACKET_SIZE],
+        far: [1.5; PACKET_SIZE],
+        alpha: [1.0; PACKET_SIZE],
+        shown: [0.0; PACKET_SIZE],
+        unit: [0.0; PACKET_SIZE],
     };
 
     #[inline(always)]
@@ -198,31 +198,31 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn f(&self, directions: &Lanes3) -> BsdfValues {
-        let (mut lobe, mut shown) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
+    fn f(&self, directions: &Vec3x16) -> BsdfValues {
+        let (mut lobe, mut shown) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             lobe[i] = self.lobe(i, lane(directions, i));
         }
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             shown[i] = lobe[i] * self.shown[i] + self.unit[i];
         }
         BsdfValues { f: [shown; 3], shared: [lobe; 2] }
     }
 
     #[inline(always)]
-    fn parts(&self, _: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
-        [[[0.0; LANES]; 3], values.f]
+    fn parts(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
+        [[[0.0; PACKET_SIZE]; 3], values.f]
     }
 
     #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> Lanes {
+    fn grey(&self, values: &BsdfValues) -> F32x16 {
         values.shared[0]
     }
 
     #[inline(always)]
-    fn pdf(&self, _: LobeSet, _: &Lanes3, directions: &Lanes3, values: &BsdfValues) -> Lanes {
-        let mut densities = [0.0; LANES];
-        for i in 0..LANES {
+    fn pdf(&self, _: LobeSet, _: &Vec3x16, directions: &Vec3x16, values: &BsdfValues) -> F32x16 {
+        let mut densities = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let [eye, light] = self.legs(i, lane(directions, i));
             densities[i] = eye.density_of(&light, values.shared[1][i]);
         }
@@ -230,9 +230,9 @@ impl<const THROUGH: bool> RoughRow for GlassRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn sample(&self, _: LobeSet, _: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
-        let mut directions = [[0.0; LANES]; 3];
-        for i in 0..LANES {
+    fn sample(&self, _: LobeSet, _: &Vec3x16, choices: &F32x16, u: &[F32x16; 2]) -> Vec3x16 {
+        let mut directions = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
             let (normal, to_eye, alpha) = (lane(&self.normal, i), lane(&self.to_eye, i), self.alpha[i]);
             let half = facet(&Frame::from_normal(normal), to_eye, [alpha; 2], [u[0][i], u[1][i]]);
             // Chance chooses between both sides, and where it goes on at the other one, the direction is of no use.

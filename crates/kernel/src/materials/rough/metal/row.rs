@@ -8,26 +8,26 @@ use crate::materials::fresnel::schlick_weight;
 use crate::materials::microfacet::{Half, Leg, facing_one, frame_along, mirrored, turn_to_viewers};
 use crate::math::Vec3;
 use crate::math::frame::Frame;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Truths, lane, set_lane, take, truths};
+use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16, lane, mask_from_bits, select, set_lane};
 
 /// Surfaces of metal, side by side, all in all azimuths alike or all brushed: a lane gets the bits that it would get alone. The values of f that are shared are the largest component of f, whatever is shown, and f for a
 /// reflectance of 1.
 #[derive(Clone, Debug)]
 pub struct MetalRow<const BRUSHED: bool> {
     /// Unit normals that face the viewer.
-    normal: Lanes3,
+    normal: Vec3x16,
     /// Unit directions to the viewer.
-    to_eye: Lanes3,
+    to_eye: Vec3x16,
     /// Directions along u; without brushed surfaces anything.
-    tangent: Lanes3,
+    tangent: Vec3x16,
     /// α along u and along v.
-    alphas: [Lanes; 2],
+    alphas: [F32x16; 2],
     /// [`FresnelPoint::first`] and [`FresnelPoint::second`].
-    fresnel: [Lanes3; 2],
+    fresnel: [Vec3x16; 2],
     /// 1 where the lobe is shown, else 0.
-    shown: Lanes,
+    shown: F32x16,
     /// f in sr⁻¹ that is shown in place of the lobe.
-    unit: Lanes,
+    unit: F32x16,
     /// Whether any surface has an index of refraction in place of a colour.
     has_index: bool,
 }
@@ -95,13 +95,13 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
     const SENDS_RAYS: bool = true;
 
     const EMPTY: Self = Self {
-        normal: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
-        to_eye: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
-        tangent: [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
-        alphas: [[1.0; LANES]; 2],
-        fresnel: [[[0.0; LANES]; 3], [[-1.0; LANES]; 3]],
-        shown: [0.0; LANES],
-        unit: [0.0; LANES],
+        normal: [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]],
+        to_eye: [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]],
+        tangent: [[1.0; PACKET_SIZE], [0.0; PACKET_SIZE], [0.0; PACKET_SIZE]],
+        alphas: [[1.0; PACKET_SIZE]; 2],
+        fresnel: [[[0.0; PACKET_SIZE]; 3], [[-1.0; PACKET_SIZE]; 3]],
+        shown: [0.0; PACKET_SIZE],
+        unit: [0.0; PACKET_SIZE],
         has_index: false,
     };
 
@@ -150,31 +150,31 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
     }
 
     #[inline(always)]
-    fn f(&self, directions: &Lanes3) -> BsdfValues {
-        let (mut white, mut cosines) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
+    fn f(&self, directions: &Vec3x16) -> BsdfValues {
+        let (mut white, mut cosines) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             [white[i], cosines[i]] = self.lobe(i, lane(directions, i));
         }
         // Multiply by the reflectance of the facets.
-        let mut f = [[0.0; LANES]; 3];
+        let mut f = [[0.0; PACKET_SIZE]; 3];
         if self.has_index {
             for axis in 0..3 {
                 let (first, second) = (&self.fresnel[0][axis], &self.fresnel[1][axis]);
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     let weight = schlick_weight(cosines[i]);
                     f[axis][i] = white[i] * reflectance(first[i], second[i], cosines[i], weight);
                 }
             }
         } else {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let weight = schlick_weight(cosines[i]);
                 let first = lane(&self.fresnel[0], i);
                 set_lane(&mut f, i, (first + (Vec3::ONE - first) * weight) * white[i]);
             }
         }
         // Keep what is shown.
-        let mut largest = [0.0; LANES];
-        for i in 0..LANES {
+        let mut largest = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let all = lane(&f, i);
             largest[i] = all.max_element();
             set_lane(&mut f, i, all * self.shown[i] + Vec3::splat(self.unit[i]));
@@ -183,19 +183,19 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
     }
 
     #[inline(always)]
-    fn parts(&self, _: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
-        [[[0.0; LANES]; 3], values.f]
+    fn parts(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
+        [[[0.0; PACKET_SIZE]; 3], values.f]
     }
 
     #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> Lanes {
+    fn grey(&self, values: &BsdfValues) -> F32x16 {
         values.shared[0]
     }
 
     #[inline(always)]
-    fn pdf(&self, _: LobeSet, _: &Lanes3, directions: &Lanes3, values: &BsdfValues) -> Lanes {
-        let mut densities = [0.0; LANES];
-        for i in 0..LANES {
+    fn pdf(&self, _: LobeSet, _: &Vec3x16, directions: &Vec3x16, values: &BsdfValues) -> F32x16 {
+        let mut densities = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let [eye, light] = self.legs(i, lane(directions, i));
             densities[i] = eye.density_of(&light, values.shared[1][i]);
         }
@@ -203,9 +203,9 @@ impl<const BRUSHED: bool> RoughRow for MetalRow<BRUSHED> {
     }
 
     #[inline(always)]
-    fn sample(&self, _: LobeSet, _: &Lanes3, _: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
-        let mut directions = [[0.0; LANES]; 3];
-        for i in 0..LANES {
+    fn sample(&self, _: LobeSet, _: &Vec3x16, _: &F32x16, u: &[F32x16; 2]) -> Vec3x16 {
+        let mut directions = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
             let u = [u[0][i], u[1][i]];
             let direction = mirrored(&self.frame(i), lane(&self.to_eye, i), self.alphas(i), u);
             set_lane(&mut directions, i, direction);
@@ -256,26 +256,26 @@ impl<const BRUSHED: bool> MaterialRow for MetalRow<BRUSHED> {
         material: &Metal,
         _: Option<&UvRow>,
         shown: &[(u32, ShownLobes)],
-        _: impl Folds,
+        _: impl Simd,
     ) -> u32 {
         let MetalPoint { fresnel, alphas } = material.constant().unwrap_or_else(|| material.bleached());
         for &(of, shown) in shown {
-            let (of, [part, unit]) = (truths(of), shown_parts(shown));
+            let (of, [part, unit]) = (mask_from_bits(of), shown_parts(shown));
             for axis in 0..3 {
-                take(&of, &[fresnel.first[axis]; LANES], &mut self.fresnel[0][axis]);
-                take(&of, &[fresnel.second[axis]; LANES], &mut self.fresnel[1][axis]);
+                select(&of, &[fresnel.first[axis]; PACKET_SIZE], &mut self.fresnel[0][axis]);
+                select(&of, &[fresnel.second[axis]; PACKET_SIZE], &mut self.fresnel[1][axis]);
             }
-            take(&of, &[alphas[0]; LANES], &mut self.alphas[0]);
-            take(&of, &[alphas[1]; LANES], &mut self.alphas[1]);
-            take(&of, &[part; LANES], &mut self.shown);
-            take(&of, &[unit; LANES], &mut self.unit);
+            select(&of, &[alphas[0]; PACKET_SIZE], &mut self.alphas[0]);
+            select(&of, &[alphas[1]; PACKET_SIZE], &mut self.alphas[1]);
+            select(&of, &[part; PACKET_SIZE], &mut self.shown);
+            select(&of, &[unit; PACKET_SIZE], &mut self.unit);
         }
         self.has_index |= fresnel.second.x >= 0.0;
         0
     }
 
     #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
+    fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
         turn_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
     }
 }

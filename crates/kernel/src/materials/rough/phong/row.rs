@@ -6,21 +6,23 @@ use crate::materials::bsdf::{
     BsdfValues, LobeSet, MaterialRow, NarrowLobe, Place, RoughRow, ShownLobes, UvRow,
 };
 use crate::math::Vec3;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane, take, truths};
+use crate::math::lanes::{
+    F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, select, set_lane,
+};
 
 /// Phong surfaces, side by side. The values of f that are shared are those of [`gloss`].
 #[derive(Clone, Debug)]
 pub struct PhongRow {
     /// The direction to the viewer, mirrored.
-    mirrored_eye: Lanes3,
+    mirrored_eye: Vec3x16,
     /// The diffuse part of f in sr⁻¹, as far as it is shown.
-    diffuse: Lanes3,
+    diffuse: Vec3x16,
     /// The glossy part of f in sr⁻¹ at its peak, as far as it is shown.
-    specular: Lanes3,
+    specular: Vec3x16,
     /// Exponent of the glossy lobe.
-    shininess: Lanes,
+    shininess: F32x16,
     /// The largest components of kd and ks, whatever parts are shown.
-    albedos: [Lanes; 2],
+    albedos: [F32x16; 2],
     /// Whether any surface has a glossy lobe.
     is_glossy: bool,
 }
@@ -28,7 +30,7 @@ pub struct PhongRow {
 impl PhongRow {
     /// The lobes of a surface.
     #[inline(always)]
-    fn lobes(&self, i: usize, normals: &Lanes3) -> Lobes {
+    fn lobes(&self, i: usize, normals: &Vec3x16) -> Lobes {
         Lobes {
             normal: lane(normals, i),
             mirrored_eye: lane(&self.mirrored_eye, i),
@@ -40,32 +42,32 @@ impl PhongRow {
 
     /// The glossy lobe of a surface alone.
     #[inline(always)]
-    fn glossy_lobe(&self, i: usize, normals: &Lanes3) -> Lobes {
+    fn glossy_lobe(&self, i: usize, normals: &Vec3x16) -> Lobes {
         Lobes { diffuse: 0.0, specular: 1.0, ..self.lobes(i, normals) }
     }
 
     /// Sets the lobes of some lanes.
     #[inline(always)]
-    fn set(&mut self, of: u32, shown: ShownLobes, diffuse: &Lanes3, specular: Vec3, shininess: f32) {
+    fn set(&mut self, of: u32, shown: ShownLobes, diffuse: &Vec3x16, specular: Vec3, shininess: f32) {
         let white = PhongBsdf { diffuse: Vec3::ONE, specular, shininess, ambient: Vec3::ZERO };
         let [of_white, glossy] = shown_parts(&white, shown);
-        let (mut shown_diffuse, mut greatest) = ([[of_white.x; LANES]; 3], [0.0; LANES]);
+        let (mut shown_diffuse, mut greatest) = ([[of_white.x; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
         if shown != ShownLobes::Unit {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 set_lane(&mut shown_diffuse, i, lane(diffuse, i) * of_white);
             }
         }
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             greatest[i] = lane(diffuse, i).max_element();
         }
-        let of = truths(of);
+        let of = mask_from_bits(of);
         for axis in 0..3 {
-            take(&of, &shown_diffuse[axis], &mut self.diffuse[axis]);
-            take(&of, &[glossy[axis]; LANES], &mut self.specular[axis]);
+            select(&of, &shown_diffuse[axis], &mut self.diffuse[axis]);
+            select(&of, &[glossy[axis]; PACKET_SIZE], &mut self.specular[axis]);
         }
-        take(&of, &[shininess; LANES], &mut self.shininess);
-        take(&of, &greatest, &mut self.albedos[0]);
-        take(&of, &[specular.max_element(); LANES], &mut self.albedos[1]);
+        select(&of, &[shininess; PACKET_SIZE], &mut self.shininess);
+        select(&of, &greatest, &mut self.albedos[0]);
+        select(&of, &[specular.max_element(); PACKET_SIZE], &mut self.albedos[1]);
         self.is_glossy |= specular != Vec3::ZERO;
     }
 }
@@ -84,13 +86,13 @@ fn shown_parts(bsdf: &PhongBsdf, shown: ShownLobes) -> [Vec3; 2] {
 
 /// A bit for each black colour.
 #[inline(always)]
-fn black(colors: &Lanes3, folds: impl Folds) -> u32 {
-    let mut black = [0; LANES];
-    for i in 0..LANES {
+fn black(colors: &Vec3x16, simd: impl Simd) -> u32 {
+    let mut black = [0; PACKET_SIZE];
+    for i in 0..PACKET_SIZE {
         let Vec3 { x, y, z } = lane(colors, i);
         black[i] = if (x == 0.0) & (y == 0.0) & (z == 0.0) { TRUE } else { 0 };
     }
-    folds.bits(&black)
+    simd.movemask(&black)
 }
 
 impl RoughRow for PhongRow {
@@ -101,11 +103,11 @@ impl RoughRow for PhongRow {
     const IS_COPIED: bool = true;
 
     const EMPTY: Self = Self {
-        mirrored_eye: [[0.0; LANES]; 3],
-        diffuse: [[0.0; LANES]; 3],
-        specular: [[0.0; LANES]; 3],
-        shininess: [0.0; LANES],
-        albedos: [[0.0; LANES]; 2],
+        mirrored_eye: [[0.0; PACKET_SIZE]; 3],
+        diffuse: [[0.0; PACKET_SIZE]; 3],
+        specular: [[0.0; PACKET_SIZE]; 3],
+        shininess: [0.0; PACKET_SIZE],
+        albedos: [[0.0; PACKET_SIZE]; 2],
         is_glossy: false,
     };
 
@@ -139,23 +141,23 @@ impl RoughRow for PhongRow {
     }
 
     #[inline(always)]
-    fn f(&self, directions: &Lanes3) -> BsdfValues {
-        let (mut f, mut glosses) = (self.diffuse, [0.0; LANES]);
+    fn f(&self, directions: &Vec3x16) -> BsdfValues {
+        let (mut f, mut glosses) = (self.diffuse, [0.0; PACKET_SIZE]);
         if self.is_glossy {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let left = gloss(lane(&self.mirrored_eye, i), lane(directions, i), self.shininess[i]);
                 set_lane(&mut f, i, lane(&self.diffuse, i) + lane(&self.specular, i) * left);
                 glosses[i] = left;
             }
         }
-        BsdfValues { f, shared: [glosses, [0.0; LANES]] }
+        BsdfValues { f, shared: [glosses, [0.0; PACKET_SIZE]] }
     }
 
     #[inline(always)]
-    fn parts(&self, _: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
+    fn parts(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
         let mut glossy = self.specular;
         for axis in 0..3 {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 glossy[axis][i] = self.specular[axis][i] * values.shared[0][i];
             }
         }
@@ -163,9 +165,9 @@ impl RoughRow for PhongRow {
     }
 
     #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> Lanes {
-        let mut grey = [0.0; LANES];
-        for i in 0..LANES {
+    fn grey(&self, values: &BsdfValues) -> F32x16 {
+        let mut grey = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             // The normal does not matter here.
             grey[i] = self.lobes(i, &self.mirrored_eye).value(values.shared[0][i]);
         }
@@ -173,9 +175,9 @@ impl RoughRow for PhongRow {
     }
 
     #[inline(always)]
-    fn pdf(&self, lobes: LobeSet, normals: &Lanes3, directions: &Lanes3, values: &BsdfValues) -> Lanes {
-        let mut densities = [0.0; LANES];
-        for i in 0..LANES {
+    fn pdf(&self, lobes: LobeSet, normals: &Vec3x16, directions: &Vec3x16, values: &BsdfValues) -> F32x16 {
+        let mut densities = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let own = match lobes {
                 LobeSet::All => self.lobes(i, normals),
                 LobeSet::Narrow => self.glossy_lobe(i, normals),
@@ -186,23 +188,23 @@ impl RoughRow for PhongRow {
     }
 
     #[inline(always)]
-    fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
-        let mut directions = [[0.0; LANES]; 3];
+    fn sample(&self, lobes: LobeSet, normals: &Vec3x16, choices: &F32x16, u: &[F32x16; 2]) -> Vec3x16 {
+        let mut directions = [[0.0; PACKET_SIZE]; 3];
         match lobes {
             LobeSet::All if self.is_glossy => {
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     let direction = self.lobes(i, normals).sample(choices[i], [u[0][i], u[1][i]]);
                     set_lane(&mut directions, i, direction);
                 }
             }
             LobeSet::All => {
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     let direction = self.lobes(i, normals).sample_diffuse([u[0][i], u[1][i]]);
                     set_lane(&mut directions, i, direction);
                 }
             }
             LobeSet::Narrow => {
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     let direction = self.glossy_lobe(i, normals).sample(1.0, [u[0][i], u[1][i]]);
                     set_lane(&mut directions, i, direction);
                 }
@@ -234,7 +236,7 @@ impl RoughRow for PhongRow {
     #[inline(always)]
     fn narrower_than(&self, of: u32, exponent: f32) -> u32 {
         let mut narrow = 0;
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             narrow |= u32::from(self.has_narrow_lobe(i) & (self.shininess[i] >= exponent)) << i;
         }
         narrow & of
@@ -264,32 +266,32 @@ impl MaterialRow for PhongRow {
         material: &Phong,
         uv: Option<&UvRow>,
         shown: &[(u32, ShownLobes)],
-        folds: impl Folds,
+        simd: impl Simd,
     ) -> u32 {
         let diffuse = match (material.diffuse.texture(), uv) {
             (Some(texture), Some(uv)) => texture.lookup_row(uv),
             (Some(_) | None, _) => {
                 let Vec3 { x, y, z } = material.diffuse.constant().unwrap_or(Vec3::ONE);
-                [[x; LANES], [y; LANES], [z; LANES]]
+                [[x; PACKET_SIZE], [y; PACKET_SIZE], [z; PACKET_SIZE]]
             }
         };
         let specular = material.specular.constant().unwrap_or(Vec3::ONE);
         for &(of, shown) in shown {
             self.set(of, shown, &diffuse, specular, material.shininess);
         }
-        if specular == Vec3::ZERO { black(&diffuse, folds) } else { 0 }
+        if specular == Vec3::ZERO { black(&diffuse, simd) } else { 0 }
     }
 
     #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
-        let mut all = [[0.0; LANES]; 3];
-        for i in 0..LANES {
+    fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
+        let mut all = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
             set_lane(&mut all, i, mirrored(lane(normals, i), -lane(directions, i)));
         }
         match of {
             Some(of) => {
                 for axis in 0..3 {
-                    take(of, &all[axis], &mut self.mirrored_eye[axis]);
+                    select(of, &all[axis], &mut self.mirrored_eye[axis]);
                 }
             }
             None => self.mirrored_eye = all,

@@ -12,36 +12,38 @@ use crate::materials::microfacet::{Half, Leg, facing_one, mirrored, turn_to_view
 use crate::materials::phong::lobes::about;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, TRUE, Truths, lane, set_lane, take, truths};
+use crate::math::lanes::{
+    F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, select, set_lane,
+};
 
 /// Surfaces of plastic, side by side. The values of f that are shared are the grey f of all lobes, and what the coat lets through on
 /// both ways.
 #[derive(Clone, Debug)]
 pub struct PlasticRow {
     /// Unit normals that face the viewer.
-    normal: Lanes3,
+    normal: Vec3x16,
     /// Unit directions to the viewer.
-    to_eye: Lanes3,
+    to_eye: Vec3x16,
     /// [`PlasticPoint::base`].
-    base: Lanes3,
+    base: Vec3x16,
     /// [`PlasticPoint::specular`].
-    specular: Lanes3,
+    specular: Vec3x16,
     /// [`PlasticPoint::ior`].
-    ior: Lanes,
+    ior: F32x16,
     /// [`PlasticPoint::alpha`].
-    alpha: Lanes,
+    alpha: F32x16,
     /// Terms of the albedo of the coat.
-    terms: [Lanes; TERMS],
+    terms: [F32x16; TERMS],
     /// Mean albedo of the coat.
-    mean: Lanes,
+    mean: F32x16,
     /// Part of the light that the coat lets through on the way to the viewer.
-    left: Lanes,
+    left: F32x16,
     /// Probability of choosing the coat's lobe.
-    share: Lanes,
+    share: F32x16,
     /// 1 where the diffuse lobe is shown, else 0; likewise the coat's.
-    shown: [Lanes; 2],
+    shown: [F32x16; 2],
     /// f in sr⁻¹ that is shown in place of the lobes.
-    unit: Lanes,
+    unit: F32x16,
     /// Whether any surface has a lobe of the coat.
     is_rough: bool,
     /// Whether the coat of any surface is smooth.
@@ -135,18 +137,18 @@ impl RoughRow for PlasticRow {
     const SENDS_RAYS: bool = true;
 
     const EMPTY: Self = Self {
-        normal: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
-        to_eye: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
-        base: [[0.0; LANES]; 3],
-        specular: [[0.0; LANES]; 3],
-        ior: [1.5; LANES],
-        alpha: [1.0; LANES],
-        terms: [[0.0; LANES]; TERMS],
-        mean: [0.0; LANES],
-        left: [1.0; LANES],
-        share: [0.0; LANES],
-        shown: [[0.0; LANES]; 2],
-        unit: [0.0; LANES],
+        normal: [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]],
+        to_eye: [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]],
+        base: [[0.0; PACKET_SIZE]; 3],
+        specular: [[0.0; PACKET_SIZE]; 3],
+        ior: [1.5; PACKET_SIZE],
+        alpha: [1.0; PACKET_SIZE],
+        terms: [[0.0; PACKET_SIZE]; TERMS],
+        mean: [0.0; PACKET_SIZE],
+        left: [1.0; PACKET_SIZE],
+        share: [0.0; PACKET_SIZE],
+        shown: [[0.0; PACKET_SIZE]; 2],
+        unit: [0.0; PACKET_SIZE],
         is_rough: false,
         is_smooth: false,
     };
@@ -200,18 +202,18 @@ impl RoughRow for PlasticRow {
     }
 
     #[inline(always)]
-    fn f(&self, directions: &Lanes3) -> BsdfValues {
-        let (mut coat, mut through) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
+    fn f(&self, directions: &Vec3x16) -> BsdfValues {
+        let (mut coat, mut through) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             through[i] = self.through(i, lane(directions, i));
         }
         if self.is_rough {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 coat[i] = self.coat(i, lane(directions, i));
             }
         }
-        let (mut f, mut grey) = ([[0.0; LANES]; 3], [0.0; LANES]);
-        for i in 0..LANES {
+        let (mut f, mut grey) = ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let (base, specular) = (lane(&self.base, i), lane(&self.specular, i));
             let value = base * (through[i] * self.shown[0][i]) + specular * (coat[i] * self.shown[1][i]);
             set_lane(&mut f, i, value + Vec3::splat(self.unit[i]));
@@ -221,10 +223,10 @@ impl RoughRow for PlasticRow {
     }
 
     #[inline(always)]
-    fn parts(&self, _: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
-        let (mut wide, mut narrow) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+    fn parts(&self, _: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
+        let (mut wide, mut narrow) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         for axis in 0..3 {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 wide[axis][i] = self.base[axis][i] * (values.shared[1][i] * self.shown[0][i]);
                 let rest = values.f[axis][i] - wide[axis][i];
                 narrow[axis][i] = if rest > 0.0 { rest } else { 0.0 };
@@ -234,15 +236,15 @@ impl RoughRow for PlasticRow {
     }
 
     #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> Lanes {
+    fn grey(&self, values: &BsdfValues) -> F32x16 {
         values.shared[0]
     }
 
     #[inline(always)]
-    fn pdf(&self, lobes: LobeSet, normals: &Lanes3, directions: &Lanes3, _: &BsdfValues) -> Lanes {
-        let (mut narrow, mut densities) = ([0.0; LANES], [0.0; LANES]);
+    fn pdf(&self, lobes: LobeSet, normals: &Vec3x16, directions: &Vec3x16, _: &BsdfValues) -> F32x16 {
+        let (mut narrow, mut densities) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
         if self.is_rough {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let direction = lane(directions, i);
                 let [distribution, _] = self.facets(i, direction);
                 let [eye, light] = self.legs(i, direction);
@@ -252,7 +254,7 @@ impl RoughRow for PlasticRow {
         }
         match lobes {
             LobeSet::All => {
-                for i in 0..LANES {
+                for i in 0..PACKET_SIZE {
                     let cosine = lane(normals, i).dot(lane(directions, i));
                     let wide = if cosine > 0.0 { cosine * FRAC_1_PI } else { 0.0 };
                     densities[i] = self.share[i] * narrow[i] + (1.0 - self.share[i]) * wide;
@@ -264,15 +266,15 @@ impl RoughRow for PlasticRow {
     }
 
     #[inline(always)]
-    fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
-        let mut directions = [[0.0; LANES]; 3];
-        for i in 0..LANES {
+    fn sample(&self, lobes: LobeSet, normals: &Vec3x16, choices: &F32x16, u: &[F32x16; 2]) -> Vec3x16 {
+        let mut directions = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
             let u = [u[0][i], u[1][i]];
             let wide = about(lane(normals, i), u[0].sqrt(), (1.0 - u[0]).sqrt(), u[1]);
             set_lane(&mut directions, i, wide);
         }
         if self.is_rough {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let (u, alpha) = ([u[0][i], u[1][i]], self.alpha[i]);
                 let frame = Frame::from_normal(lane(&self.normal, i));
                 let narrow = mirrored(&frame, lane(&self.to_eye, i), [alpha; 2], u);
@@ -340,27 +342,28 @@ impl MaterialRow for PlasticRow {
         material: &Plastic,
         uv: Option<&UvRow>,
         shown: &[(u32, ShownLobes)],
-        folds: impl Folds,
+        simd: impl Simd,
     ) -> u32 {
         let point = material.constant().unwrap_or_else(|| material.bleached());
-        let mut bases = [[point.base.x; LANES], [point.base.y; LANES], [point.base.z; LANES]];
+        let mut bases =
+            [[point.base.x; PACKET_SIZE], [point.base.y; PACKET_SIZE], [point.base.z; PACKET_SIZE]];
         if let (Some(texture), Some(uv)) = (material.row_texture(), uv) {
             let diffuse = texture.lookup_row(uv);
             let squared = point.ior * point.ior;
             let returned = 1.0 - (1.0 - point.albedo.mean) / squared;
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let diffuse = lane(&diffuse, i).min(Vec3::ONE);
                 set_lane(&mut bases, i, under_coat(diffuse, returned) * (FRAC_1_PI / squared));
             }
         }
         for &(of, shown) in shown {
-            let (of, [diffuse, specular, unit]) = (truths(of), shown_parts(shown));
+            let (of, [diffuse, specular, unit]) = (mask_from_bits(of), shown_parts(shown));
             for axis in 0..3 {
-                take(&of, &bases[axis], &mut self.base[axis]);
-                take(&of, &[point.specular[axis]; LANES], &mut self.specular[axis]);
+                select(&of, &bases[axis], &mut self.base[axis]);
+                select(&of, &[point.specular[axis]; PACKET_SIZE], &mut self.specular[axis]);
             }
             for (own, term) in self.terms.iter_mut().zip(point.albedo.terms) {
-                take(&of, &[term; LANES], own);
+                select(&of, &[term; PACKET_SIZE], own);
             }
             for (value, own) in [
                 (point.ior, &mut self.ior),
@@ -368,25 +371,25 @@ impl MaterialRow for PlasticRow {
                 (point.albedo.mean, &mut self.mean),
                 (unit, &mut self.unit),
             ] {
-                take(&of, &[value; LANES], own);
+                select(&of, &[value; PACKET_SIZE], own);
             }
-            take(&of, &[diffuse; LANES], &mut self.shown[0]);
-            take(&of, &[specular; LANES], &mut self.shown[1]);
+            select(&of, &[diffuse; PACKET_SIZE], &mut self.shown[0]);
+            select(&of, &[specular; PACKET_SIZE], &mut self.shown[1]);
         }
         self.is_rough |= point.alpha > 0.0;
         self.is_smooth |= point.alpha == 0.0;
-        let mut black = [0; LANES];
-        for i in 0..LANES {
+        let mut black = [0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let is_black = (lane(&bases, i) == Vec3::ZERO) & (point.specular == Vec3::ZERO);
             black[i] = if is_black { TRUE } else { 0 };
         }
-        folds.bits(&black)
+        simd.movemask(&black)
     }
 
     #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
+    fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
         turn_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
-        for i in 0..LANES {
+        for i in 0..PACKET_SIZE {
             self.look(i);
         }
     }

@@ -12,50 +12,50 @@ use crate::materials::microfacet::{Half, Leg, facing_one, mirrored, turn_to_view
 use crate::materials::phong::lobes::about;
 use crate::math::Vec3;
 use crate::math::frame::Frame;
-use crate::math::lanes::{Folds, LANES, Lanes, Lanes3, Truths, lane, set_lane, take, truths};
+use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, Vec3x16, lane, mask_from_bits, select, set_lane};
 
 /// Surfaces of principled materials, side by side: with light that they reflect, or that comes through. The values of f that are
 /// shared are the grey f of all lobes, and nothing.
 #[derive(Clone, Debug)]
 pub struct PrincipledRow<const THROUGH: bool> {
     /// Unit normals that face the viewer; for light that comes through, those on the other side.
-    normal: Lanes3,
+    normal: Vec3x16,
     /// Unit directions to the viewer; for light that comes through, mirrored to the other side.
-    to_eye: Lanes3,
+    to_eye: Vec3x16,
     /// [`PrincipledPoint::base`].
-    base: Lanes3,
+    base: Vec3x16,
     /// The largest component of the diffuse lobe's albedo where nothing is above it.
-    diffuse: Lanes,
+    diffuse: F32x16,
     /// [`PrincipledPoint::facets`].
-    facets: Lanes3,
+    facets: Vec3x16,
     /// [`PrincipledPoint::grazing`].
-    grazing: Lanes,
+    grazing: F32x16,
     /// [`PrincipledPoint::dielectric`].
-    dielectric: (Lanes3, Lanes),
+    dielectric: (Vec3x16, F32x16),
     /// [`PrincipledPoint::transmission`].
-    transmission: Lanes3,
+    transmission: Vec3x16,
     /// [`PrincipledPoint::alpha`].
-    alpha: Lanes,
+    alpha: F32x16,
     /// Terms of [`PrincipledPoint::albedo`].
-    terms: [[Lanes; TERMS]; 2],
+    terms: [[F32x16; TERMS]; 2],
     /// [`PrincipledPoint::coat`].
-    coat: Lanes,
+    coat: F32x16,
     /// [`PrincipledPoint::coat_alpha`].
-    coat_alpha: Lanes,
+    coat_alpha: F32x16,
     /// Terms of [`PrincipledPoint::coat_albedo`].
-    coat_terms: [Lanes; TERMS],
+    coat_terms: [F32x16; TERMS],
     /// Part of the light that the specular lobe leaves to the diffuse one on the way to the viewer.
-    left: Lanes3,
+    left: Vec3x16,
     /// Part of the light that the coat lets through on the way to the viewer.
-    through: Lanes,
+    through: F32x16,
     /// Probabilities of choosing the specular lobe, and the coat's.
-    shares: [Lanes; 2],
+    shares: [F32x16; 2],
     /// Probability of choosing the light that comes through.
-    through_share: Lanes,
+    through_share: F32x16,
     /// 1 where the diffuse lobe is shown, else 0; likewise the others.
-    shown: [Lanes; 2],
+    shown: [F32x16; 2],
     /// f in sr⁻¹ that is shown in place of the lobes.
-    unit: Lanes,
+    unit: F32x16,
     /// Whether any surface has a clear coat.
     is_coated: bool,
     /// Whether any surface has a diffuse lobe.
@@ -221,9 +221,9 @@ impl<const THROUGH: bool> PrincipledRow<THROUGH> {
     #[inline(always)]
     fn look_all(&mut self) {
         // The loop writes to arrays apart from those that it reads: otherwise it stays scalar.
-        let (mut left, mut shares) = ([[0.0; LANES]; 3], [[0.0; LANES]; 2]);
-        let (mut through, mut through_share) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
+        let (mut left, mut shares) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 2]);
+        let (mut through, mut through_share) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let seen = self.seen(i);
             set_lane(&mut left, i, seen.left);
             (through[i], through_share[i]) = (seen.through, seen.through_share);
@@ -239,25 +239,25 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     const SENDS_RAYS: bool = true;
 
     const EMPTY: Self = Self {
-        normal: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
-        to_eye: [[0.0; LANES], [0.0; LANES], [1.0; LANES]],
-        base: [[0.0; LANES]; 3],
-        diffuse: [0.0; LANES],
-        facets: [[0.0; LANES]; 3],
-        grazing: [1.0; LANES],
-        dielectric: ([[0.0; LANES]; 3], [0.0; LANES]),
-        transmission: [[0.0; LANES]; 3],
-        alpha: [1.0; LANES],
-        terms: [[[0.0; LANES]; TERMS]; 2],
-        coat: [0.0; LANES],
-        coat_alpha: [1.0; LANES],
-        coat_terms: [[0.0; LANES]; TERMS],
-        left: [[1.0; LANES]; 3],
-        through: [1.0; LANES],
-        shares: [[1.0; LANES], [0.0; LANES]],
-        through_share: [0.0; LANES],
-        shown: [[0.0; LANES]; 2],
-        unit: [0.0; LANES],
+        normal: [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]],
+        to_eye: [[0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [1.0; PACKET_SIZE]],
+        base: [[0.0; PACKET_SIZE]; 3],
+        diffuse: [0.0; PACKET_SIZE],
+        facets: [[0.0; PACKET_SIZE]; 3],
+        grazing: [1.0; PACKET_SIZE],
+        dielectric: ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]),
+        transmission: [[0.0; PACKET_SIZE]; 3],
+        alpha: [1.0; PACKET_SIZE],
+        terms: [[[0.0; PACKET_SIZE]; TERMS]; 2],
+        coat: [0.0; PACKET_SIZE],
+        coat_alpha: [1.0; PACKET_SIZE],
+        coat_terms: [[0.0; PACKET_SIZE]; TERMS],
+        left: [[1.0; PACKET_SIZE]; 3],
+        through: [1.0; PACKET_SIZE],
+        shares: [[1.0; PACKET_SIZE], [0.0; PACKET_SIZE]],
+        through_share: [0.0; PACKET_SIZE],
+        shown: [[0.0; PACKET_SIZE]; 2],
+        unit: [0.0; PACKET_SIZE],
         is_coated: false,
         is_diffuse: false,
         transmits: false,
@@ -337,32 +337,32 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn f(&self, directions: &Lanes3) -> BsdfValues {
-        let (mut f, mut grey) = ([[0.0; LANES]; 3], [0.0; LANES]);
-        for i in 0..LANES {
+    fn f(&self, directions: &Vec3x16) -> BsdfValues {
+        let (mut f, mut grey) = ([[0.0; PACKET_SIZE]; 3], [0.0; PACKET_SIZE]);
+        for i in 0..PACKET_SIZE {
             let direction = lane(directions, i);
             let narrow = if THROUGH { self.transmitted(i, direction) } else { self.narrow(i, direction) };
             set_lane(&mut f, i, narrow * self.shown[1][i] + Vec3::splat(self.unit[i]));
             grey[i] = narrow.max_element();
         }
         if self.is_diffuse && !THROUGH {
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let wide = self.wide(i, lane(directions, i));
                 let sum = lane(&f, i) + wide * self.shown[0][i];
                 set_lane(&mut f, i, sum);
                 grey[i] += wide.max_element();
             }
         }
-        BsdfValues { f, shared: [grey, [0.0; LANES]] }
+        BsdfValues { f, shared: [grey, [0.0; PACKET_SIZE]] }
     }
 
     #[inline(always)]
-    fn parts(&self, directions: &Lanes3, values: &BsdfValues) -> [Lanes3; 2] {
+    fn parts(&self, directions: &Vec3x16, values: &BsdfValues) -> [Vec3x16; 2] {
         if THROUGH {
-            return [[[0.0; LANES]; 3], values.f];
+            return [[[0.0; PACKET_SIZE]; 3], values.f];
         }
-        let (mut wide, mut narrow) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-        for i in 0..LANES {
+        let (mut wide, mut narrow) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
+        for i in 0..PACKET_SIZE {
             let direction = lane(directions, i);
             set_lane(&mut wide, i, self.wide(i, direction) * self.shown[0][i]);
             let value = self.narrow(i, direction) * self.shown[1][i] + Vec3::splat(self.unit[i]);
@@ -372,14 +372,14 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn grey(&self, values: &BsdfValues) -> Lanes {
+    fn grey(&self, values: &BsdfValues) -> F32x16 {
         values.shared[0]
     }
 
     #[inline(always)]
-    fn pdf(&self, lobes: LobeSet, normals: &Lanes3, directions: &Lanes3, _: &BsdfValues) -> Lanes {
-        let mut densities = [0.0; LANES];
-        for i in 0..LANES {
+    fn pdf(&self, lobes: LobeSet, normals: &Vec3x16, directions: &Vec3x16, _: &BsdfValues) -> F32x16 {
+        let mut densities = [0.0; PACKET_SIZE];
+        for i in 0..PACKET_SIZE {
             let direction = lane(directions, i);
             let [specular, coat] = self.densities(i, direction);
             let (of_specular, of_coat) = (self.shares[0][i], self.shares[1][i]);
@@ -399,9 +399,9 @@ impl<const THROUGH: bool> RoughRow for PrincipledRow<THROUGH> {
     }
 
     #[inline(always)]
-    fn sample(&self, lobes: LobeSet, normals: &Lanes3, choices: &Lanes, u: &[Lanes; 2]) -> Lanes3 {
-        let mut directions = [[0.0; LANES]; 3];
-        for i in 0..LANES {
+    fn sample(&self, lobes: LobeSet, normals: &Vec3x16, choices: &F32x16, u: &[F32x16; 2]) -> Vec3x16 {
+        let mut directions = [[0.0; PACKET_SIZE]; 3];
+        for i in 0..PACKET_SIZE {
             let u = [u[0][i], u[1][i]];
             let (of_specular, of_coat) = (self.shares[0][i], self.shares[1][i]);
             let of_through = self.through_share[i];
@@ -485,20 +485,20 @@ impl MaterialRow for PrincipledRow<false> {
         material: &Principled,
         _: Option<&UvRow>,
         shown: &[(u32, ShownLobes)],
-        _: impl Folds,
+        _: impl Simd,
     ) -> u32 {
         let point = material.constant().unwrap_or_else(|| material.bleached());
         for &(of, shown) in shown {
-            let (of, [diffuse, specular, unit]) = (truths(of), shown_parts(shown));
+            let (of, [diffuse, specular, unit]) = (mask_from_bits(of), shown_parts(shown));
             for axis in 0..3 {
-                take(&of, &[point.base[axis]; LANES], &mut self.base[axis]);
-                take(&of, &[point.facets[axis]; LANES], &mut self.facets[axis]);
-                take(&of, &[point.dielectric.0[axis]; LANES], &mut self.dielectric.0[axis]);
+                select(&of, &[point.base[axis]; PACKET_SIZE], &mut self.base[axis]);
+                select(&of, &[point.facets[axis]; PACKET_SIZE], &mut self.facets[axis]);
+                select(&of, &[point.dielectric.0[axis]; PACKET_SIZE], &mut self.dielectric.0[axis]);
             }
             for number in 0..TERMS {
-                take(&of, &[point.albedo.normal.terms[number]; LANES], &mut self.terms[0][number]);
-                take(&of, &[point.albedo.grazing.terms[number]; LANES], &mut self.terms[1][number]);
-                take(&of, &[point.coat_albedo.terms[number]; LANES], &mut self.coat_terms[number]);
+                select(&of, &[point.albedo.normal.terms[number]; PACKET_SIZE], &mut self.terms[0][number]);
+                select(&of, &[point.albedo.grazing.terms[number]; PACKET_SIZE], &mut self.terms[1][number]);
+                select(&of, &[point.coat_albedo.terms[number]; PACKET_SIZE], &mut self.coat_terms[number]);
             }
             for (value, own) in [
                 (point.ambient.max_element(), &mut self.diffuse),
@@ -509,10 +509,10 @@ impl MaterialRow for PrincipledRow<false> {
                 (point.coat_alpha, &mut self.coat_alpha),
                 (unit, &mut self.unit),
             ] {
-                take(&of, &[value; LANES], own);
+                select(&of, &[value; PACKET_SIZE], own);
             }
-            take(&of, &[diffuse; LANES], &mut self.shown[0]);
-            take(&of, &[specular; LANES], &mut self.shown[1]);
+            select(&of, &[diffuse; PACKET_SIZE], &mut self.shown[0]);
+            select(&of, &[specular; PACKET_SIZE], &mut self.shown[1]);
         }
         self.is_coated |= point.coat > 0.0;
         self.is_diffuse |= point.base != Vec3::ZERO;
@@ -520,7 +520,7 @@ impl MaterialRow for PrincipledRow<false> {
     }
 
     #[inline(always)]
-    fn orient(&mut self, of: Option<&Truths>, normals: &mut Lanes3, directions: &Lanes3) {
+    fn orient(&mut self, of: Option<&Mask>, normals: &mut Vec3x16, directions: &Vec3x16) {
         turn_to_viewers(of, normals, directions, &mut self.normal, &mut self.to_eye);
         self.look_all();
     }

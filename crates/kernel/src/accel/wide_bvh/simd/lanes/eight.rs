@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
-use super::{F4, Lanes, operators, wide_mask};
+use super::{F4, SimdVector, operators, wide_mask};
 
 /// Vector of eight floats.
 #[derive(Clone, Copy)]
@@ -16,7 +16,7 @@ pub struct Mask8(__m256);
 operators!(F8, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps);
 wide_mask!(Mask8, _mm256_and_ps, _mm256_or_ps);
 
-impl Lanes for F8 {
+impl SimdVector for F8 {
     const COUNT: usize = 8;
     type Mask = Mask8;
 
@@ -100,7 +100,7 @@ impl Lanes for F8 {
     }
 
     #[inline(always)]
-    fn bits(mask: Mask8) -> u32 {
+    fn movemask(mask: Mask8) -> u32 {
         // SAFETY: as above.
         unsafe { _mm256_movemask_ps(mask.0) as u32 }
     }

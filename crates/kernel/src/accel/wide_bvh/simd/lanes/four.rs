@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
-use super::{Lanes, operators, wide_mask};
+use super::{SimdVector, operators, wide_mask};
 
 /// Vector of four floats.
 #[derive(Clone, Copy)]
@@ -16,7 +16,7 @@ pub struct Mask4(__m128);
 operators!(F4, _mm_add_ps, _mm_sub_ps, _mm_mul_ps);
 wide_mask!(Mask4, _mm_and_ps, _mm_or_ps);
 
-impl Lanes for F4 {
+impl SimdVector for F4 {
     const COUNT: usize = 4;
     type Mask = Mask4;
 
@@ -100,7 +100,7 @@ impl Lanes for F4 {
     }
 
     #[inline(always)]
-    fn bits(mask: Mask4) -> u32 {
+    fn movemask(mask: Mask4) -> u32 {
         // SAFETY: as above.
         unsafe { _mm_movemask_ps(mask.0) as u32 }
     }

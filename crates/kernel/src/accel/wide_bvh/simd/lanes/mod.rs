@@ -18,7 +18,7 @@ pub use sixteen::F16;
 
 /// A SIMD vector of floats. Comparisons with NaN are false; `min` and `max` return their argument if either
 /// is NaN.
-pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+pub trait SimdVector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// Number of lanes.
     const COUNT: usize;
     /// One truth value per lane.
@@ -33,7 +33,7 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
     /// Loads floats from memory.
     ///
     /// # Safety
-    /// The processor must have the instructions of this type, and `from` must point to [`Lanes::COUNT`]
+    /// The processor must have the instructions of this type, and `from` must point to [`SimdVector::COUNT`]
     /// floats.
     unsafe fn load(from: *const f32) -> Self;
 
@@ -44,7 +44,7 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
         unsafe { Self::splat(x) }
     }
 
-    /// Loads from a slice with at least [`Lanes::COUNT`] floats.
+    /// Loads from a slice with at least [`SimdVector::COUNT`] floats.
     #[inline(always)]
     fn gather(self, from: &[f32]) -> Self {
         assert!(from.len() >= Self::COUNT);
@@ -52,7 +52,7 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
         unsafe { Self::load(from.as_ptr()) }
     }
 
-    /// Stores into a slice with at least [`Lanes::COUNT`] floats.
+    /// Stores into a slice with at least [`SimdVector::COUNT`] floats.
     fn store(self, to: &mut [f32]);
     /// Divides by `divisor`.
     fn over(self, divisor: Self) -> Self;
@@ -75,7 +75,7 @@ pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = S
     /// Lanes set in `mask` but not in `but`.
     fn without(mask: Self::Mask, but: Self::Mask) -> Self::Mask;
     /// Packs a mask into bits, one per lane.
-    fn bits(mask: Self::Mask) -> u32;
+    fn movemask(mask: Self::Mask) -> u32;
     /// Expands bits into a mask; `like` proves that the processor has the instructions.
     fn mask(bits: u32, like: Self) -> Self::Mask;
     /// Maximum of all lanes.

@@ -2,13 +2,13 @@
 
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
-use super::Lanes;
+use super::SimdVector;
 
 /// Two vectors used as one of twice the width.
 #[derive(Clone, Copy)]
 pub struct Pair<V>(V, V);
 
-impl<V: Lanes> Add for Pair<V> {
+impl<V: SimdVector> Add for Pair<V> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -16,7 +16,7 @@ impl<V: Lanes> Add for Pair<V> {
     }
 }
 
-impl<V: Lanes> Sub for Pair<V> {
+impl<V: SimdVector> Sub for Pair<V> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -24,7 +24,7 @@ impl<V: Lanes> Sub for Pair<V> {
     }
 }
 
-impl<V: Lanes> Mul for Pair<V> {
+impl<V: SimdVector> Mul for Pair<V> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -48,7 +48,7 @@ impl<M: BitOr<Output = M>> BitOr for Pair<M> {
     }
 }
 
-impl<V: Lanes> Lanes for Pair<V> {
+impl<V: SimdVector> SimdVector for Pair<V> {
     const COUNT: usize = 2 * V::COUNT;
     type Mask = Pair<V::Mask>;
 
@@ -122,8 +122,8 @@ impl<V: Lanes> Lanes for Pair<V> {
     }
 
     #[inline(always)]
-    fn bits(mask: Self::Mask) -> u32 {
-        V::bits(mask.0) | V::bits(mask.1) << V::COUNT
+    fn movemask(mask: Self::Mask) -> u32 {
+        V::movemask(mask.0) | V::movemask(mask.1) << V::COUNT
     }
 
     #[inline(always)]

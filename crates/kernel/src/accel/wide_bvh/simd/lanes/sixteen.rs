@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
-use super::{Lanes, operators};
+use super::{SimdVector, operators};
 
 /// Vector of 16 floats.
 #[derive(Clone, Copy)]
@@ -31,7 +31,7 @@ impl BitOr for Mask16 {
     }
 }
 
-impl Lanes for F16 {
+impl SimdVector for F16 {
     const COUNT: usize = 16;
     type Mask = Mask16;
 
@@ -117,7 +117,7 @@ impl Lanes for F16 {
     }
 
     #[inline(always)]
-    fn bits(mask: Mask16) -> u32 {
+    fn movemask(mask: Mask16) -> u32 {
         u32::from(mask.0)
     }
 

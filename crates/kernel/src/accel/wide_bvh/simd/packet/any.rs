@@ -5,20 +5,20 @@ use super::rays::Packet;
 use super::rows::Rows;
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, PACK, TrianglePack};
-use crate::accel::wide_bvh::simd::lanes::{F8, Lanes};
+use crate::accel::wide_bvh::simd::lanes::{F8, SimdVector};
 use crate::accel::wide_bvh::simd::single::prefetch;
 use crate::accel::wide_bvh::simd::stack::Stack;
-use crate::accel::{Ends, PACKET as SIZE};
+use crate::accel::{F32x16, PACKET_SIZE as SIZE};
 use crate::geometry::Ray;
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::watertight::ShearedRay;
 
 /// [`WideBvh::any_packet`]. `None` if the rays are not coherent.
 #[inline(always)]
-pub fn any<V: Lanes>(
+pub fn any<V: SimdVector>(
     tree: &WideBvh,
     rays: &[Ray],
-    ends: &Ends,
+    ends: &F32x16,
     except: &[Option<u32>],
     like: V,
     like8: F8,

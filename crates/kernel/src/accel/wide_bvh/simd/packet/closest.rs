@@ -4,10 +4,10 @@ use super::frustum::Frustum;
 use super::nearest::Nearest;
 use super::rays::Packet;
 use super::rows::Rows;
-use crate::accel::Ends;
+use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
 use crate::accel::wide_bvh::node::{Child, Node, PACK};
-use crate::accel::wide_bvh::simd::lanes::{F8, Lanes};
+use crate::accel::wide_bvh::simd::lanes::{F8, SimdVector};
 use crate::accel::wide_bvh::simd::single::prefetch;
 use crate::accel::wide_bvh::simd::stack::{Stack, entry, key};
 use crate::geometry::aabb::SLAB_PAD;
@@ -15,10 +15,10 @@ use crate::geometry::{Ray, ShapeHit};
 
 /// [`WideBvh::closest_packet`]. Returns false if the rays are not coherent.
 #[inline(always)]
-pub fn closest<V: Lanes>(
+pub fn closest<V: SimdVector>(
     tree: &WideBvh,
     rays: &[Ray],
-    ends: &Ends,
+    ends: &F32x16,
     hits: &mut [Option<ShapeHit>],
     like: V,
     like8: F8,
@@ -64,7 +64,7 @@ pub fn closest<V: Lanes>(
 
 /// Pushes the children that any ray hits, farthest first, so that the nearest is on top.
 #[inline(always)]
-fn push_ordered<V: Lanes>(
+fn push_ordered<V: SimdVector>(
     tree: &WideBvh,
     node: &Node,
     near: F8,

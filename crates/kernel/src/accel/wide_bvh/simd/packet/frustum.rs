@@ -2,7 +2,7 @@
 
 use super::rays::Packet;
 use crate::accel::wide_bvh::node::Node;
-use crate::accel::wide_bvh::simd::lanes::{F8, Lanes};
+use crate::accel::wide_bvh::simd::lanes::{F8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 
 /// Bounds that hold for every ray of a packet, tested against eight boxes at a time. Subtraction and
@@ -17,7 +17,7 @@ pub struct Frustum {
 
 impl Frustum {
     #[inline(always)]
-    pub fn new<V: Lanes>(packet: &Packet<V>, like: F8) -> Self {
+    pub fn new<V: SimdVector>(packet: &Packet<V>, like: F8) -> Self {
         let (mut near_origin, mut far_origin) = ([like; 3], [like; 3]);
         let mut inverse = [[like; 2]; 3];
         for axis in 0..3 {
@@ -45,6 +45,6 @@ impl Frustum {
             near = (to_near * least).min(to_near * greatest).max(near);
             far = ((to_far * least).max(to_far * greatest) * pad).min(far);
         }
-        (near, F8::bits(near.le(far)))
+        (near, F8::movemask(near.le(far)))
     }
 }

@@ -9,8 +9,8 @@ mod nearest;
 mod rays;
 mod rows;
 
-use super::lanes::{F8, F16, Lanes, Pair};
-use crate::accel::Ends;
+use super::lanes::{F8, F16, Pair, SimdVector};
+use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
 use crate::geometry::{Ray, ShapeHit};
 
@@ -19,7 +19,7 @@ use closest::closest;
 
 /// [`closest`] with AVX2.
 #[target_feature(enable = "avx2")]
-pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
+pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
     // SAFETY: this function is compiled with these instructions.
     let (like, like8) = unsafe { (Pair::<F8>::splat(0.0), F8::splat(0.0)) };
     closest(tree, rays, ends, hits, like, like8)
@@ -27,7 +27,7 @@ pub fn closest_avx2(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Optio
 
 /// [`any`] with AVX2.
 #[target_feature(enable = "avx2")]
-pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
+pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function is compiled with these instructions.
     let (like, like8) = unsafe { (Pair::<F8>::splat(0.0), F8::splat(0.0)) };
     any(tree, rays, ends, except, like, like8)
@@ -35,7 +35,7 @@ pub fn any_avx2(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>
 
 /// [`closest`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
-pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Option<ShapeHit>]) -> bool {
+pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, hits: &mut [Option<ShapeHit>]) -> bool {
     // SAFETY: this function is compiled with these instructions.
     let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
     closest(tree, rays, ends, hits, like, like8)
@@ -43,7 +43,7 @@ pub fn closest_avx512(tree: &WideBvh, rays: &[Ray], ends: &Ends, hits: &mut [Opt
 
 /// [`any`] with AVX-512.
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2")]
-pub fn any_avx512(tree: &WideBvh, rays: &[Ray], ends: &Ends, except: &[Option<u32>]) -> Option<u32> {
+pub fn any_avx512(tree: &WideBvh, rays: &[Ray], ends: &F32x16, except: &[Option<u32>]) -> Option<u32> {
     // SAFETY: this function is compiled with these instructions.
     let (like, like8) = unsafe { (F16::splat(0.0), F8::splat(0.0)) };
     any(tree, rays, ends, except, like, like8)

@@ -1,15 +1,15 @@
 //! Nearest hits of a packet.
 
 use super::rays::Packet;
-use crate::accel::PACKET as SIZE;
+use crate::accel::PACKET_SIZE as SIZE;
 use crate::accel::wide_bvh::node::TrianglePack;
-use crate::accel::wide_bvh::simd::lanes::Lanes;
+use crate::accel::wide_bvh::simd::lanes::SimdVector;
 use crate::accel::wide_bvh::simd::triangle;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 
 /// Nearest hits found so far.
-pub struct Nearest<V: Lanes> {
+pub struct Nearest<V: SimdVector> {
     pub t: V,
     u: V,
     v: V,
@@ -18,7 +18,7 @@ pub struct Nearest<V: Lanes> {
     found: u32,
 }
 
-impl<V: Lanes> Nearest<V> {
+impl<V: SimdVector> Nearest<V> {
     /// Starts without hits, with the given ends.
     #[inline(always)]
     pub fn new(ends: V) -> Self {
@@ -41,7 +41,7 @@ impl<V: Lanes> Nearest<V> {
     #[inline(always)]
     fn keep(&mut self, hits: &triangle::Hits<V>, pack: &TrianglePack, lane: usize, rays: &[Ray]) -> u32 {
         let own = pack.ids[lane];
-        let as_near = hits.hit & V::bits(hits.t.eq(self.t));
+        let as_near = hits.hit & V::movemask(hits.t.eq(self.t));
         let mut taken = hits.hit & !as_near;
         if taken != 0 {
             let mask = V::mask(taken, self.t);

@@ -2,7 +2,7 @@
 
 use super::rows::Rows;
 use crate::accel::wide_bvh::node::{Node, TrianglePack};
-use crate::accel::wide_bvh::simd::lanes::Lanes;
+use crate::accel::wide_bvh::simd::lanes::SimdVector;
 use crate::accel::wide_bvh::simd::triangle;
 use crate::geometry::Aabb;
 use crate::geometry::aabb::{SLAB_PAD, triangle_margin};
@@ -10,7 +10,7 @@ use crate::geometry::watertight::ShearedRay;
 use crate::math::Vec3;
 
 /// Rays in registers, prepared for boxes and triangles.
-pub struct Packet<V: Lanes> {
+pub struct Packet<V: SimdVector> {
     /// Origins for near and far planes, a margin apart.
     near_origin: [V; 3],
     far_origin: [V; 3],
@@ -30,7 +30,7 @@ pub struct Packet<V: Lanes> {
     pub margin: f32,
 }
 
-impl<V: Lanes> Packet<V> {
+impl<V: SimdVector> Packet<V> {
     /// Loads a packet. `None` if the rays are not coherent: their directions must have the same signs and the
     /// same longest axis.
     #[inline(always)]
@@ -57,15 +57,15 @@ impl<V: Lanes> Packet<V> {
         own.margin = triangle_margin(corner(0), whole).max(triangle_margin(corner(1), whole));
         let margin = like.like(own.margin);
         let (zero, one) = (like.like(0.0), like.like(1.0));
-        let all = V::bits(zero.eq(zero));
+        let all = V::movemask(zero.eq(zero));
         for axis in 0..3 {
             direction[axis] = like.gather(&rows.direction[axis]);
             size[axis] = direction[axis].abs();
             own.inverse[axis] = one.over(direction[axis]);
-            let up = V::bits(zero.lt(own.inverse[axis]) & own.inverse[axis].lt(like.like(f32::INFINITY)));
+            let up = V::movemask(zero.lt(own.inverse[axis]) & own.inverse[axis].lt(like.like(f32::INFINITY)));
             let down =
-                V::bits(own.inverse[axis].lt(zero) & like.like(f32::NEG_INFINITY).lt(own.inverse[axis]));
-            let finite = V::bits(origin[axis].abs().lt(like.like(f32::INFINITY)));
+                V::movemask(own.inverse[axis].lt(zero) & like.like(f32::NEG_INFINITY).lt(own.inverse[axis]));
+            let finite = V::movemask(origin[axis].abs().lt(like.like(f32::INFINITY)));
             if (up != all && down != all) || finite != all {
                 return None;
             }
@@ -75,11 +75,13 @@ impl<V: Lanes> Packet<V> {
             own.near[axis] = 2 * axis + usize::from(down == all);
         }
         // Find the longest axis and the shears, as in `ShearedRay::new`.
-        let x_over_y = V::bits(size[1].lt(size[0]));
+        let x_over_y = V::movemask(size[1].lt(size[0]));
         let longest = match axes[2] {
-            0 => x_over_y & V::bits(size[2].lt(size[0])),
-            1 => !x_over_y & V::bits(size[2].lt(size[1])),
-            _ => !(x_over_y & V::bits(size[2].lt(size[0])) | !x_over_y & V::bits(size[2].lt(size[1]))),
+            0 => x_over_y & V::movemask(size[2].lt(size[0])),
+            1 => !x_over_y & V::movemask(size[2].lt(size[1])),
+            _ => {
+                !(x_over_y & V::movemask(size[2].lt(size[0])) | !x_over_y & V::movemask(size[2].lt(size[1])))
+            }
         };
         if longest & all != all {
             return None;
@@ -101,7 +103,7 @@ impl<V: Lanes> Packet<V> {
             near = ((to_near - self.near_origin[axis]) * self.inverse[axis]).max(near);
             far = ((to_far - self.far_origin[axis]) * self.inverse[axis] * pad).min(far);
         }
-        V::bits(near.le(far)) != 0
+        V::movemask(near.le(far)) != 0
     }
 
     /// Tests the triangle in a lane of a pack against all rays, even those that start on it.
@@ -114,7 +116,7 @@ impl<V: Lanes> Packet<V> {
     /// Bits of the rays that start on the triangle with this index.
     #[inline(always)]
     pub fn starting_on(&self, triangle: u32) -> u32 {
-        V::bits(self.start.eq(self.start.like(f32::from_bits(triangle))))
+        V::movemask(self.start.eq(self.start.like(f32::from_bits(triangle))))
     }
 
     /// A corner in each ray's sheared coordinates; `row` is the corner's first row.

@@ -1,18 +1,15 @@
 //! Structure-of-arrays storage for the rays of a packet.
 
-use crate::accel::{Ends, PACKET as SIZE};
+use crate::accel::{F32x16, PACKET_SIZE as SIZE};
 use crate::geometry::Ray;
-
-/// One value per ray.
-type Row = [f32; SIZE];
 
 /// Rays in structure-of-arrays layout.
 pub struct Rows {
-    pub origin: [Row; 3],
-    pub direction: [Row; 3],
-    pub ends: Ends,
+    pub origin: [F32x16; 3],
+    pub direction: [F32x16; 3],
+    pub ends: F32x16,
     /// Bits of [`Ray::start`]; NaN for none.
-    pub start: Row,
+    pub start: F32x16,
     /// Bits of the traced rays.
     pub traced: u32,
     /// First traced ray.
@@ -35,7 +32,7 @@ impl Rows {
     /// Loads rays. Lanes without a ray, or with a negative end, repeat the first ray. `None` if no ray is
     /// traced.
     #[inline(always)]
-    pub fn new(rays: &[Ray], ends: &Ends) -> Option<Self> {
+    pub fn new(rays: &[Ray], ends: &F32x16) -> Option<Self> {
         let count = rays.len().min(SIZE);
         let mut traced = 0;
         for (lane, &end) in ends.iter().enumerate().take(count) {

@@ -4,18 +4,18 @@
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
 
-use super::Instructions;
-pub use crate::math::lanes::Loops;
-use crate::math::lanes::PlainFolds;
+use super::InstructionSet;
+use crate::math::lanes::PortableSimd;
+pub use crate::math::lanes::SimdKernel;
 #[cfg(target_arch = "x86_64")]
-use crate::math::lanes::{Folds, LANES, Lanes, Truths};
+use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd};
 
-impl Instructions {
+impl InstructionSet {
     /// Runs a kernel with this instruction set, or the best one that the processor has.
     #[inline]
-    pub fn run<L: Loops>(self, work: L) -> L::Done {
+    pub fn run<L: SimdKernel>(self, work: L) -> L::Output {
         match self.available() {
-            Self::Portable => work.run(PlainFolds),
+            Self::Portable => work.run(PortableSimd),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: `available` returns an instruction set that the processor has.
             Self::Avx2 => unsafe { avx2(work) },
@@ -23,7 +23,7 @@ impl Instructions {
             // SAFETY: as above.
             Self::Avx512 => unsafe { avx512(work) },
             #[cfg(not(target_arch = "x86_64"))]
-            Self::Avx2 | Self::Avx512 => work.run(PlainFolds),
+            Self::Avx2 | Self::Avx512 => work.run(PortableSimd),
         }
     }
 }
@@ -31,49 +31,49 @@ impl Instructions {
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
 #[target_feature(enable = "avx2,fma")]
-fn avx2<L: Loops>(work: L) -> L::Done {
-    work.run(Avx2Folds(()))
+fn avx2<L: SimdKernel>(work: L) -> L::Output {
+    work.run(Avx2Simd(()))
 }
 
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-fn avx512<L: Loops>(work: L) -> L::Done {
-    work.run(Avx512Folds(()))
+fn avx512<L: SimdKernel>(work: L) -> L::Output {
+    work.run(Avx512Simd(()))
 }
 
 /// Proof that the processor has AVX2 and FMA.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
-struct Avx2Folds(());
+struct Avx2Simd(());
 
 #[cfg(target_arch = "x86_64")]
-impl Folds for Avx2Folds {
+impl Simd for Avx2Simd {
     #[inline(always)]
-    fn bits(self, holds: &Truths) -> u32 {
+    fn movemask(self, mask: &Mask) -> u32 {
         // SAFETY: values are only created if the processor has AVX2 and FMA.
-        unsafe { avx2_bits(holds) }
+        unsafe { avx2_movemask(mask) }
     }
 
     #[inline(always)]
-    fn span(self, row: &Lanes, of: u32) -> [f32; 2] {
+    fn min_max(self, row: &F32x16, of: u32) -> [f32; 2] {
         // SAFETY: as above.
-        unsafe { avx2_span(row, of) }
+        unsafe { avx2_min_max(row, of) }
     }
 
     #[inline(always)]
-    fn reciprocals(self, row: &Lanes) -> Lanes {
+    fn reciprocals(self, row: &F32x16) -> F32x16 {
         // SAFETY: as above.
         unsafe { avx2_reciprocals(row) }
     }
 
     #[inline(always)]
-    fn about(self, a: f32, b: f32, c: f32) -> f32 {
+    fn mul_add_relaxed(self, a: f32, b: f32, c: f32) -> f32 {
         a.mul_add(b, c)
     }
 
     #[inline(always)]
-    fn call<L: Loops>(self, work: L) -> L::Done {
+    fn call<L: SimdKernel>(self, work: L) -> L::Output {
         // SAFETY: as above.
         unsafe { avx2(work) }
     }
@@ -82,35 +82,35 @@ impl Folds for Avx2Folds {
 /// Proof that the processor has AVX-512F, VL, DQ and BW.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
-struct Avx512Folds(());
+struct Avx512Simd(());
 
 #[cfg(target_arch = "x86_64")]
-impl Folds for Avx512Folds {
+impl Simd for Avx512Simd {
     #[inline(always)]
-    fn bits(self, holds: &Truths) -> u32 {
+    fn movemask(self, mask: &Mask) -> u32 {
         // SAFETY: values are only created if the processor has AVX-512F, VL, DQ and BW.
-        unsafe { avx512_bits(holds) }
+        unsafe { avx512_movemask(mask) }
     }
 
     #[inline(always)]
-    fn span(self, row: &Lanes, of: u32) -> [f32; 2] {
+    fn min_max(self, row: &F32x16, of: u32) -> [f32; 2] {
         // SAFETY: as above.
-        unsafe { avx512_span(row, of) }
+        unsafe { avx512_min_max(row, of) }
     }
 
     #[inline(always)]
-    fn reciprocals(self, row: &Lanes) -> Lanes {
+    fn reciprocals(self, row: &F32x16) -> F32x16 {
         // SAFETY: as above.
         unsafe { avx512_reciprocals(row) }
     }
 
     #[inline(always)]
-    fn about(self, a: f32, b: f32, c: f32) -> f32 {
+    fn mul_add_relaxed(self, a: f32, b: f32, c: f32) -> f32 {
         a.mul_add(b, c)
     }
 
     #[inline(always)]
-    fn call<L: Loops>(self, work: L) -> L::Done {
+    fn call<L: SimdKernel>(self, work: L) -> L::Output {
         // SAFETY: as above.
         unsafe { avx512(work) }
     }
@@ -119,27 +119,27 @@ impl Folds for Avx512Folds {
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
-fn avx2_bits(holds: &Truths) -> u32 {
-    let (low, high) = holds.split_at(LANES / 2);
+fn avx2_movemask(mask: &Mask) -> u32 {
+    let (low, high) = mask.split_at(PACKET_SIZE / 2);
     // SAFETY: reads eight numbers from each half; no alignment is required.
     let [low, high] = [low, high].map(|half| unsafe { _mm256_loadu_ps(half.as_ptr().cast()) });
-    (_mm256_movemask_ps(low) | _mm256_movemask_ps(high) << (LANES / 2)) as u32
+    (_mm256_movemask_ps(low) | _mm256_movemask_ps(high) << (PACKET_SIZE / 2)) as u32
 }
 
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-fn avx512_bits(holds: &Truths) -> u32 {
+fn avx512_movemask(mask: &Mask) -> u32 {
     // SAFETY: reads 16 numbers; no alignment is required.
-    let row = unsafe { _mm512_loadu_epi32(holds.as_ptr().cast()) };
+    let row = unsafe { _mm512_loadu_epi32(mask.as_ptr().cast()) };
     u32::from(_mm512_movepi32_mask(row))
 }
 
-/// [`Folds::span`] of two halves, in the order of the portable implementation.
+/// [`Simd::min_max`] of two halves, in the order of the portable implementation.
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
-fn span_of_halves(low: __m256, high: __m256) -> [f32; 2] {
+fn min_max_of_halves(low: __m256, high: __m256) -> [f32; 2] {
     let (least, greatest) = (_mm256_min_ps(high, low), _mm256_max_ps(high, low));
     let halves = |row: __m256| (_mm256_castps256_ps128(row), _mm256_extractf128_ps::<1>(row));
     let ((low, high), (below, above)) = (halves(least), halves(greatest));
@@ -154,34 +154,34 @@ fn span_of_halves(low: __m256, high: __m256) -> [f32; 2] {
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
-fn avx2_span(row: &Lanes, of: u32) -> [f32; 2] {
-    let other = _mm256_set1_ps(row[of.trailing_zeros() as usize % LANES]);
+fn avx2_min_max(row: &F32x16, of: u32) -> [f32; 2] {
+    let other = _mm256_set1_ps(row[of.trailing_zeros() as usize % PACKET_SIZE]);
     let lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-    let (low, high) = row.split_at(LANES / 2);
-    let [low, high] = [(low, of), (high, of >> (LANES / 2))].map(|(half, of)| {
+    let (low, high) = row.split_at(PACKET_SIZE / 2);
+    let [low, high] = [(low, of), (high, of >> (PACKET_SIZE / 2))].map(|(half, of)| {
         let own = _mm256_and_si256(_mm256_set1_epi32(of as i32), lanes);
-        let holds = _mm256_castsi256_ps(_mm256_cmpeq_epi32(own, lanes));
+        let mask = _mm256_castsi256_ps(_mm256_cmpeq_epi32(own, lanes));
         // SAFETY: reads eight numbers; no alignment is required.
-        _mm256_blendv_ps(other, unsafe { _mm256_loadu_ps(half.as_ptr()) }, holds)
+        _mm256_blendv_ps(other, unsafe { _mm256_loadu_ps(half.as_ptr()) }, mask)
     });
-    span_of_halves(low, high)
+    min_max_of_halves(low, high)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-fn avx512_span(row: &Lanes, of: u32) -> [f32; 2] {
-    let other = _mm512_set1_ps(row[of.trailing_zeros() as usize % LANES]);
+fn avx512_min_max(row: &F32x16, of: u32) -> [f32; 2] {
+    let other = _mm512_set1_ps(row[of.trailing_zeros() as usize % PACKET_SIZE]);
     // SAFETY: reads 16 numbers; no alignment is required.
     let row = unsafe { _mm512_mask_loadu_ps(other, of as u16, row.as_ptr()) };
-    span_of_halves(_mm512_castps512_ps256(row), _mm512_extractf32x8_ps::<1>(row))
+    min_max_of_halves(_mm512_castps512_ps256(row), _mm512_extractf32x8_ps::<1>(row))
 }
 
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2")]
-fn avx2_reciprocals(row: &Lanes) -> Lanes {
-    let mut inverse = [0.0; LANES];
+fn avx2_reciprocals(row: &F32x16) -> F32x16 {
+    let mut inverse = [0.0; PACKET_SIZE];
     for (own, row) in inverse.chunks_exact_mut(8).zip(row.chunks_exact(8)) {
         // SAFETY: reads and writes eight numbers; no alignment is required.
         unsafe {
@@ -195,8 +195,8 @@ fn avx2_reciprocals(row: &Lanes) -> Lanes {
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
-fn avx512_reciprocals(row: &Lanes) -> Lanes {
-    let mut inverse = [0.0; LANES];
+fn avx512_reciprocals(row: &F32x16) -> F32x16 {
+    let mut inverse = [0.0; PACKET_SIZE];
     // SAFETY: reads and writes 16 numbers; no alignment is required.
     unsafe {
         let row = _mm512_loadu_ps(row.as_ptr());
@@ -208,37 +208,37 @@ fn avx512_reciprocals(row: &Lanes) -> Lanes {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::lanes::{Folds, truths};
+    use crate::math::lanes::{Simd, mask_from_bits};
     use crate::math::random::signed;
 
     struct Folding(u32);
 
-    impl Loops for Folding {
-        type Done = u32;
+    impl SimdKernel for Folding {
+        type Output = u32;
 
         #[inline(always)]
-        fn run(self, folds: impl Folds) -> u32 {
-            folds.bits(&truths(self.0))
+        fn run(self, simd: impl Simd) -> u32 {
+            simd.movemask(&mask_from_bits(self.0))
         }
     }
 
     #[test]
     fn movemask_is_equal_on_all_instruction_sets() {
-        for instructions in Instructions::ALL {
+        for instructions in InstructionSet::ALL {
             for bits in 0..1 << 16 {
                 assert_eq!(instructions.run(Folding(bits)), bits, "{instructions:?}");
             }
         }
     }
 
-    struct Spanning<'a>(&'a Lanes, u32);
+    struct Spanning<'a>(&'a F32x16, u32);
 
-    impl Loops for Spanning<'_> {
-        type Done = ([f32; 2], Lanes);
+    impl SimdKernel for Spanning<'_> {
+        type Output = ([f32; 2], F32x16);
 
         #[inline(always)]
-        fn run(self, folds: impl Folds) -> Self::Done {
-            (folds.span(self.0, self.1), folds.reciprocals(self.0))
+        fn run(self, simd: impl Simd) -> Self::Output {
+            (simd.min_max(self.0, self.1), simd.reciprocals(self.0))
         }
     }
 
@@ -247,17 +247,17 @@ mod tests {
         let mut next = signed(21);
         let odd = [0.0, -0.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 1e-45, f32::MAX];
         for round in 0..20_000_u32 {
-            let mut row: Lanes = std::array::from_fn(|_| next());
+            let mut row: F32x16 = std::array::from_fn(|_| next());
             for i in 0..round as usize % 4 {
-                row[(round as usize * 7 + i * 5) % LANES] = odd[(round as usize / 4 + i) % odd.len()];
+                row[(round as usize * 7 + i * 5) % PACKET_SIZE] = odd[(round as usize / 4 + i) % odd.len()];
             }
             let of = (next().to_bits() >> 3 & 0xffff) | 1 << (round % 16);
-            let each = Instructions::ALL.map(|instructions| instructions.run(Spanning(&row, of)));
+            let each = InstructionSet::ALL.map(|instructions| instructions.run(Spanning(&row, of)));
             let bits =
-                |(span, inverse): ([f32; 2], Lanes)| (span.map(f32::to_bits), inverse.map(f32::to_bits));
+                |(span, inverse): ([f32; 2], F32x16)| (span.map(f32::to_bits), inverse.map(f32::to_bits));
             assert!(each.iter().all(|one| bits(*one) == bits(each[0])), "{row:?} {of:b} {each:?}");
             // Without NaN, they are the minimum and the maximum.
-            let lanes = || (0..LANES).filter(|i| of >> i & 1 == 1).map(|i| row[i]);
+            let lanes = || (0..PACKET_SIZE).filter(|i| of >> i & 1 == 1).map(|i| row[i]);
             if !lanes().any(f32::is_nan) {
                 let ([least, greatest], inverse) = each[0];
                 assert_eq!(lanes().fold(f32::INFINITY, f32::min), least, "{row:?} {of:b}");
