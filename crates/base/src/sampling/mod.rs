@@ -7,4 +7,4 @@ pub mod grid;
 pub mod stream;
 pub mod warp;
 
-pub use stream::{CAMERA_PATH, Decision, PixelSampler, SamplerRow};
+pub use stream::{CAMERA_PATH, Decision, PixelSampler, SamplerPacket};

@@ -107,12 +107,12 @@ impl PixelSampler {
 
 /// A packet of [`PixelSampler`]s.
 #[derive(Clone, Copy, Debug)]
-pub struct SamplerRow<const N: usize> {
+pub struct SamplerPacket<const N: usize> {
     seeds: [u32; N],
     samples: [u32; N],
 }
 
-impl<const N: usize> SamplerRow<N> {
+impl<const N: usize> SamplerPacket<N> {
     /// Creates the samplers for samples of pixels (x, y) of the full image.
     #[inline(always)]
     pub fn new(seed: u32, x: &[u32; N], y: &[u32; N], samples: &[u32; N]) -> Self {
@@ -207,7 +207,7 @@ mod tests {
         decision: Decision,
         of: u32,
     ) -> impl Iterator<Item = [f32; 2]> {
-        let row = SamplerRow::new(seed, &[x], &[y], &[sample]);
+        let row = SamplerPacket::new(seed, &[x], &[y], &[sample]);
         (0..of).map(move |repetition| row.pairs(&[1], decision, repetition, of).map(|[x]| x))
     }
 
@@ -220,7 +220,7 @@ mod tests {
                 let seed = mix(own.seed ^ Decision::Choice.dimension(1)) ^ mix((index >> 32) as u32);
                 let [[x], [y]] = scrambled([index as u32], [seed]);
                 assert_eq!([x, y], point, "number {i} of sample {sample}");
-                let row = SamplerRow::new(2, &[3; 16], &[4; 16], &[sample; 16]);
+                let row = SamplerPacket::new(2, &[3; 16], &[4; 16], &[sample; 16]);
                 let [x, y] = row.pairs(&[1; 16], Decision::Choice, i as u32, n);
                 assert_eq!([x[i % 16], y[15]], point, "number {i} of sample {sample} in a row");
             }
@@ -265,7 +265,7 @@ mod tests {
     fn aligned_repetition_groups_are_stratified() {
         // Check every aligned group of 32 repetitions, for several numbers of groups per sample.
         for (sample, of) in [(0, 32), (5, 96), (77, 160), (1 << 27, 64)] {
-            let row = SamplerRow::new(3, &[7; 16], &[9; 16], &[sample; 16]);
+            let row = SamplerPacket::new(3, &[7; 16], &[9; 16], &[sample; 16]);
             let paths = std::array::from_fn(|i| i as u32);
             for group in 0..of / 32 {
                 let mut found = [0_u32; 16];

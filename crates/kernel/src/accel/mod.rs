@@ -8,20 +8,20 @@ mod reference;
 pub mod wide_bvh;
 
 #[cfg(test)]
-mod facets_tests;
-#[cfg(test)]
 mod pathological;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
-mod watertight_rows_tests;
+mod triangle_list_tests;
+#[cfg(test)]
+mod watertight_packet_tests;
 
 pub use along::{Cell, Stretch};
 pub use bvh::{AnyTest, Bvh, ClosestTest};
 pub use kd_tree::KdTree;
 pub use wide_bvh::{InstructionSet, SimdKernel, WideBvh};
 
-pub use crate::geometry::rows::{F32x16, PACKET_SIZE};
+pub use crate::geometry::packet::{F32x16, PACKET_SIZE};
 
 /// Ends of at most [`PACKET_SIZE`] rays.
 #[inline(always)]

@@ -2,9 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::axial::{self, AxialFrame, Line, Stretch, across, at_turn, is_rounding, radial, ring_shown, turn};
 use super::disk::{BORDER, Disk};
-use super::surface_rows::{Exact, ExactPoint};
+use super::surface_of_revolution::{
+    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_rounding, radial,
+    ring_projected_area, sine_from_cosine,
+};
+use super::surface_packet::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -45,15 +48,15 @@ impl Cone {
 
     /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(axial::hit)
+        self.nearest(ray).map(surface_of_revolution::hit)
     }
 
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let line = self.frame.line(ray);
         let base = if self.capped { self.height } else { self.height * (1.0 + BORDER) };
-        let ends = Stretch::between(&line, (0.0, 0), (base, 1))?;
+        let ends = LineInterval::between(&line, (0.0, 0), (base, 1))?;
         let starts_on = |part| self.starts_on(ray, part);
-        axial::meet(ray, &line, self.side_stretch(&line)?, ends, self.capped, starts_on)
+        surface_of_revolution::first_hit(ray, &line, self.side_interval(&line)?, ends, self.capped, starts_on)
     }
 
     /// Whether a ray starts on a part, up to rounding.
@@ -70,7 +73,7 @@ impl Cone {
     /// tip. The quadratic A·s² − 2B·s + C is relative to the point of the line nearest to the tip, so that B
     /// is a single product. B² − AC is a difference of squares of the line's moment about the tip, which is
     /// precise to the last digits even for lines that graze the side near the tip.
-    fn side_stretch(&self, line: &Line) -> Option<Stretch> {
+    fn side_interval(&self, line: &LocalLine) -> Option<LineInterval> {
         let k = self.radius / self.height;
         let (p, d) = (line.foot, line.direction);
         let factors = |x: DVec3| {
@@ -90,9 +93,9 @@ impl Cone {
         let a = if a == 0.0 { -0.0 } else { a };
         let (s0, s1) = if q == 0.0 { (0.0, 0.0) } else { (c / q, q / a) };
         Some(match (crosses_both, d.z > 0.0) {
-            (false, _) => Stretch::of_side(s0.min(s1), s0.max(s1)),
-            (true, true) => Stretch::of_side(s0.max(s1), f64::INFINITY),
-            (true, false) => Stretch::of_side(f64::NEG_INFINITY, s0.min(s1)),
+            (false, _) => LineInterval::of_side(s0.min(s1), s0.max(s1)),
+            (true, true) => LineInterval::of_side(s0.max(s1), f64::INFINITY),
+            (true, false) => LineInterval::of_side(f64::NEG_INFINITY, s0.min(s1)),
         })
     }
 
@@ -100,10 +103,10 @@ impl Cone {
     fn exact_point(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {
         let line = self.frame.line(ray);
         let crossings = match hit.primitive {
-            0 => self.side_stretch(&line),
-            cap => Stretch::between(&line, (self.height, cap), (self.height, cap)),
+            0 => self.side_interval(&line),
+            cap => LineInterval::between(&line, (self.height, cap), (self.height, cap)),
         };
-        axial::exact_point((ray, &line), hit, crossings, || self.nearest(ray))
+        surface_of_revolution::exact_point((ray, &line), hit, crossings, || self.nearest(ray))
     }
 
     /// Surface point at a hit.
@@ -120,7 +123,7 @@ impl Cone {
         SurfacePoint::exact(
             point,
             normal,
-            Vec2::new(turn(mirrored(out)) as f32, (1.0 - along / self.slant) as f32),
+            Vec2::new(angle_to_u(mirrored(out)) as f32, (1.0 - along / self.slant) as f32),
             self.frame.vector(around.extend(0.0)),
             self.frame.vector((out * -self.radius).extend(-self.height)),
             reach,
@@ -152,7 +155,7 @@ impl Cone {
             return self.base().uv_at(point);
         }
         let (_, along) = self.along(local);
-        DVec2::new(turn(mirrored(radial(local.truncate()))), 1.0 - along / self.slant)
+        DVec2::new(angle_to_u(mirrored(radial(local.truncate()))), 1.0 - along / self.slant)
     }
 
     /// Mean curvature at a point of a part. On the side only the direction around the axis contributes, which
@@ -168,7 +171,7 @@ impl Cone {
 
     /// Point and unit normal of the side at texture coordinates.
     pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
-        let out = mirrored(at_turn(u));
+        let out = mirrored(direction_at_u(u));
         let point = (out * self.radius).extend(self.height) * (1.0 - v);
         let normal = (out * self.height).extend(-self.radius) / self.slant;
         (self.frame.point(point), self.frame.vector(normal))
@@ -186,18 +189,18 @@ impl Cone {
     }
 
     /// Samples a point of a part uniformly over its area.
-    pub fn place(&self, part: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         match part {
             0 => {
                 let (point, normal) = self.side(f64::from(u.x), 1.0 - (1.0 - f64::from(u.y)).sqrt());
                 AreaPoint { point, normal }
             }
-            _ => self.base().place(0, u),
+            _ => self.base().sample(0, u),
         }
     }
 
     /// Centroid of the surface.
-    pub fn middle(&self) -> DVec3 {
+    pub fn centroid(&self) -> DVec3 {
         let [side, cap] = self.areas();
         self.frame.point(DVec3::Z * (self.height * (side * 2.0 / 3.0 + cap) / (side + cap)))
     }
@@ -208,7 +211,7 @@ impl Cone {
         let [side, cap] = self.areas();
         // Components of the side's normals across the axis and towards the tip.
         let (cosine, sine) = (self.height / self.slant, self.radius / self.slant);
-        ring_shown(side, cosine * across(along), -sine * along) + cap * along.max(0.0)
+        ring_projected_area(side, cosine * sine_from_cosine(along), -sine * along) + cap * along.max(0.0)
     }
 
     /// The tip.
@@ -253,7 +256,7 @@ fn mirrored(p: DVec2) -> DVec2 {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
-    use crate::geometry::axial::tests::{Thin, hits_from_afar};
+    use crate::geometry::surface_of_revolution::tests::{Thin, hits_from_afar};
     use crate::math::Vec3;
 
     /// A cone on the ground with its tip at y = 2 and a base of radius 1.
@@ -337,8 +340,8 @@ mod tests {
             self.nearest(ray)
         }
 
-        fn within(&self, ray: &RayF64) -> Option<Stretch> {
-            self.side_stretch(&self.frame.line(ray))
+        fn within(&self, ray: &RayF64) -> Option<LineInterval> {
+            self.side_interval(&self.frame.line(ray))
         }
 
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {

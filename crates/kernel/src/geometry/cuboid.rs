@@ -1,8 +1,8 @@
 //! Oriented boxes in double precision.
 
-use super::rows::{F32x16, HitRows, RayRows, accept};
+use super::packet::{F32x16, HitPacket, RayPacket, accept};
 use super::surface::flat_axes;
-use super::surface_rows::{Exact, ExactPoint};
+use super::surface_packet::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
@@ -56,7 +56,7 @@ impl Cuboid {
 
     /// [`Cuboid::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows) {
+    pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket) {
         let axes = [self.axes.x_axis, self.axes.y_axis, self.axes.z_axis];
         let half = self.half.to_array();
         for (lane, &end) in ends.iter().enumerate() {
@@ -180,14 +180,14 @@ impl Cuboid {
     }
 
     /// Samples a point of a face uniformly over its area.
-    pub fn place(&self, face: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, face: u32, u: Vec2) -> AreaPoint {
         let (corner, a, b) = self.face(face);
         let point = corner + a * f64::from(u.x) + b * f64::from(u.y);
         AreaPoint { point, normal: self.axes * face_normal(face).1 }
     }
 
     /// Centroid.
-    pub fn middle(&self) -> DVec3 {
+    pub fn centroid(&self) -> DVec3 {
         self.center
     }
 

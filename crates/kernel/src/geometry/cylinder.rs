@@ -2,9 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::axial::{self, AxialFrame, Line, Stretch, across, at_turn, is_rounding, radial, ring_shown, turn};
 use super::disk::{BORDER, Disk};
-use super::surface_rows::{Exact, ExactPoint};
+use super::surface_of_revolution::{
+    self, AxialFrame, LineInterval, LocalLine, angle_to_u, direction_at_u, is_rounding, radial,
+    ring_projected_area, sine_from_cosine,
+};
+use super::surface_packet::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 
@@ -42,15 +45,15 @@ impl Cylinder {
 
     /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(axial::hit)
+        self.nearest(ray).map(surface_of_revolution::hit)
     }
 
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
         let line = self.frame.line(ray);
         let end = if self.capped { self.half_length } else { self.half_length * (1.0 + BORDER) };
-        let ends = Stretch::between(&line, (-end, 1), (end, 2))?;
+        let ends = LineInterval::between(&line, (-end, 1), (end, 2))?;
         let starts_on = |part| self.starts_on(ray, part);
-        axial::meet(ray, &line, self.side_stretch(&line)?, ends, self.capped, starts_on)
+        surface_of_revolution::first_hit(ray, &line, self.side_interval(&line)?, ends, self.capped, starts_on)
     }
 
     /// Whether a ray starts on a part, up to rounding.
@@ -66,12 +69,12 @@ impl Cylinder {
     /// Interval in which the line is within the radius. Uses the distance of the projected line from the axis
     /// and avoids cancellation, as for spheres (Haines, Günther, Akenine-Möller, Ray Tracing Gems, chapter
     /// 7).
-    fn side_stretch(&self, line: &Line) -> Option<Stretch> {
+    fn side_interval(&self, line: &LocalLine) -> Option<LineInterval> {
         let (p, d) = (line.foot.truncate(), line.direction.truncate());
         let factors = |distance: f64| (distance - self.radius) * (distance + self.radius);
         let (a, c) = (d.length_squared(), factors(p.length()));
         if a == 0.0 {
-            return (c <= 0.0).then_some(Stretch::WHOLE);
+            return (c <= 0.0).then_some(LineInterval::WHOLE);
         }
         let b = -p.dot(d);
         let discriminant = -factors(p.perp_dot(d).abs() / a.sqrt());
@@ -80,7 +83,7 @@ impl Cylinder {
         }
         let q = b + (a * discriminant).sqrt().copysign(b);
         let (t0, t1) = (if q == 0.0 { 0.0 } else { c / q }, q / a);
-        Some(Stretch::of_side(t0.min(t1), t0.max(t1)))
+        Some(LineInterval::of_side(t0.min(t1), t0.max(t1)))
     }
 
     /// Unrounded point of a hit.
@@ -88,10 +91,10 @@ impl Cylinder {
         let line = self.frame.line(ray);
         let height = if hit.primitive == 1 { -self.half_length } else { self.half_length };
         let crossings = match hit.primitive {
-            0 => self.side_stretch(&line),
-            cap => Stretch::between(&line, (height, cap), (height, cap)),
+            0 => self.side_interval(&line),
+            cap => LineInterval::between(&line, (height, cap), (height, cap)),
         };
-        axial::exact_point((ray, &line), hit, crossings, || self.nearest(ray))
+        surface_of_revolution::exact_point((ray, &line), hit, crossings, || self.nearest(ray))
     }
 
     /// Surface point at a hit.
@@ -105,7 +108,7 @@ impl Cylinder {
         SurfacePoint::exact(
             point,
             normal,
-            Vec2::new(turn(out) as f32, self.height(z) as f32),
+            Vec2::new(angle_to_u(out) as f32, self.height(z) as f32),
             self.frame.vector((out.perp() * (TAU * self.radius)).extend(0.0)),
             self.frame.vector(DVec3::Z * (2.0 * self.half_length)),
             reach,
@@ -139,7 +142,7 @@ impl Cylinder {
         if self.capped && below.abs() < inwards.abs() {
             return self.cap(if local.z < 0.0 { 1 } else { 2 }).uv_at(point);
         }
-        DVec2::new(turn(radial(local.truncate())), self.height(local.z))
+        DVec2::new(angle_to_u(radial(local.truncate())), self.height(local.z))
     }
 
     /// Mean curvature of a part.
@@ -153,7 +156,7 @@ impl Cylinder {
 
     /// Point and unit normal of the side at texture coordinates.
     pub fn side(&self, u: f64, v: f64) -> (DVec3, DVec3) {
-        let (out, z) = (at_turn(u), (2.0 * v - 1.0) * self.half_length);
+        let (out, z) = (direction_at_u(u), (2.0 * v - 1.0) * self.half_length);
         (self.frame.point((out * self.radius).extend(z)), self.frame.vector(out.extend(0.0)))
     }
 
@@ -171,18 +174,18 @@ impl Cylinder {
     }
 
     /// Samples a point of a part uniformly over its area.
-    pub fn place(&self, part: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
         match part {
             0 => {
                 let (point, normal) = self.side(f64::from(u.x), f64::from(u.y));
                 AreaPoint { point, normal }
             }
-            cap => self.cap(cap).place(0, u),
+            cap => self.cap(cap).sample(0, u),
         }
     }
 
     /// Centroid.
-    pub fn middle(&self) -> DVec3 {
+    pub fn centroid(&self) -> DVec3 {
         self.frame.origin
     }
 
@@ -190,7 +193,7 @@ impl Cylinder {
     pub fn projected_area(&self, direction: DVec3) -> f64 {
         let along = self.frame.axis().dot(direction);
         let [side, cap, _] = self.areas();
-        ring_shown(side, across(along), 0.0) + cap * along.abs()
+        ring_projected_area(side, sine_from_cosine(along), 0.0) + cap * along.abs()
     }
 
     /// Whether the cylinder has caps.
@@ -229,7 +232,7 @@ impl Cylinder {
 mod tests {
     use super::*;
     use crate::geometry::Ray;
-    use crate::geometry::axial::tests::{Thin, hits_from_afar};
+    use crate::geometry::surface_of_revolution::tests::{Thin, hits_from_afar};
     use crate::math::Vec3;
 
     /// A cylinder around the axis x = 1, z = 0, from y = 0 to y = 4.
@@ -296,8 +299,8 @@ mod tests {
             self.nearest(ray)
         }
 
-        fn within(&self, ray: &RayF64) -> Option<Stretch> {
-            self.side_stretch(&self.frame.line(ray))
+        fn within(&self, ray: &RayF64) -> Option<LineInterval> {
+            self.side_interval(&self.frame.line(ray))
         }
 
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3 {

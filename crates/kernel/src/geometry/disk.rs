@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::axial::{AxialFrame, exact_t, hit};
-use super::local_form::{Extent, Ground, LocalForm};
-use super::rows::{F32x16, HitRows, RayRows, accept};
-use super::surface_rows::{Exact, ExactPoint};
+use super::kernel_domain::{Extent, Ground, KernelDomain};
+use super::packet::{F32x16, HitPacket, RayPacket, accept};
+use super::surface_of_revolution::{AxialFrame, exact_t, hit};
+use super::surface_packet::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
@@ -41,7 +41,7 @@ impl Disk {
 
     /// [`Disk::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows) {
+    pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket) {
         let radius = self.radius * (1.0 + BORDER);
         for (lane, &end) in ends.iter().enumerate() {
             let line = self.frame.line(&rays.line(lane));
@@ -101,7 +101,7 @@ impl Disk {
     }
 
     /// Centroid.
-    pub fn middle(&self) -> DVec3 {
+    pub fn centroid(&self) -> DVec3 {
         self.frame.origin
     }
 
@@ -121,7 +121,7 @@ impl Disk {
     }
 
     /// Samples a point uniformly over the area.
-    pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
         AreaPoint { point: self.point(warp::disk(u).as_dvec2()), normal: self.normal() }
     }
 
@@ -132,11 +132,11 @@ impl Disk {
     }
 
     /// Geometry of the disk near a point.
-    pub fn local_form(&self, point: DVec3) -> LocalForm {
-        let (normal, from) = (self.normal(), point - self.middle());
+    pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
+        let (normal, from) = (self.normal(), point - self.centroid());
         let extent = Extent::Flat(self.radius - from.length());
         let ground = Ground { normal, height: from.dot(normal).abs(), extent };
-        LocalForm::Surface { distance: self.distance(point), ground: Some(ground) }
+        KernelDomain::Surface { distance: self.distance(point), ground: Some(ground) }
     }
 
     /// Whether a point is inside: always false, as a disk has no volume.

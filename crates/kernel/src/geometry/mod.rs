@@ -4,28 +4,28 @@
 //! tori, intersected in `f64` so that their rounding is invisible to `f32` rays.
 
 pub mod aabb;
-mod axial;
 pub mod cone;
 pub mod cuboid;
 pub mod cylinder;
 pub mod disk;
-pub mod facets;
-pub mod local_form;
+pub mod kernel_domain;
 pub mod mesh;
+pub mod packet;
 pub mod parallelogram;
 pub mod plane;
 pub mod ray;
-pub mod rows;
 pub mod sphere;
 pub mod surface;
-pub mod surface_rows;
+mod surface_of_revolution;
+pub mod surface_packet;
 pub mod torus;
 pub mod triangle;
+pub mod triangle_list;
 pub mod watertight;
-pub mod watertight_rows;
+pub mod watertight_packet;
 
 pub use aabb::Aabb;
-pub use local_form::LocalForm;
+pub use kernel_domain::KernelDomain;
 pub use ray::{Ray, RayF64};
 pub use surface::{AreaPoint, ShapeHit, SurfacePoint, SurfaceRequest};
 
@@ -35,12 +35,12 @@ use cone::Cone;
 use cuboid::Cuboid;
 use cylinder::Cylinder;
 use disk::Disk;
-use local_form::{Piece, parallelogram};
+use kernel_domain::{FlatPolygon, parallelogram};
+use packet::{F32x16, HitPacket, RayPacket};
 use parallelogram::Parallelogram;
 use plane::Plane;
-use rows::{F32x16, HitRows, RayRows};
 use sphere::Sphere;
-use surface_rows::{Exact as _, SurfaceRow};
+use surface_packet::{Exact as _, SurfacePacket};
 use torus::Torus;
 use triangle::Triangle;
 
@@ -68,7 +68,7 @@ pub enum Shape {
 }
 
 /// Calls the same method on a shape of any type.
-macro_rules! of_any {
+macro_rules! for_shape {
     ($shape:expr, $it:ident => $asked:expr) => {
         match $shape {
             Shape::Sphere($it) => $asked,
@@ -88,43 +88,43 @@ impl Shape {
     /// Finds the nearest hit.
     #[inline]
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        of_any!(self, it => it.intersect(ray))
+        for_shape!(self, it => it.intersect(ray))
     }
 
     /// Finds the nearest hits of the rays in `met`, with a SIMD loop if the shape has one. All other rays
     /// have negative ends, and `found` must not contain hits.
     #[inline(always)]
-    pub fn intersect_rows(
+    pub fn intersect_packet(
         &self,
-        rows: &RayRows,
+        rows: &RayPacket,
         met: u32,
         ends: &F32x16,
-        found: &mut HitRows,
+        found: &mut HitPacket,
         simd: impl Simd,
     ) {
         match self {
-            Self::Plane(plane) => plane.intersect_rows(rows, ends, found, simd),
-            Self::Quad(quad) => quad.intersect_rows(rows, ends, found, simd),
-            Self::Sphere(sphere) => sphere.intersect_rows(rows, ends, found, simd),
-            Self::Box(cuboid) => cuboid.intersect_rows(rows, ends, found),
-            Self::Triangle(triangle) => triangle.intersect_rows(rows, ends, found),
-            Self::Disk(disk) => disk.intersect_rows(rows, ends, found),
-            Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => self.one_by_one(rows, met, ends, found),
+            Self::Plane(plane) => plane.intersect_packet(rows, ends, found, simd),
+            Self::Quad(quad) => quad.intersect_packet(rows, ends, found, simd),
+            Self::Sphere(sphere) => sphere.intersect_packet(rows, ends, found, simd),
+            Self::Box(cuboid) => cuboid.intersect_packet(rows, ends, found),
+            Self::Triangle(triangle) => triangle.intersect_packet(rows, ends, found),
+            Self::Disk(disk) => disk.intersect_packet(rows, ends, found),
+            Self::Cylinder(_) | Self::Cone(_) | Self::Torus(_) => self.intersect_each(rows, met, ends, found),
         }
     }
 
     #[inline(never)]
-    fn one_by_one(&self, rays: &RayRows, met: u32, ends: &F32x16, found: &mut HitRows) {
-        for lane in rows::lanes(met) {
+    fn intersect_each(&self, rays: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
+        for lane in packet::lanes(met) {
             if let Some(hit) = self.intersect(&Ray { t_max: ends[lane], ..rays.ray(lane) }.to_f64()) {
                 found.put(lane, &hit);
             }
         }
     }
 
-    /// [`SurfaceRow::fill`]: returns whether the shape has a SIMD loop.
+    /// [`SurfacePacket::fill`]: returns whether the shape has a SIMD loop.
     #[inline(always)]
-    fn fill_surfaces(&self, row: &mut SurfaceRow, rays: &RayRows, hits: &HitRows, of: u32) -> bool {
+    fn fill_surfaces(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
             Self::Sphere(sphere) => row.fill_from(sphere, rays, hits, of),
             Self::Quad(quad) => row.fill_from(quad, rays, hits, of),
@@ -136,9 +136,9 @@ impl Shape {
         true
     }
 
-    /// [`SurfaceRow::fill_uv`]: returns whether the shape has a SIMD loop.
+    /// [`SurfacePacket::fill_uv`]: returns whether the shape has a SIMD loop.
     #[inline(always)]
-    fn fill_uvs(&self, row: &mut SurfaceRow, rays: &RayRows, hits: &HitRows, of: u32) -> bool {
+    fn fill_uvs(&self, row: &mut SurfacePacket, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         match self {
             Self::Quad(quad) => row.uv_from(quad, rays, hits, of),
             Self::Plane(plane) => row.uv_from(plane, rays, hits, of),
@@ -156,13 +156,13 @@ impl Shape {
     /// Surface point at a hit.
     #[inline]
     pub fn surface(&self, ray: &RayF64, hit: &ShapeHit) -> SurfacePoint {
-        of_any!(self, it => it.surface(ray, hit))
+        for_shape!(self, it => it.surface(ray, hit))
     }
 
     /// Requested parts of the surface point at a hit.
     #[inline]
-    pub fn asked_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
-        if asked.uv { self.surface(ray, hit) } else { of_any!(self, it => it.exact(ray, hit)).bare() }
+    pub fn requested_surface(&self, ray: &RayF64, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
+        if asked.uv { self.surface(ray, hit) } else { for_shape!(self, it => it.exact(ray, hit)).bare() }
     }
 
     /// Bounding box, or `None` if the shape is infinite.
@@ -198,22 +198,22 @@ impl Shape {
 
     /// Areas of the parts, indexed like `ShapeHit::primitive`; empty if the shape is infinite.
     pub fn areas(&self) -> Vec<f64> {
-        of_any!(self, it => it.areas().to_vec())
+        for_shape!(self, it => it.areas().to_vec())
     }
 
     /// Samples a point of a part uniformly over its area, for uniform `u` in [0, 1)².
-    pub fn place(&self, part: u32, u: Vec2) -> AreaPoint {
-        of_any!(self, it => it.place(part, u))
+    pub fn sample(&self, part: u32, u: Vec2) -> AreaPoint {
+        for_shape!(self, it => it.sample(part, u))
     }
 
     /// Centroid of the surface.
-    pub fn middle(&self) -> DVec3 {
-        of_any!(self, it => it.middle())
+    pub fn centroid(&self) -> DVec3 {
+        for_shape!(self, it => it.centroid())
     }
 
     /// Whether a point is inside.
     pub fn contains(&self, point: DVec3) -> bool {
-        of_any!(self, it => it.contains(point))
+        for_shape!(self, it => it.contains(point))
     }
 
     /// Whether the shape encloses a volume; a plane encloses the half-space behind it.
@@ -246,14 +246,14 @@ impl Shape {
             | Self::Quad(_)
             | Self::Triangle(_)
             | Self::Disk(_) => {
-                self.is_closed().then(|| of_any!(self, it => points.map(|point| it.contains(point))))
+                self.is_closed().then(|| for_shape!(self, it => points.map(|point| it.contains(point))))
             }
         }
     }
 
     /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
-        of_any!(self, it => it.uv_at(point))
+        for_shape!(self, it => it.uv_at(point))
     }
 
     /// Mean curvature at a point of a part; positive where the front is convex.
@@ -270,23 +270,23 @@ impl Shape {
 
     /// Geometry of the shape near a point.
     #[inline]
-    pub fn local_form(&self, point: DVec3) -> LocalForm {
+    pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         match self {
-            Self::Quad(_) | Self::Triangle(_) => LocalForm::Pieces(1),
-            Self::Box(_) => LocalForm::Pieces(6),
-            Self::Sphere(sphere) => sphere.local_form(point),
-            Self::Plane(plane) => plane.local_form(point),
-            Self::Disk(disk) => disk.local_form(point),
-            Self::Cylinder(cylinder) => LocalForm::curved(cylinder.distance(point)),
-            Self::Cone(cone) => LocalForm::curved(cone.distance(point)),
-            Self::Torus(torus) => LocalForm::curved(torus.distance(point)),
+            Self::Quad(_) | Self::Triangle(_) => KernelDomain::Polygons(1),
+            Self::Box(_) => KernelDomain::Polygons(6),
+            Self::Sphere(sphere) => sphere.kernel_domain(point),
+            Self::Plane(plane) => plane.kernel_domain(point),
+            Self::Disk(disk) => disk.kernel_domain(point),
+            Self::Cylinder(cylinder) => KernelDomain::curved(cylinder.distance(point)),
+            Self::Cone(cone) => KernelDomain::curved(cone.distance(point)),
+            Self::Torus(torus) => KernelDomain::curved(torus.distance(point)),
         }
     }
 
     /// Flat polygon with the given index. `None` if the index is out of range or the shape is not made of
     /// flat polygons.
     #[inline]
-    pub fn piece(&self, number: u32) -> Option<Piece> {
+    pub fn polygon(&self, number: u32) -> Option<FlatPolygon> {
         match self {
             Self::Quad(quad) => (number < 1).then(|| parallelogram((quad.corner, quad.u, quad.v))),
             Self::Triangle(triangle) => {
@@ -322,7 +322,7 @@ impl Shape {
     /// Projected area: the surface area facing a unit direction, weighted by the cosine. For a torus, the
     /// mean over all directions.
     pub fn projected_area(&self, direction: DVec3) -> f64 {
-        of_any!(self, it => it.projected_area(direction))
+        for_shape!(self, it => it.projected_area(direction))
     }
 }
 
@@ -353,7 +353,7 @@ mod tests {
     fn integral(shape: &Shape, asked: impl Fn(&AreaPoint) -> f64) -> f64 {
         let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
         let over_part = |(part, area): (u32, f64)| {
-            let sum: f64 = (0..SIDE * SIDE).map(|i| asked(&shape.place(part, grid(i)))).sum();
+            let sum: f64 = (0..SIDE * SIDE).map(|i| asked(&shape.sample(part, grid(i)))).sum();
             sum * area / f64::from(SIDE * SIDE)
         };
         (0..).zip(shape.areas()).map(over_part).sum()
@@ -362,11 +362,11 @@ mod tests {
     /// Hits of rays aimed at the shape from a sphere around it.
     fn hits(shape: &Shape) -> impl Iterator<Item = (RayF64, ShapeHit)> + '_ {
         (0..4000).filter_map(move |i| {
-            let around = Shape::Sphere(Sphere { center: shape.middle(), radius: 5.0 });
+            let around = Shape::Sphere(Sphere { center: shape.centroid(), radius: 5.0 });
             let u = |i: u32| Vec2::new(i as f32 * 0.618_034 % 1.0, i as f32 * 0.754_877_7 % 1.0);
-            let from = around.place(0, u(i)).point;
-            let near = Shape::Sphere(Sphere { center: shape.middle(), radius: 0.8 });
-            let to = near.place(0, u(3 * i + 7)).point;
+            let from = around.sample(0, u(i)).point;
+            let near = Shape::Sphere(Sphere { center: shape.centroid(), radius: 0.8 });
+            let to = near.sample(0, u(3 * i + 7)).point;
             let ray = Ray::new(from.as_vec3(), (to - from).as_vec3()).to_f64();
             shape.intersect(&ray).map(|hit| (ray, hit))
         })
@@ -378,7 +378,7 @@ mod tests {
             for (part, _) in (0_u32..).zip(shape.areas()).filter(|(_, area)| *area > 0.0) {
                 for i in 0..200_u32 {
                     let u = Vec2::new((i as f32 + 0.5) * 0.618_034 % 1.0, (i as f32 + 0.5) / 200.0);
-                    let place = shape.place(part, u);
+                    let place = shape.sample(part, u);
                     assert!((place.normal.length() - 1.0).abs() < 1e-9, "{shape:?}");
                     let from = place.point + place.normal * 0.01;
                     let ray = Ray::new(from.as_vec3(), -place.normal.as_vec3()).to_f64();
@@ -397,7 +397,7 @@ mod tests {
         for shape in shapes() {
             for (ray, hit) in hits(&shape).take(1000) {
                 let [bare, full] = [false, true]
-                    .map(|uv| shape.asked_surface(&ray, &hit, SurfaceRequest { uv, shadow_point: true }));
+                    .map(|uv| shape.requested_surface(&ray, &hit, SurfaceRequest { uv, shadow_point: true }));
                 let parts =
                     |of: &SurfacePoint| [of.point, of.error, of.normal, of.shadow_point, of.shading_normal];
                 assert_eq!(parts(&bare), parts(&full), "{shape:?} {ray:?}");
@@ -432,27 +432,27 @@ mod tests {
             let area: f64 = shape.areas().iter().sum();
             for axis in 0..3 {
                 let mean = integral(&shape, |place| place.point[axis]) / area;
-                assert!((mean - shape.middle()[axis]).abs() < 2e-3, "{shape:?}: {mean}");
+                assert!((mean - shape.centroid()[axis]).abs() < 2e-3, "{shape:?}: {mean}");
             }
         }
     }
 
     #[test]
     fn distance_is_to_the_nearest_point() {
-        let distance = |shape: &Shape, point: DVec3| match shape.local_form(point) {
-            LocalForm::Surface { distance, .. } => Some(distance),
-            LocalForm::Pieces(_) => None,
+        let distance = |shape: &Shape, point: DVec3| match shape.kernel_domain(point) {
+            KernelDomain::Surface { distance, .. } => Some(distance),
+            KernelDomain::Polygons(_) => None,
         };
         for shape in shapes() {
             let parts = (0_u32..).zip(shape.areas()).filter(|(_, area)| *area > 0.0);
             let grid = |i: u32| Vec2::new((i % SIDE) as f32 + 0.5, (i / SIDE) as f32 + 0.5) / SIDE as f32;
             let places: Vec<DVec3> = parts
                 .flat_map(|(part, _)| (0..SIDE * SIDE).map(move |i| (part, grid(i))))
-                .map(|(part, u)| shape.place(part, u).point)
+                .map(|(part, u)| shape.sample(part, u).point)
                 .collect();
             for i in 0..12_u32 {
                 let u = |factor: f64| (f64::from(i) + 0.5) * factor % 1.0 * 3.0 - 1.5;
-                let point = shape.middle() + DVec3::new(u(0.618_034), u(0.754_878), u(0.569_84));
+                let point = shape.centroid() + DVec3::new(u(0.618_034), u(0.754_878), u(0.569_84));
                 let Some(told) = distance(&shape, point).filter(|_| !places.is_empty()) else { continue };
                 let nearest = places.iter().map(|place| (*place - point).length()).fold(f64::MAX, f64::min);
                 assert!((told - 1e-9..told + 0.03).contains(&nearest), "{shape:?}: {told}, {nearest}");

@@ -1,7 +1,7 @@
 //! Quads: squares and other parallelograms in double precision.
 
-use super::rows::{F32x16, HitRows, PACKET_SIZE, RayRows, accept, may_accept};
-use super::surface_rows::{Exact, ExactPoint, Mapped};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept, may_accept};
+use super::surface_packet::{Exact, ExactPoint, Mapped};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -53,7 +53,7 @@ impl Parallelogram {
 
     /// [`Parallelogram::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows, simd: impl Simd) {
+    pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket, simd: impl Simd) {
         let (mut above, mut along, mut may_hit) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [0; PACKET_SIZE]);
         for lane in 0..PACKET_SIZE {
             let ray = rays.line(lane);
@@ -115,13 +115,13 @@ impl Parallelogram {
     }
 
     /// Samples a point uniformly over the area.
-    pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
         let point = self.corner + self.u * f64::from(u.x) + self.v * f64::from(u.y);
         AreaPoint { point, normal: self.normal.normalize() }
     }
 
     /// Centroid.
-    pub fn middle(&self) -> DVec3 {
+    pub fn centroid(&self) -> DVec3 {
         self.corner + (self.u + self.v) * 0.5
     }
 

@@ -1,9 +1,9 @@
 //! Infinite planes in double precision.
 
-use super::local_form::{Extent, Ground, LocalForm};
-use super::rows::{F32x16, HitRows, PACKET_SIZE, RayRows, accept, may_accept};
+use super::kernel_domain::{Extent, Ground, KernelDomain};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept, may_accept};
 use super::surface::flat_axes;
-use super::surface_rows::{Exact, ExactPoint, Mapped};
+use super::surface_packet::{Exact, ExactPoint, Mapped};
 use super::{AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -35,7 +35,7 @@ impl Plane {
 
     /// [`Plane::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows, simd: impl Simd) {
+    pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket, simd: impl Simd) {
         let (mut above, mut along, mut may_hit) = ([0.0; PACKET_SIZE], [0.0; PACKET_SIZE], [0; PACKET_SIZE]);
         for lane in 0..PACKET_SIZE {
             let ray = rays.line(lane);
@@ -83,12 +83,12 @@ impl Plane {
     }
 
     /// The plane's reference point, as no uniform sampling exists.
-    pub fn place(&self, _: u32, _: Vec2) -> AreaPoint {
+    pub fn sample(&self, _: u32, _: Vec2) -> AreaPoint {
         AreaPoint { point: self.point, normal: self.normal }
     }
 
     /// The plane's reference point.
-    pub fn middle(&self) -> DVec3 {
+    pub fn centroid(&self) -> DVec3 {
         self.point
     }
 
@@ -103,10 +103,10 @@ impl Plane {
     }
 
     /// Geometry of the plane near a point.
-    pub fn local_form(&self, point: DVec3) -> LocalForm {
+    pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let distance = self.distance(point);
         let ground = Ground { normal: self.normal, height: distance, extent: Extent::Flat(f64::INFINITY) };
-        LocalForm::Surface { distance, ground: Some(ground) }
+        KernelDomain::Surface { distance, ground: Some(ground) }
     }
 
     /// Whether a point is inside: always false.

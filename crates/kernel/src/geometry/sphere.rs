@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use super::local_form::{Extent, Ground, LocalForm};
-use super::rows::{F32x16, HitRows, PACKET_SIZE, RayRows, accept};
-use super::surface_rows::{Exact, ExactPoint};
+use super::kernel_domain::{Extent, Ground, KernelDomain};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, accept};
+use super::surface_packet::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Simd, TRUE};
 use crate::math::{DVec2, DVec3, Vec2};
@@ -41,7 +41,7 @@ impl Sphere {
 
     /// [`Sphere::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows, simd: impl Simd) {
+    pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket, simd: impl Simd) {
         let (mut discriminants, mut may_hit) = ([0.0; PACKET_SIZE], [0; PACKET_SIZE]);
         for lane in 0..PACKET_SIZE {
             let ray = rays.line(lane);
@@ -95,7 +95,7 @@ impl Sphere {
     }
 
     /// Samples a point uniformly over the area.
-    pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         let height = 1.0 - 2.0 * x;
         let across = (1.0 - height * height).max(0.0).sqrt();
@@ -105,7 +105,7 @@ impl Sphere {
     }
 
     /// Centroid.
-    pub fn middle(&self) -> DVec3 {
+    pub fn centroid(&self) -> DVec3 {
         self.center
     }
 
@@ -115,10 +115,10 @@ impl Sphere {
     }
 
     /// Geometry of the sphere near a point.
-    pub fn local_form(&self, point: DVec3) -> LocalForm {
+    pub fn kernel_domain(&self, point: DVec3) -> KernelDomain {
         let (distance, out) = (self.distance(point), (point - self.center).normalize_or_zero());
         let ground = Ground { normal: out, height: distance, extent: Extent::Round(self.radius) };
-        LocalForm::Surface { distance, ground: Some(ground) }
+        KernelDomain::Surface { distance, ground: Some(ground) }
     }
 
     /// Whether a point is inside.

@@ -1,7 +1,7 @@
 //! Single triangles in double precision.
 
-use super::rows::{F32x16, HitRows, RayRows, accept};
-use super::surface_rows::{Exact, ExactPoint};
+use super::packet::{F32x16, HitPacket, RayPacket, accept};
+use super::surface_packet::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit, SurfacePoint};
 use crate::math::{DVec2, DVec3, Vec2};
 use crate::sampling::warp;
@@ -39,7 +39,7 @@ impl Triangle {
 
     /// [`Triangle::intersect`] for a packet.
     #[inline(always)]
-    pub fn intersect_rows(&self, rays: &RayRows, ends: &F32x16, hits: &mut HitRows) {
+    pub fn intersect_packet(&self, rays: &RayPacket, ends: &F32x16, hits: &mut HitPacket) {
         for (lane, &end) in ends.iter().enumerate() {
             let ray = rays.line(lane);
             let (a, b, c) = (self.a - ray.origin, self.b - ray.origin, self.c - ray.origin);
@@ -84,13 +84,13 @@ impl Triangle {
     }
 
     /// Samples a point uniformly over the area.
-    pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
         let w = warp::triangle(u).as_dvec3();
         AreaPoint { point: self.a * w.x + self.b * w.y + self.c * w.z, normal: self.normal().normalize() }
     }
 
     /// Centroid.
-    pub fn middle(&self) -> DVec3 {
+    pub fn centroid(&self) -> DVec3 {
         (self.a + self.b + self.c) / 3.0
     }
 

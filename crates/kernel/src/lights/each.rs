@@ -9,7 +9,7 @@ use super::delta::DeltaLight;
 use super::row::{LightRow, row_of};
 use super::sample::Source;
 use super::{Light, Lights};
-use crate::geometry::rows::lanes;
+use crate::geometry::packet::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 

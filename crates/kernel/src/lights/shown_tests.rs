@@ -113,7 +113,7 @@ fn near_and_far_lamps_scatter_at_most_twice_as_much_as_a_ball_of_their_solid_ang
 /// cosines at the receiver in directions uniform over the solid angle.
 fn scatter_of_a_ball(shape: &Shape, from: Vec3) -> (f64, f64) {
     // Take directions all around the middle of the shape that hit its front.
-    let frame = Frame::from_normal((shape.middle().as_vec3() - from).normalize());
+    let frame = Frame::from_normal((shape.centroid().as_vec3() - from).normalize());
     let (mut solid_angle, mut sum, mut cosines) = (0.0, Vec3::ZERO, Vec::new());
     let around = shape.bounds().expect("it has an end");
     let reach = around.extent().length() * 0.5 / (around.center() - from).length();

@@ -189,7 +189,7 @@ fn the_samples_of_both_sides_fill_all_directions_in_which_the_shape_is_seen() {
         let lights = two_sided(&shape);
         // Points around it, and one inside of it.
         let is_flat = area_light(&shape, Vec3::ONE, 0).is_some_and(|light| light.bounds.cone.cos == 1.0);
-        let inner = shape.place(0, Vec2::splat(0.5));
+        let inner = shape.sample(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
         for from in points().into_iter().chain((!is_flat).then_some(inner)) {
             let (n, mut seen, mut sum) = (100_000_u32, 0.0, 0.0);
@@ -230,7 +230,7 @@ fn the_density_of_a_sample_of_a_back_is_that_of_its_hit() {
     for shape in shapes().into_iter().chain([tube]) {
         let light = Light::Area(back_light(&shape, Vec3::ONE, OBJECT).expect("a light"));
         let mut compared = 0;
-        let inner = shape.place(0, Vec2::splat(0.5));
+        let inner = shape.sample(0, Vec2::splat(0.5));
         let inner = (inner.point - inner.normal * 0.1).as_vec3();
         for from in points().into_iter().chain([inner]) {
             for (direction, target, factor) in samples(&light, 0, from, 256) {
@@ -253,10 +253,10 @@ fn densities_integrate_to_one_over_the_directions_that_meet_the_light() {
     for shape in shapes() {
         let lights = lights_of(&shape);
         let around = shape.bounds().expect("it has an end");
-        let reach = around.extent().length() * 0.5 + (around.center() - shape.middle().as_vec3()).length();
+        let reach = around.extent().length() * 0.5 + (around.center() - shape.centroid().as_vec3()).length();
         for from in points() {
             // Directions in a cone around the shape.
-            let to_middle = shape.middle() - from.as_dvec3();
+            let to_middle = shape.centroid() - from.as_dvec3();
             let sin = (f64::from(reach) / to_middle.length()).min(1.0) as f32;
             let cone = SphereCone::new(to_middle.as_vec3(), sin);
             let (mut sums, n) = (vec![0.0; lights.len()], 200_000);

@@ -29,8 +29,8 @@ use super::transport::walk::{Interaction, Interface, NullInteraction, OpaqueHit,
 use super::view::LightAov;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::geometry::rows::{RayRows, lanes};
-use crate::geometry::surface_rows::SurfaceRow;
+use crate::geometry::packet::{RayPacket, lanes};
+use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::bsdf::LobeSet;
 use crate::materials::{Bsdf, Coated, GlassPoint, Mirror, Pane, Rough, RoughBsdf};
 use crate::math::Vec3;
@@ -129,7 +129,7 @@ struct Wavefront<'a, 's> {
     /// Vertices of this bounce that await direct lighting.
     direct: &'a mut DirectLightQueue,
     /// Surfaces at the hits of the current packet.
-    surfaces: &'a mut SurfaceRow,
+    surfaces: &'a mut SurfacePacket,
     accumulator: Accumulator<'s>,
     /// Rays of the next bounce.
     next: &'a mut Vec<PathRay>,
@@ -318,7 +318,7 @@ impl Wavefront<'_, '_> {
     /// receives it before any direct light, so it can be added directly.
     fn add_visible_emission(
         &mut self,
-        rays: &RayRows,
+        rays: &RayPacket,
         first: u32,
         packet: &PacketHits,
         (plain, beyond): (u32, u32),

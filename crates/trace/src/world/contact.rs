@@ -182,7 +182,7 @@ impl World {
         let ray = sides.ray().to_f64();
         let bare = SurfaceRequest { uv: false, shadow_point: false };
         let own = shape.intersect(&ray)?;
-        let is_front = shape.asked_surface(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
+        let is_front = shape.requested_surface(&ray, &own, bare).normal.as_dvec3().dot(ray.direction) < 0.0;
         Some(self.surface_near(Hit { shape: own, object }, material, is_front))
     }
 

@@ -3,8 +3,8 @@
 
 use super::MeshInstance;
 use crate::accel::{F32x16, PACKET_SIZE};
-use crate::geometry::rows::{HitRows, RayRows};
-use crate::geometry::watertight_rows::ShearedRows;
+use crate::geometry::packet::{HitPacket, RayPacket};
+use crate::geometry::watertight_packet::ShearedPacket;
 use crate::math::lanes::{Simd, lane, set_lane};
 
 /// Most triangles of such a mesh: for more, the tree skips so many that it is faster.
@@ -21,14 +21,14 @@ impl MeshInstance {
     #[inline(always)]
     pub(super) fn closest_of_few(
         &self,
-        rows: &RayRows,
+        rows: &RayPacket,
         met: u32,
         ends: &F32x16,
-        found: &mut HitRows,
+        found: &mut HitPacket,
         simd: impl Simd,
     ) {
         let (mesh, local, mut ends) = (&self.tree.loaded().mesh, self.local_rows(rows), *ends);
-        let rays = ShearedRows::new(&local);
+        let rays = ShearedPacket::new(&local);
         for number in 0..mesh.triangles.len() as u32 {
             rays.closest((number, &mesh.corners(number)), (met, &mut ends), found, simd);
         }
@@ -38,14 +38,14 @@ impl MeshInstance {
     #[inline(always)]
     pub(super) fn any_of_few(
         &self,
-        rows: &RayRows,
+        rows: &RayPacket,
         met: u32,
         ends: &F32x16,
         except: Option<(u32, &[u32; PACKET_SIZE])>,
         simd: impl Simd,
     ) -> u32 {
         let (mesh, local) = (&self.tree.loaded().mesh, self.local_rows(rows));
-        let (rays, mut hit) = (ShearedRows::new(&local), 0);
+        let (rays, mut hit) = (ShearedPacket::new(&local), 0);
         for number in 0..mesh.triangles.len() as u32 {
             let mut asked = met & !hit;
             if let Some((own, parts)) = except {
@@ -63,8 +63,8 @@ impl MeshInstance {
 
     /// The rays in the mesh's coordinates.
     #[inline(always)]
-    fn local_rows(&self, rows: &RayRows) -> RayRows {
-        let RayRows { mut origin, mut direction, mut start } = *rows;
+    fn local_rows(&self, rows: &RayPacket) -> RayPacket {
+        let RayPacket { mut origin, mut direction, mut start } = *rows;
         if self.is_moved {
             for i in 0..PACKET_SIZE {
                 let at = self.transform.inverse_point(lane(&origin, i).as_dvec3()).as_vec3();
@@ -76,6 +76,6 @@ impl MeshInstance {
         for start in &mut start {
             *start = self.own_number(*start);
         }
-        RayRows::of(origin, direction).leaving(start)
+        RayPacket::of(origin, direction).leaving(start)
     }
 }

@@ -273,11 +273,11 @@ impl Geometry {
 
     /// The surface at a hit of this ray.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        self.asked_surface(ray, hit, SurfaceRequest::ALL)
+        self.requested_surface(ray, hit, SurfaceRequest::ALL)
     }
 
     /// The requested parts of the surface at a hit of this ray.
-    pub fn asked_surface(&self, ray: &Ray, hit: &Hit, asked: SurfaceRequest) -> SurfacePoint {
+    pub fn requested_surface(&self, ray: &Ray, hit: &Hit, asked: SurfaceRequest) -> SurfacePoint {
         self.objects[hit.object as usize].surface(ray, &hit.shape, asked)
     }
 

@@ -130,7 +130,7 @@ impl World {
                 return None;
             }
             let bare = SurfaceRequest { uv: false, shadow_point: false };
-            let surface = self.geometry.asked_surface(&ray, &hit, bare);
+            let surface = self.geometry.requested_surface(&ray, &hit, bare);
             if self.is_glass(material) && self.body(hit.object) == body.body {
                 let is_back = surface.normal.dot(ray.direction) > 0.0;
                 return Some((is_back != self.bodies.is_turned(hit.object), material));
@@ -151,7 +151,7 @@ impl Object {
                 let parts: Vec<usize> = (0..areas.len()).filter(|&part| areas[part] > 0.0).collect();
                 let part = *parts.get(number % parts.len().max(1))?;
                 let u = Vec2::new(0.618_034, 0.754_877_7) * (number as f32 + 0.5);
-                Some(shape.place(part as u32, u.fract()).point)
+                Some(shape.sample(part as u32, u.fract()).point)
             }
             Self::Mesh(mesh) => {
                 let count = mesh.triangle_count();

@@ -247,7 +247,7 @@ fn what_is_isolated_is_what_a_search_finds_nothing_at() {
             if !world.is_glass(world.material_index(&hit) as u32) {
                 continue;
             }
-            let surface = world.geometry.asked_surface(&ray, &hit, SurfaceRequest::ALL);
+            let surface = world.geometry.requested_surface(&ray, &hit, SurfaceRequest::ALL);
             let facing = surface.normal.dot(ray.direction);
             let normal = if facing > 0.0 { -surface.normal } else { surface.normal };
             let at = Meeting {

@@ -1,5 +1,5 @@
 //! Small meshes under one tree: a ray that passes many of them visits one set of boxes in place of a tree of each. Packets meet few
-//! triangles without a tree, as [`Facets`].
+//! triangles without a tree, as [`TriangleList`].
 //!
 //! The triangles are those of the instances in the scene's coordinates, rounded there; `contact` and `along` use the trees of the
 //! meshes themselves. Hits of instances that stand as in their files keep their bits.
@@ -8,8 +8,8 @@ use super::triangle_tree::TriangleTree;
 use super::{MeshInstance, Object};
 use crate::accel::{F32x16, InstructionSet, PACKET_SIZE, SimdKernel};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::facets::{self, Facets};
-use crate::geometry::rows::{HitRows, RayRows, lanes};
+use crate::geometry::packet::{HitPacket, RayPacket, lanes};
+use crate::geometry::triangle_list::{self, TriangleList};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, TRUE};
@@ -22,7 +22,7 @@ const MOST_EACH: usize = 1 << 14;
 const MOST_IN_ALL: usize = 1 << 17;
 
 /// Most triangles that rays side by side meet without a tree.
-const MOST_FACETS: usize = facets::MOST;
+const MOST_FACETS: usize = triangle_list::MOST;
 
 /// Least triangles that are worth being merged: fewer are as fast in rows of rays, mesh by mesh.
 const LEAST_FACETS: usize = 8;
@@ -44,7 +44,7 @@ pub struct MergedTriangle {
 pub struct MergedMeshes {
     tree: TriangleTree,
     /// Facets, which packets meet in place of the tree. `None` if there are too many triangles.
-    facets: Option<Facets>,
+    facets: Option<TriangleList>,
     /// Triangles in the order of objects, so that of hits at one distance the lowest object counts.
     triangles: Vec<MergedTriangle>,
     /// The number of the first triangle of each object; [`MergedMeshes::NOT_HERE`] of the others.
@@ -84,8 +84,11 @@ impl MergedMeshes {
                 .flat_map(|mesh| (0..mesh.triangle_count() as u32).map(|own| mesh.rounded_corners(own)))
         };
         chosen.sort_unstable();
-        let facets =
-            if total > MOST_FACETS { None } else { Facets::new(chosen.iter().flat_map(rounded).collect()) };
+        let facets = if total > MOST_FACETS {
+            None
+        } else {
+            TriangleList::new(chosen.iter().flat_map(rounded).collect())
+        };
         if total <= MOST_FACETS && facets.is_none() {
             return Ok(None);
         }
@@ -158,9 +161,9 @@ impl MergedMeshes {
     pub fn closest_rows(
         &self,
         by: InstructionSet,
-        rows: &RayRows,
+        rows: &RayPacket,
         (met, ends): (u32, &F32x16),
-        found: &mut HitRows,
+        found: &mut HitPacket,
     ) {
         let Some(facets) = &self.facets else { return self.closest_by_tree(rows, met, ends, found) };
         let size = self.bounds().extent();
@@ -174,7 +177,7 @@ impl MergedMeshes {
     /// The nearest hits of these rays, one by one.
     #[cold]
     #[inline(never)]
-    fn closest_of_each(&self, rows: &RayRows, these: u32, ends: &F32x16, found: &mut HitRows) {
+    fn closest_of_each(&self, rows: &RayPacket, these: u32, ends: &F32x16, found: &mut HitPacket) {
         for lane in lanes(these) {
             if let Some(hit) = self.tree.closest(&Ray { t_max: ends[lane], ..rows.ray(lane) }) {
                 found.put(lane, &hit);
@@ -183,7 +186,7 @@ impl MergedMeshes {
     }
 
     #[inline(never)]
-    fn closest_by_tree(&self, rows: &RayRows, met: u32, ends: &F32x16, found: &mut HitRows) {
+    fn closest_by_tree(&self, rows: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
         let mut hits = [None; PACKET_SIZE];
         self.tree.closest_packet(&rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
@@ -199,7 +202,7 @@ impl MergedMeshes {
     pub fn any_rows(
         &self,
         by: InstructionSet,
-        rows: &RayRows,
+        rows: &RayPacket,
         (met, ends): (u32, &F32x16),
         except: Option<&[u32; PACKET_SIZE]>,
     ) -> u32 {
@@ -216,7 +219,7 @@ impl MergedMeshes {
     /// A bit for each of these rays that hits any triangle but its own of `except`, one by one.
     #[cold]
     #[inline(never)]
-    fn any_of_each(&self, rows: &RayRows, these: u32, ends: &F32x16, except: &[u32; PACKET_SIZE]) -> u32 {
+    fn any_of_each(&self, rows: &RayPacket, these: u32, ends: &F32x16, except: &[u32; PACKET_SIZE]) -> u32 {
         let is_hit = |&lane: &usize| {
             let own = (except[lane] != Self::NO_TRIANGLE).then_some(except[lane]);
             self.tree.any(&Ray { t_max: ends[lane], ..rows.ray(lane) }, own)
@@ -227,7 +230,7 @@ impl MergedMeshes {
     #[inline(never)]
     fn any_by_tree(
         &self,
-        rows: &RayRows,
+        rows: &RayPacket,
         met: u32,
         ends: &F32x16,
         except: Option<&[u32; PACKET_SIZE]>,
@@ -240,7 +243,7 @@ impl MergedMeshes {
 
     /// Bytes that the tree takes.
     pub fn memory_bytes(&self) -> usize {
-        let facets = self.facets.as_ref().map_or(0, Facets::memory_bytes);
+        let facets = self.facets.as_ref().map_or(0, TriangleList::memory_bytes);
         self.tree.memory_bytes() + facets + size_of_val(&*self.triangles) + size_of_val(&*self.first)
     }
 }
@@ -248,7 +251,7 @@ impl MergedMeshes {
 /// Whether the rays in `met` start near each other, by the size of a box, and go similar ways: then they visit fewer triangles by
 /// the tree than by facets.
 #[inline(always)]
-fn are_alike(rows: &RayRows, met: u32, size: Vec3, simd: impl Simd) -> bool {
+fn are_alike(rows: &RayPacket, met: u32, size: Vec3, simd: impl Simd) -> bool {
     let first = met.trailing_zeros() as usize % PACKET_SIZE;
     let near = size.element_sum() * ALIKE;
     let along = (0..3).map(|axis| rows.direction[axis][first].abs()).sum::<f32>() * ALIKE;
@@ -267,14 +270,14 @@ fn are_alike(rows: &RayRows, met: u32, size: Vec3, simd: impl Simd) -> bool {
 /// Greatest distance of the starts of rays, by the size of all triangles, and of their directions, by their length.
 const ALIKE: f32 = 0.125;
 
-/// [`Facets::closest`], if the rays are not alike in a box of this size.
+/// [`TriangleList::closest`], if the rays are not alike in a box of this size.
 struct Nearest<'a> {
-    facets: &'a Facets,
+    facets: &'a TriangleList,
     size: Vec3,
-    rows: &'a RayRows,
+    rows: &'a RayPacket,
     met: u32,
     ends: &'a F32x16,
-    found: &'a mut HitRows,
+    found: &'a mut HitPacket,
 }
 
 impl SimdKernel for Nearest<'_> {
@@ -290,11 +293,11 @@ impl SimdKernel for Nearest<'_> {
     }
 }
 
-/// [`Facets::any`], if the rays are not alike in a box of this size.
+/// [`TriangleList::any`], if the rays are not alike in a box of this size.
 struct Any<'a> {
-    facets: &'a Facets,
+    facets: &'a TriangleList,
     size: Vec3,
-    rows: &'a RayRows,
+    rows: &'a RayPacket,
     met: u32,
     ends: &'a F32x16,
     except: &'a [u32; PACKET_SIZE],
@@ -315,7 +318,7 @@ impl SimdKernel for Any<'_> {
 
 /// The rays of a packet; a lane that is not in `met` gets the first ray that is, which goes in a similar direction.
 #[inline]
-fn rays(rows: &RayRows, met: u32) -> [Ray; PACKET_SIZE] {
+fn rays(rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
     let mut rays = [rows.ray(met.trailing_zeros() as usize % PACKET_SIZE); PACKET_SIZE];
     for lane in lanes(met & met.wrapping_sub(1)) {
         rays[lane] = rows.ray(lane);

@@ -7,7 +7,7 @@ use super::mesh_rows::uv_between;
 use super::mesh_tree::MeshTree;
 use super::placement::{Placement, Unmoved};
 use crate::accel::{F32x16, PACKET_SIZE};
-use crate::geometry::rows::{HitRows, RayRows, lanes};
+use crate::geometry::packet::{HitPacket, RayPacket, lanes};
 use crate::geometry::{Aabb, Ray, RayF64, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::materials::UvSet;
 use crate::math::transform::Transform;
@@ -256,7 +256,7 @@ impl MeshInstance {
 
     /// The nearest hits of the rays in `met`; the others end below 0.
     #[inline(never)]
-    pub(super) fn closest_rows(&self, rows: &RayRows, met: u32, ends: &F32x16, found: &mut HitRows) {
+    pub(super) fn closest_rows(&self, rows: &RayPacket, met: u32, ends: &F32x16, found: &mut HitPacket) {
         let mut hits = [None; PACKET_SIZE];
         self.tree.triangles().closest_packet(&self.local_rays(rows, met), ends, &mut hits);
         for (lane, hit) in hits.iter().enumerate() {
@@ -270,7 +270,7 @@ impl MeshInstance {
     #[inline(never)]
     pub(super) fn any_rows(
         &self,
-        rows: &RayRows,
+        rows: &RayPacket,
         met: u32,
         ends: &F32x16,
         except: Option<(u32, &[u32; PACKET_SIZE])>,
@@ -285,7 +285,7 @@ impl MeshInstance {
     /// The rays of a packet that are in `met`, in the mesh's coordinates; other lanes get the first of these rays, which goes in a
     /// similar direction.
     #[inline]
-    fn local_rays(&self, rows: &RayRows, met: u32) -> [Ray; PACKET_SIZE] {
+    fn local_rays(&self, rows: &RayPacket, met: u32) -> [Ray; PACKET_SIZE] {
         let local = |lane: usize| {
             let ray = rows.ray(lane % PACKET_SIZE);
             let ray = ray.leaving(self.own_number(ray.start));

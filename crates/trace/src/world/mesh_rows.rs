@@ -4,8 +4,8 @@ use super::MeshInstance;
 use super::mesh_facet::PlacedMesh;
 use super::placement::{Placement, Unmoved};
 use crate::accel::PACKET_SIZE;
-use crate::geometry::rows::{HitRows, RayRows, lanes};
-use crate::geometry::surface_rows::SurfaceRow;
+use crate::geometry::packet::{HitPacket, RayPacket, lanes};
+use crate::geometry::surface_packet::SurfacePacket;
 use crate::materials::UvSet;
 use crate::math::lanes::{Simd, TRUE, Vec3x16, lane, set_lane};
 use crate::math::{Vec2, Vec3};
@@ -16,9 +16,9 @@ impl MeshInstance {
     #[inline(always)]
     pub fn fill_surfaces(
         &self,
-        surface: &mut SurfaceRow,
-        rays: &RayRows,
-        hits: &HitRows,
+        surface: &mut SurfacePacket,
+        rays: &RayPacket,
+        hits: &HitPacket,
         of: u32,
         asked_uvs: Option<UvSet>,
         simd: impl Simd,
@@ -35,8 +35,8 @@ impl MeshInstance {
     fn fill_placed(
         &self,
         placed: PlacedMesh<impl Placement>,
-        surface: &mut SurfaceRow,
-        (rays, hits): (&RayRows, &HitRows),
+        surface: &mut SurfacePacket,
+        (rays, hits): (&RayPacket, &HitPacket),
         of: u32,
         asked_uvs: Option<UvSet>,
         simd: impl Simd,
@@ -143,18 +143,18 @@ mod tests {
     struct Filling<'a> {
         mesh: &'a MeshInstance,
         rays: &'a [Ray],
-        hits: &'a HitRows,
+        hits: &'a HitPacket,
         of: u32,
         set: UvSet,
     }
 
     impl SimdKernel for Filling<'_> {
-        type Output = SurfaceRow;
+        type Output = SurfacePacket;
 
         #[inline(always)]
-        fn run(self, simd: impl Simd) -> SurfaceRow {
-            let mut surface = SurfaceRow::EMPTY;
-            let (rows, _) = RayRows::new(self.rays);
+        fn run(self, simd: impl Simd) -> SurfacePacket {
+            let mut surface = SurfacePacket::EMPTY;
+            let (rows, _) = RayPacket::new(self.rays);
             self.mesh.fill_surfaces(&mut surface, &rows, self.hits, self.of, Some(self.set), simd);
             surface
         }
@@ -259,7 +259,7 @@ mod tests {
                 let rays: Vec<Ray> = (0..PACKET_SIZE)
                     .map(|_| Ray::new(Vec3::splat(9.0), Vec3::new(next(), next(), next()).normalize()))
                     .collect();
-                let mut hits = HitRows::none();
+                let mut hits = HitPacket::none();
                 for i in 0..PACKET_SIZE {
                     let (u, v) = (number(next()), number(next()));
                     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };

@@ -54,7 +54,7 @@ pub use textures::{
 
 use crate::assets::OrbiterCamera;
 use crate::geometry::SurfacePoint;
-use crate::geometry::rows::lanes;
+use crate::geometry::packet::lanes;
 use crate::lights::Lights;
 use crate::materials::texels::Texels;
 use crate::materials::{Footprint, Material, Mipmaps, SecondPoint, TexturePoint};

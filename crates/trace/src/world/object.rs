@@ -2,7 +2,7 @@
 
 use super::mesh_instance::MeshInstance;
 use crate::accel::{F32x16, PACKET_SIZE};
-use crate::geometry::rows::{HitRows, RayRows};
+use crate::geometry::packet::{HitPacket, RayPacket};
 use crate::geometry::sphere::Sphere;
 use crate::geometry::{Aabb, Ray, RayF64, Shape, ShapeHit, SurfacePoint, SurfaceRequest};
 use crate::lights::{Ball, Outline};
@@ -39,14 +39,14 @@ impl Object {
     #[inline(always)]
     pub fn closest_rows(
         &self,
-        rows: &RayRows,
+        rows: &RayPacket,
         met: u32,
         ends: &F32x16,
-        found: &mut HitRows,
+        found: &mut HitPacket,
         simd: impl Simd,
     ) {
         match self {
-            Self::Shape(shape) => shape.intersect_rows(rows, met, ends, found, simd),
+            Self::Shape(shape) => shape.intersect_packet(rows, met, ends, found, simd),
             Self::Mesh(mesh) if mesh.has_few() => mesh.closest_of_few(rows, met, ends, found, simd),
             Self::Mesh(mesh) => mesh.closest_rows(rows, met, ends, found),
         }
@@ -57,7 +57,7 @@ impl Object {
     #[inline(always)]
     pub fn any_rows(
         &self,
-        rows: &RayRows,
+        rows: &RayPacket,
         met: u32,
         ends: &F32x16,
         except: Option<(u32, &[u32; PACKET_SIZE])>,
@@ -68,8 +68,8 @@ impl Object {
             Self::Mesh(mesh) if mesh.has_few() => return mesh.any_of_few(rows, met, ends, except, simd),
             Self::Mesh(mesh) => return mesh.any_rows(rows, met, ends, except),
         };
-        let mut found = HitRows::none();
-        shape.intersect_rows(rows, met, ends, &mut found, simd);
+        let mut found = HitPacket::none();
+        shape.intersect_packet(rows, met, ends, &mut found, simd);
         let mut hit = found.any(simd);
         if let Some((own, parts)) = except {
             for (lane, &part) in parts.iter().enumerate() {
@@ -84,7 +84,7 @@ impl Object {
     pub fn surface(&self, ray: &Ray, hit: &ShapeHit, asked: SurfaceRequest) -> SurfacePoint {
         let ray = ray.to_f64();
         match self {
-            Self::Shape(shape) => shape.asked_surface(&ray, hit, asked),
+            Self::Shape(shape) => shape.requested_surface(&ray, hit, asked),
             Self::Mesh(mesh) => mesh.surface(&ray, hit, asked),
         }
     }

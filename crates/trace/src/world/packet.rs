@@ -4,7 +4,7 @@ use super::merged::MergedMeshes;
 use super::{Geometry, Hit};
 use crate::accel::{AnyTest, ClosestTest, F32x16, PACKET_SIZE, SimdKernel};
 use crate::geometry::Ray;
-use crate::geometry::rows::{HitRows, RayRows, lanes, traced};
+use crate::geometry::packet::{HitPacket, RayPacket, lanes, traced};
 use crate::lights::{Source, SourceRow};
 use crate::math::lanes::{Simd, TRUE, select, select_u32};
 
@@ -20,13 +20,13 @@ impl Geometry {
     #[inline(always)]
     pub fn closest_rows(
         &self,
-        rows: &RayRows,
+        rows: &RayPacket,
         ends: &mut F32x16,
         traced: u32,
         simd: impl Simd,
-    ) -> (HitRows, [u32; PACKET_SIZE]) {
+    ) -> (HitPacket, [u32; PACKET_SIZE]) {
         let mut nearest =
-            Nearest { geometry: self, rows, hits: HitRows::none(), object: [NONE; PACKET_SIZE], simd };
+            Nearest { geometry: self, rows, hits: HitPacket::none(), object: [NONE; PACKET_SIZE], simd };
         self.visited().closest_packet(rows, ends, traced, self.unbounded(), &mut nearest, simd);
         (nearest.hits, nearest.object)
     }
@@ -36,7 +36,7 @@ impl Geometry {
     #[inline(always)]
     pub fn occluded_rows(
         &self,
-        rows: &RayRows,
+        rows: &RayPacket,
         ends: &F32x16,
         traced: u32,
         sources: &SourceRow,
@@ -63,7 +63,7 @@ impl Geometry {
     /// [`Geometry::occluded`], one ray after the other.
     #[cold]
     #[inline(never)]
-    fn occluded_by_each(&self, rows: &RayRows, ends: &F32x16, traced: u32, sources: &SourceRow) -> u32 {
+    fn occluded_by_each(&self, rows: &RayPacket, ends: &F32x16, traced: u32, sources: &SourceRow) -> u32 {
         let is_occluded =
             |&lane: &usize| self.occluded(&Ray { t_max: ends[lane], ..rows.ray(lane) }, sources.source(lane));
         lanes(traced).filter(is_occluded).fold(0, |bits, lane| bits | 1 << lane)
@@ -73,7 +73,7 @@ impl Geometry {
 /// [`Geometry::occluded_rows`].
 struct OccludedRows<'a> {
     geometry: &'a Geometry,
-    rows: &'a RayRows,
+    rows: &'a RayPacket,
     ends: &'a F32x16,
     traced: u32,
     sources: &'a SourceRow,
@@ -106,7 +106,7 @@ impl SimdKernel for Closest<'_> {
 
     #[inline(always)]
     fn run(self, simd: impl Simd) {
-        let (rows, mut ends) = RayRows::new(self.rays);
+        let (rows, mut ends) = RayPacket::new(self.rays);
         let traced = traced(&ends, simd);
         let (hits, object) = self.geometry.closest_rows(&rows, &mut ends, traced, simd);
         for (lane, hit) in self.hits.iter_mut().enumerate().take(PACKET_SIZE) {
@@ -121,8 +121,8 @@ const NONE: u32 = u32::MAX;
 /// The nearest hits so far, and their objects.
 struct Nearest<'a, F> {
     geometry: &'a Geometry,
-    rows: &'a RayRows,
-    hits: HitRows,
+    rows: &'a RayPacket,
+    hits: HitPacket,
     object: [u32; PACKET_SIZE],
     simd: F,
 }
@@ -130,7 +130,7 @@ struct Nearest<'a, F> {
 impl<F: Simd> ClosestTest for Nearest<'_, F> {
     #[inline(always)]
     fn test(&mut self, id: u32, met: u32, ends: &mut F32x16) {
-        let mut found = HitRows::none();
+        let mut found = HitPacket::none();
         let (these, mut objects) = (of_these(met, ends), [id; PACKET_SIZE]);
         match self.geometry.merged(id) {
             Some(merged) => {
@@ -160,7 +160,7 @@ impl<F: Simd> ClosestTest for Nearest<'_, F> {
 
 /// Returns the objects of hits of merged meshes, and renumbers their triangles by object.
 #[inline(always)]
-fn numbered_by_object(merged: &MergedMeshes, found: &mut HitRows) -> [u32; PACKET_SIZE] {
+fn numbered_by_object(merged: &MergedMeshes, found: &mut HitPacket) -> [u32; PACKET_SIZE] {
     let mut objects = [NONE; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
         // Rays without a hit get the first triangle, without effect.
@@ -174,7 +174,7 @@ fn numbered_by_object(merged: &MergedMeshes, found: &mut HitRows) -> [u32; PACKE
 /// Test for occluders of shadow rays.
 pub(super) struct Blockers<'a, F> {
     geometry: &'a Geometry,
-    rows: &'a RayRows,
+    rows: &'a RayPacket,
     sources: &'a SourceRow,
     /// Rays whose light is a part of an object.
     in_part: u32,
@@ -184,7 +184,7 @@ pub(super) struct Blockers<'a, F> {
 impl<'a, F: Simd> Blockers<'a, F> {
     /// The test for the rays of a packet, each with its light.
     #[inline(always)]
-    pub(super) fn new(geometry: &'a Geometry, rows: &'a RayRows, sources: &'a SourceRow, simd: F) -> Self {
+    pub(super) fn new(geometry: &'a Geometry, rows: &'a RayPacket, sources: &'a SourceRow, simd: F) -> Self {
         Self { geometry, rows, sources, in_part: in_part(sources, simd), simd }
     }
 }
@@ -325,7 +325,7 @@ mod tests {
 
         #[inline(always)]
         fn run(self, simd: impl Simd) -> u32 {
-            let (rows, ends) = RayRows::new(self.rays);
+            let (rows, ends) = RayPacket::new(self.rays);
             self.geometry.occluded_rows(&rows, &ends, traced(&ends, simd), self.sources, simd)
         }
     }

@@ -91,16 +91,16 @@ struct Both<'a> {
 }
 
 impl SimdKernel for Both<'_> {
-    type Output = (HitRows, u32, u32);
+    type Output = (HitPacket, u32, u32);
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Self::Output {
         let Self { object, rays, met, except } = self;
-        let (rows, mut ends) = RayRows::new(rays);
+        let (rows, mut ends) = RayPacket::new(rays);
         for (lane, end) in ends.iter_mut().enumerate() {
             *end = if met & 1 << lane != 0 { *end } else { -1.0 };
         }
-        let mut found = HitRows::none();
+        let mut found = HitPacket::none();
         object.closest_rows(&rows, met, &ends, &mut found, simd);
         let any_part = object.any_rows(&rows, met, &ends, None, simd);
         (found, any_part, object.any_rows(&rows, met, &ends, Some(except), simd))

@@ -6,8 +6,8 @@
 use super::packet::Blockers;
 use super::{Geometry, Hit, PACKET_SIZE, SimdKernel, World};
 use crate::accel::{AnyTest, F32x16};
+use crate::geometry::packet::{RayPacket, lanes};
 use crate::geometry::ray::offset_origin;
-use crate::geometry::rows::{RayRows, lanes};
 use crate::geometry::{Ray, SurfaceRequest};
 use crate::lights::{Source, SourceRow};
 use crate::materials::{Footprint, Material};
@@ -68,7 +68,13 @@ impl World {
     /// end.
     #[cold]
     #[inline(never)]
-    pub fn weakened_rows(&self, rows: &RayRows, ends: &F32x16, traced: u32, sources: &SourceRow) -> Weakened {
+    pub fn weakened_rows(
+        &self,
+        rows: &RayPacket,
+        ends: &F32x16,
+        traced: u32,
+        sources: &SourceRow,
+    ) -> Weakened {
         self.geometry.instructions().run(Weakening { world: self, rows, ends, traced, sources })
     }
 
@@ -95,7 +101,7 @@ impl World {
         let index = self.material_index(hit);
         let material = &self.materials[index];
         let asked = SurfaceRequest { uv: self.is_textured(index), shadow_point: false };
-        let surface = self.geometry.asked_surface(ray, hit, asked);
+        let surface = self.geometry.requested_surface(ray, hit, asked);
         let cosine = surface.shading_normal.dot(ray.direction.normalize_or_zero());
         let color = self.vertex_color(hit).unwrap_or(Vec3::ONE);
         let at = self.texture_point(hit, &surface, |_| Footprint::POINT);
@@ -138,7 +144,7 @@ impl World {
 /// [`World::weakened_rows`].
 struct Weakening<'a> {
     world: &'a World,
-    rows: &'a RayRows,
+    rows: &'a RayPacket,
     ends: &'a F32x16,
     traced: u32,
     sources: &'a SourceRow,

@@ -12,7 +12,7 @@ use super::{Bvh, Child, DEEP_STACK};
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
 use crate::geometry::aabb::SLAB_PAD;
-use crate::geometry::rows::{RayRows, lanes};
+use crate::geometry::packet::{RayPacket, lanes};
 use crate::math::lanes::{Simd, TRUE};
 
 /// Callback that finds the nearest hits of a packet.
@@ -42,7 +42,7 @@ struct Stretches {
 
 impl<'a> SlabPacket<'a> {
     #[inline(always)]
-    fn new(rays: &'a RayRows, simd: impl Simd) -> Self {
+    fn new(rays: &'a RayPacket, simd: impl Simd) -> Self {
         let [x, y, z] = &rays.direction;
         let inverse = [simd.reciprocals(x), simd.reciprocals(y), simd.reciprocals(z)];
         Self { origin: &rays.origin, inverse }
@@ -154,7 +154,7 @@ impl Bvh {
     #[inline(always)]
     pub fn closest_packet(
         &self,
-        rays: &RayRows,
+        rays: &RayPacket,
         ends: &mut F32x16,
         traced: u32,
         outside: &[u32],
@@ -216,7 +216,7 @@ impl Bvh {
     #[inline(always)]
     pub fn any_packet(
         &self,
-        rays: &RayRows,
+        rays: &RayPacket,
         ends: &F32x16,
         traced: u32,
         outside: &[u32],

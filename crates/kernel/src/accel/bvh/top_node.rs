@@ -162,7 +162,7 @@ mod tests {
     use crate::control::CancelToken;
     use crate::geometry::Ray;
     use crate::geometry::aabb::SlabRay;
-    use crate::geometry::rows::{RayRows, lanes, traced};
+    use crate::geometry::packet::{RayPacket, lanes, traced};
     use crate::math::random::signed as random;
 
     /// Records which primitives are tested, and for which rays.
@@ -209,7 +209,7 @@ mod tests {
                     }
                 };
                 let rays: Vec<Ray> = (0..=round % PACKET_SIZE).map(|_| ray()).collect();
-                let (rows, mut ends) = RayRows::new(&rays);
+                let (rows, mut ends) = RayPacket::new(&rays);
                 // Leave some rays untraced.
                 for lane in (0..rays.len()).filter(|lane| round % 5 == 0 && lane % 3 == 1) {
                     ends[lane] = -1.0;

@@ -5,7 +5,7 @@ use arrayvec::ArrayVec;
 use super::{Bvh, Child, DEEP_STACK, SHALLOW_STACK};
 use crate::accel::{Cell, Stretch};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
-use crate::geometry::rows::lanes;
+use crate::geometry::packet::lanes;
 use crate::geometry::{Aabb, Ray};
 
 impl Bvh {

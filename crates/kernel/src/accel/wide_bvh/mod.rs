@@ -8,7 +8,7 @@ mod node;
 mod simd;
 
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::rows::lanes;
+use crate::geometry::packet::lanes;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
 

@@ -4,9 +4,11 @@ mod crossing;
 
 use std::f64::consts::{PI, TAU};
 
-use super::axial::{self, AxialFrame, Line, at_turn, exact_t, radial, turn};
 use super::surface::SurfacePoint;
-use super::surface_rows::{Exact, ExactPoint};
+use super::surface_of_revolution::{
+    self, AxialFrame, LocalLine, angle_to_u, direction_at_u, exact_t, radial,
+};
+use super::surface_packet::{Exact, ExactPoint};
 use super::{Aabb, AreaPoint, RayF64, ShapeHit};
 use crate::math::{DVec2, DVec3, Vec2};
 use crossing::UnitLine;
@@ -41,7 +43,7 @@ impl Torus {
 
     /// Finds the nearest hit, from outside or inside.
     pub fn intersect(&self, ray: &RayF64) -> Option<ShapeHit> {
-        self.nearest(ray).map(axial::hit)
+        self.nearest(ray).map(surface_of_revolution::hit)
     }
 
     fn nearest(&self, ray: &RayF64) -> Option<(f64, u32)> {
@@ -56,7 +58,7 @@ impl Torus {
     }
 
     /// A ray's line, the line in units of the circle's radius, and this unit in terms of the ray's t.
-    fn unit_line(&self, ray: &RayF64) -> (Line, UnitLine, f64) {
+    fn unit_line(&self, ray: &RayF64) -> (LocalLine, UnitLine, f64) {
         let line = self.frame.line(ray);
         let length = line.direction.length();
         let unit_line = UnitLine {
@@ -91,7 +93,7 @@ impl Torus {
     /// Texture coordinates of a point on the surface.
     pub fn uv_at(&self, point: DVec3) -> DVec2 {
         let (out, from_circle) = self.chart(point);
-        DVec2::new(turn(out), turn(from_circle))
+        DVec2::new(angle_to_u(out), angle_to_u(from_circle))
     }
 
     /// Mean curvature at a point of the surface.
@@ -108,7 +110,7 @@ impl Torus {
         SurfacePoint::exact(
             point,
             normal,
-            Vec2::new(turn(out) as f32, turn(from_circle) as f32),
+            Vec2::new(angle_to_u(out) as f32, angle_to_u(from_circle) as f32),
             self.frame.vector((out.perp() * (TAU * ring)).extend(0.0)),
             self.frame.vector((out * -up).extend(across) * (TAU * self.tube)),
             reach,
@@ -128,7 +130,7 @@ impl Torus {
 
     /// Point and unit normal at texture coordinates.
     pub fn at(&self, u: f64, v: f64) -> (DVec3, DVec3) {
-        let (out, from_circle) = (at_turn(u), at_turn(v));
+        let (out, from_circle) = (direction_at_u(u), direction_at_u(v));
         let normal = (out * from_circle.x).extend(from_circle.y);
         (self.frame.point((out * self.radius).extend(0.0) + normal * self.tube), self.frame.vector(normal))
     }
@@ -140,7 +142,7 @@ impl Torus {
     /// Samples a point uniformly over the area. The tube angle ψ has a pdf proportional to 1 +
     /// (tube/radius)·cos ψ. Its values at a uniform ψ and at the mirrored angle π − ψ have a constant sum, so
     /// one of the two is chosen in proportion to them.
-    pub fn place(&self, _: u32, u: Vec2) -> AreaPoint {
+    pub fn sample(&self, _: u32, u: Vec2) -> AreaPoint {
         let (x, y) = (f64::from(u.x), f64::from(u.y));
         // cos ψ at v = y, since ψ = 0 is v = ½.
         let share = 0.5 - 0.5 * (self.tube / self.radius) * libm::cos(2.0 * PI * y);
@@ -166,7 +168,7 @@ impl Torus {
     }
 
     /// Centroid.
-    pub fn middle(&self) -> DVec3 {
+    pub fn centroid(&self) -> DVec3 {
         self.frame.origin
     }
 

@@ -90,7 +90,7 @@ impl BoxEmitter {
     pub fn new(cuboid: &Cuboid) -> Self {
         let axes = cuboid.axes();
         Self {
-            center: cuboid.middle(),
+            center: cuboid.centroid(),
             half: cuboid.half().as_vec3().to_array(),
             axes: [axes.x_axis, axes.y_axis, axes.z_axis].map(DVec3::as_vec3),
         }

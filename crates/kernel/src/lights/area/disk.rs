@@ -60,7 +60,7 @@ impl ShapeEmitter for DiskEmitter {
 impl DiskEmitter {
     /// The emitter of a whole disk.
     pub fn new(disk: &Disk) -> Self {
-        Self { center: disk.middle(), normal: disk.normal(), radius: disk.radius() }
+        Self { center: disk.centroid(), normal: disk.normal(), radius: disk.radius() }
     }
 
     /// View of the disk from a point before it. From behind, the view's height is not positive, and nothing else of it counts.

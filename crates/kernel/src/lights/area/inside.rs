@@ -36,7 +36,7 @@ impl ShapeEmitter for InsideEmitter {
     }
 
     fn middle(&self) -> DVec3 {
-        self.shape.middle()
+        self.shape.centroid()
     }
 }
 
@@ -65,7 +65,7 @@ impl InsideEmitter {
     /// Samples a place by area; nothing arrives if another part of the shape is before it.
     fn by_area(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (part, rest) = self.by_area.sample(u[0]);
-        let AreaPoint { point: place, normal } = self.shape.place(part as u32, Vec2::new(rest, u[1]));
+        let AreaPoint { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
         let offset = place - point.as_dvec3();
         let distance = offset.length();
         let direction = offset / distance;

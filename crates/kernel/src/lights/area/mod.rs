@@ -212,7 +212,7 @@ pub fn back_light(shape: &Shape, radiance: Vec3, object: u32) -> Option<AreaLigh
     let turned = match shape {
         Shape::Quad(quad) => Some(Shape::Quad(Parallelogram::new(quad.corner, quad.v, quad.u))),
         Shape::Triangle(Triangle { a, b, c }) => Some(Shape::Triangle(Triangle { a: *a, b: *c, c: *b })),
-        Shape::Disk(disk) => Some(Shape::Disk(Disk::new(disk.middle(), -disk.normal(), disk.radius()))),
+        Shape::Disk(disk) => Some(Shape::Disk(Disk::new(disk.centroid(), -disk.normal(), disk.radius()))),
         Shape::Plane(_) => return None,
         Shape::Sphere(_) | Shape::Box(_) | Shape::Cylinder(_) | Shape::Cone(_) | Shape::Torus(_) => None,
     };

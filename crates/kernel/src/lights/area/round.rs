@@ -137,15 +137,15 @@ impl RoundEmitter<CylinderSide> {
     /// The emitter of a whole cylinder.
     pub fn of_cylinder(cylinder: &Cylinder) -> Self {
         let caps = [1, 2].map(|number| cylinder.cap(number));
-        let across = caps[1].middle() - caps[0].middle();
+        let across = caps[1].centroid() - caps[0].centroid();
         let side = CylinderSide {
-            middle: cylinder.middle(),
+            middle: cylinder.centroid(),
             axis: caps[1].normal(),
             half_length: across.length() * 0.5,
             radius: caps[0].radius(),
         };
         let caps = caps.map(|cap| cylinder.is_capped().then(|| DiskEmitter::new(&cap)));
-        Self { side, caps, middle: cylinder.middle() }
+        Self { side, caps, middle: cylinder.centroid() }
     }
 }
 
@@ -237,11 +237,11 @@ impl RoundEmitter<ConeSide> {
     /// The emitter of a whole cone.
     pub fn of_cone(cone: &Cone) -> Self {
         let (base, tip) = (cone.base(), cone.tip());
-        let (height, radius) = ((base.middle() - tip).length(), base.radius());
+        let (height, radius) = ((base.centroid() - tip).length(), base.radius());
         let slant = (height * height + radius * radius).sqrt();
         let side = ConeSide { tip, axis: base.normal(), opening: (radius / slant, height / slant), slant };
         let cap = cone.is_capped().then(|| DiskEmitter::new(&base));
-        Self { side, caps: [cap, None], middle: cone.middle() }
+        Self { side, caps: [cap, None], middle: cone.centroid() }
     }
 }
 

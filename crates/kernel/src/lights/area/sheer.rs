@@ -29,7 +29,7 @@ impl SheerEmitter {
 impl ShapeEmitter for SheerEmitter {
     fn sample(&self, point: Vec3, u: [f32; 2]) -> LightSamplePoint {
         let (part, rest) = self.by_area.sample(u[0]);
-        let AreaPoint { point: place, normal } = self.shape.place(part as u32, Vec2::new(rest, u[1]));
+        let AreaPoint { point: place, normal } = self.shape.sample(part as u32, Vec2::new(rest, u[1]));
         let offset = place - point.as_dvec3();
         let distance = offset.length();
         let cosine = -self.outwards * normal.dot(offset) / distance;
@@ -46,6 +46,6 @@ impl ShapeEmitter for SheerEmitter {
     }
 
     fn middle(&self) -> DVec3 {
-        self.shape.middle()
+        self.shape.centroid()
     }
 }

@@ -121,7 +121,7 @@ impl ShapeEmitter for TorusEmitter {
     }
 
     fn middle(&self) -> DVec3 {
-        self.torus.middle()
+        self.torus.centroid()
     }
 }
 
@@ -134,7 +134,7 @@ impl TorusEmitter {
 
 impl View {
     fn new(torus: &Torus, point: Vec3) -> Option<Self> {
-        let (center, axis) = (torus.middle(), torus.axis());
+        let (center, axis) = (torus.centroid(), torus.axis());
         let (radius, tube) = torus.radii();
         let point = point.as_dvec3();
         let from_center = point - center;

@@ -139,7 +139,7 @@ impl On {
                 let (part, cell) = (index / (all * all), index % (all * all));
                 let corner = Vec2::new((cell % all) as f32, (cell / all) as f32);
                 let u = ((corner + u) / *side as f32).min(Vec2::splat(1.0_f32.next_down()));
-                let AreaPoint { point, normal } = shape.place(part as u32, u);
+                let AreaPoint { point, normal } = shape.sample(part as u32, u);
                 let normal = match light.side {
                     Side::Front => normal,
                     Side::Back => -normal,

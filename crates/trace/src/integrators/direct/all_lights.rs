@@ -2,7 +2,7 @@
 
 use super::mis::CompetingTechnique;
 use crate::geometry::Ray;
-use crate::geometry::rows::{F32x16, RayRows, lanes};
+use crate::geometry::packet::{F32x16, RayPacket, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, absorption};
 use crate::integrators::transport::tile::TileContext;
@@ -282,7 +282,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(always)]
     pub fn add_unoccluded(
         &self,
-        (rays, ends, traced): (&RayRows, &F32x16, u32),
+        (rays, ends, traced): (&RayPacket, &F32x16, u32),
         sources: &SourceRow,
         values: &Vec3x16,
         sums: &mut LightSums,
@@ -304,7 +304,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     #[inline(never)]
     fn add_attenuated(
         &self,
-        (rays, ends, traced): (&RayRows, &F32x16, u32),
+        (rays, ends, traced): (&RayPacket, &F32x16, u32),
         sources: &SourceRow,
         values: &Vec3x16,
         sums: &mut LightSums,
@@ -352,7 +352,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// The shadow rays to the samples in `active`; in other lanes, `t_max` is below 0.
     #[inline(always)]
-    pub fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayRows, F32x16) {
+    pub fn shadow_rays(&self, samples: &LightRow, active: u32) -> (RayPacket, F32x16) {
         let (mut direction, mut ends) = (samples.directions, [-1.0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let ray = Ray::segment(lane(&self.row.from, i), lane(&samples.targets, i));
@@ -363,7 +363,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             set_lane(&mut direction, i, lane(&samples.directions, i));
             ends[i] = f32::INFINITY;
         }
-        (RayRows::of(self.row.from, direction).leaving(self.row.starts(&direction)), ends)
+        (RayPacket::of(self.row.from, direction).leaving(self.row.starts(&direction)), ends)
     }
 }
 

@@ -10,7 +10,7 @@ use crate::lights::{LightRow, LightTree, Lobe, Middle, Picks, Receiver, Receiver
 use crate::materials::bsdf::NarrowLobe;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, lane, set_lane};
-use crate::sampling::{Decision, SamplerRow};
+use crate::sampling::{Decision, SamplerPacket};
 use crate::scene::description::Shadows;
 use crate::world::SimdKernel;
 
@@ -113,7 +113,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn picks(
         &self,
         Selection { tree, picks: way, .. }: Selection<'_>,
-        sampler: &SamplerRow<PACKET_SIZE>,
+        sampler: &SamplerPacket<PACKET_SIZE>,
         samples: Range<u32>,
     ) -> Vec<LightPicks> {
         let row = self.row;

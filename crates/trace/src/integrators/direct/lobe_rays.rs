@@ -2,7 +2,7 @@
 
 use super::all_lights::{ReflectedLight, add_traversal_cost};
 use super::unshadowed::UnshadowedLobeRay;
-use crate::geometry::rows::{RayRows, lanes};
+use crate::geometry::rows::{RayPacket, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, absorption};
 use crate::integrators::transport::tile::TileContext;
@@ -59,7 +59,7 @@ impl SimdKernel for LobeRays<'_> {
                 sent &= if (cosines[i] > 0.0) & (pdfs[i] > 0.0) { !0 } else { !bit };
                 ends[i] = if sent & bit != 0 { f32::INFINITY } else { -1.0 };
             }
-            let rays = RayRows::of(row.from, wi).leaving(row.starts(&wi));
+            let rays = RayPacket::of(row.from, wi).leaving(row.starts(&wi));
             arrived.rays.scattered += u64::from(sent.count_ones());
             // Without soft shadows, add the light of every emitter along the rays, whatever is in front of it.
             if tile.settings.render.shadows != Shadows::Soft {

@@ -9,7 +9,7 @@ use super::mis::CompetingTechnique;
 use super::shadow_rays::ShadowRayQueue;
 use crate::control::Cancelled;
 use crate::geometry::Ray;
-use crate::geometry::rows::{RayRows, lanes, traced};
+use crate::geometry::packet::{RayPacket, lanes, traced};
 use crate::integrators::transport::accumulator::Accumulator;
 use crate::integrators::transport::batch::{ALL, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
@@ -422,7 +422,7 @@ impl SimdKernel for LiftOrigins<'_> {
         for i in 0..PACKET_SIZE {
             ends[i] = if row.may_lift & 1 << i != 0 { row.lift_end[i] } else { -1.0 };
         }
-        let rays = RayRows::of(row.from, direction).leaving(row.start);
+        let rays = RayPacket::of(row.from, direction).leaving(row.start);
         // Find the occluded rays.
         let blocked = {
             let (traced, nothing) = (traced(&ends, simd), SourceRow::of(Source::Nothing));

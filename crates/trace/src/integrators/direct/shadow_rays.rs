@@ -13,7 +13,7 @@ use crate::world::{SimdKernel, World};
 struct QueuedShadowRays {
     /// Index of the packet of vertices.
     row: u32,
-    rays: RayRows,
+    rays: RayPacket,
     ends: Ends,
     /// Mask of rays to trace.
     traced: u32,
@@ -49,7 +49,7 @@ impl ShadowRayQueue {
     pub fn push(
         &mut self,
         row: u32,
-        (rays, ends, traced): (RayRows, F32x16, u32),
+        (rays, ends, traced): (RayPacket, F32x16, u32),
         sources: &SourceRow,
         values: &Vec3x16,
         places: &[u32; PACKET_SIZE],

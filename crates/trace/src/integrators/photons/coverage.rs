@@ -153,11 +153,11 @@ impl KernelNeighborhood {
 
     /// Adds a shape; returns whether the coverage still has a closed form.
     fn add_shape(&mut self, shape: &Shape, receives: impl Fn() -> bool) -> bool {
-        match shape.local_form(self.point) {
-            LocalForm::Pieces(count) => (0..count)
-                .filter_map(|number| shape.piece(number))
+        match shape.kernel_domain(self.point) {
+            KernelDomain::Polygons(count) => (0..count)
+                .filter_map(|number| shape.polygon(number))
                 .all(|piece| self.add_piece(&piece, &receives)),
-            LocalForm::Surface { distance, ground } => {
+            KernelDomain::Surface { distance, ground } => {
                 distance > FAR * self.radius
                     || ground.is_some_and(|ground| self.add_ground(&ground, receives))
             }

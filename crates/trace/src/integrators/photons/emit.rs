@@ -8,9 +8,9 @@
 
 use super::map::Photon;
 use crate::control::Cancelled;
+use crate::geometry::packet::lanes;
 use crate::geometry::ray::offset_origin;
-use crate::geometry::rows::lanes;
-use crate::geometry::surface_rows::SurfaceRow;
+use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::transport::batch::{ALL, UNPERTURBED, VertexBatch};
 use crate::integrators::transport::cone::RayCone;
@@ -32,7 +32,7 @@ use crate::materials::bsdf::LobeSet;
 use crate::materials::{Bsdf, Coated, Pane, Rough, RoughBsdf};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, lane, set_lane};
-use crate::sampling::{CAMERA_PATH, Decision, SamplerRow};
+use crate::sampling::{CAMERA_PATH, Decision, SamplerPacket};
 use crate::world::{BodyInParts, Hit, SimdKernel, World};
 
 /// Squared difference below which directions are equal within rounding.
@@ -87,7 +87,7 @@ impl PhotonTracing<'_> {
         // Emit the photons, then trace them bounce by bounce.
         let mut rays = Vec::new();
         wavefront.emit(count, &mut rays);
-        let (mut row, mut surfaces) = (VertexBatch::EMPTY, SurfaceRow::EMPTY);
+        let (mut row, mut surfaces) = (VertexBatch::EMPTY, SurfacePacket::EMPTY);
         while !rays.is_empty() {
             for packet in rays.chunks(PACKET_SIZE) {
                 self.tile.token.check()?;
@@ -256,7 +256,7 @@ impl PhotonWavefront<'_> {
     }
 
     /// Traces a packet of photons to their hits, and stores and scatters them.
-    fn intersect(&mut self, rays: &[PathRay], row: &mut VertexBatch, surfaces: &mut SurfaceRow) {
+    fn intersect(&mut self, rays: &[PathRay], row: &mut VertexBatch, surfaces: &mut SurfacePacket) {
         let tile = self.tracing.tile;
         let packet = tile.intersect(PacketSource::Paths(rays, 0), LightAov::ALL, true, (row, surfaces));
         self.counters.texture_lookups += packet.lookups;

@@ -5,7 +5,7 @@ use super::packed::{self, Packed};
 use super::reservoir::{LaneReservoirs, PhotonPosition};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
-use crate::geometry::rows::lanes;
+use crate::geometry::packet::lanes;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, Mask, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
 

@@ -9,7 +9,7 @@ use crate::materials::bsdf::{BsdfValues, Place};
 use crate::materials::{BsdfRow, RoughKind};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
-use crate::sampling::SamplerRow;
+use crate::sampling::SamplerPacket;
 use crate::scene::description::Shadows;
 
 /// A packet of vertices to be lit.
@@ -101,7 +101,7 @@ impl VertexBatch {
 
     /// The samplers of the vertices.
     #[inline(always)]
-    pub fn sampler(&self, tile: &TileContext<'_>) -> SamplerRow<PACKET_SIZE> {
+    pub fn sampler(&self, tile: &TileContext<'_>) -> SamplerPacket<PACKET_SIZE> {
         let (block, slots) = (tile.block, &self.slot);
         let mut is_run = true;
         for i in 0..PACKET_SIZE {

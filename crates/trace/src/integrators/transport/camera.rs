@@ -7,11 +7,11 @@ use super::interiors::{Interior, InteriorList};
 use super::ray::{PathRay, PathState};
 use super::tile::TileContext;
 use crate::geometry::Ray;
-use crate::geometry::rows::{F32x16, RayRows};
+use crate::geometry::packet::{F32x16, RayPacket};
 use crate::math::lanes::{Simd, set_lane};
 use crate::math::{DVec2, Vec2, Vec3};
 use crate::sampling::filter::FilterSample;
-use crate::sampling::{CAMERA_PATH, Decision, SamplerRow, warp};
+use crate::sampling::{CAMERA_PATH, Decision, SamplerPacket, warp};
 use crate::world::{PACKET_SIZE, SimdKernel};
 
 /// Number of camera-ray packets generated in one loop, which hides the latency of each packet's random numbers.
@@ -21,7 +21,7 @@ pub const CAMERA_ROWS: usize = 8;
 #[derive(Clone)]
 pub struct CameraRow {
     /// The rays.
-    pub rays: RayRows,
+    pub rays: RayPacket,
     /// Mask of rays whose filter weight is negative.
     pub negative: u32,
 }
@@ -118,7 +118,7 @@ impl TileContext<'_> {
                 set_lane(&mut direction, lane, ray.direction);
             }
         }
-        CameraRow { rays: RayRows::of(origin, direction), negative }
+        CameraRow { rays: RayPacket::of(origin, direction), negative }
     }
 }
 

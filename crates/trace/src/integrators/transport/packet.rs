@@ -9,8 +9,7 @@ use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::lift_segment;
 use crate::geometry::ray::offset_origin;
-use crate::geometry::rows::{self, HitRows, RayRows};
-use crate::geometry::surface_rows::SurfaceRow;
+use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::integrators::view::LightAov;
 use crate::materials::Rough;
@@ -65,7 +64,7 @@ impl PacketSource<'_> {
 /// Hits of a packet. A surface is plain if its ray is in air, its shape and the textures of its non-specular material
 /// can be evaluated in packets, and all plain surfaces of the packet have the same kind of BSDF.
 pub struct PacketHits {
-    hits: HitRows,
+    hits: HitPacket,
     object: [u32; PACKET_SIZE],
     /// Mask of rays that hit anything.
     pub any: u32,
@@ -88,7 +87,7 @@ impl PacketHits {
     }
 
     /// The surface at a hit. `None` if it is plain or not in the surface packet.
-    pub fn surface(&self, surfaces: &SurfaceRow, lane_of_ray: usize) -> Option<SurfacePoint> {
+    pub fn surface(&self, surfaces: &SurfacePacket, lane_of_ray: usize) -> Option<SurfacePoint> {
         let (i, bit) = (lane_of_ray, 1 << lane_of_ray);
         if self.found & bit == 0 {
             return None;
@@ -135,7 +134,7 @@ impl TileContext<'_> {
         rays: PacketSource<'_>,
         aov: LightAov,
         are_lit: bool,
-        (row, surface): (&mut VertexBatch, &mut SurfaceRow),
+        (row, surface): (&mut VertexBatch, &mut SurfacePacket),
     ) -> PacketHits {
         self.world.geometry.instructions().run(PacketIntersection {
             tile: self,
@@ -171,7 +170,7 @@ struct PacketIntersection<'a> {
     aov: LightAov,
     are_lit: bool,
     row: &'a mut VertexBatch,
-    surface: &'a mut SurfaceRow,
+    surface: &'a mut SurfacePacket,
 }
 
 /// Masks of the plain surfaces of a packet.
@@ -212,8 +211,8 @@ impl SimdKernel for PacketIntersection<'_> {
                     set_lane(&mut direction, lane, path.ray.direction);
                     (start[lane], ends[lane]) = (path.ray.start, path.ray.t_max);
                 }
-                traced = rows::traced(&ends, simd);
-                of_paths = RayRows::of(origin, direction).leaving(start);
+                traced = packet::traced(&ends, simd);
+                of_paths = RayPacket::of(origin, direction).leaving(start);
                 &of_paths
             }
         };
@@ -225,7 +224,7 @@ impl SimdKernel for PacketIntersection<'_> {
             PacketSource::Traced(_, known, places) => known_hits(known, places),
         };
         // Select the rays in air, whose surfaces may be plain.
-        *self.surface = SurfaceRow::EMPTY;
+        *self.surface = SurfacePacket::EMPTY;
         let any = hits.any(simd);
         let (mut in_air, mut only_specular_before, mut after_gloss) = (any, !0, 0);
         match rays {
@@ -266,8 +265,8 @@ impl PacketIntersection<'_> {
     #[inline(always)]
     fn fill_plain(
         &mut self,
-        rows: &RayRows,
-        (hits, object): (&HitRows, &[u32; PACKET_SIZE]),
+        rows: &RayPacket,
+        (hits, object): (&HitPacket, &[u32; PACKET_SIZE]),
         mut left: u32,
         simd: impl Simd,
     ) -> PlainSurfaces {
@@ -351,8 +350,8 @@ fn group_first(indices: &[u32; PACKET_SIZE], left: u32, simd: impl Simd) -> (u32
 
 /// Gathers the known hits at the given queue indices into a packet.
 #[inline(always)]
-fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitRows, [u32; PACKET_SIZE]) {
-    let (mut hits, mut object) = (HitRows::none(), [u32::MAX; PACKET_SIZE]);
+fn known_hits(known: &[Option<Hit>], places: &[u32]) -> (HitPacket, [u32; PACKET_SIZE]) {
+    let (mut hits, mut object) = (HitPacket::none(), [u32::MAX; PACKET_SIZE]);
     for (lane, &place) in places.iter().enumerate().take(PACKET_SIZE) {
         if let Some(hit) = &known[place as usize] {
             hits.put(lane, &hit.shape);
@@ -367,9 +366,9 @@ impl TileContext<'_> {
     #[inline(always)]
     fn fill_other_surfaces(
         &self,
-        surface: &mut SurfaceRow,
-        rows: &RayRows,
-        (hits, object): (&HitRows, &[u32; PACKET_SIZE]),
+        surface: &mut SurfacePacket,
+        rows: &RayPacket,
+        (hits, object): (&HitPacket, &[u32; PACKET_SIZE]),
         mut left: u32,
         simd: impl Simd,
     ) -> u32 {
@@ -482,8 +481,8 @@ impl VertexBatch {
     fn set_positions(
         &mut self,
         paths: &PacketSource<'_>,
-        rays: &RayRows,
-        surface: &SurfaceRow,
+        rays: &RayPacket,
+        surface: &SurfacePacket,
         lifts: LiftMode,
         simd: impl Simd,
     ) -> u32 {

@@ -7,7 +7,7 @@ use super::interiors::InteriorLists;
 use super::ray::{PathRay, PathState};
 use super::tile::TileContext;
 use crate::geometry::Ray;
-use crate::geometry::rows::lanes;
+use crate::geometry::packet::lanes;
 use crate::materials::bsdf::{LobeSet, SideSamples};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};

@@ -3,7 +3,7 @@
 use super::camera::CameraRow;
 use super::crossing::CrossingMemory;
 use super::ray::PathRay;
-use crate::geometry::surface_rows::SurfaceRow;
+use crate::geometry::surface_packet::SurfacePacket;
 use crate::world::Hit;
 
 /// Buffers that all batches of a thread reuse.
@@ -16,7 +16,7 @@ pub struct TraceBuffers {
     /// Packets of camera rays.
     pub camera: Vec<CameraRow>,
     /// Surfaces at the hits of a packet.
-    pub surfaces: SurfaceRow,
+    pub surfaces: SurfacePacket,
     /// Hits of the rays of this bounce.
     pub hits: Vec<Option<Hit>>,
     /// The rays ordered by the object that they hit.

@@ -75,7 +75,7 @@ impl<'a> Vertex<'a> {
         let index = tile.world.material_index(hit);
         let is_lit = tile.world.materials[index].bsdf.is_lit();
         let asked = SurfaceRequest { uv: tile.world.is_textured(index), shadow_point: is_lit };
-        let surface = tile.world.geometry.asked_surface(by, hit, asked);
+        let surface = tile.world.geometry.requested_surface(by, hit, asked);
         Self::at_surface(tile, path, index, surface, hit, distance)
     }
 

@@ -1,8 +1,8 @@
 //! Tests of facets: decided packet results must match single rays on every instruction set.
 
 use super::{InstructionSet, SimdKernel};
-use crate::geometry::facets::Facets;
-use crate::geometry::rows::{HitRows, PACKET_SIZE, RayRows};
+use crate::geometry::packet::{HitPacket, PACKET_SIZE, RayPacket};
+use crate::geometry::triangle_list::TriangleList;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
@@ -11,18 +11,18 @@ use crate::math::random::signed;
 
 /// Nearest hits, undecided rays, rays that hit any triangle but their own, and undecided ones among those.
 struct FacetQueries<'a> {
-    facets: &'a Facets,
+    facets: &'a TriangleList,
     rays: &'a [Ray],
     except: &'a [u32; PACKET_SIZE],
 }
 
 impl SimdKernel for FacetQueries<'_> {
-    type Output = (HitRows, [u32; 3]);
+    type Output = (HitPacket, [u32; 3]);
 
     #[inline(always)]
     fn run(self, simd: impl Simd) -> Self::Output {
-        let (rows, ends) = RayRows::new(self.rays);
-        let (met, mut found) = (((1_u64 << self.rays.len()) - 1) as u32, HitRows::none());
+        let (rows, ends) = RayPacket::new(self.rays);
+        let (met, mut found) = (((1_u64 << self.rays.len()) - 1) as u32, HitPacket::none());
         let open = self.facets.closest(&rows, (met, &ends), &mut found, simd);
         let [any, open_any] = self.facets.any(&rows, (met, &ends), self.except, simd);
         (found, [open, any, open_any])
@@ -89,7 +89,7 @@ fn decided_packets_match_single_rays() {
     let mut counts = [[0_u32; 3]; 6];
     for round in 0..6000 {
         let triangles = room(round / 6, &mut next);
-        let Some(facets) = Facets::new(triangles.clone()) else { continue };
+        let Some(facets) = TriangleList::new(triangles.clone()) else { continue };
         let kind = round % 6;
         let any = |next: &mut dyn FnMut() -> f32| (next().abs() * (triangles.len() as f32 - 0.01)) as usize;
         let on = |of: &[Vec3; 3], next: &mut dyn FnMut() -> f32| {
@@ -145,7 +145,7 @@ fn decided_packets_match_single_rays() {
 
 #[test]
 fn nan_rays_are_undecided() {
-    let facets = Facets::new(walls(Vec3::splat(-1.0), Vec3::ONE)).expect("a room");
+    let facets = TriangleList::new(walls(Vec3::splat(-1.0), Vec3::ONE)).expect("a room");
     let bad = [f32::NAN, f32::INFINITY, 0.0, -0.0, 1e38, 1e-40];
     for (a, b) in bad.into_iter().flat_map(|a| bad.map(|b| (a, b))) {
         for ray in [
@@ -169,10 +169,10 @@ fn nan_rays_are_undecided() {
 #[test]
 fn needles_and_large_meshes_are_rejected() {
     let needle = [Vec3::ZERO, Vec3::X, Vec3::new(0.5, 1e-5, 0.0)];
-    assert!(Facets::new(vec![needle]).is_none());
+    assert!(TriangleList::new(vec![needle]).is_none());
     let wall = [Vec3::ZERO, Vec3::X, Vec3::Y];
-    assert!(Facets::new(vec![wall; 64]).is_some());
-    assert!(Facets::new(vec![wall; 65]).is_none());
-    assert!(Facets::new(vec![]).is_none());
-    assert!(Facets::new(vec![[Vec3::NAN; 3], wall]).is_none());
+    assert!(TriangleList::new(vec![wall; 64]).is_some());
+    assert!(TriangleList::new(vec![wall; 65]).is_none());
+    assert!(TriangleList::new(vec![]).is_none());
+    assert!(TriangleList::new(vec![[Vec3::NAN; 3], wall]).is_none());
 }

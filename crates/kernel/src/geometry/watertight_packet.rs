@@ -1,15 +1,15 @@
 //! Watertight intersection of mesh triangles with packets of rays in any directions. Performs the operations
 //! of [`ShearedRay::intersect`] in the same order, so the bits are equal.
 
-use super::rows::{F32x16, HitRows, PACKET_SIZE, RayRows, lanes};
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket, lanes};
 use super::watertight::{ILL_CONDITIONED, ShearedRay};
 use crate::math::Vec3;
 use crate::math::float::gamma;
 use crate::math::lanes::{Mask, Simd, TRUE, Vec3x16, select, select_u32};
 
 /// The rays of a packet, prepared for some triangles.
-pub struct ShearedRows<'a> {
-    rays: &'a RayRows,
+pub struct ShearedPacket<'a> {
+    rays: &'a RayPacket,
     /// Whether the longest axis of a ray is x, and whether it is y.
     longest: [Mask; 2],
     /// Whether a ray points down its longest axis. The scalar test swaps the other axes, which only negates
@@ -49,10 +49,10 @@ impl Corner for &Vec3x16 {
     }
 }
 
-impl<'a> ShearedRows<'a> {
+impl<'a> ShearedPacket<'a> {
     /// Prepares a packet.
     #[inline(always)]
-    pub fn new(rays: &'a RayRows) -> Self {
+    pub fn new(rays: &'a RayPacket) -> Self {
         let (mut longest, mut is_down) = ([[0; PACKET_SIZE]; 2], [0; PACKET_SIZE]);
         let mut shear = [[0.0; PACKET_SIZE]; 3];
         for i in 0..PACKET_SIZE {
@@ -99,7 +99,7 @@ impl<'a> ShearedRows<'a> {
         &self,
         (number, corners): (u32, &[Vec3; 3]),
         (met, ends): (u32, &mut F32x16),
-        found: &mut HitRows,
+        found: &mut HitPacket,
         simd: impl Simd,
     ) {
         let hits = self.hits(&[number; PACKET_SIZE], *corners, ends);
@@ -129,7 +129,7 @@ impl<'a> ShearedRows<'a> {
         if doubtful == 0 { hit } else { hit | self.decided(doubtful, corners, ends) }
     }
 
-    /// [`ShearedRows::closest`] for the given rays, one at a time.
+    /// [`ShearedPacket::closest`] for the given rays, one at a time.
     #[cold]
     #[inline(never)]
     fn decide(
@@ -137,7 +137,7 @@ impl<'a> ShearedRows<'a> {
         these: u32,
         (number, corners): (u32, &[Vec3; 3]),
         ends: &mut F32x16,
-        found: &mut HitRows,
+        found: &mut HitPacket,
     ) {
         for i in lanes(these) {
             let Some(hit) = self.alone(i, corners, ends[i]) else { continue };
@@ -148,7 +148,7 @@ impl<'a> ShearedRows<'a> {
         }
     }
 
-    /// [`ShearedRows::any`] for the given rays, one at a time.
+    /// [`ShearedPacket::any`] for the given rays, one at a time.
     #[cold]
     #[inline(never)]
     fn decided(&self, these: u32, corners: &[Vec3; 3], ends: &F32x16) -> u32 {

@@ -52,11 +52,11 @@ impl AxialFrame {
 
     /// Line of a ray, starting at its point nearest to the frame's origin.
     #[inline(always)]
-    pub fn line(&self, ray: &RayF64) -> Line {
+    pub fn line(&self, ray: &RayF64) -> LocalLine {
         let origin = self.local(ray.origin);
         let direction = self.axes.transpose() * ray.direction;
         let start = -origin.dot(direction) / direction.length_squared();
-        Line { foot: origin + direction * start, direction, start }
+        LocalLine { foot: origin + direction * start, direction, start }
     }
 
     /// Bounding box of a circle around the axis at a height.
@@ -79,7 +79,7 @@ impl AxialFrame {
 /// A line in local coordinates. It starts at its point nearest to the origin, so that numbers are at most the
 /// size of the shape and rays from far away stay precise.
 #[derive(Clone, Copy, Debug)]
-pub struct Line {
+pub struct LocalLine {
     /// Point nearest to the origin.
     pub foot: DVec3,
     /// Direction of the ray.
@@ -90,14 +90,14 @@ pub struct Line {
 
 /// Interval of a line relative to its foot; each end has the index of the part that it is on.
 #[derive(Clone, Copy, Debug)]
-pub struct Stretch {
+pub struct LineInterval {
     /// Start of the interval.
     pub enter: (f64, u32),
     /// End of the interval.
     pub leave: (f64, u32),
 }
 
-impl Stretch {
+impl LineInterval {
     /// The whole line.
     pub const WHOLE: Self = Self { enter: (f64::NEG_INFINITY, 0), leave: (f64::INFINITY, 0) };
 
@@ -107,7 +107,7 @@ impl Stretch {
     }
 
     /// Interval between two heights, each with its part.
-    pub fn between(line: &Line, low: (f64, u32), high: (f64, u32)) -> Option<Self> {
+    pub fn between(line: &LocalLine, low: (f64, u32), high: (f64, u32)) -> Option<Self> {
         let (z, dz) = (line.foot.z, line.direction.z);
         if dz == 0.0 {
             return (low.0..=high.0).contains(&z).then_some(Self::WHOLE);
@@ -124,11 +124,11 @@ impl Stretch {
 
 /// First t of the ray at an interval end: on the closed solid, or only on the side if it is open. `starts_on`
 /// returns whether the ray starts on a part, up to rounding, which is not a hit.
-pub fn meet(
+pub fn first_hit(
     ray: &RayF64,
-    line: &Line,
-    side: Stretch,
-    ends: Stretch,
+    line: &LocalLine,
+    side: LineInterval,
+    ends: LineInterval,
     closed: bool,
     starts_on: impl Fn(u32) -> bool,
 ) -> Option<(f64, u32)> {
@@ -172,14 +172,14 @@ pub fn is_rounding(distance: f64, size: f64) -> bool {
 }
 
 /// Sine of the angle to an axis, from its cosine.
-pub fn across(along: f64) -> f64 {
-    (1.0 - along * along).max(0.0).sqrt()
+pub fn sine_from_cosine(cosine: f64) -> f64 {
+    (1.0 - cosine * cosine).max(0.0).sqrt()
 }
 
 /// Projected area of a surface whose normals are uniformly distributed on a ring around an axis: ∫max(0,
 /// a·cos φ + b) over the area, where a·cos φ + b is the cosine between normal and direction at the angle φ
 /// around the axis.
-pub fn ring_shown(area: f64, a: f64, b: f64) -> f64 {
+pub fn ring_projected_area(area: f64, a: f64, b: f64) -> f64 {
     if b >= a {
         area * b
     } else if b <= -a {
@@ -205,12 +205,12 @@ pub fn exact_t(hit: &ShapeHit, again: Option<(f64, u32)>) -> f64 {
 /// Unrounded point of a hit, where the ray crosses the part that was hit. Uses a second intersection unless
 /// exactly one of the crossings is at the hit's distance.
 pub fn exact_point(
-    (ray, line): (&RayF64, &Line),
+    (ray, line): (&RayF64, &LocalLine),
     hit: &ShapeHit,
-    crossings: Option<Stretch>,
+    crossings: Option<LineInterval>,
     again: impl FnOnce() -> Option<(f64, u32)>,
 ) -> DVec3 {
-    let fitting = crossings.and_then(|Stretch { enter, leave }| {
+    let fitting = crossings.and_then(|LineInterval { enter, leave }| {
         let [first, second] = [enter, leave].map(|(along, _)| line.start + along);
         match [first, second].map(|t| t as f32 == hit.t) {
             [true, true] => (first == second).then_some(first),
@@ -228,12 +228,12 @@ pub fn radial(p: DVec2) -> DVec2 {
 }
 
 /// ½ + angle/2π of a direction in the plane, in [0, 1].
-pub fn turn(p: DVec2) -> f64 {
+pub fn angle_to_u(p: DVec2) -> f64 {
     0.5 + libm::atan2(p.y, p.x) / std::f64::consts::TAU
 }
 
-/// Inverse of [`turn`]: the direction for a value of `u`.
-pub fn at_turn(u: f64) -> DVec2 {
+/// Inverse of [`angle_to_u`]: the direction for a value of `u`.
+pub fn direction_at_u(u: f64) -> DVec2 {
     let (sin, cos) = libm::sincos((u - 0.5) * std::f64::consts::TAU);
     DVec2::new(cos, sin)
 }
@@ -286,7 +286,7 @@ pub(super) mod tests {
         fn met(&self, ray: &RayF64) -> Option<(f64, u32)>;
 
         /// Interval of the ray within the side.
-        fn within(&self, ray: &RayF64) -> Option<Stretch>;
+        fn within(&self, ray: &RayF64) -> Option<LineInterval>;
 
         /// Unrounded point of a hit.
         fn exact(&self, ray: &RayF64, hit: &ShapeHit) -> DVec3;

@@ -6,13 +6,13 @@ use arrayvec::ArrayVec;
 use crate::math::DVec3;
 
 /// Corners of a flat polygon, counterclockwise as seen from its front.
-pub type Piece = ArrayVec<DVec3, 4>;
+pub type FlatPolygon = ArrayVec<DVec3, 4>;
 
 /// Geometry of a shape near a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LocalForm {
-    /// Number of flat polygons that make up the shape; see [`Shape::piece`](super::Shape::piece).
-    Pieces(u32),
+pub enum KernelDomain {
+    /// Number of flat polygons that make up the shape; see [`Shape::polygon`](super::Shape::polygon).
+    Polygons(u32),
     /// A surface at a distance from the point.
     Surface {
         /// Distance of the point from the surface.
@@ -44,11 +44,11 @@ pub enum Extent {
 
 /// Parallelogram with a corner c and edges u and v.
 #[inline]
-pub(super) fn parallelogram((c, u, v): (DVec3, DVec3, DVec3)) -> Piece {
-    Piece::from([c, c + u, c + u + v, c + v])
+pub(super) fn parallelogram((c, u, v): (DVec3, DVec3, DVec3)) -> FlatPolygon {
+    FlatPolygon::from([c, c + u, c + u + v, c + v])
 }
 
-impl LocalForm {
+impl KernelDomain {
     /// A curved surface of which only the distance is known.
     pub(super) fn curved(distance: f64) -> Self {
         Self::Surface { distance, ground: None }

@@ -29,7 +29,7 @@ pub fn lanes(mut bits: u32) -> impl Iterator<Item = usize> {
 
 /// The rays of a packet. Lanes without a ray are 0.
 #[derive(Clone, Debug)]
-pub struct RayRows {
+pub struct RayPacket {
     /// Coordinates of the origins.
     pub origin: [F32x16; 3],
     /// Coordinates of the directions.
@@ -38,7 +38,7 @@ pub struct RayRows {
     pub start: [u32; PACKET_SIZE],
 }
 
-impl RayRows {
+impl RayPacket {
     /// Creates a packet of rays that do not start on triangles.
     #[inline(always)]
     pub fn of(origin: [F32x16; 3], direction: [F32x16; 3]) -> Self {
@@ -98,7 +98,7 @@ impl RayRows {
 
 /// Hits of a packet: [`ShapeHit`]s in structure-of-arrays layout.
 #[derive(Clone, Debug)]
-pub struct HitRows {
+pub struct HitPacket {
     /// [`ShapeHit::t`], or NaN for a ray without a hit.
     pub t: F32x16,
     /// [`ShapeHit::primitive`].
@@ -109,7 +109,7 @@ pub struct HitRows {
     pub v: F32x16,
 }
 
-impl HitRows {
+impl HitPacket {
     /// Hits for a packet in which no ray hits.
     #[inline(always)]
     pub fn none() -> Self {

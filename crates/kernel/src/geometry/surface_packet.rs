@@ -1,6 +1,6 @@
 //! Packets of surface points, computed with SIMD loops for the most common shapes.
 
-use super::rows::{HitRows, PACKET_SIZE, RayRows, lanes};
+use super::packet::{HitPacket, PACKET_SIZE, RayPacket, lanes};
 use super::surface::error;
 use super::{RayF64, Shape, ShapeHit, SurfacePoint};
 use crate::math::lanes::{Vec3x16, mask_from_bits, select, set_lane};
@@ -8,7 +8,7 @@ use crate::math::{DVec2, DVec3, Vec2};
 
 /// The parts of a packet of [`SurfacePoint`]s that lighting needs.
 #[derive(Clone, Debug)]
-pub struct SurfaceRow {
+pub struct SurfacePacket {
     /// Points in world coordinates.
     pub point: Vec3x16,
     /// Bounds on the errors of the points.
@@ -54,13 +54,13 @@ pub trait Mapped {
     fn uv(&self, ray: &RayF64, hit: &ShapeHit) -> DVec2;
 }
 
-impl Default for SurfaceRow {
+impl Default for SurfacePacket {
     fn default() -> Self {
         Self::EMPTY
     }
 }
 
-impl SurfaceRow {
+impl SurfacePacket {
     /// A packet with all fields 0.
     pub const EMPTY: Self = Self {
         point: [[0.0; PACKET_SIZE]; 3],
@@ -75,13 +75,13 @@ impl SurfaceRow {
     /// Computes the surface points of the hits selected by `of`, all on one shape. Returns false if the shape
     /// has no SIMD loop.
     #[inline(always)]
-    pub fn fill(&mut self, shape: &Shape, rays: &RayRows, hits: &HitRows, of: u32) -> bool {
+    pub fn fill(&mut self, shape: &Shape, rays: &RayPacket, hits: &HitPacket, of: u32) -> bool {
         shape.fill_surfaces(self, rays, hits, of)
     }
 
     /// Computes the texture coordinates of the hits selected by `of`, all on one shape.
     #[inline(always)]
-    pub fn fill_uv(&mut self, shape: &Shape, rays: &RayRows, hits: &HitRows, of: u32) {
+    pub fn fill_uv(&mut self, shape: &Shape, rays: &RayPacket, hits: &HitPacket, of: u32) {
         if shape.fill_uvs(self, rays, hits, of) {
             return;
         }
@@ -92,9 +92,9 @@ impl SurfaceRow {
         }
     }
 
-    /// [`SurfaceRow::fill_uv`] for a shape with a SIMD loop.
+    /// [`SurfacePacket::fill_uv`] for a shape with a SIMD loop.
     #[inline(always)]
-    pub(super) fn uv_from(&mut self, shape: &impl Mapped, rays: &RayRows, hits: &HitRows, of: u32) {
+    pub(super) fn uv_from(&mut self, shape: &impl Mapped, rays: &RayPacket, hits: &HitPacket, of: u32) {
         for lane in 0..PACKET_SIZE {
             let uv = shape.uv(&rays.line(lane), &ShapeHit::at(hits.t[lane]));
             let is_own = of & 1 << lane != 0;
@@ -103,9 +103,9 @@ impl SurfaceRow {
         }
     }
 
-    /// [`SurfaceRow::fill`] for a shape with a SIMD loop.
+    /// [`SurfacePacket::fill`] for a shape with a SIMD loop.
     #[inline(always)]
-    pub(super) fn fill_from(&mut self, shape: &impl Exact, rays: &RayRows, hits: &HitRows, of: u32) {
+    pub(super) fn fill_from(&mut self, shape: &impl Exact, rays: &RayPacket, hits: &HitPacket, of: u32) {
         let mut found = Self::EMPTY;
         for lane in 0..PACKET_SIZE {
             let hit = ShapeHit {

@@ -1,9 +1,9 @@
 //! Tests of packet triangle intersection on every instruction set.
 
 use super::{InstructionSet, SimdKernel};
-use crate::geometry::rows::{HitRows, PACKET_SIZE, RayRows};
+use crate::geometry::packet::{HitPacket, PACKET_SIZE, RayPacket};
 use crate::geometry::watertight::ShearedRay;
-use crate::geometry::watertight_rows::ShearedRows;
+use crate::geometry::watertight_packet::ShearedPacket;
 use crate::geometry::{Ray, ShapeHit};
 use crate::math::Vec3;
 use crate::math::lanes::Simd;
@@ -15,12 +15,12 @@ struct Tested<'a> {
 }
 
 impl SimdKernel for Tested<'_> {
-    type Output = (HitRows, u32);
+    type Output = (HitPacket, u32);
 
     #[inline(always)]
-    fn run(self, simd: impl Simd) -> (HitRows, u32) {
-        let (rows, ends) = RayRows::new(self.rays);
-        let (rays, mut found, mut any) = (ShearedRows::new(&rows), HitRows::none(), 0);
+    fn run(self, simd: impl Simd) -> (HitPacket, u32) {
+        let (rows, ends) = RayPacket::new(self.rays);
+        let (rays, mut found, mut any) = (ShearedPacket::new(&rows), HitPacket::none(), 0);
         let (met, mut nearest) = ((1 << self.rays.len()) - 1, ends);
         for (number, corners) in (0..).zip(self.triangles) {
             any |= rays.any((number, corners), met, &ends, simd);

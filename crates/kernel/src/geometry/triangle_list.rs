@@ -26,8 +26,8 @@
 //! - A ray that stays farther from a plane than the first two bounds, times |n·d|, certainly misses, however
 //!   grazing it is.
 
-use super::rows::{F32x16, HitRows, PACKET_SIZE, RayRows};
-use super::watertight_rows::ShearedRows;
+use super::packet::{F32x16, HitPacket, PACKET_SIZE, RayPacket};
+use super::watertight_packet::ShearedPacket;
 use crate::math::float::UNIT_ROUNDOFF;
 use crate::math::lanes::{Mask, Simd, TRUE, select, select_u32, set_lane};
 use crate::math::{DVec3, Vec3};
@@ -84,7 +84,7 @@ struct Facet {
 
 /// The triangles of a small scene.
 #[derive(Debug)]
-pub struct Facets {
+pub struct TriangleList {
     facets: Vec<Facet>,
     corners: Vec<[Vec3; 3]>,
     /// Bounding box.
@@ -118,7 +118,7 @@ struct Errors {
     end: F32x16,
 }
 
-impl Facets {
+impl TriangleList {
     /// Creates the facets of some triangles. `None` if there are too many, or one is too slender for the
     /// bounds.
     pub fn new(corners: Vec<[Vec3; 3]>) -> Option<Self> {
@@ -161,9 +161,9 @@ impl Facets {
     #[inline(always)]
     pub fn closest(
         &self,
-        rays: &RayRows,
+        rays: &RayPacket,
         (met, ends): (u32, &F32x16),
-        found: &mut HitRows,
+        found: &mut HitPacket,
         simd: impl Simd,
     ) -> u32 {
         let candidates = self.candidates(rays, ends, &[NONE; PACKET_SIZE], simd);
@@ -180,7 +180,7 @@ impl Facets {
     #[inline(always)]
     pub fn any(
         &self,
-        rays: &RayRows,
+        rays: &RayPacket,
         (met, ends): (u32, &F32x16),
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
@@ -202,7 +202,7 @@ impl Facets {
     #[inline(always)]
     fn candidates(
         &self,
-        rays: &RayRows,
+        rays: &RayPacket,
         ends: &F32x16,
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
@@ -286,7 +286,7 @@ impl Facets {
     #[inline(always)]
     fn test(
         &self,
-        rays: &RayRows,
+        rays: &RayPacket,
         candidates: &Candidates,
         (met, ends): (u32, &F32x16),
         simd: impl Simd,
@@ -299,7 +299,7 @@ impl Facets {
             }
         }
         let [a, b, c] = &corners;
-        let hits = ShearedRows::new(rays).hits(&candidates.number, [a, b, c], ends);
+        let hits = ShearedPacket::new(rays).hits(&candidates.number, [a, b, c], ends);
         let (mut hit, mut undecided) = ([0; PACKET_SIZE], [0; PACKET_SIZE]);
         for i in 0..PACKET_SIZE {
             let is_any = candidates.near[i] < f32::INFINITY;
@@ -316,7 +316,7 @@ impl Facets {
 
     /// Computes the error terms of the rays.
     #[inline(always)]
-    fn errors(&self, rays: &RayRows) -> Errors {
+    fn errors(&self, rays: &RayPacket) -> Errors {
         let none = [0.0; PACKET_SIZE];
         let mut errors = Errors { plane: none, far: none, across: none, length: none, end: none };
         for i in 0..PACKET_SIZE {
@@ -352,7 +352,7 @@ struct Tested {
     hit: Mask,
     /// Bits of the undecided rays.
     undecided: u32,
-    hits: super::watertight_rows::Hits,
+    hits: super::watertight_packet::Hits,
 }
 
 impl Facet {
