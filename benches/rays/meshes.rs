@@ -5,13 +5,13 @@ use std::path::Path;
 
 use glimt::accel::WideBvh;
 use glimt::assets::mesh;
-use glimt::control::{CancelToken, unwatched};
+use glimt::control::{CancelToken, ignore_progress};
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::geometry::ray::offset_origin;
 use glimt::geometry::{Aabb, Ray};
 use glimt::math::frame::Frame;
 use glimt::math::{Vec2, Vec3};
-use glimt::sampling::{CAMERA_PATH, Decision, PixelSampler, warp};
+use glimt::sampling::{CAMERA_PATH, Dimension, PixelSampler, warp};
 
 /// Image width and height: a million rays.
 const SIDE: u32 = 1000;
@@ -46,7 +46,8 @@ pub fn load(path: &Path) -> Result<TriangleMesh, String> {
         return raw_mesh(&std::fs::read(path).map_err(|error| error.to_string())?)
             .map_err(|error| error.to_string());
     }
-    let loaded = mesh::load(path, &unwatched, &CancelToken::new()).map_err(|error| error.to_string())?;
+    let loaded =
+        mesh::load(path, &ignore_progress, &CancelToken::new()).map_err(|error| error.to_string())?;
     Ok(loaded.mesh)
 }
 
@@ -98,7 +99,7 @@ pub fn rays(tree: &WideBvh, mesh: &TriangleMesh) -> Rays {
         let normal = if normal.dot(ray.direction) < 0.0 { normal } else { -normal };
         let point = a * (1.0 - hit.u - hit.v) + b * hit.u + c * hit.v;
         let origin = offset_origin(point, point.abs() * 1e-6 + Vec3::splat(size * 1e-7), normal, normal);
-        let [x, y] = PixelSampler::new(0, i, 0, 0).pair(CAMERA_PATH, Decision::Pixel).to_array();
+        let [x, y] = PixelSampler::new(0, i, 0, 0).pair(CAMERA_PATH, Dimension::Pixel).to_array();
         let disk = warp::disk(Vec2::new(x, y));
         let up = (1.0 - disk.length_squared()).max(0.0).sqrt();
         rays.diffuse.push(Ray::new(origin, Frame::from_normal(normal).to_world(disk.extend(up))));

@@ -418,7 +418,7 @@ fn a_mesh_may_be_placed_by_a_matrix() {
     let by_matrix = transform("matrix = [0, -2, 0, 5, 1, 0, 0, 6, 0, 0, -3, 7, 0, 0, 0, 1]");
     let by_steps = transform("scale = [1, 2, -3]\nrotate = [0, 0, 90]\ntranslate = [5, 6, 7]");
     assert_eq!(by_matrix, by_steps);
-    assert!(by_matrix.mirrors());
+    assert!(by_matrix.flips_handedness());
 }
 
 #[test]

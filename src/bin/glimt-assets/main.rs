@@ -85,7 +85,7 @@ fn stored() -> Vec<AssetFile> {
 mod tests {
     use super::*;
     use glimt::assets::mesh;
-    use glimt::control::{CancelToken, unwatched};
+    use glimt::control::{CancelToken, ignore_progress};
     use std::collections::HashMap;
 
     fn folder() -> &'static Path {
@@ -115,7 +115,7 @@ mod tests {
             ("gem.off", true),
             ("room.obj", false),
         ] {
-            let loaded = mesh::load(&folder().join(name), &unwatched, &CancelToken::new()).expect(name);
+            let loaded = mesh::load(&folder().join(name), &ignore_progress, &CancelToken::new()).expect(name);
             assert_eq!(
                 (loaded.dropped, loaded.warnings, loaded.material_warnings),
                 Default::default(),
@@ -185,7 +185,8 @@ mod tests {
     #[test]
     fn stored_normals_point_to_the_front() {
         for name in ["knot.obj", "vase.obj", "room.obj"] {
-            let mesh = mesh::load(&folder().join(name), &unwatched, &CancelToken::new()).expect(name).mesh;
+            let mesh =
+                mesh::load(&folder().join(name), &ignore_progress, &CancelToken::new()).expect(name).mesh;
             let against = (0..mesh.triangles.len() as u32)
                 .filter(|&triangle| {
                     let [a, b, c] = mesh.corners(triangle);

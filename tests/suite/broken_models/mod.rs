@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glimt::assets::gltf::Container;
 use glimt::assets::mesh::load;
-use glimt::control::{CancelToken, unwatched};
+use glimt::control::{CancelToken, ignore_progress};
 use serde_json::{Value, json};
 
 use self::cases::{every_byte, mtl, obj, off, ply, stl};
@@ -89,8 +89,10 @@ fn said(folder: &Path, name: &str, content: &[u8]) -> String {
     let (path, token) = (folder.join(name), CancelToken::new());
     fs::write(&path, content).expect("written");
     let read = match name.ends_with("gltf") || name.ends_with("glb") {
-        true => Container::open(&path, &unwatched, &token).and_then(|file| file.scene(&token)).map(drop),
-        false => load(&path, &unwatched, &token).map(drop),
+        true => {
+            Container::open(&path, &ignore_progress, &token).and_then(|file| file.scene(&token)).map(drop)
+        }
+        false => load(&path, &ignore_progress, &token).map(drop),
     };
     let message = read.map_or_else(|error| error.to_string(), |()| String::new());
     message.replace(&format!("{}/", folder.display()), "")

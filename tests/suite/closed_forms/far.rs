@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glimt::assets::mesh::load;
-use glimt::control::{CancelToken, unwatched};
+use glimt::control::{CancelToken, ignore_progress};
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::math::{DVec3, Vec2, Vec3};
 use glimt::scene::description::light::Falloff;
@@ -180,7 +180,7 @@ fn mesh_files_keep_vertices_that_are_far_from_the_origin() {
         for ending in ["obj", "off", "ply"] {
             let path = folder.path().join(format!("ball.{ending}"));
             std::fs::write(&path, text_of(&ball, far, ending)).expect("written");
-            let loaded = load(Path::new(&path), &unwatched, &CancelToken::new()).expect("a mesh");
+            let loaded = load(Path::new(&path), &ignore_progress, &CancelToken::new()).expect("a mesh");
             assert_eq!(loaded.mesh.triangles.len(), ball.triangles.len(), "{ending}");
             // Where the file has it, and moved back by the scene.
             let off = difference(&seen(scene().loaded(loaded.clone(), AS_IT_IS, matte(0.8)), far), &near);

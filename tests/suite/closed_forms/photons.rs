@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use glimt::control::{CancelToken, unwatched};
+use glimt::control::{CancelToken, ignore_progress};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::{PhotonMap, PhotonMaps, PhotonSettings, Photons, View, render_tile_with_photons};
@@ -47,7 +47,7 @@ fn what_is_stored_in_a_closed_room_is_the_power_and_how_often_photons_arrive_is_
         let of_photons = PhotonSettings { count, radius: 0.1, bounces: 10_000 };
         let settings = build.photons(count.into(), 0.1).settings(3);
         let (_, pass) =
-            Photons::new(&world, &settings, of_photons, &unwatched, &token).expect("nobody cancels");
+            Photons::new(&world, &settings, of_photons, &ignore_progress, &token).expect("nobody cancels");
         let (power, n) = (4.0 * PI, f64::from(count));
         let flux = |map: &PhotonMap| map.photons().map(|photon| f64::from(photon.flux.x)).sum::<f64>();
         let error = (reflectance * (1.0 - reflectance) / n).sqrt();
@@ -68,7 +68,7 @@ fn where_nothing_mirrors_or_refracts_no_photons_are_sent() {
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
     let (photons, pass) =
-        Photons::new(&world, &settings, of_photons, &unwatched, &token).expect("nobody cancels");
+        Photons::new(&world, &settings, of_photons, &ignore_progress, &token).expect("nobody cancels");
     assert!(!photons.emits_photons());
     assert_eq!((pass.emitted, pass.stored()), (0, 0));
 }
@@ -280,8 +280,8 @@ fn the_bits_are_the_same_whatever_the_threads_and_the_cut() {
     let maps = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
-            let (photons, _) =
-                Photons::new(&world, &settings, of_photons, &unwatched, &token).expect("nobody cancels");
+            let (photons, _) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
+                .expect("nobody cancels");
             photons.maps(&world, &settings, 0..4, &token).expect("nobody cancels")
         })
     };
@@ -306,8 +306,8 @@ fn the_bits_are_the_same_whatever_the_threads_and_the_cut() {
     for cuts in [&[0, 1, 2, 3, 4][..], &[0, 1, 4], &[0, 3, 4]] {
         for part in cuts.windows(2) {
             let samples = part[0]..part[1];
-            let (photons, _) =
-                Photons::new(&world, &settings, of_photons, &unwatched, &token).expect("nobody cancels");
+            let (photons, _) = Photons::new(&world, &settings, of_photons, &ignore_progress, &token)
+                .expect("nobody cancels");
             let maps = photons.maps(&world, &settings, samples.clone(), &token).expect("nobody cancels");
             let own: Vec<_> = at_once
                 .chunks(4)
@@ -334,6 +334,7 @@ fn meshes_whose_files_say_that_they_are_of_glass_are_aimed_at() {
         .photons(1000, 0.1);
     let (world, settings, token) = (build.world(), build.settings(1), CancelToken::new());
     let of_photons = settings.photons.expect("photons are on");
-    let (_, pass) = Photons::new(&world, &settings, of_photons, &unwatched, &token).expect("nobody cancels");
+    let (_, pass) =
+        Photons::new(&world, &settings, of_photons, &ignore_progress, &token).expect("nobody cancels");
     assert!(pass.caustic.len() > 500, "{} of 1000", pass.caustic.len());
 }

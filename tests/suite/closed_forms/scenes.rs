@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glimt::assets::image::mipmaps;
 use glimt::assets::{FileMaterial, LoadedMesh};
-use glimt::control::{CancelToken, unwatched};
+use glimt::control::{CancelToken, ignore_progress};
 use glimt::film::Rect;
 use glimt::geometry::mesh::TriangleMesh;
 use glimt::integrators::{self, PhotonMaps, PhotonSettings, RenderSettings, View, render_tile_with_photons};
@@ -282,7 +282,7 @@ pub fn tile(world: &World, settings: &RenderSettings, rect: Rect, samples: u32) 
 pub fn maps(world: &World, settings: &RenderSettings, samples: u32) -> Option<PhotonMaps> {
     let token = CancelToken::new();
     settings.effective().photons.filter(|_| settings.gathers()).map(|of_photons| {
-        let photons = integrators::Photons::new(world, settings, of_photons, &unwatched, &token);
+        let photons = integrators::Photons::new(world, settings, of_photons, &ignore_progress, &token);
         let (photons, _) = photons.expect("nobody cancels");
         photons.maps(world, settings, 0..samples, &token).expect("nobody cancels")
     })

@@ -13,7 +13,7 @@ pub struct Cancelled;
 pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
 
 /// Progress callback that ignores all reports.
-pub fn unwatched(_done: u64, _total: u64) {}
+pub fn ignore_progress(_done: u64, _total: u64) {}
 
 /// Shared flag that cancels or pauses work. Workers poll [`CancelToken::check`] often enough to stop within
 /// 10 ms.
@@ -24,13 +24,13 @@ pub struct CancelToken(Arc<Shared>);
 struct Shared {
     cancelled: AtomicBool,
     paused: AtomicBool,
-    held: Mutex<Held>,
+    held: Mutex<PauseTime>,
     changed: Condvar,
 }
 
 /// Total length of earlier pauses and the start of the current one.
 #[derive(Debug, Default)]
-struct Held {
+struct PauseTime {
     before: Duration,
     since: Option<Instant>,
 }
@@ -60,7 +60,7 @@ impl CancelToken {
     }
 
     /// Total time for which the work has been paused.
-    pub fn held(&self) -> Duration {
+    pub fn paused_time(&self) -> Duration {
         let held = self.lock();
         held.before + held.since.map_or(Duration::ZERO, |since| since.elapsed())
     }
@@ -92,7 +92,7 @@ impl CancelToken {
         self.0.changed.notify_all();
     }
 
-    fn lock(&self) -> MutexGuard<'_, Held> {
+    fn lock(&self) -> MutexGuard<'_, PauseTime> {
         self.0.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -122,16 +122,16 @@ mod tests {
         const HOLD: Duration = Duration::from_millis(20);
         let token = CancelToken::new();
         token.set_paused(false);
-        assert_eq!(token.held(), Duration::ZERO);
+        assert_eq!(token.paused_time(), Duration::ZERO);
         token.set_paused(true);
         std::thread::sleep(HOLD);
         token.set_paused(true);
-        let during = token.held();
+        let during = token.paused_time();
         token.set_paused(false);
-        let after = token.held();
+        let after = token.paused_time();
         std::thread::sleep(HOLD);
         assert!(HOLD <= during && during <= after);
-        assert_eq!(token.held(), after, "the work runs again");
+        assert_eq!(token.paused_time(), after, "the work runs again");
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! Block sums of a film: memory and completion of blocks.
 
 use super::Rect;
-use super::blocks::Blocks;
+use super::sum_order::SumOrder;
 use super::sums::{Film, FilmError, Tile, bytes_needed, is_available};
 use crate::math::DVec3;
 
 impl Tile {
     /// Moves a pixel's sum to its block if the block is complete.
-    pub(super) fn close_block(&mut self, pixel: usize, blocks: Blocks) {
+    pub(super) fn close_block(&mut self, pixel: usize, blocks: SumOrder) {
         let Some(block) = blocks.finished(self.counts[pixel]) else { return };
         let put = |earlier: &mut [Vec<DVec3>], sums: &mut [DVec3]| {
             if let Some(block) = earlier.get_mut(block) {
@@ -26,7 +26,7 @@ impl Film {
     ///
     /// # Errors
     /// There is not enough memory for the block sums.
-    pub fn in_blocks(mut self, blocks: Blocks) -> Result<Self, FilmError> {
+    pub fn with_sum_order(mut self, blocks: SumOrder) -> Result<Self, FilmError> {
         let (crop, kept) = (self.crop(), blocks.kept());
         let more = crop.area() as u64 * (kept * size_of::<DVec3>()) as u64;
         let (width, height, bytes) = (self.width(), self.height(), self.memory_bytes() + more);
@@ -49,14 +49,14 @@ impl Film {
     }
 
     /// Bytes for the sums of a crop with this summation order, and for the finished image of this size.
-    pub fn bytes_of((width, height): (u32, u32), crop: Rect, blocks: Blocks) -> (u64, u64) {
+    pub fn memory_for((width, height): (u32, u32), crop: Rect, blocks: SumOrder) -> (u64, u64) {
         let more = crop.area() as u64 * (blocks.kept() * size_of::<DVec3>()) as u64;
         let picture = bytes_needed(width, height, Rect { width: 0, height: 0, ..crop });
         (bytes_needed(width, height, crop) - picture + more, picture)
     }
 
     /// Summation order of the samples.
-    pub fn blocks(&self) -> Blocks {
+    pub fn sum_order(&self) -> SumOrder {
         self.blocks
     }
 }
@@ -72,8 +72,8 @@ mod tests {
     fn block_sums_ignore_sample_grouping() {
         let mut next = unit(3);
         let values: Vec<f32> = (0..41).map(|_| next() * 1e3).collect();
-        let add = |blocks: Blocks, counts: &[usize]| {
-            let film = Film::new(1, 1, None).and_then(|film| film.in_blocks(blocks)).expect("a film");
+        let add = |blocks: SumOrder, counts: &[usize]| {
+            let film = Film::new(1, 1, None).and_then(|film| film.with_sum_order(blocks)).expect("a film");
             let mut rest = &values[..];
             for &count in counts {
                 let (some, others) = rest.split_at(count);
@@ -92,9 +92,9 @@ mod tests {
         let sum = |values: &[f32]| values.iter().fold(0.0, |sum, value| sum + f64::from(*value));
         let exact = ((sum(&values[..16]) + sum(&values[16..32])) + sum(&values[32..])) / 41.0;
         for counts in [&[41][..], &[1; 41], &[16, 16, 9], &[7, 20, 14]] {
-            assert_eq!(add(Blocks::Added, counts).to_bits(), exact.to_bits(), "{counts:?}");
-            assert_eq!(add(Blocks::Apart(2), counts).to_bits(), exact.to_bits(), "{counts:?}");
-            assert_eq!(add(Blocks::Whole, counts).to_bits(), (sum(&values) / 41.0).to_bits());
+            assert_eq!(add(SumOrder::Blocked, counts).to_bits(), exact.to_bits(), "{counts:?}");
+            assert_eq!(add(SumOrder::SeparateBlocks(2), counts).to_bits(), exact.to_bits(), "{counts:?}");
+            assert_eq!(add(SumOrder::Sequential, counts).to_bits(), (sum(&values) / 41.0).to_bits());
         }
     }
 }

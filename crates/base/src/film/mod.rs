@@ -8,31 +8,31 @@
 //! thread. The caller chooses the number of threads.
 
 mod block_sums;
-mod blocks;
+mod convergence;
 mod curves;
 mod noise;
-mod part;
-mod pilot;
+mod pixel_subset;
+mod prepass;
 mod preview;
 mod quantity;
+pub mod range_map;
 mod resample;
 mod section;
 mod srgb;
-mod steps;
 mod stored;
-pub mod stretch;
+mod sum_order;
 mod sums;
 pub mod tone;
 
-pub use blocks::{BLOCK, Blocks};
-pub use noise::{HalfNoise, PictureNoise, samples_by};
-pub use part::{Part, Pixels};
-pub use pilot::{PILOT_SAMPLES, Pilot};
+pub use convergence::Convergence;
+pub use noise::{HalfNoise, ImageNoise, samples_to_reduce_error};
+pub use pixel_subset::{PixelSubset, Pixels};
+pub use prepass::{PREPASS_SAMPLES, Prepass};
 pub use preview::Previewer;
 pub use quantity::Quantity;
 pub use srgb::linear_to_srgb8;
-pub use steps::Convergence;
 pub use stored::{Malformed, StoredTile};
+pub use sum_order::{BLOCK_SIZE, SumOrder};
 pub use sums::{Film, FilmError, SampleStats};
 
 use crate::math::Vec3;

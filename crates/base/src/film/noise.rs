@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::steps::{Convergence, luminance};
-use super::{CELLS, Film, Part, Pixels, is_in_pool};
+use super::convergence::{Convergence, luminance};
+use super::{CELLS, Film, PixelSubset, Pixels, is_in_pool};
 
 /// Number of samples that reduces the standard error of `count` samples by the factor `part`, if the variance
 /// falls with this power of the sample count.
-pub fn samples_by(power: f64, part: f64, count: u32) -> u32 {
+pub fn samples_to_reduce_error(power: f64, part: f64, count: u32) -> u32 {
     (f64::from(count) * libm::pow(part, -2.0 / power)).ceil() as u32
 }
 
@@ -26,7 +26,7 @@ pub struct HalfNoise {
 
 /// Noise of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PictureNoise {
+pub struct ImageNoise {
     /// Relative standard error: [`Film::relative_error`].
     pub relative_error: f64,
     /// Expected exponent: the squared error falls with this power of the sample count.
@@ -66,13 +66,13 @@ impl Film {
     }
 
     /// [`Film::relative_error`] and the exponent with which it falls.
-    pub fn noise(&self) -> Option<PictureNoise> {
+    pub fn noise(&self) -> Option<ImageNoise> {
         let sums @ NoiseSums { variance, mean, .. } = self.noise_sums()?;
         let pixels = self.crop().area() as f64;
         let error = (variance / pixels).sqrt();
         // A black image without error has a relative error of 0.
         let relative_error = if error == 0.0 { 0.0 } else { error / (mean / pixels) };
-        Some(PictureNoise { relative_error, power: sums.power() })
+        Some(ImageNoise { relative_error, power: sums.power() })
             .filter(|noise| noise.relative_error.is_finite())
     }
 
@@ -108,11 +108,11 @@ impl Film {
                 mean: sums.mean + other.mean,
             })
         };
-        self.of_tiles(of_tile).into_iter().try_fold(NoiseSums::default(), add)
+        self.map_tiles(of_tile).into_iter().try_fold(NoiseSums::default(), add)
     }
 
     /// Calls `tell` for every tile, in parallel inside a rayon pool, and returns the results in tile order.
-    pub fn of_tiles<T: Send>(&self, tell: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+    pub fn map_tiles<T: Send>(&self, tell: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
         let tiles = 0..self.tile_count();
         if is_in_pool() { tiles.into_par_iter().map(tell).collect() } else { tiles.map(tell).collect() }
     }
@@ -163,7 +163,7 @@ impl Film {
     }
 
     /// Error of a half-cell after the first `count` samples per pixel, where `count` is a power of two: the
-    /// mean of luminance variance / (luminance² + [`RELMSE_LEAST`](crate::math::color::RELMSE_LEAST)) over
+    /// mean of luminance variance / (luminance² + [`RELMSE_EPSILON`](crate::math::color::RELMSE_EPSILON)) over
     /// the pixels, and the exponent with which it falls. `None` for fewer than two samples, for more than the
     /// pixels have, and if the half has no pixels.
     pub fn half_error(&self, number: usize, half: usize, count: u32) -> Option<(f64, f64)> {
@@ -180,15 +180,15 @@ impl Film {
 
     /// Number of pixels in one half of a cell.
     pub fn half_pixel_count(&self, cell: usize, half: usize) -> usize {
-        self.cell_rect(cell).map_or(0, |rect| Part::Half(half).count(rect.area()))
+        self.cell_rect(cell).map_or(0, |rect| PixelSubset::Half(half).count(rect.area()))
     }
 
     /// Indices within the tile of the pixels of a half-cell.
     fn half_pixels(&self, cell: usize, half: usize) -> impl Iterator<Item = usize> {
         let (tile, rect) = (self.tile_rect(cell / CELLS), self.cell_rect(cell));
-        let part = Part::Half(half);
+        let part = PixelSubset::Half(half);
         tile.zip(rect).into_iter().flat_map(move |(tile, rect)| {
-            let place = move |number| Pixels { rect, part }.place(number);
+            let place = move |number| Pixels { rect, part }.position(number);
             let index = move |(x, y): (u32, u32)| ((y - tile.y) * tile.width + x - tile.x) as usize;
             (0..part.count(rect.area()) as u32).map(move |number| index(place(number)))
         })
@@ -203,7 +203,7 @@ impl Film {
             }
             (0..tile.counts.len()).map(|pixel| tile.mean(pixel).map(luminance)).sum::<Option<f64>>()
         };
-        let sum: Option<f64> = self.of_tiles(of_tile).into_iter().sum();
+        let sum: Option<f64> = self.map_tiles(of_tile).into_iter().sum();
         sum.map(|sum| sum / self.crop().area() as f64)
     }
 }
@@ -268,7 +268,11 @@ mod tests {
         let film = film(&[&[4.0, 6.0], &[0.5, 1.5]]);
         let error = film.mean_luminance_error().expect("an estimate");
         assert!((error - 1.25_f64.sqrt() / 2.0).abs() < 1e-6, "{error}");
-        assert_eq!(film.converging(Convergence::Photons).mean_luminance_error(), None, "photons are shared");
+        assert_eq!(
+            film.with_convergence(Convergence::Photons).mean_luminance_error(),
+            None,
+            "photons are shared"
+        );
         assert_eq!(self::film(&[&[4.0, 6.0], &[0.5]]).mean_luminance_error(), None);
         let part = Film::new(4, 1, Some(Rect { x: 0, y: 0, width: 2, height: 1 })).expect("a film");
         assert_eq!(part.mean_luminance_error(), None);
@@ -283,7 +287,8 @@ mod tests {
             let pixels: Vec<&[f32]> = pixels.iter().map(Vec::as_slice).collect();
             let exact = (1.0 / 12.0 / f64::from(count)).sqrt() / 0.5;
             for convergence in [Convergence::Stratified, Convergence::Photons] {
-                let error = film(&pixels).converging(convergence).relative_error().expect("an estimate");
+                let error =
+                    film(&pixels).with_convergence(convergence).relative_error().expect("an estimate");
                 assert!((0.9..1.04).contains(&(error / exact)), "{count} samples: {error} is not {exact}");
             }
         }

@@ -1,6 +1,6 @@
 //! Quantities that a film can display: the mean radiance or statistics of the samples.
 
-use super::steps::{Convergence, pixel_variance};
+use super::convergence::{Convergence, pixel_variance};
 use super::sums::{Tile, tile_grid, tile_rect};
 use super::{Film, RadianceImage, Rect, TILE_SIZE};
 use crate::math::{DVec3, Vec3};

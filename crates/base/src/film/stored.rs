@@ -2,9 +2,9 @@
 
 use std::sync::atomic::Ordering;
 
-use super::steps::Steps;
+use super::convergence::Steps;
 use super::sums::{Negative, Tile};
-use super::{CELLS, Film, Part};
+use super::{CELLS, Film, PixelSubset};
 use crate::math::DVec3;
 
 /// Error for bytes that are not a tile of the film.
@@ -126,7 +126,7 @@ impl Film {
     pub fn restore(&self, tile: usize, stored: StoredTile) -> Result<(), Malformed> {
         let area = self.tile_rect(tile).ok_or(Malformed)?.area();
         let Tile { sums, earlier, counts, negative, steps, .. } = stored.tile;
-        if sums.len() != area || earlier.len() != self.blocks().kept() {
+        if sums.len() != area || earlier.len() != self.sum_order().kept() {
             return Err(Malformed);
         }
         let mut own = self.tile(tile);
@@ -139,10 +139,10 @@ impl Film {
     /// Samples per pixel in one half of a cell, or 0 if the half has no pixels.
     pub fn half_samples(&self, cell: usize, half: usize) -> u32 {
         let (Some(tile), Some(rect)) = (self.tile_rect(cell / CELLS), self.cell_rect(cell)) else { return 0 };
-        if Part::Half(half).count(rect.area()) == 0 {
+        if PixelSubset::Half(half).count(rect.area()) == 0 {
             return 0;
         }
-        let index = Part::Half(half).index(0, rect);
+        let index = PixelSubset::Half(half).index(0, rect);
         let (x, y) = (rect.x + index % rect.width - tile.x, rect.y + index / rect.width - tile.y);
         self.tile(cell / CELLS).count((y * tile.width + x) as usize)
     }
@@ -218,7 +218,7 @@ impl Bytes<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{BLOCK, Blocks, NegativeLobes, Rect, TileSamples};
+    use crate::film::{BLOCK_SIZE, NegativeLobes, Rect, SumOrder, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit;
 
@@ -243,9 +243,9 @@ mod tests {
         }
     }
 
-    fn film(blocks: Blocks) -> Film {
+    fn film(blocks: SumOrder) -> Film {
         let crop = Some(Rect { x: 5, y: 2, width: 40, height: 33 });
-        Film::new(64, 64, crop).and_then(|film| film.in_blocks(blocks)).expect("a film")
+        Film::new(64, 64, crop).and_then(|film| film.with_sum_order(blocks)).expect("a film")
     }
 
     fn stored(film: &Film, tile: usize) -> Vec<u8> {
@@ -256,9 +256,12 @@ mod tests {
 
     #[test]
     fn restored_films_continue_identically() {
-        for (blocks, is_signed) in
-            [(Blocks::Whole, false), (Blocks::Whole, true), (Blocks::Added, true), (Blocks::Apart(2), true)]
-        {
+        for (blocks, is_signed) in [
+            (SumOrder::Sequential, false),
+            (SumOrder::Sequential, true),
+            (SumOrder::Blocked, true),
+            (SumOrder::SeparateBlocks(2), true),
+        ] {
             let (whole, first, second) = (film(blocks), film(blocks), film(blocks));
             add(&whole, 0..37, is_signed);
             add(&first, 0..21, is_signed);
@@ -280,14 +283,14 @@ mod tests {
     #[test]
     fn merged_blocks_equal_the_whole() {
         for is_signed in [false, true] {
-            let whole = film(Blocks::Added);
-            add(&whole, 0..2 * BLOCK + 5, is_signed);
+            let whole = film(SumOrder::Blocked);
+            add(&whole, 0..2 * BLOCK_SIZE + 5, is_signed);
             // One machine renders the first and last blocks, another the middle one.
-            let (outer, inner) = (film(Blocks::Apart(1)), film(Blocks::Apart(1)));
-            add(&outer, 0..BLOCK, is_signed);
-            add(&outer, 2 * BLOCK..2 * BLOCK + 5, is_signed);
-            add(&inner, BLOCK..2 * BLOCK, is_signed);
-            let merged = film(Blocks::Added);
+            let (outer, inner) = (film(SumOrder::SeparateBlocks(1)), film(SumOrder::SeparateBlocks(1)));
+            add(&outer, 0..BLOCK_SIZE, is_signed);
+            add(&outer, 2 * BLOCK_SIZE..2 * BLOCK_SIZE + 5, is_signed);
+            add(&inner, BLOCK_SIZE..2 * BLOCK_SIZE, is_signed);
+            let merged = film(SumOrder::Blocked);
             for tile in 0..whole.tile_count() {
                 let area = whole.tile_rect(tile).expect("a tile").area();
                 let [outer, inner] =
@@ -306,7 +309,7 @@ mod tests {
 
     #[test]
     fn malformed_tiles_are_rejected() {
-        let film = film(Blocks::Added);
+        let film = film(SumOrder::Blocked);
         add(&film, 0..9, true);
         let (bytes, area) = (stored(&film, 0), film.tile_rect(0).expect("a tile").area());
         for length in (0..bytes.len()).step_by(997).chain([bytes.len() - 1]) {

@@ -3,9 +3,9 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::blocks::{Blocks, total};
-use super::part::Part;
-use super::steps::{Convergence, Steps, luminance};
+use super::convergence::{Convergence, Steps, luminance};
+use super::pixel_subset::PixelSubset;
+use super::sum_order::{SumOrder, total};
 use super::{CELL_SIZE, CELLS, CELLS_ACROSS, Rect, TILE_SIZE, TileSamples};
 use crate::math::{DVec3, Vec3};
 
@@ -71,7 +71,7 @@ pub struct Film {
     pub(super) non_finite_samples: AtomicU64,
     id: u64,
     pub(super) convergence: Convergence,
-    pub(super) blocks: Blocks,
+    pub(super) blocks: SumOrder,
 }
 
 /// Sums of one tile in row-major order. Empty until the first samples arrive, so the thread that renders the
@@ -80,7 +80,7 @@ pub struct Film {
 pub(super) struct Tile {
     pub(super) sums: Vec<DVec3>,
     pub(super) counts: Vec<u32>,
-    /// Sums of finished sample blocks: none, one for all blocks, or one for each; see [`Blocks`].
+    /// Sums of finished sample blocks: none, one for all blocks, or one for each; see [`SumOrder`].
     pub(super) earlier: Vec<Vec<DVec3>>,
     /// Sums of the samples in the filter's negative lobes. `None` until the first one.
     pub(super) negative: Option<Negative>,
@@ -151,7 +151,7 @@ impl Tile {
         (index, cell, half): (usize, usize, usize),
         radiances: &[Vec3],
         lobes: Option<(f64, &[bool])>,
-        blocks: Blocks,
+        blocks: SumOrder,
     ) -> u64 {
         let mut non_finite = 0;
         let mut rest = 0..radiances.len();
@@ -159,8 +159,10 @@ impl Tile {
             // Stop at the next count at which the mean is recorded or a block ends.
             let to_note = Steps::samples_to_next(self.counts[index]);
             let left = match blocks {
-                Blocks::Whole => to_note,
-                Blocks::Added | Blocks::Apart(_) => to_note.min(blocks.samples_to_end(self.counts[index])),
+                SumOrder::Sequential => to_note,
+                SumOrder::Blocked | SumOrder::SeparateBlocks(_) => {
+                    to_note.min(blocks.samples_to_end(self.counts[index]))
+                }
             };
             let part = rest.start..rest.end.min(rest.start + left);
             non_finite += match lobes {
@@ -176,7 +178,7 @@ impl Tile {
             {
                 self.steps.note((index, cell, half), self.counts[index], luminance(mean));
             }
-            if blocks != Blocks::Whole {
+            if blocks != SumOrder::Sequential {
                 self.close_block(index, blocks);
             }
         }
@@ -248,12 +250,12 @@ impl Film {
             non_finite_samples: AtomicU64::new(0),
             id: IDS.fetch_add(1, Ordering::Relaxed),
             convergence: Convergence::default(),
-            blocks: Blocks::default(),
+            blocks: SumOrder::default(),
         })
     }
 
     /// Sets the convergence model of the noise.
-    pub fn converging(self, convergence: Convergence) -> Self {
+    pub fn with_convergence(self, convergence: Convergence) -> Self {
         Self { convergence, ..self }
     }
 
@@ -317,12 +319,12 @@ impl Film {
         tile.fill(rect.area());
         let count = samples.samples as usize;
         for (i, pixel) in samples.radiance.chunks_exact(count).enumerate() {
-            let (x, y) = samples.pixels.place(i as u32);
+            let (x, y) = samples.pixels.position(i as u32);
             let Some(index) = index_in(rect, x, y) else { continue };
             let (cell, inside) = cell_at(rect, x, y);
             let lobes = samples.negative.as_ref();
             let lobes = lobes.map(|lobes| (lobes.weight, &lobes.is_negative[i * count..][..count]));
-            let half = index_in(inside, x, y).map_or(0, |index| Part::half_of(index as u32, inside));
+            let half = index_in(inside, x, y).map_or(0, |index| PixelSubset::half_of(index as u32, inside));
             non_finite += tile.add((index, cell, half), pixel, lobes, self.blocks);
         }
         tile.revision += 1;

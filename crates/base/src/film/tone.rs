@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::stretch::Stretch;
+use super::range_map::RangeMap;
 use super::{Picture, Picture16, RadianceImage, curves, is_in_pool, linear_to_srgb8};
 use crate::choice;
 use crate::math::Vec3;
@@ -50,7 +50,7 @@ pub struct ToneMapping {
     /// Encoding of the result.
     pub transfer: Transfer,
     /// Range mapping for data without an inherent brightness.
-    pub stretch: Stretch,
+    pub range_map: RangeMap,
 }
 
 /// Maximum radiance: far above the point where every curve saturates, and far below overflow.
@@ -64,12 +64,12 @@ impl ToneMapping {
         exposure_stops: 0.0,
         curve: Tonemap::None,
         transfer: Transfer::Identity,
-        stretch: Stretch::None,
+        range_map: RangeMap::None,
     };
 
     /// Resolves the range mapping with the values in this image.
-    pub fn of_picture(self, image: &RadianceImage) -> Self {
-        Self { stretch: self.stretch.of_picture(image), ..self }
+    pub fn resolved_for(self, image: &RadianceImage) -> Self {
+        Self { range_map: self.range_map.resolved_for(image), ..self }
     }
 
     /// Linear display light in [0, 1] for any input color. NaN and negative components count as 0.
@@ -78,7 +78,7 @@ impl ToneMapping {
     }
 
     fn exposed(&self, radiance: Vec3, factor: f32) -> Vec3 {
-        let radiance = self.stretch.apply(radiance);
+        let radiance = self.range_map.apply(radiance);
         let bounded = |x: f32| if x.is_nan() { 0.0 } else { x.clamp(0.0, BRIGHTEST) };
         let color = Vec3::from_array((radiance * factor).to_array().map(bounded));
         match self.curve {

@@ -8,7 +8,7 @@ use super::elementary::pow;
 
 /// Added to the squared reference in relMSE so that errors of black pixels stay finite: below a radiance of
 /// 0.1, errors are effectively absolute; above it, relative.
-pub const RELMSE_LEAST: f64 = 0.01;
+pub const RELMSE_EPSILON: f64 = 0.01;
 
 /// Contribution of each linear Rec. 709 primary to relative luminance (IEC 61966-2-1).
 pub const LUMINANCE_WEIGHTS: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);

@@ -9,7 +9,7 @@ pub fn rounded(number: f64, step: f64) -> f64 {
 
 /// Decimal step for coordinates at `distance` from the viewpoint: a power of ten between 1e-5 and 1e-4 of the
 /// distance.
-pub fn step_at(distance: f64) -> f64 {
+pub fn decimal_step(distance: f64) -> f64 {
     libm::pow(10.0, libm::floor(libm::log10(distance)) - 4.0)
 }
 
@@ -28,7 +28,7 @@ mod tests {
             assert_eq!(rounded(number, step).to_string(), text);
         }
         for distance in [0.003, 1.0, 4.0, 9.99, 12_345.0] {
-            let error = step_at(distance) / 2.0 / distance;
+            let error = decimal_step(distance) / 2.0 / distance;
             assert!((4e-6..=5.1e-5).contains(&error), "{distance}: {error}");
         }
     }

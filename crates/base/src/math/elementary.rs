@@ -17,7 +17,7 @@ pub fn pow(x: f32, y: f32) -> f32 {
 /// xʸ for normal x > 0, with a relative error of at most 1e-11 · y. Underflows to 0 and overflows to ∞ where
 /// `f32` does.
 #[inline(always)]
-pub fn power_f64(x: f64, y: f64) -> f64 {
+pub fn pow_f64(x: f64, y: f64) -> f64 {
     exp2_f64(y * log2_f64(x))
 }
 

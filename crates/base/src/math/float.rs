@@ -11,7 +11,7 @@ pub const fn gamma(n: u32) -> f32 {
 }
 
 /// Largest power of two that is at most `number`, for `number` > 0. Returns 0 for subnormal numbers.
-pub fn power_of_two_below(number: f64) -> f64 {
+pub fn floor_to_power_of_two(number: f64) -> f64 {
     f64::from_bits(number.to_bits() & f64::INFINITY.to_bits())
 }
 

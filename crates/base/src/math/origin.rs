@@ -1,7 +1,7 @@
 //! Local coordinate origins for single precision.
 
 use super::DVec3;
-use super::float::power_of_two_below;
+use super::float::floor_to_power_of_two;
 
 /// Step of the grid of origins, in scene sizes: at this distance, single precision errs by a millionth of the
 /// size.
@@ -13,7 +13,7 @@ const OFF_POWERS: f64 = 1.37;
 /// Local origin for a scene of this size around `place`: 0 near 0, and otherwise on a grid whose step is a
 /// power of two. Subtracting the origin is therefore exact, and small changes of `place` leave it unchanged.
 pub fn origin_near(place: DVec3, size: f64) -> DVec3 {
-    let step = STEP * power_of_two_below(size * OFF_POWERS);
+    let step = STEP * floor_to_power_of_two(size * OFF_POWERS);
     // Adding 0 turns −0 into 0.
     let origin = (place / step).round() * step + DVec3::ZERO;
     if step > 0.0 && origin.is_finite() { origin } else { DVec3::ZERO }

@@ -77,7 +77,7 @@ impl Transform {
     }
 
     /// Upper bound on the factor by which the inverse lengthens vectors.
-    pub fn inverse_growth(&self) -> f64 {
+    pub fn max_inverse_stretch(&self) -> f64 {
         let DMat3 { x_axis, y_axis, z_axis } = self.inverse_linear.transpose();
         let lengths = DVec3::new(x_axis.length(), y_axis.length(), z_axis.length());
         // Orthogonal rows, as in a scale followed by a rotation: the longest row is exact.
@@ -87,7 +87,7 @@ impl Transform {
     }
 
     /// Whether the map reverses handedness.
-    pub fn mirrors(&self) -> bool {
+    pub fn flips_handedness(&self) -> bool {
         self.linear.determinant() < 0.0
     }
 }
@@ -153,13 +153,13 @@ mod tests {
         );
         let p = DVec3::new(0.3, -0.8, 12.0);
         assert!((t.inverse_point(t.point(p)) - p).length() < 1e-12);
-        assert!(t.mirrors());
-        assert!((t.inverse_growth() - 2.0).abs() < 1e-6, "{}", t.inverse_growth());
+        assert!(t.flips_handedness());
+        assert!((t.max_inverse_stretch() - 2.0).abs() < 1e-6, "{}", t.max_inverse_stretch());
         let sheared = Transform {
             inverse_linear: DMat3::from_cols(DVec3::X, DVec3::new(3.0, 1.0, 0.0), DVec3::Z),
             ..t
         };
-        assert!(sheared.inverse_growth() >= 3.3027, "at least the largest singular value");
+        assert!(sheared.max_inverse_stretch() >= 3.3027, "at least the largest singular value");
         // A normal stays perpendicular to a transformed tangent.
         assert!(t.normal(DVec3::Y).dot(t.vector(DVec3::new(1.0, 0.0, 2.0))).abs() < 1e-12);
     }

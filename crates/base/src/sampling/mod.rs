@@ -3,8 +3,8 @@
 
 pub mod distribution;
 pub mod filter;
-pub mod grid;
+pub mod piecewise_constant;
 pub mod stream;
 pub mod warp;
 
-pub use stream::{CAMERA_PATH, Decision, PixelSampler, SamplerPacket};
+pub use stream::{CAMERA_PATH, Dimension, PixelSampler, SamplerPacket};

@@ -3,10 +3,10 @@
 
 use crate::math::Vec2;
 
-/// A random decision at a path vertex. Numbers for different decisions are independent; numbers for the same
+/// A dimension of the sample sequence: one random decision at a path vertex. Numbers for different decisions are independent; numbers for the same
 /// decision are well distributed over a pixel's samples. Every random number belongs to one decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Decision {
+pub enum Dimension {
     /// Position in the pixel.
     Pixel,
     /// Position on the lens.
@@ -14,13 +14,13 @@ pub enum Decision {
     /// Position on the light with this index.
     Light(u32),
     /// Choice of a light, unless all lights are sampled.
-    Pick,
+    LightChoice,
     /// Position on the chosen light.
-    Picked,
+    ChosenLight,
     /// Choice of the selected lights that get shadow rays.
-    Trace,
+    ShadowRayChoice,
     /// Choice between reflection and refraction.
-    Choice,
+    Fresnel,
     /// Stochastic transparency: whether the surface is opaque here.
     Opacity,
     /// Choice of the BSDF lobe to sample.
@@ -31,41 +31,41 @@ pub enum Decision {
     Roulette,
     /// Russian roulette after a specular surface. Separate from `Roulette`, as the next vertex has the same
     /// path number.
-    Spared,
+    SpecularRoulette,
     /// Choice of the vertices that look up photons, if the path has several.
     Gather,
     /// Position in a density kernel of the trial with this index, which searches for a surface.
     Trial(u32),
     /// Choice of a photon's light and of a part of it.
-    Lamp,
+    PhotonLight,
     /// Whether to aim a photon, and at which target.
-    Aim,
+    PhotonTarget,
     /// Starting position of a photon on its light.
-    Start,
+    PhotonPosition,
     /// Direction of an emitted photon.
-    Sent,
+    PhotonDirection,
 }
 
-impl Decision {
+impl Dimension {
     /// Sobol dimension of this decision; `path` distinguishes the paths of one sample.
     #[inline(always)]
-    fn dimension(self, path: u32) -> u32 {
+    fn hash(self, path: u32) -> u32 {
         let number = match self {
             Self::Light(number) => number,
-            Self::Choice => u32::MAX,
+            Self::Fresnel => u32::MAX,
             Self::Pixel => u32::MAX - 1,
             Self::Lens => u32::MAX - 2,
             Self::Lobe => u32::MAX - 3,
             Self::Direction => u32::MAX - 4,
             Self::Roulette => u32::MAX - 5,
-            Self::Pick => u32::MAX - 6,
-            Self::Picked => u32::MAX - 7,
-            Self::Trace => u32::MAX - 8,
-            Self::Lamp => u32::MAX - 9,
-            Self::Aim => u32::MAX - 10,
-            Self::Start => u32::MAX - 11,
-            Self::Sent => u32::MAX - 12,
-            Self::Spared => u32::MAX - 13,
+            Self::LightChoice => u32::MAX - 6,
+            Self::ChosenLight => u32::MAX - 7,
+            Self::ShadowRayChoice => u32::MAX - 8,
+            Self::PhotonLight => u32::MAX - 9,
+            Self::PhotonTarget => u32::MAX - 10,
+            Self::PhotonPosition => u32::MAX - 11,
+            Self::PhotonDirection => u32::MAX - 12,
+            Self::SpecularRoulette => u32::MAX - 13,
             Self::Gather => u32::MAX - 14,
             Self::Opacity => u32::MAX - 15,
             Self::Trial(number) => (1 << 31) + number,
@@ -99,8 +99,8 @@ impl PixelSampler {
 
     /// Returns two numbers in [0, 1) for one decision.
     #[inline]
-    pub fn pair(&self, path: u32, decision: Decision) -> Vec2 {
-        let [[x], [y]] = scrambled([self.sample], [mix(self.seed ^ decision.dimension(path)) ^ mix(0)]);
+    pub fn pair(&self, path: u32, decision: Dimension) -> Vec2 {
+        let [[x], [y]] = scrambled([self.sample], [mix(self.seed ^ decision.hash(path)) ^ mix(0)]);
         Vec2::new(x, y)
     }
 }
@@ -126,12 +126,12 @@ impl<const N: usize> SamplerPacket<N> {
     /// Returns two numbers in [0, 1) per sample for one of the `of` repetitions of a decision, well
     /// distributed over repetitions and samples together. The scramble changes every 2³² points.
     #[inline(always)]
-    pub fn pairs(&self, paths: &[u32; N], decision: Decision, repetition: u32, of: u32) -> [[f32; N]; 2] {
+    pub fn pairs(&self, paths: &[u32; N], decision: Dimension, repetition: u32, of: u32) -> [[f32; N]; 2] {
         let (mut indices, mut seeds) = ([0; N], [0; N]);
         for i in 0..N {
             let index = u64::from(self.samples[i]) * u64::from(of) + u64::from(repetition);
             indices[i] = index as u32;
-            seeds[i] = mix(self.seeds[i] ^ decision.dimension(paths[i])) ^ mix((index >> 32) as u32);
+            seeds[i] = mix(self.seeds[i] ^ decision.hash(paths[i])) ^ mix((index >> 32) as u32);
         }
         scrambled(indices, seeds)
     }
@@ -204,7 +204,7 @@ mod tests {
     fn points(
         seed: u32,
         [x, y, sample]: [u32; 3],
-        decision: Decision,
+        decision: Dimension,
         of: u32,
     ) -> impl Iterator<Item = [f32; 2]> {
         let row = SamplerPacket::new(seed, &[x], &[y], &[sample]);
@@ -215,17 +215,17 @@ mod tests {
     fn repetitions_continue_one_sequence() {
         for (sample, n) in [(0, 3), (7, 5), (9, 1), (u32::MAX / 3, 6), (u32::MAX / 2, 3)] {
             let own = PixelSampler::new(2, 3, 4, sample);
-            for (i, point) in points(2, [3, 4, sample], Decision::Choice, n).enumerate() {
+            for (i, point) in points(2, [3, 4, sample], Dimension::Fresnel, n).enumerate() {
                 let index = u64::from(sample) * u64::from(n) + i as u64;
-                let seed = mix(own.seed ^ Decision::Choice.dimension(1)) ^ mix((index >> 32) as u32);
+                let seed = mix(own.seed ^ Dimension::Fresnel.hash(1)) ^ mix((index >> 32) as u32);
                 let [[x], [y]] = scrambled([index as u32], [seed]);
                 assert_eq!([x, y], point, "number {i} of sample {sample}");
                 let row = SamplerPacket::new(2, &[3; 16], &[4; 16], &[sample; 16]);
-                let [x, y] = row.pairs(&[1; 16], Decision::Choice, i as u32, n);
+                let [x, y] = row.pairs(&[1; 16], Dimension::Fresnel, i as u32, n);
                 assert_eq!([x[i % 16], y[15]], point, "number {i} of sample {sample} in a row");
             }
-            let first = points(2, [3, 4, sample], Decision::Choice, 1).next();
-            assert_eq!(first, Some(own.pair(1, Decision::Choice).to_array()));
+            let first = points(2, [3, 4, sample], Dimension::Fresnel, 1).next();
+            assert_eq!(first, Some(own.pair(1, Dimension::Fresnel).to_array()));
         }
     }
 
@@ -233,7 +233,7 @@ mod tests {
     fn power_of_two_counts_are_stratified() {
         // 64 points, one in each cell of every grid of 64: 64×1, 32×2, … 1×64.
         for n in [1_u32, 16] {
-            let all = (0..64 / n).flat_map(|sample| points(3, [10, 20, sample], Decision::Light(2), n));
+            let all = (0..64 / n).flat_map(|sample| points(3, [10, 20, sample], Dimension::Light(2), n));
             let points: Vec<[f32; 2]> = all.collect();
             for columns in [1_usize, 2, 4, 8, 16, 32, 64] {
                 let mut cells = [0_u32; 64];
@@ -244,7 +244,7 @@ mod tests {
                 assert_eq!(cells, [1; 64], "{columns} columns");
             }
         }
-        let first = |x| PixelSampler::new(3, x, 20, 0).pair(CAMERA_PATH, Decision::Pixel);
+        let first = |x| PixelSampler::new(3, x, 20, 0).pair(CAMERA_PATH, Dimension::Pixel);
         assert_ne!(first(10), first(11));
     }
 
@@ -270,7 +270,7 @@ mod tests {
             for group in 0..of / 32 {
                 let mut found = [0_u32; 16];
                 for repetition in 0..32 {
-                    let [u, _] = row.pairs(&paths, Decision::Pick, group * 32 + repetition, of);
+                    let [u, _] = row.pairs(&paths, Dimension::LightChoice, group * 32 + repetition, of);
                     for i in 0..16 {
                         found[i] |= 1 << (u[i] * 32.0) as u32;
                     }
@@ -285,7 +285,7 @@ mod tests {
         let (mut sums, mut product, n) = ([0.0; 2], 0.0, 40_000_u32);
         for pixel in 0..n {
             let place = [pixel % 200, pixel / 200, 7];
-            for [x, y] in points(1, place, Decision::Light(0), 1).map(|point| point.map(f64::from)) {
+            for [x, y] in points(1, place, Dimension::Light(0), 1).map(|point| point.map(f64::from)) {
                 sums = [sums[0] + x, sums[1] + y];
                 product += (x - 0.5) * (y - 0.5) * 12.0;
             }
@@ -300,14 +300,18 @@ mod tests {
     fn decisions_are_independent() {
         // Mean correlation of first coordinates over a pixel's samples, for 64 pixels. A shared scramble
         // would give 1.
-        let others =
-            [(0, Decision::Light(1)), (0, Decision::Choice), (1, Decision::Light(0)), (0, Decision::Pixel)];
+        let others = [
+            (0, Dimension::Light(1)),
+            (0, Dimension::Fresnel),
+            (1, Dimension::Light(0)),
+            (0, Dimension::Pixel),
+        ];
         let (mut products, samples, pixels) = ([0.0; 4], 1024, 64);
         for (pixel, sample) in (0..pixels).flat_map(|pixel| (0..samples).map(move |sample| (pixel, sample))) {
             let sampler = PixelSampler::new(1, pixel % 8, pixel / 8, sample);
             let first = |path, decision| f64::from(sampler.pair(path, decision).x) - 0.5;
             for (sum, other) in products.iter_mut().zip(others) {
-                *sum += first(0, Decision::Light(0)) * first(other.0, other.1) * 12.0;
+                *sum += first(0, Dimension::Light(0)) * first(other.0, other.1) * 12.0;
             }
         }
         let count = f64::from(samples * pixels);

@@ -19,7 +19,7 @@ use signal_hook::low_level;
 static REFUSED_BYTES: AtomicUsize = AtomicUsize::new(0);
 
 /// Restores the terminal, using only async-signal-safe calls.
-static GIVE_BACK: OnceLock<fn()> = OnceLock::new();
+static RESTORE_TERMINAL: OnceLock<fn()> = OnceLock::new();
 
 /// Exit code for failed work.
 const FAILED: i32 = 1;
@@ -29,7 +29,7 @@ pub struct Allocator;
 
 /// Records `bytes` if the allocation was refused.
 #[inline(always)]
-fn noted(memory: *mut u8, bytes: usize) -> *mut u8 {
+fn record_refusal(memory: *mut u8, bytes: usize) -> *mut u8 {
     if memory.is_null() {
         REFUSED_BYTES.store(bytes, Ordering::Relaxed);
     }
@@ -41,19 +41,19 @@ unsafe impl GlobalAlloc for Allocator {
     #[inline]
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller keeps the contract of `GlobalAlloc`.
-        noted(unsafe { System.alloc(layout) }, layout.size())
+        record_refusal(unsafe { System.alloc(layout) }, layout.size())
     }
 
     #[inline]
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         // SAFETY: as above.
-        noted(unsafe { System.alloc_zeroed(layout) }, layout.size())
+        record_refusal(unsafe { System.alloc_zeroed(layout) }, layout.size())
     }
 
     #[inline]
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, new_bytes: usize) -> *mut u8 {
         // SAFETY: as above.
-        noted(unsafe { System.realloc(memory, layout, new_bytes) }, new_bytes)
+        record_refusal(unsafe { System.realloc(memory, layout, new_bytes) }, new_bytes)
     }
 
     #[inline]
@@ -68,14 +68,14 @@ unsafe impl GlobalAlloc for Allocator {
 /// # Errors
 /// The handler cannot be installed.
 pub fn catch() -> io::Result<()> {
-    // SAFETY: `last_words` makes only async-signal-safe calls.
-    unsafe { low_level::register(SIGABRT, last_words) }.map(drop)
+    // SAFETY: `on_abort` makes only async-signal-safe calls.
+    unsafe { low_level::register(SIGABRT, on_abort) }.map(drop)
 }
 
 /// Sets the function that restores the terminal before the message is printed. It may only make
 /// async-signal-safe calls. Later calls have no effect.
-pub fn give_back_by(give_back: fn()) {
-    let _ = GIVE_BACK.set(give_back);
+pub fn set_terminal_restore(restore: fn()) {
+    let _ = RESTORE_TERMINAL.set(restore);
 }
 
 /// Whether a thread is already running the handler.
@@ -83,47 +83,47 @@ static IS_ENDING: AtomicBool = AtomicBool::new(false);
 
 /// Restores the terminal, prints the reason and exits. Several threads may abort at once when memory runs
 /// out: the first one prints, the others wait for the process to end.
-fn last_words() {
+fn on_abort() {
     while IS_ENDING.swap(true, Ordering::AcqRel) {
         pause();
     }
-    if let Some(give_back) = GIVE_BACK.get() {
-        give_back();
+    if let Some(restore) = RESTORE_TERMINAL.get() {
+        restore();
     }
-    let mut sentence = Sentence::default();
+    let mut message = MessageBuffer::default();
     // A message that does not fit is truncated.
     let _ = match REFUSED_BYTES.load(Ordering::Relaxed) {
-        0 => writeln!(sentence, "error: glimt was aborted (SIGABRT)"),
+        0 => writeln!(message, "error: glimt was aborted (SIGABRT)"),
         bytes => writeln!(
-            sentence,
+            message,
             "error: out of memory: an allocation of {} MB failed; use a smaller image or scene, or raise the limit (`ulimit -v`)",
             bytes.div_ceil(1_000_000)
         ),
     };
     // SAFETY: standard error is open for the whole life of the process, or the write fails.
-    let _ = write(unsafe { BorrowedFd::borrow_raw(nix::libc::STDERR_FILENO) }, sentence.bytes());
+    let _ = write(unsafe { BorrowedFd::borrow_raw(nix::libc::STDERR_FILENO) }, message.bytes());
     low_level::exit(FAILED);
 }
 
 /// Text buffer on the stack.
-struct Sentence {
+struct MessageBuffer {
     bytes: [u8; 256],
     length: usize,
 }
 
-impl Default for Sentence {
+impl Default for MessageBuffer {
     fn default() -> Self {
         Self { bytes: [0; 256], length: 0 }
     }
 }
 
-impl Sentence {
+impl MessageBuffer {
     fn bytes(&self) -> &[u8] {
         &self.bytes[..self.length]
     }
 }
 
-impl Write for Sentence {
+impl Write for MessageBuffer {
     fn write_str(&mut self, text: &str) -> std::fmt::Result {
         let end = self.length + text.len();
         let room = self.bytes.get_mut(self.length..end).ok_or(std::fmt::Error)?;
@@ -148,9 +148,9 @@ mod tests {
 
     #[test]
     fn messages_that_do_not_fit_are_truncated() {
-        let mut sentence = Sentence::default();
-        assert!(write!(sentence, "{}", "a".repeat(200)).is_ok());
-        assert!(write!(sentence, "{}", "b".repeat(100)).is_err());
-        assert_eq!(sentence.bytes(), [b'a'; 200]);
+        let mut message = MessageBuffer::default();
+        assert!(write!(message, "{}", "a".repeat(200)).is_ok());
+        assert!(write!(message, "{}", "b".repeat(100)).is_err());
+        assert_eq!(message.bytes(), [b'a'; 200]);
     }
 }

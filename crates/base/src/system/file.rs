@@ -10,7 +10,7 @@ pub const PART_MARK: [u8; 12] = *b"\x89GLIMT\r\n\x1a\n\0\0";
 
 /// File type of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum FileKind {
     /// A regular file, which can be read to its end.
     Regular,
     /// A folder.
@@ -21,7 +21,7 @@ pub enum Kind {
     Kernel,
 }
 
-impl Kind {
+impl FileKind {
     /// Description that completes "it is …".
     pub fn words(self) -> &'static str {
         match self {
@@ -46,9 +46,9 @@ impl Kind {
 ///
 /// # Errors
 /// The file does not exist or its metadata cannot be read.
-pub fn kind(path: &Path) -> io::Result<(Kind, Metadata)> {
+pub fn kind(path: &Path) -> io::Result<(FileKind, Metadata)> {
     let metadata = fs::metadata(path)?;
-    Ok((Kind::of(path, &metadata), metadata))
+    Ok((FileKind::of(path, &metadata), metadata))
 }
 
 /// Most bytes of a pointer of Git LFS (the specification of Git LFS: "pointer files must be less than 1024 bytes").
@@ -62,7 +62,7 @@ pub fn is_lfs_pointer(bytes: &[u8]) -> bool {
 
 /// Reason not to replace this file with another one, if there is any. Read-only files are kept even for root,
 /// who could replace them.
-pub fn why_keep(metadata: &Metadata) -> Option<&'static str> {
+pub fn reason_to_keep(metadata: &Metadata) -> Option<&'static str> {
     match () {
         () if metadata.nlink() > 1 => Some("has other hard links, which would keep the old text"),
         () if metadata.permissions().readonly() => Some("is read-only"),
@@ -75,9 +75,9 @@ pub fn why_keep(metadata: &Metadata) -> Option<&'static str> {
 ///
 /// # Errors
 /// The file does not exist or cannot be read.
-pub fn open(path: &Path) -> io::Result<Result<(File, Metadata), Kind>> {
+pub fn open(path: &Path) -> io::Result<Result<(File, Metadata), FileKind>> {
     let (kind, _) = kind(path)?;
-    if kind != Kind::Regular {
+    if kind != FileKind::Regular {
         return Ok(Err(kind));
     }
     let mut options = OpenOptions::new();
@@ -86,8 +86,8 @@ pub fn open(path: &Path) -> io::Result<Result<(File, Metadata), Kind>> {
     std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, nix::libc::O_NONBLOCK);
     let file = options.open(path)?;
     let metadata = file.metadata()?;
-    Ok(match Kind::of(path, &metadata) {
-        Kind::Regular => Ok((file, metadata)),
+    Ok(match FileKind::of(path, &metadata) {
+        FileKind::Regular => Ok((file, metadata)),
         other => Err(other),
     })
 }
@@ -123,11 +123,11 @@ mod tests {
     fn only_regular_files_are_opened() {
         let folder = tempfile::tempdir().expect("a folder");
         let said = |path: &Path| open(path).expect("it is there").err();
-        assert_eq!(said(folder.path()), Some(Kind::Folder));
-        assert_eq!(said(Path::new("/dev/zero")), Some(Kind::Special));
+        assert_eq!(said(folder.path()), Some(FileKind::Folder));
+        assert_eq!(said(Path::new("/dev/zero")), Some(FileKind::Special));
         let pipe = folder.path().join("pipe");
         nix::unistd::mkfifo(&pipe, nix::sys::stat::Mode::S_IRWXU).expect("a pipe");
-        assert_eq!(said(&pipe), Some(Kind::Special));
+        assert_eq!(said(&pipe), Some(FileKind::Special));
         let file = folder.path().join("file");
         fs::write(&file, "text").expect("written");
         assert_eq!(said(&file), None);
@@ -141,7 +141,7 @@ mod tests {
         let link = folder.path().join("link");
         std::os::unix::fs::symlink("/proc/kmsg", &link).expect("a link");
         for path in [Path::new("/proc/kmsg"), Path::new("/proc/self/status"), &link] {
-            assert_eq!(open(path).expect("it is there").err(), Some(Kind::Kernel), "{}", path.display());
+            assert_eq!(open(path).expect("it is there").err(), Some(FileKind::Kernel), "{}", path.display());
         }
         // An open file's path in /proc leads to the file itself.
         let file = File::create(folder.path().join("file")).expect("a file");

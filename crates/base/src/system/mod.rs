@@ -3,17 +3,17 @@
 
 #[allow(unsafe_code)]
 pub mod abort;
+pub mod cpu_time;
 pub mod file;
 pub mod machine;
 pub mod priority;
-pub mod processor;
 pub mod text;
 pub mod threads;
 
 use std::io::{Error, ErrorKind};
 
 /// Describes a file-system error as part of a sentence: in lower case, without the error number.
-pub fn in_words(error: &Error) -> String {
+pub fn describe_error(error: &Error) -> String {
     #[cfg(unix)]
     if error.raw_os_error() == Some(nix::libc::ELOOP) {
         return "its symbolic links form a loop".to_owned();
@@ -38,13 +38,13 @@ mod tests {
 
     #[test]
     fn error_texts_have_no_numbers_or_capitals() {
-        let said = |number: i32| in_words(&Error::from_raw_os_error(number));
+        let said = |number: i32| describe_error(&Error::from_raw_os_error(number));
         assert_eq!(said(nix::libc::ENOENT), "no such file or directory");
         assert_eq!(said(nix::libc::EACCES), "permission denied");
         assert_eq!(said(nix::libc::ELOOP), "its symbolic links form a loop");
         assert_eq!(said(nix::libc::ENOTDIR), "a part of its path is a file, not a folder");
         let zero = std::fs::metadata("a\0b").expect_err("no name");
-        assert_eq!(in_words(&zero), "that is not a valid file name");
-        assert_eq!(in_words(&Error::other("The disk is on fire")), "the disk is on fire");
+        assert_eq!(describe_error(&zero), "that is not a valid file name");
+        assert_eq!(describe_error(&Error::other("The disk is on fire")), "the disk is on fire");
     }
 }

@@ -5,7 +5,7 @@
 
 /// Raises the nice value of this thread and the threads it starts from now on, or of the whole process
 /// outside Linux (nice(2), sched(7)). Does nothing for 0 or if the system refuses.
-pub fn give_way(steps: u8) {
+pub fn lower_priority(steps: u8) {
     #[cfg(unix)]
     if steps > 0 {
         let _ = rustix::process::nice(i32::from(steps));
@@ -15,8 +15,8 @@ pub fn give_way(steps: u8) {
 }
 
 /// Raises the nice value of this thread on systems with per-thread nice values. Does nothing elsewhere.
-pub fn give_way_alone(steps: u8) {
+pub fn lower_thread_priority(steps: u8) {
     if cfg!(target_os = "linux") {
-        give_way(steps);
+        lower_priority(steps);
     }
 }

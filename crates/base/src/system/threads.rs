@@ -5,7 +5,7 @@ use std::io::Error;
 
 use nix::sys::resource::{Resource, getrlimit};
 
-use super::in_words;
+use super::describe_error;
 
 /// Address space used by a thread's stack: the standard library's default.
 const STACK_BYTES: u64 = 2 << 20;
@@ -16,7 +16,7 @@ const STACK_BYTES: u64 = 2 << 20;
 ///
 /// # Errors
 /// The error that the system returns for a thread it cannot start.
-pub fn check_room(threads: usize) -> Result<(), Error> {
+pub fn check_stack_space(threads: usize) -> Result<(), Error> {
     let Ok((limit, _)) = getrlimit(Resource::RLIMIT_AS) else { return Ok(()) };
     if (threads as u64).saturating_mul(STACK_BYTES) > limit {
         return Err(Error::from_raw_os_error(nix::libc::EAGAIN));
@@ -26,8 +26,8 @@ pub fn check_room(threads: usize) -> Result<(), Error> {
 
 /// Explains why `what` could not be started and how to fix it: raise a limit on memory (for stacks) or on the
 /// number of threads, or use fewer.
-pub fn not_started(what: &str, is_number_chosen: bool, error: &impl Display) -> String {
-    let why = in_words(&Error::other(error.to_string()));
+pub fn start_failure(what: &str, is_number_chosen: bool, error: &impl Display) -> String {
+    let why = describe_error(&Error::other(error.to_string()));
     let fewer = if is_number_chosen { "use fewer (--threads 1), or " } else { "" };
     format!(
         "cannot start {what}: {why}; {fewer}raise the limits on memory and on processes (ulimit -v, ulimit -u)"
@@ -43,12 +43,12 @@ mod tests {
         let error = Error::from_raw_os_error(nix::libc::EAGAIN);
         let limits = "raise the limits on memory and on processes (ulimit -v, ulimit -u)";
         assert_eq!(
-            not_started("2 threads", true, &error),
+            start_failure("2 threads", true, &error),
             format!(
                 "cannot start 2 threads: resource temporarily unavailable; use fewer (--threads 1), or {limits}"
             )
         );
         let alone = format!("cannot start a thread: resource temporarily unavailable; {limits}");
-        assert_eq!(not_started("a thread", false, &error), alone);
+        assert_eq!(start_failure("a thread", false, &error), alone);
     }
 }

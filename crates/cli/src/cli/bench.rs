@@ -23,7 +23,7 @@ use crate::pipeline::protocol::Failure;
 use crate::pipeline::settings::Overrides;
 use crate::scene::diagnostic::Diagnostic;
 use crate::system::priority;
-use crate::system::threads::not_started;
+use crate::system::threads::start_failure;
 
 /// Between two looks for a signal.
 const TICK: Duration = Duration::from_millis(50);
@@ -34,7 +34,7 @@ pub(super) fn run(args: &BenchArgs, console: &Console) -> Exit {
 
 /// Reports errors; `Err` has their exit code.
 fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
-    priority::give_way(args.nice);
+    priority::lower_priority(args.nice);
     let order = order(args, console)?;
     let scenes = order.scenes.len();
     let outputs = Outputs::of(args, &order.scenes, console)?;
@@ -46,7 +46,7 @@ fn measured(args: &BenchArgs, console: &Console) -> Result<Exit, Exit> {
         .map_err(|error| console.fail(Exit::FAILED, &format!("cannot listen to signals: {error}")))?;
     let mut said = Said::new(args.progress, console);
     let (news, work) = begin(order, token.clone())
-        .map_err(|error| console.fail(Exit::FAILED, &not_started("a thread", false, &error)))?;
+        .map_err(|error| console.fail(Exit::FAILED, &start_failure("a thread", false, &error)))?;
     follow(&news, &mut said);
     let results = work.join().unwrap_or_else(|_| Err(Box::new(broken())));
     said.end();

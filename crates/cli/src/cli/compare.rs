@@ -16,13 +16,13 @@ use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::output::write::{self, Guard};
 use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError};
-use crate::system::threads::not_started;
+use crate::system::threads::start_failure;
 use crate::tui::wrapped;
 
 pub(super) fn run(args: &CompareArgs, console: &Console) -> Exit {
     match ThreadPoolBuilder::new().build() {
         Ok(pool) => run_in(&pool, args, console).unwrap_or_else(|exit| exit),
-        Err(error) => console.fail(Exit::FAILED, &not_started("threads", false, &error)),
+        Err(error) => console.fail(Exit::FAILED, &start_failure("threads", false, &error)),
     }
 }
 

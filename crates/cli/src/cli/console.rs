@@ -9,7 +9,7 @@ use super::exit::Exit;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::report::{Style, render};
 use crate::scene::sanitize::visible;
-use crate::system::in_words;
+use crate::system::describe_error;
 use crate::tui::ColorChoice;
 
 /// The two streams.
@@ -85,8 +85,10 @@ impl Console {
     /// Exit code of the program: a failure if an answer did not get through.
     pub(super) fn end(&self, exit: Exit) -> Exit {
         match self.lost.take() {
-            Some(error) if exit == Exit::DONE => self
-                .fail(Exit::FAILED, &format!("the answer cannot be written to stdout: {}", in_words(&error))),
+            Some(error) if exit == Exit::DONE => self.fail(
+                Exit::FAILED,
+                &format!("the answer cannot be written to stdout: {}", describe_error(&error)),
+            ),
             Some(_) | None => exit,
         }
     }

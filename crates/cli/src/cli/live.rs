@@ -14,7 +14,7 @@ use crate::pipeline::watch::{Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
 use crate::scene::{SAME_TEXT, is_absence, text_now};
-use crate::system::threads::not_started;
+use crate::system::threads::start_failure;
 use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 
 /// Time that the end waits for a picture that is being written, after a signal; and after a key, until a person hears what it
@@ -33,7 +33,7 @@ pub(super) fn run(order: Order, console: &Console) -> Exit {
 }
 
 fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
-    let no_thread = |error: std::io::Error| (Exit::FAILED, not_started("a thread", false, &error));
+    let no_thread = |error: std::io::Error| (Exit::FAILED, start_failure("a thread", false, &error));
     let mut worker = start(order.nice).map_err(no_thread)?;
     let (sender, news) = channel();
     let watcher = Watcher::start(order.poll, worker.contents(), move |said| {

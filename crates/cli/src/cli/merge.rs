@@ -21,7 +21,7 @@ use crate::output::part::{self, Merged, PartError, PartFile};
 use crate::output::write::{Guard, atomic_until};
 use crate::output::{self, FileIdentity, Finish, Format, Losses, OutputError};
 use crate::scene::sanitize::{shortened, visible};
-use crate::system::threads::not_started;
+use crate::system::threads::start_failure;
 use crate::tui::{Named, printed};
 
 /// Between two looks for parts that arrive.
@@ -30,7 +30,7 @@ const PAUSE: Duration = Duration::from_millis(500);
 pub(super) fn run(args: &MergeArgs, console: &Console) -> Exit {
     let pool = match ThreadPoolBuilder::new().build() {
         Ok(pool) => pool,
-        Err(error) => return console.fail(Exit::FAILED, &not_started("threads", false, &error)),
+        Err(error) => return console.fail(Exit::FAILED, &start_failure("threads", false, &error)),
     };
     let token = CancelToken::new();
     let cancel = token.clone();

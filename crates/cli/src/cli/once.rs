@@ -19,7 +19,7 @@ use crate::pipeline::turntable::{Turn, left_over};
 use crate::pipeline::{Handle, start};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::system::priority;
-use crate::system::threads::not_started;
+use crate::system::threads::start_failure;
 
 /// Longest time that the end may take after a signal.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -30,10 +30,10 @@ const TICK: Duration = Duration::from_millis(50);
 
 pub(super) fn run(order: &Order, console: &Console) -> Exit {
     // Before the first thread starts: all of them give way.
-    priority::give_way(order.nice);
+    priority::lower_priority(order.nice);
     let worker = match start(0) {
         Ok(worker) => worker,
-        Err(error) => return console.fail(Exit::FAILED, &not_started("a thread", false, &error)),
+        Err(error) => return console.fail(Exit::FAILED, &start_failure("a thread", false, &error)),
     };
     let remote = worker.remote();
     let is_again = AtomicBool::new(false);

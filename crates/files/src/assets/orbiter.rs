@@ -19,7 +19,7 @@
 use std::path::Path;
 
 use super::{AssetError, FileHash, OrbiterCamera, read};
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 use crate::math::limits::{LARGEST, SHORTEST, is_too_short};
 
 /// Most bytes of an orbiter file, which has five lines: a larger file is something else.
@@ -36,7 +36,7 @@ const DEFAULT_FIELD: [f64; 3] = [45.0, 1024.0, 640.0];
 /// a number that is not finite or out of range.
 pub fn load(path: &Path) -> Result<(OrbiterCamera, FileHash), AssetError> {
     let token = CancelToken::new();
-    let bytes = read::text(path, LIMIT, read::Watch { progress: &unwatched, token: &token })?;
+    let bytes = read::text(path, LIMIT, read::Watch { progress: &ignore_progress, token: &token })?;
     Ok((parse(path, &String::from_utf8_lossy(&bytes))?, read::hash(&bytes)))
 }
 

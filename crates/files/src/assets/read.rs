@@ -6,8 +6,8 @@ use std::path::Path;
 
 use super::{AssetError, FileHash};
 use crate::control::{CancelToken, Cancelled, Progress};
-use crate::system::file::{self, Kind};
-pub(crate) use crate::system::in_words;
+pub(crate) use crate::system::describe_error;
+use crate::system::file::{self, FileKind};
 
 /// Bytes between two polls of the token.
 const CHUNK: usize = 1 << 20;
@@ -35,7 +35,7 @@ pub(crate) fn hash(bytes: &[u8]) -> FileHash {
 /// Opens a regular file of at most `limit` bytes and returns its length too. Pipes, devices and folders are refused
 /// before they are opened, so that nothing blocks.
 pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
-    let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
+    let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
     let refused =
         |kind: Kind| AssetError::unreadable(path, format!("it is {}, not a regular file", kind.words()));
     let (mut file, found) = file::open(path).map_err(unreadable)?.map_err(refused)?;
@@ -79,7 +79,7 @@ pub(crate) fn start(path: &Path, most: u64) -> Result<Vec<u8>, AssetError> {
     let (file, _) = open(path, u64::MAX)?;
     let mut bytes = Vec::new();
     let read = file.take(most).read_to_end(&mut bytes);
-    read.map(|_| bytes).map_err(|error| AssetError::unreadable(path, in_words(&error)))
+    read.map(|_| bytes).map_err(|error| AssetError::unreadable(path, describe_error(&error)))
 }
 
 /// Reads a file, text or binary, that does not begin with zeros alone.
@@ -125,7 +125,7 @@ fn bytes_if(
     accept: impl Fn(&[u8]) -> Result<(), AssetError>,
 ) -> Result<Vec<u8>, AssetError> {
     let (mut file, length) = open(path, limit)?;
-    let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
+    let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
     let mut start = Vec::new();
     (&mut file).take(START as u64).read_to_end(&mut start).map_err(unreadable)?;
     accept(&start)?;
@@ -140,7 +140,7 @@ pub(crate) fn rest(
     (length, limit): (u64, u64),
     watch: Watch<'_>,
 ) -> Result<Vec<u8>, AssetError> {
-    let unreadable = |error: std::io::Error| AssetError::unreadable(path, in_words(&error));
+    let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
     let mut file = file.take(limit);
     let length = length as usize;
     let mut bytes = Vec::new();
@@ -158,12 +158,12 @@ pub(crate) fn rest(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::unwatched;
+    use crate::control::ignore_progress;
     use std::fs;
     use std::sync::Mutex;
 
     fn watch(token: &CancelToken) -> Watch<'_> {
-        Watch { progress: &unwatched, token }
+        Watch { progress: &ignore_progress, token }
     }
 
     #[test]

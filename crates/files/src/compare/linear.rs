@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::Pair;
-use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_LEAST};
+use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 use crate::math::{DVec2, Vec3};
 
 /// The trimmed mean leaves out one in so many pixels.
@@ -83,7 +83,7 @@ fn row_sums(a: &[Vec3], b: &[Vec3]) -> Sums {
 /// Mean over the channels of (a − b)²/(b² + 0.01).
 fn relative(a: Vec3, b: Vec3) -> f64 {
     let (a, b) = (a.as_dvec3(), b.as_dvec3());
-    ((a - b) * (a - b) / (b * b + RELMSE_LEAST)).element_sum() / 3.0
+    ((a - b) * (a - b) / (b * b + RELMSE_EPSILON)).element_sum() / 3.0
 }
 
 /// Mean of [`relative`] without the largest values.

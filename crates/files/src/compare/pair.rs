@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::assets::AssetError;
 use crate::assets::image::{ImageEncoding, ImageLimits, load};
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 use crate::film::RadianceImage;
 use crate::math::Vec3;
 
@@ -106,7 +106,7 @@ impl Pair {
 }
 
 fn read(path: &Path) -> Result<RadianceImage, AssetError> {
-    let image = load(path, ImageEncoding::Raw, ImageLimits::default(), &unwatched, &CancelToken::new())?;
+    let image = load(path, ImageEncoding::Raw, ImageLimits::default(), &ignore_progress, &CancelToken::new())?;
     let texels = image.texels;
     let (width, height) = (texels.width, texels.height);
     Ok(RadianceImage { width, height, pixels: texels.into_linear() })

@@ -3,7 +3,7 @@
 
 use super::Pair;
 use crate::film::RadianceImage;
-use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_LEAST};
+use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 use crate::math::{DVec3, Vec3};
 
 fn luminance(color: DVec3) -> f64 {
@@ -24,7 +24,7 @@ impl TwoReferences {
         let values = 3.0 * pair.a().pixels.len() as f64;
         let weight = |(a, b): (&Vec3, &Vec3)| {
             let mean = (a.as_dvec3() + b.as_dvec3()) / 2.0;
-            1.0 / ((mean * mean + RELMSE_LEAST) * values)
+            1.0 / ((mean * mean + RELMSE_EPSILON) * values)
         };
         let weights = pair.a().pixels.iter().zip(&pair.b().pixels).map(weight).collect();
         Self { pair, weights }

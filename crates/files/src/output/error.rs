@@ -4,7 +4,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use super::{Format, MovingFormat};
-use crate::system::in_words;
+use crate::system::describe_error;
 
 /// Reasons for which a picture could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -73,7 +73,7 @@ pub enum OutputError {
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
     /// The system refused the operation.
-    #[error("cannot write {}: {}; {}", path.display(), in_words(source), way_out(source))]
+    #[error("cannot write {}: {}; {}", path.display(), describe_error(source), way_out(source))]
     File {
         /// The path as given.
         path: PathBuf,

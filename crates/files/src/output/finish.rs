@@ -46,10 +46,10 @@ impl Finish {
         format: Format,
         token: &CancelToken,
     ) -> Result<Vec<u8>, OutputError> {
-        let tone = self.tone.of_picture(image);
+        let tone = self.tone.resolved_for(image);
         // Add what the film tells: the samples, the range at the end.
         let mut metadata = self.metadata_with(film.samples());
-        let range = tone.stretch.range();
+        let range = tone.range_map.range();
         let range = range.map(|range| format!("{} to {}", range.least, range.greatest));
         metadata.extend(range.map(|range| ("glimt:range".to_owned(), range)));
         let mean_luminance_error = if self.is_light { film.mean_luminance_error() } else { None };

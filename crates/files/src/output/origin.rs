@@ -53,9 +53,10 @@ impl Replaced {
         match self {
             Self::Own => None,
             Self::Foreign(kind) => Some(format!("the file of this name is not {kind} that glimt wrote")),
-            Self::Unreadable(error) => {
-                Some(format!("the file of this name cannot be read: {}", crate::system::in_words(error)))
-            }
+            Self::Unreadable(error) => Some(format!(
+                "the file of this name cannot be read: {}",
+                crate::system::describe_error(error)
+            )),
         }
     }
 }

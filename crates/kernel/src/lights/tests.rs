@@ -15,7 +15,7 @@ use crate::geometry::{Ray, Shape, ShapeHit};
 use crate::lights::delta::{Falloff, PointLight};
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane};
 use crate::math::{DVec3, Vec2, Vec3};
-use crate::sampling::{Decision, PixelSampler};
+use crate::sampling::{Dimension, PixelSampler};
 
 /// Shapes for every sampling method: rectangles by solid angle, other parallelograms and distant ones by area.
 fn shapes() -> Vec<Shape> {
@@ -56,7 +56,7 @@ pub fn met(shape: &Shape, from: Vec3, direction: Vec3) -> Option<(LightHit, Shap
 /// Samples of a light for a point: directions, their ends, and inverse pdfs.
 fn samples(light: &Light, number: u32, from: Vec3, count: u32) -> Vec<(Vec3, Vec3, f32)> {
     let one = |sample: u32| {
-        let u = PixelSampler::new(1, 2, 3, sample).pair(1, Decision::Light(number));
+        let u = PixelSampler::new(1, 2, 3, sample).pair(1, Dimension::Light(number));
         let sample = light.sample(from, Vec3::Y, u.to_array())?;
         let End::At(target) = sample.end else { return None };
         Some((sample.direction, target, sample.weight.x))
@@ -110,14 +110,14 @@ fn lights_that_each_point_picked_give_the_samples_of_each_alone() {
     for round in 0..200_u32 {
         let at = |i: usize, decision| PixelSampler::new(5, round, i as u32, 0).pair(1, decision);
         let picked: [u32; PACKET_SIZE] =
-            std::array::from_fn(|i| (at(i, Decision::Pick).x * all.len() as f32) as u32);
+            std::array::from_fn(|i| (at(i, Dimension::LightChoice).x * all.len() as f32) as u32);
         let used = 0xffff & !(round * 37 % 97);
         let u: [F32x16; 2] = [
-            std::array::from_fn(|i| at(i, Decision::Picked).x),
-            std::array::from_fn(|i| at(i, Decision::Picked).y),
+            std::array::from_fn(|i| at(i, Dimension::ChosenLight).x),
+            std::array::from_fn(|i| at(i, Dimension::ChosenLight).y),
         ];
         let points: Vec3x16 = std::array::from_fn(|axis| {
-            std::array::from_fn(|i| 6.0 * at(axis * PACKET_SIZE + i, Decision::Lobe).x - 3.0)
+            std::array::from_fn(|i| 6.0 * at(axis * PACKET_SIZE + i, Dimension::Lobe).x - 3.0)
         });
         let normals: Vec3x16 = [[0.0; PACKET_SIZE], [1.0; PACKET_SIZE], [0.0; PACKET_SIZE]];
         let (row, inverse, _) = lights.sample_each(&picked, (&points, &normals), used, &u);
@@ -369,7 +369,7 @@ fn two_triangles_that_make_a_parallelogram_are_sampled_as_a_quad_is() {
         assert!(light.shape.as_quad().is_some());
         for sample in 0..400 {
             let at = |decision| PixelSampler::new(9, 2, 3, sample).pair(1, decision);
-            let (a, b) = (at(Decision::Pick), at(Decision::Picked));
+            let (a, b) = (at(Dimension::LightChoice), at(Dimension::ChosenLight));
             let from = Vec3::new(4.0 * a.x - 2.0, 4.0 * a.y - 2.0, 3.0 * b.x);
             let own = light.sample(from, Vec3::Z, [b.x, b.y]);
             let expected = quad.sample(from, Vec3::Z, [b.x, b.y]);
@@ -432,7 +432,7 @@ fn samples_by_area_fall_on_triangles_as_often_as_these_are_large() {
     let (from, mut counts, mut flux) = (Vec3::new(1.0, 0.5, 2.0), [0_u32; 3], 0.0);
     const COUNT: u32 = 1 << 14;
     for sample in 0..COUNT {
-        let u = PixelSampler::new(3, 1, 4, sample).pair(1, Decision::Picked);
+        let u = PixelSampler::new(3, 1, 4, sample).pair(1, Dimension::ChosenLight);
         let Some(sample) = light.sample(from, Vec3::NEG_Z, [u.x, u.y]) else { panic!("seen from the front") };
         let Source::Primitive(OBJECT, part) = sample.source else { panic!("a triangle of it") };
         counts[(part - 5) as usize] += 1;

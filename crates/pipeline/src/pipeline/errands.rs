@@ -15,7 +15,7 @@ use crate::integrators::RenderSettings;
 use crate::math::DVec2;
 use crate::output::{Losses, OutputError, write};
 use crate::scene::{Loaded, is_mesh, is_model, text_now};
-use crate::system::{file, in_words};
+use crate::system::{describe_error, file};
 use crate::world::World;
 
 /// An order that a person gives.
@@ -178,8 +178,8 @@ fn replace(
     inputs: &Inputs,
     (changed, outcome): (&str, &str),
 ) -> Result<(), String> {
-    let metadata = file::kind(path).map(|(_, metadata)| metadata).map_err(|error| in_words(&error))?;
-    if let Some(why) = file::why_keep(&metadata) {
+    let metadata = file::kind(path).map(|(_, metadata)| metadata).map_err(|error| describe_error(&error))?;
+    if let Some(why) = file::reason_to_keep(&metadata) {
         return Err(format!("{} {why}: {outcome}", path.display()));
     }
     let refused = || OutputError::Refused { reason: changed.to_owned() };
@@ -204,7 +204,7 @@ fn write_scene_of_model(loaded: &Loaded, camera: &Viewpoint) -> Result<Kept, Str
     }
     let text = loaded.text_with_camera(camera)?;
     write::new_file(&path, text.as_bytes())
-        .map_err(|error| format!("{shown} is not written: {}", in_words(&error)))?;
+        .map_err(|error| format!("{shown} is not written: {}", describe_error(&error)))?;
     Ok(Kept { path, is_new: true, is_own: false, of_model: true, edit: None })
 }
 

@@ -7,7 +7,7 @@ use super::plan::Plan;
 use super::render::share::Share;
 use super::stages::Stop;
 use super::stages::meshes::Meshes;
-use crate::film::{Blocks, Film, Rect};
+use crate::film::{Film, Rect, SumOrder};
 use crate::integrators::PhotonSettings;
 use crate::scene::description::{Accel, Scene};
 
@@ -37,7 +37,7 @@ impl Foretold {
         let render = &plan.settings.render;
         let whole = Rect { x: 0, y: 0, width: render.width, height: render.height };
         let (film, picture) =
-            Film::bytes_of((render.width, render.height), plan.crop.unwrap_or(whole), blocks(plan));
+            Film::memory_for((render.width, render.height), plan.crop.unwrap_or(whole), blocks(plan));
         let mut items = vec![("the program", PROGRAM), ("the film", film), ("the picture", picture)];
         if !plan.layers.is_empty() {
             // One film at a time, and a picture of each.
@@ -114,12 +114,12 @@ impl Foretold {
 }
 
 /// Order in which the samples of a plan are added up. Whether photons are emitted at all is known later.
-fn blocks(plan: &Plan) -> Blocks {
+fn blocks(plan: &Plan) -> SumOrder {
     let gathers = plan.settings.gathers();
     match plan.shard {
         Some(shard) => Share::new(shard, gathers, plan.settings.render.samples).sums(),
-        None if gathers => Blocks::Added,
-        None => Blocks::Whole,
+        None if gathers => SumOrder::Blocked,
+        None => SumOrder::Sequential,
     }
 }
 

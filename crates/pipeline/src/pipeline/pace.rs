@@ -37,11 +37,11 @@ pub(super) struct Stopwatch<'a> {
 
 impl<'a> Stopwatch<'a> {
     pub(super) fn start(token: &'a CancelToken) -> Self {
-        Self { begin: Instant::now(), token, held: token.held() }
+        Self { begin: Instant::now(), token, held: token.paused_time() }
     }
 
     pub(super) fn seconds(&self) -> f64 {
-        let held = self.token.held().saturating_sub(self.held);
+        let held = self.token.paused_time().saturating_sub(self.held);
         self.begin.elapsed().saturating_sub(held).as_secs_f64()
     }
 }

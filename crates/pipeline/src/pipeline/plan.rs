@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::settings::{Checkpoints, Effective, Layer, Overrides, Side, UpAxis, View};
 use super::turntable::{self, Turn};
 use crate::choice::Choice;
-use crate::film::stretch::{Kind, Stretch};
+use crate::film::range_map::{DataKind, RangeMap};
 use crate::film::tone::ToneMapping;
 use crate::film::{Quantity, Rect};
 use crate::integrators::{AovSource, FirstHit, LightAov, PhotonSettings, RenderSettings};

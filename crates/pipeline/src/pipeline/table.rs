@@ -5,7 +5,7 @@ use super::protocol::{Stage, StageReport, Status};
 use super::sink::Sink;
 use super::stages::{Staged, Stop};
 use crate::control::CancelToken;
-use crate::system::processor::seconds_of_process;
+use crate::system::cpu_time::process_cpu_seconds;
 
 /// The stages of one request.
 pub(super) struct StageTable<'a> {
@@ -28,9 +28,9 @@ impl StageTable<'_> {
         work: impl FnOnce() -> Result<Staged<T>, Stop>,
     ) -> Result<T, Stop> {
         let watch = Stopwatch::start(self.token);
-        let before = seconds_of_process();
+        let before = process_cpu_seconds();
         let report = |status, why| {
-            let processor_seconds = seconds_of_process() - before;
+            let processor_seconds = process_cpu_seconds() - before;
             StageReport { name, status, seconds: watch.seconds(), processor_seconds, why }
         };
         self.say(report(Status::Running, String::new()));

@@ -10,7 +10,7 @@ use rayon::ThreadPool;
 use crate::control::{CancelToken, Cancelled};
 use crate::film::{Pixels, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
-use crate::system::processor::seconds_of_thread;
+use crate::system::cpu_time::thread_cpu_seconds;
 use crate::world::World;
 
 /// The function that renders a tile, with photon maps or without: see [`crate::integrators::render_tile_with_photons`].
@@ -71,9 +71,9 @@ impl Tracer<'_> {
     fn trace(&self, job: &Job) -> Result<(TileSamples, Cost), Cancelled> {
         let Self { kernel, world, settings, token, photons, first, .. } = *self;
         let samples = first + job.samples.start..first + job.samples.end;
-        let begin = seconds_of_thread();
+        let begin = thread_cpu_seconds();
         let (samples, rays) = kernel(photons, world, settings, job.pixels, samples, token)?;
-        Ok((samples, Cost { rays, seconds: seconds_of_thread() - begin }))
+        Ok((samples, Cost { rays, seconds: thread_cpu_seconds() - begin }))
     }
 
     /// Do the jobs. `keep` takes the samples of every job that is finished on the thread that made them, in whose cache

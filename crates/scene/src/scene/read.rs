@@ -11,8 +11,8 @@ use super::nearest::nearest;
 use super::other_content::{OtherContent, other_content};
 use super::sanitize::visible;
 use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE, NO_SUCH_MODEL};
-use crate::system::file::{self, Kind};
-use crate::system::in_words;
+use crate::system::describe_error;
+use crate::system::file::{self, FileKind};
 
 /// The text. The error is one diagnostic that names the file.
 pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
@@ -137,13 +137,13 @@ fn parts(text: &[u8]) -> usize {
     text.iter().filter(|byte| b"[]{}=,\n".contains(byte)).count()
 }
 
-fn not_regular(path: &Path, kind: Kind) -> Refusal {
+fn not_regular(path: &Path, kind: FileKind) -> Refusal {
     if is_mesh(path) {
         return (format!("this is {}, not a model", kind.words()), None);
     }
     let help = match kind {
-        Kind::Folder => "name a scene file, such as scene.toml",
-        Kind::Regular | Kind::Special | Kind::Kernel => {
+        FileKind::Folder => "name a scene file, such as scene.toml",
+        FileKind::Regular | FileKind::Special | FileKind::Kernel => {
             "a scene is read from a regular file, so that it can be watched"
         }
     };
@@ -177,7 +177,7 @@ fn unreadable(path: &Path, error: &io::Error) -> Refusal {
         let message = if is_model { NO_SUCH_MODEL } else { NO_SUCH_FILE };
         return (message.to_owned(), help);
     }
-    (format!("cannot read the scene file: {}", in_words(error)), None)
+    (format!("cannot read the scene file: {}", describe_error(error)), None)
 }
 
 /// Files of a folder that are looked at.
@@ -192,7 +192,7 @@ pub(super) fn neighbour(path: &Path, may_be_meant: impl Fn(&Path) -> bool) -> Op
         .take(MOST_FILES)
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .filter(|name| is_alike(Path::new(name), path) && may_be_meant(Path::new(name)))
-        .filter(|name| matches!(file::kind(&folder.join(name)), Ok((Kind::Regular, _))))
+        .filter(|name| matches!(file::kind(&folder.join(name)), Ok((FileKind::Regular, _))))
         .collect();
     let near = nearest(path.file_name()?.to_str()?, names.iter().map(String::as_str))?;
     Some(folder.join(near))
@@ -204,7 +204,7 @@ pub fn same_text_beside(path: &Path, text: &str) -> Option<PathBuf> {
     let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let length = u64::try_from(text.len()).ok()?;
     let has_text = |file: &PathBuf| {
-        matches!(file::kind(file), Ok((Kind::Regular, metadata)) if metadata.len() == length)
+        matches!(file::kind(file), Ok((FileKind::Regular, metadata)) if metadata.len() == length)
             && bytes(file).is_ok_and(|bytes| bytes == text.as_bytes())
     };
     let names =

@@ -2,7 +2,7 @@
 
 use crate::assets::OrbiterCamera;
 use crate::geometry::Ray;
-use crate::math::decimal::{rounded, step_at};
+use crate::math::decimal::{decimal_step, rounded};
 use crate::math::transform::rotation_xyz;
 use crate::math::{DMat3, DVec2, DVec3, Vec2};
 use crate::scene::description::{self, Pose, Viewpoint};
@@ -79,7 +79,7 @@ impl Camera {
                 let Self { position, up, forward, aperture, .. } = Self::new(camera, Some(&file));
                 let look_at = position + forward * file.size;
                 let short = |place: DVec3| {
-                    DVec3::from_array(place.to_array().map(|at| rounded(at, step_at(file.size))))
+                    DVec3::from_array(place.to_array().map(|at| rounded(at, decimal_step(file.size))))
                 };
                 let (position, look_at) = (short(position), short(look_at));
                 // An orbiter does not roll, so that y is up in its picture too, unless it is upside down.

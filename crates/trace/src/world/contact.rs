@@ -338,6 +338,6 @@ impl MeshInstance {
         let sum = wa + wb + wc;
         let (t, u, v) = (start / (start - end), wb / sum, wc / sum);
         let hit = ShapeHit { t: t as f32, primitive: triangle, u: u as f32, v: v as f32 };
-        (sum > 0.0).then_some((hit, (start > 0.0) != self.transform.mirrors()))
+        (sum > 0.0).then_some((hit, (start > 0.0) != self.transform.flips_handedness()))
     }
 }

@@ -155,7 +155,7 @@ impl Geometry {
     fn parts_from_edges(&self, object: u32, mesh: &MeshInstance, triangle: u32, margin: f32) -> u8 {
         let corners = mesh.world_corners(triangle);
         let own_corners = mesh.local_corners(triangle);
-        let growth = mesh.transform.inverse_growth();
+        let growth = mesh.transform.max_inverse_stretch();
         let [a, b, c] = corners;
         let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
         let height = (b - a).cross(c - a).length() / longest;

@@ -35,7 +35,7 @@ pub struct MeshInstance {
 impl MeshInstance {
     /// An instance of a mesh with its own tree.
     pub fn new(tree: Arc<MeshTree>, transform: Transform, smooth: bool) -> Self {
-        let aside = ASIDE * transform.inverse_growth();
+        let aside = ASIDE * transform.max_inverse_stretch();
         let is_moved = transform != Transform::IDENTITY;
         Self { tree, transform, smooth, is_merged: false, first: None, is_moved, aside }
     }
@@ -91,7 +91,7 @@ impl MeshInstance {
     /// Corners of a triangle in world coordinates, ordered so that the front is along (b − a) × (c − a).
     pub fn world_corners(&self, triangle: u32) -> [DVec3; 3] {
         let [a, b, c] = self.tree.loaded().mesh.corners(triangle).map(|p| self.transform.point(p.as_dvec3()));
-        if self.transform.mirrors() { [a, c, b] } else { [a, b, c] }
+        if self.transform.flips_handedness() { [a, c, b] } else { [a, b, c] }
     }
 
     /// Corners of a triangle in the mesh's coordinates, in the order of the file.
@@ -138,7 +138,7 @@ impl MeshInstance {
         let corners = self.tree.loaded().mesh.triangles[triangle as usize];
         let [a, b, c] = corners.map(|vertex| values.get(vertex as usize).copied());
         let (a, b, c) = (a?, b?, c?);
-        Some(if self.transform.mirrors() { [a, c, b] } else { [a, b, c] })
+        Some(if self.transform.flips_handedness() { [a, c, b] } else { [a, b, c] })
     }
 
     /// The point at a hit by the second set of texture coordinates, with its tangents. `None` without one.

@@ -2,7 +2,7 @@
 //! shown.
 
 use crate::math::DVec3;
-use crate::math::decimal::{rounded, step_at};
+use crate::math::decimal::{decimal_step, rounded};
 use crate::pipeline::protocol::Viewpoint;
 use crate::scene::description::Pose;
 
@@ -45,7 +45,7 @@ pub(super) fn zoomed(view: &Viewpoint, factor: f64) -> f64 {
 
 /// With the eye at the end of this arm from `look_at`, to a hundred-thousandth of its length or better.
 fn placed(pose: &Pose, arm: DVec3) -> Pose {
-    let step = step_at(arm.length());
+    let step = decimal_step(arm.length());
     let position = (pose.look_at + arm).to_array().map(|number| rounded(number, step));
     Pose { position: DVec3::from_array(position), ..*pose }
 }

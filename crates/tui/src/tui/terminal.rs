@@ -224,7 +224,7 @@ fn prepare_abort() {
         let _ = leave_images(&mut delete_images).and_then(|()| leave_text(&mut leave));
         LastWords { modes: tcgetattr(io::stdin()).ok().map(Into::into), delete_images, leave }
     });
-    abort::give_back_by(give_back_at_once);
+    abort::set_terminal_restore(give_back_at_once);
 }
 
 /// Gives the terminal back by async-signal-safe calls alone: no lock, no allocation. A terminal that takes nothing is

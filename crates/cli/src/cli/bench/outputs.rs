@@ -12,7 +12,7 @@ use crate::cli::lower::STANDARD;
 use crate::control::CancelToken;
 use crate::output::write::{self, Guard};
 use crate::output::{self, FileIdentity, Losses, OutputError, replaced_json, replaced_plot, replaced_table};
-use crate::system::{file, in_words};
+use crate::system::{describe_error, file};
 
 /// Files to write, and files that must not be written.
 pub(super) struct Outputs {
@@ -165,7 +165,7 @@ impl Outputs {
 fn bytes_of(path: &Path) -> Result<Vec<u8>, String> {
     /// Bytes of the results of a million pictures.
     const MOST: u64 = 256 << 20;
-    let words = |error: std::io::Error| in_words(&error);
+    let words = |error: std::io::Error| describe_error(&error);
     let (file, metadata) = file::open(path)
         .map_err(words)?
         .map_err(|kind| format!("it is {}, not a regular file", kind.words()))?;

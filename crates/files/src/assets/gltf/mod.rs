@@ -27,7 +27,7 @@ use self::json::{Root, Uri};
 use super::image::{self, ImageEncoding, ImageLimits, ImageWithin};
 use super::read::{self, Watch};
 use super::{AssetError, Companion, FileHash};
-use crate::control::{CancelToken, Progress, unwatched};
+use crate::control::{CancelToken, Progress, ignore_progress};
 
 /// Most bytes of a file, and of all buffers together.
 const FILE_LIMIT: u64 = 4 << 30;
@@ -218,7 +218,9 @@ impl Container {
     pub fn image_content(&self, number: usize, token: &CancelToken) -> Result<Vec<u8>, AssetError> {
         match self.image(number)? {
             ImageBytes::Inside(bytes) => Ok(bytes.to_vec()),
-            ImageBytes::File(file) => read::bytes(&file, FILE_LIMIT, Watch { progress: &unwatched, token }),
+            ImageBytes::File(file) => {
+                read::bytes(&file, FILE_LIMIT, Watch { progress: &ignore_progress, token })
+            }
         }
     }
 
@@ -315,10 +317,10 @@ impl Container {
     pub fn check_image(&self, number: usize, token: &CancelToken) -> Result<(), AssetError> {
         let (limits, encoding) = (ImageLimits::default(), ImageEncoding::Color);
         let texels = match self.image(number)? {
-            ImageBytes::File(file) => image::load(&file, encoding, limits, &unwatched, token),
+            ImageBytes::File(file) => image::load(&file, encoding, limits, &ignore_progress, token),
             ImageBytes::Inside(bytes) => {
                 let image = ImageWithin { path: &self.path, bytes: bytes.into() };
-                image::load_within(image, encoding, limits, &unwatched, token)
+                image::load_within(image, encoding, limits, &ignore_progress, token)
             }
         };
         texels.map(drop).map_err(|error| self.about_image(number, error))
@@ -493,7 +495,7 @@ fn buffers(
             Some(Uri::Data(bytes)) => bytes,
             Some(Uri::File(uri)) => {
                 let file = beside(path, &uri).map_err(wrong)?;
-                let silent = Watch { progress: &unwatched, token: watch.token };
+                let silent = Watch { progress: &ignore_progress, token: watch.token };
                 let bytes = read::bytes(&file, FILE_LIMIT - total, silent).map_err(|error| match error {
                     AssetError::Unreadable { path: missing, reason } => {
                         let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -11,7 +11,7 @@ use super::json::{Camera, Light, Node, Primitive};
 use super::materials::material;
 use super::{Container, Wrong};
 use crate::assets::AssetError;
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::{DMat3, DVec3};
 
@@ -50,7 +50,7 @@ impl Container {
         for instance in &scene.instances {
             let (mesh, extremes) = match parts.entry(instance.part) {
                 Entry::Occupied(known) => &*known.into_mut(),
-                Entry::Vacant(new) => match self.part(instance.part, &unwatched, token) {
+                Entry::Vacant(new) => match self.part(instance.part, &ignore_progress, token) {
                     Err(AssetError::Cancelled(cancelled)) => return Err(cancelled.into()),
                     loaded => {
                         let mesh = loaded.map(|loaded| loaded.mesh).unwrap_or_else(|wrong| {

@@ -23,7 +23,7 @@ impl Desk {
     }
 
     fn open(&self, name: &str, bytes: &[u8]) -> Result<Container, AssetError> {
-        Container::open(&self.write(name, bytes), &unwatched, &CancelToken::new())
+        Container::open(&self.write(name, bytes), &ignore_progress, &CancelToken::new())
     }
 }
 
@@ -32,7 +32,7 @@ fn open_json(json: &Value) -> Result<Container, AssetError> {
 }
 
 fn part(container: &Container, number: usize) -> Result<LoadedMesh, AssetError> {
-    container.part(number, &unwatched, &CancelToken::new())
+    container.part(number, &ignore_progress, &CancelToken::new())
 }
 
 fn scene(container: &Container) -> Result<ModelScene, AssetError> {

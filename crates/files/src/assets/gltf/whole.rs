@@ -6,7 +6,7 @@ use std::collections::hash_map::Entry;
 use super::description::{Alpha, ModelMaterial, Placed};
 use super::{Container, ModelScene, Wrong};
 use crate::assets::{AssetError, FileMaterial, LoadedMesh, PhysicalMaterial};
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 use crate::geometry::mesh::TriangleMesh;
 use crate::math::Vec3;
 use crate::math::origin::origin_near;
@@ -37,7 +37,8 @@ impl Container {
             let part = match parts.entry(instance.part) {
                 Entry::Occupied(known) => known.into_mut(),
                 Entry::Vacant(new) => {
-                    let LoadedMesh { mesh, dropped, .. } = self.part(instance.part, &unwatched, token)?;
+                    let LoadedMesh { mesh, dropped, .. } =
+                        self.part(instance.part, &ignore_progress, token)?;
                     whole.dropped.degenerate += dropped.degenerate;
                     whole.dropped.non_finite += dropped.non_finite;
                     new.insert(mesh)

@@ -98,7 +98,7 @@ fn left() -> std::sync::MutexGuard<'static, Vec<JoinHandle<()>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::unwatched;
+    use crate::control::ignore_progress;
 
     #[test]
     fn a_cancel_does_not_wait_for_the_work_and_new_work_does() {
@@ -112,12 +112,13 @@ mod tests {
             let in_time = released.recv_timeout(Duration::from_secs(20)).is_ok();
             let _ = said.send((in_time, report.reached(1).is_err()));
         };
-        let watch = Watch { progress: &unwatched, token: &token };
+        let watch = Watch { progress: &ignore_progress, token: &token };
         assert_eq!(run(watch, 1, stuck).err(), Some(Cancelled));
         release.send(()).expect("the work goes on");
         let fresh = CancelToken::new();
         let next = move |_| ended.try_recv();
-        let ended = run(Watch { progress: &unwatched, token: &fresh }, 1, next).expect("nobody cancels");
+        let ended =
+            run(Watch { progress: &ignore_progress, token: &fresh }, 1, next).expect("nobody cancels");
         assert_eq!(ended, Some(Ok((true, true))));
     }
 

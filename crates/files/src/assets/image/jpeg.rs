@@ -4,12 +4,12 @@ use std::path::Path;
 
 use crate::assets::AssetError;
 use crate::assets::read::{self, Watch};
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 
 /// Checks that the last scan ends: the marker of the end of the image follows that of the scan's start. Within a scan
 /// neither can occur (ITU-T T.81, B.1.1.5).
 pub(super) fn check_whole(path: &Path, limit: u64, token: &CancelToken) -> Result<(), String> {
-    let bytes = read::bytes(path, limit, Watch { progress: &unwatched, token });
+    let bytes = read::bytes(path, limit, Watch { progress: &ignore_progress, token });
     check_bytes(&bytes.map_err(|error: AssetError| error.to_string())?)
 }
 

@@ -23,8 +23,8 @@ use ::image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageFormat, Im
 
 use super::contain::contain;
 use super::read::{self, Watch};
-use super::{AssetError, FileHash, read::in_words};
-use crate::control::{CancelToken, Cancelled, Progress, unwatched};
+use super::{AssetError, FileHash, read::describe_error};
+use crate::control::{CancelToken, Cancelled, Progress, ignore_progress};
 use crate::materials::mipmaps::Halving;
 use crate::materials::texels::Texels;
 use crate::materials::{Mipmaps, PixelNumber};
@@ -207,7 +207,7 @@ pub fn size(
     limits: ImageLimits,
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
-    size_of_source(Source::open(path, limits, token)?, encoding, Watch { progress: &unwatched, token })
+    size_of_source(Source::open(path, limits, token)?, encoding, Watch { progress: &ignore_progress, token })
 }
 
 fn size_of_source(
@@ -255,7 +255,7 @@ pub fn size_within(
     limits: ImageLimits,
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
-    size_of_source(Source::within(image, limits, token)?, encoding, Watch { progress: &unwatched, token })
+    size_of_source(Source::within(image, limits, token)?, encoding, Watch { progress: &ignore_progress, token })
 }
 
 /// The mip levels of an image.
@@ -340,7 +340,8 @@ impl Source {
             // Do not fill the memory with a file that is not going to be decoded.
             size(path, encoding, limits, token)?;
         }
-        let bytes = read::rest(path, file, (length, FILE_LIMIT), Watch { progress: &unwatched, token })?;
+        let bytes =
+            read::rest(path, file, (length, FILE_LIMIT), Watch { progress: &ignore_progress, token })?;
         let (hash, length) = (read::hash(&bytes), bytes.len() as u64);
         if length == 0 {
             return Err(AssetError::malformed(path, None, "the file is empty"));
@@ -401,8 +402,8 @@ impl Source {
             Bytes::Within(_) => {}
         }
         let mut bytes = BufReader::new(Counting::new(self.file, self.length, report));
-        let is_hdr = bytes.fill_buf().map_err(|error| in_words(&error))?.starts_with(hdr::MAGIC);
-        let mut reader = ImageReader::new(bytes).with_guessed_format().map_err(|error| in_words(&error))?;
+        let is_hdr = bytes.fill_buf().map_err(|error| describe_error(&error))?.starts_with(hdr::MAGIC);
+        let mut reader = ImageReader::new(bytes).with_guessed_format().map_err(|error| describe_error(&error))?;
         if is_hdr {
             reader.set_format(ImageFormat::Hdr);
         }
@@ -568,7 +569,7 @@ fn reason(error: &ImageError) -> String {
         ImageError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => {
             "the file ends before the image does".to_owned()
         }
-        ImageError::IoError(error) => in_words(error),
+        ImageError::IoError(error) => describe_error(error),
         ImageError::Limits(error) if error.kind() == LimitErrorKind::InsufficientMemory => {
             "it takes more memory than an image may take".to_owned()
         }

@@ -17,7 +17,7 @@ mod png;
 mod tga;
 
 fn load_with(path: &Path, encoding: ImageEncoding) -> Result<Texels, AssetError> {
-    Ok(load(path, encoding, ImageLimits::default(), &unwatched, &CancelToken::new())?.texels)
+    Ok(load(path, encoding, ImageLimits::default(), &ignore_progress, &CancelToken::new())?.texels)
 }
 
 fn load_bytes(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Result<Texels, AssetError> {
@@ -251,8 +251,8 @@ fn the_memory_limit_holds() {
     let path = folder.path().join("a.png");
     fs::write(&path, small_png()).expect("written");
     let limits = ImageLimits { side: 16384, memory_bytes: 23 };
-    let error =
-        load(&path, ImageEncoding::Color, limits, &unwatched, &CancelToken::new()).expect_err("24 bytes");
+    let error = load(&path, ImageEncoding::Color, limits, &ignore_progress, &CancelToken::new())
+        .expect_err("24 bytes");
     assert!(error.to_string().contains("a.png: "), "{error}");
 }
 

@@ -387,12 +387,12 @@ fn complete_normals(mesh: &mut TriangleMesh, token: &CancelToken) -> Result<(), 
 mod tests {
     use super::*;
     use crate::assets::read::Watch;
-    use crate::control::unwatched;
+    use crate::control::ignore_progress;
     use std::path::Path;
 
     fn assembled(parsed: Parsed) -> Result<LoadedMesh, AssetError> {
         let token = CancelToken::new();
-        let watch = Watch { progress: &unwatched, token: &token };
+        let watch = Watch { progress: &ignore_progress, token: &token };
         assemble(&Source { path: Path::new("a.off"), bytes: &[], watch }, parsed)
     }
 
@@ -460,7 +460,7 @@ mod tests {
     #[test]
     fn more_triangles_than_trees_can_hold_are_refused_with_their_number() {
         let token = CancelToken::new();
-        let watch = Watch { progress: &unwatched, token: &token };
+        let watch = Watch { progress: &ignore_progress, token: &token };
         let source = Source { path: Path::new("a.off"), bytes: &[], watch };
         for list in [&[&[0, 1, 2][..], &[0, 2, 3]][..], &[&[0, 1, 2, 3]]] {
             assert!(Cutter::new(&SQUARE, &[], 2).cut_all(&source, &faces(list)).is_ok());

@@ -94,7 +94,7 @@ impl Source<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::unwatched;
+    use crate::control::ignore_progress;
     use proptest::prelude::*;
     use std::fs;
     use std::sync::Mutex;
@@ -103,7 +103,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join(name);
         fs::write(&path, bytes).expect("written");
-        load(&path, &unwatched, &CancelToken::new())
+        load(&path, &ignore_progress, &CancelToken::new())
     }
 
     #[test]
@@ -154,7 +154,7 @@ mod tests {
             fs::write(&path, text).expect("written");
             let token = CancelToken::new();
             token.cancel();
-            assert!(matches!(load(&path, &unwatched, &token), Err(AssetError::Cancelled(_))), "{name}");
+            assert!(matches!(load(&path, &ignore_progress, &token), Err(AssetError::Cancelled(_))), "{name}");
         }
     }
 

@@ -344,13 +344,13 @@ impl Reader<'_> {
 mod tests {
     use super::*;
     use crate::assets::read::Watch;
-    use crate::control::{CancelToken, unwatched};
+    use crate::control::{CancelToken, ignore_progress};
     use crate::math::Vec3;
     use std::path::Path;
 
     fn read(text: &str) -> Result<LoadedMesh, AssetError> {
         let token = CancelToken::new();
-        let watch = Watch { progress: &unwatched, token: &token };
+        let watch = Watch { progress: &ignore_progress, token: &token };
         parse(&Source { path: Path::new("a.off"), bytes: text.as_bytes(), watch })
     }
 

@@ -214,7 +214,7 @@ impl Text<'_> {
 mod tests {
     use super::*;
     use crate::assets::mesh::Watch;
-    use crate::control::{CancelToken, unwatched};
+    use crate::control::{CancelToken, ignore_progress};
     use crate::math::Vec3;
     use std::path::Path;
 
@@ -223,7 +223,7 @@ mod tests {
         parse(&Source {
             path: Path::new("a.stl"),
             bytes,
-            watch: Watch { progress: &unwatched, token: &token },
+            watch: Watch { progress: &ignore_progress, token: &token },
         })
     }
 

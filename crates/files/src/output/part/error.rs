@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use crate::system::in_words;
+use crate::system::describe_error;
 
 /// A part by its number and the number of parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub struct WhichPart {
 #[derive(Debug, thiserror::Error)]
 pub enum PartError {
     /// The file cannot be read.
-    #[error("{}: {}", path.display(), in_words(source))]
+    #[error("{}: {}", path.display(), describe_error(source))]
     Unreadable {
         /// The file.
         path: PathBuf,

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::super::{BitDepth, Finish};
 use crate::choice::Choice;
-use crate::film::stretch::{Kind as StretchKind, Stretch};
+use crate::film::range_map::{DataKind, RangeMap};
 use crate::film::tone::{ToneMapping, Tonemap, Transfer};
-use crate::film::{Blocks, Convergence, Film, FilmError, Quantity, Rect};
+use crate::film::{Convergence, Film, FilmError, Quantity, Rect, SumOrder};
 
 /// The head of a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -121,19 +121,18 @@ const QUANTITIES: [(Quantity, &str); 3] =
     [(Quantity::Radiance, "radiance"), (Quantity::Samples, "samples"), (Quantity::Error, "error")];
 
 /// The words for kinds of stretches.
-const STRETCHES: [(StretchKind, &str); 2] =
-    [(StretchKind::Distances, "distances"), (StretchKind::Amounts, "amounts")];
+const STRETCHES: [(DataKind, &str); 2] = [(DataKind::Distances, "distances"), (DataKind::Amounts, "amounts")];
 
 impl PictureHead {
     /// The head of a film's picture that is finished so.
     pub fn new(film: &Film, finish: &Finish) -> Self {
         let Rect { x, y, width, height } = film.crop();
         let tone = &finish.tone;
-        let kind = match tone.stretch {
-            Stretch::None => None,
-            Stretch::Unknown(kind) | Stretch::To(kind, _) => Some(kind),
+        let kind = match tone.range_map {
+            RangeMap::None => None,
+            RangeMap::Unresolved(kind) | RangeMap::Resolved(kind, _) => Some(kind),
         };
-        let word = |of: StretchKind| STRETCHES.iter().find(|(kind, _)| *kind == of).map(|(_, word)| *word);
+        let word = |of: DataKind| STRETCHES.iter().find(|(kind, _)| *kind == of).map(|(_, word)| *word);
         let quantity = QUANTITIES.iter().find(|(quantity, _)| *quantity == finish.quantity);
         Self {
             width: film.width(),
@@ -158,9 +157,9 @@ impl PictureHead {
 
     /// The settings that turn the film into a file. `None` if a word in it has no meaning.
     pub fn finish(&self) -> Option<Finish> {
-        let stretch = match self.tone.stretch.as_deref() {
-            None => Stretch::None,
-            Some(word) => Stretch::Unknown(STRETCHES.iter().find(|(_, known)| *known == word)?.0),
+        let range_map = match self.tone.stretch.as_deref() {
+            None => RangeMap::None,
+            Some(word) => RangeMap::Unresolved(STRETCHES.iter().find(|(_, known)| *known == word)?.0),
         };
         Some(Finish {
             quantity: QUANTITIES.iter().find(|(_, word)| *word == self.quantity)?.0,
@@ -168,7 +167,7 @@ impl PictureHead {
                 exposure_stops: self.tone.exposure,
                 curve: Tonemap::named(&self.tone.curve)?,
                 transfer: if self.tone.is_data { Transfer::Identity } else { Transfer::Srgb },
-                stretch,
+                range_map,
             },
             bit_depth: BitDepth::try_from(self.bit_depth).ok()?,
             metadata: self.metadata.clone(),
@@ -184,7 +183,7 @@ impl PictureHead {
         let [x, y, width, height] = self.crop;
         let film = Film::new(self.width, self.height, Some(Rect { x, y, width, height }))?;
         Ok(match self.is_by_photons {
-            true => film.converging(Convergence::Photons).in_blocks(Blocks::Added)?,
+            true => film.with_convergence(Convergence::Photons).with_sum_order(SumOrder::Blocked)?,
             false => film,
         })
     }

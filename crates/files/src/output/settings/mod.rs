@@ -12,8 +12,8 @@ use ::exr::meta::MetaData;
 
 use super::part::{Kind, PartFile, is_part};
 use super::{PROGRAM, SOFTWARE};
+use crate::system::describe_error;
 use crate::system::file;
-use crate::system::in_words;
 
 /// Bytes at the start of a file in which its settings are: behind them are pixels.
 const START_BYTES: u64 = 4 << 20;
@@ -95,12 +95,12 @@ pub fn made(path: &Path) -> Result<Made, MadeError> {
     let (opened, _) = match file::open(path) {
         Ok(Ok(found)) => found,
         Ok(Err(kind)) => return Err(unreadable(format!("it is {}, not a file", kind.words()))),
-        Err(error) => return Err(unreadable(in_words(&error))),
+        Err(error) => return Err(unreadable(describe_error(&error))),
     };
     if is_part(path) {
         return of_part(path).map_err(unreadable);
     }
-    let start = start(&opened).map_err(|error| unreadable(in_words(&error)))?;
+    let start = start(&opened).map_err(|error| unreadable(describe_error(&error)))?;
     // A WebP file has its settings behind the pixels.
     if start.len() as u64 == START_BYTES
         && start.starts_with(b"RIFF")

@@ -5,7 +5,7 @@ use super::sample_point::LightSamplePoint;
 use super::{LightHit, ShapeEmitter};
 use crate::lights::tree::bounds::strength;
 use crate::math::{DVec3, Vec3};
-use crate::sampling::grid::{Grid, InGrid};
+use crate::sampling::piecewise_constant::{GridSample, PiecewiseConstant2D};
 
 /// A parallelogram with an emission texture. A fraction of the samples is chosen by the texture, the others by the solid
 /// angle. Their pdf is the mean of both (the balance heuristic for one sample: Veach, *Robust Monte Carlo Methods for Light
@@ -16,7 +16,7 @@ pub struct TexturedQuadEmitter {
     /// Number of cells along both edges.
     size: [usize; 2],
     /// Brightness of the cells.
-    cells: Grid,
+    cells: PiecewiseConstant2D,
     /// Fraction of the samples that the texture chooses.
     share: f32,
     /// The products of these and a point's offset from the corner are its coordinates along the edges.
@@ -42,7 +42,7 @@ impl ShapeEmitter for TexturedQuadEmitter {
         const LAST: f32 = 1.0_f32.next_down();
         let u = [if rest < LAST { rest } else { LAST }, u[1]];
         let to_corner = self.quad.corner_from(point);
-        let InGrid { column, row, rest } = self.cells.sample(u);
+        let GridSample { column, row, rest } = self.cells.sample(u);
         let at =
             [(column as f32 + rest[0]) / self.size[0] as f32, (row as f32 + rest[1]) / self.size[1] as f32];
         let (offset, by_area) = self.quad.by_area(to_corner, at);
@@ -98,7 +98,7 @@ impl TexturedQuadEmitter {
         // Divide the variance of the brightness by the mean of its square: 0 if the brightness is constant.
         let contrast = 1.0 - sum * sum / (squares * (size[0] * size[1]) as f64);
         let share = (MOST_BY_PICTURE * contrast) as f32;
-        let cells = Grid::new(size[0], rows.into_iter()).filter(|_| share > LEAST_SHARE)?;
+        let cells = PiecewiseConstant2D::new(size[0], rows.into_iter()).filter(|_| share > LEAST_SHARE)?;
         Some(Self { along: quad.along(), quad, size, cells, share })
     }
 

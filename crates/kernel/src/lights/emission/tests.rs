@@ -19,7 +19,7 @@ use crate::materials::texels::{TexelData, Texels};
 use crate::materials::texture::{Texture, TextureFilter, Wrap};
 use crate::math::random;
 use crate::math::transform::Transform;
-use crate::sampling::{Decision, PixelSampler};
+use crate::sampling::{Dimension, PixelSampler};
 
 mod textures;
 
@@ -122,7 +122,7 @@ fn mean(source: &PhotonSource, count: u32, of: impl Fn(&Emitted) -> f64) -> Mean
     let groups = (0..GROUPS).map(|group| {
         let one = |i: u32| {
             let sampler = PixelSampler::new(3, group, 5, i);
-            let pair = |k: u32| sampler.pair(1, Decision::Light(k)).to_array();
+            let pair = |k: u32| sampler.pair(1, Dimension::Light(k)).to_array();
             let u = Numbers { light: pair(0), aim: pair(1), position: pair(2), direction: pair(3) };
             source.emit(&u).map_or(0.0, |photon| of(&photon))
         };
@@ -180,9 +180,9 @@ fn sampled(light: &Light, count: u32) -> Mean {
     let groups = (0..GROUPS).map(|group| {
         let one = |i: u32| {
             let sampler = PixelSampler::new(4, group, 5, i);
-            let at = warp::disk(sampler.pair(1, Decision::Lens)) * DISC.radius as f32;
+            let at = warp::disk(sampler.pair(1, Dimension::Lens)) * DISC.radius as f32;
             let from = DISC.center.as_vec3() + s * at.x + t * at.y;
-            let sample = light.sample(from, normal, sampler.pair(1, Decision::Light(0)).to_array());
+            let sample = light.sample(from, normal, sampler.pair(1, Dimension::Light(0)).to_array());
             sample.map_or(0.0, |sample| f64::from(sample.weight.y * sample.direction.dot(normal).max(0.0)))
         };
         (0..count).map(one).sum::<f64>() / f64::from(count)

@@ -118,7 +118,7 @@ impl InfiniteLight for DirectionalLight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling::{Decision, PixelSampler};
+    use crate::sampling::{Dimension, PixelSampler};
 
     #[test]
     fn samples_are_of_the_disc_and_bring_the_irradiance() {
@@ -126,7 +126,7 @@ mod tests {
             let sun = DirectionalLight::new(Vec3::new(0.6, 0.0, 0.8), Vec3::splat(3.0), degrees.to_radians());
             let (mut irradiance, count) = (0.0, 4096);
             for sample in 0..count {
-                let u = PixelSampler::new(1, 2, 3, sample).pair(1, Decision::Light(0)).to_array();
+                let u = PixelSampler::new(1, 2, 3, sample).pair(1, Dimension::Light(0)).to_array();
                 let sample = sun.sample(u).expect("light");
                 assert_eq!(sample.end, End::Beyond);
                 // The very edge may count either way.

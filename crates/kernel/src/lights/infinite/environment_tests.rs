@@ -3,7 +3,7 @@ use std::f64::consts::{PI, TAU};
 use super::*;
 use crate::materials::texels::{TexelData, Texels};
 use crate::math::DVec3;
-use crate::sampling::{Decision, PixelSampler};
+use crate::sampling::{Dimension, PixelSampler};
 
 /// A map by a function of column and row.
 fn map(width: u32, height: u32, color: impl Fn(u32, u32) -> Vec3) -> Arc<Texels> {
@@ -29,7 +29,7 @@ fn patchy(width: u32, height: u32) -> Arc<Texels> {
 }
 
 fn random(i: u32) -> [f32; 2] {
-    PixelSampler::new(5, i >> 16, 3, i & 0xffff).pair(1, Decision::Light(0)).to_array()
+    PixelSampler::new(5, i >> 16, 3, i & 0xffff).pair(1, Dimension::Light(0)).to_array()
 }
 
 /// The contract in double precision: a direction's colour.

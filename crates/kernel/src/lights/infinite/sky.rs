@@ -8,7 +8,7 @@ use crate::math::color::luminance;
 use crate::math::elementary::{atan2, sin_cos};
 use crate::math::lanes::{F32x16, PACKET_SIZE, Vec3x16, lane, set_lane};
 use crate::math::{DVec3, Vec3};
-use crate::sampling::grid::{Grid, InGrid};
+use crate::sampling::piecewise_constant::{GridSample, PiecewiseConstant2D};
 use crate::sampling::warp;
 
 /// A map with the distribution by which its directions are sampled: top row at +y, its middle towards −z, its right quarter
@@ -18,7 +18,7 @@ use crate::sampling::warp;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkyMap {
     texels: Arc<Texels>,
-    cells: Grid,
+    cells: PiecewiseConstant2D,
     /// Cosines of the angles from the top at which rows of cells begin, and −1.
     heights: Vec<f64>,
     /// Pdf in sr⁻¹ of a row as if its columns were alike.
@@ -61,7 +61,7 @@ impl SkyMap {
             sum += both.iter().sum::<f64>() * extent;
             (0..columns).map(|column| (both[column] + both[(column + 1) % columns]) * extent).collect()
         });
-        let cells = Grid::new(columns, weights)?;
+        let cells = PiecewiseConstant2D::new(columns, weights)?;
         let density = |row: usize| {
             let extent = 2.0 * std::f64::consts::PI / columns as f64 * (heights[row] - heights[row + 1]);
             (f64::from(cells.row_probability(row)) / extent) as f32
@@ -108,7 +108,7 @@ impl SkyMap {
     /// A unit direction, with the results of [`SkyMap::lookup`] for it.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2], turn: f32) -> (Vec3, Vec3, f32) {
-        let InGrid { column, row, rest } = self.cells.sample(u);
+        let GridSample { column, row, rest } = self.cells.sample(u);
         let corners = self.corners(column as u32, row as u32);
         let luminances = luminances(&corners);
         let along = warp::bilinear(rest, &luminances);

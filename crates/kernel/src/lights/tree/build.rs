@@ -6,7 +6,7 @@ use super::node::{Child, Node};
 use super::{LightTree, NOWHERE};
 use crate::control::{CancelToken, Cancelled};
 use crate::math::DVec3;
-use crate::math::float::power_of_two_below;
+use crate::math::float::floor_to_power_of_two;
 use crate::math::lanes::PACKET_SIZE;
 
 impl LightTree {
@@ -20,7 +20,7 @@ impl LightTree {
         leaves.sort_by_key(|leaf| leaf.bounds.space);
         let power: f64 = leaves.iter().map(|leaf| leaf.bounds.power).sum();
         let mut places = vec![NOWHERE; lights.len()];
-        let unit = power_of_two_below(power);
+        let unit = floor_to_power_of_two(power);
         let mut builder = Builder { nodes: Vec::new(), unit, leaves: leaves.len() as u32, token };
         if leaves.is_empty() {
             return Ok(None);

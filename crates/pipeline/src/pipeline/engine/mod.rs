@@ -70,7 +70,7 @@ use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
-use crate::system::threads::{check_room, not_started};
+use crate::system::threads::{check_room, start_failure};
 use crate::world::{Bodies, Coplanar, Lookups, World};
 
 /// Means of an engine; tests replace some of them.
@@ -622,12 +622,12 @@ impl Engine {
         self.pool = None;
         let name = |index| format!("glimt-{index}");
         let nice = self.means.nice;
-        let begin = move |_| priority::give_way_alone(nice);
+        let begin = move |_| priority::lower_thread_priority(nice);
         let failed = |error: &dyn Display| match threads {
-            1 => Stop::work(not_started("a thread", false, &error)),
-            _ => Stop::work(not_started(&format!("{threads} threads"), true, &error)),
+            1 => Stop::work(start_failure("a thread", false, &error)),
+            _ => Stop::work(start_failure(&format!("{threads} threads"), true, &error)),
         };
-        check_room(threads).map_err(|error| failed(&error))?;
+        check_stack_space(threads).map_err(|error| failed(&error))?;
         let builder = ThreadPoolBuilder::new().num_threads(threads).thread_name(name).start_handler(begin);
         let pool = builder.build().map_err(|error| failed(&error))?;
         Ok(self.pool.insert(Arc::new(pool)).clone())

@@ -16,7 +16,7 @@ use crate::assets::gltf::{
     ModelScene, Slot,
 };
 use crate::assets::{AssetError, Companion};
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 use crate::math::color::luminance;
 use crate::math::{DMat3, DVec3};
 use crate::pipeline::settings::Side;
@@ -58,7 +58,7 @@ pub(super) fn text(
     containers: &Containers,
     token: &CancelToken,
 ) -> Result<ModelText, AssetError> {
-    let container = containers.open(path, &unwatched, token)?;
+    let container = containers.open(path, &ignore_progress, token)?;
     let scene = container.scene(token)?;
     let Some(bounds) = scene.bounds else {
         let reason = "its scene shows no faces".to_owned();

@@ -7,7 +7,7 @@ use super::{ModelText, Show, in_its_scene};
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
 use crate::assets::mesh::ply::write;
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 use crate::pipeline::stages::containers::Containers;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::load_made;
@@ -37,11 +37,11 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
         let ModelText { text, notes, assets, .. } =
             super::gltf::text(path, (Show::default(), &naming), &containers, token)?;
         check_scene(path, &containers, token)?;
-        let container = containers.open(path, &unwatched, token)?;
+        let container = containers.open(path, &ignore_progress, token)?;
         let mut files = Vec::new();
         for asset in assets {
             let bytes = match asset.content {
-                Content::Part(part) => write::bytes(&container.part(part, &unwatched, token)?.mesh),
+                Content::Part(part) => write::bytes(&container.part(part, &ignore_progress, token)?.mesh),
                 Content::Image(image) => {
                     // Files from anywhere could be copied under the name of an image.
                     container.check_image(image, token)?;

@@ -11,7 +11,7 @@ use super::{
     render,
 };
 use crate::assets::{AssetError, FileMaterial, LoadedMesh};
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 use crate::math::DVec3;
 use crate::math::limits::LARGEST;
 use crate::pipeline::settings::{Side, UpAxis};
@@ -88,7 +88,7 @@ pub(super) fn text(
     containers: &Containers,
     token: &CancelToken,
 ) -> Result<ModelText, AssetError> {
-    let loaded = containers.mesh((path, None), &unwatched, token)?;
+    let loaded = containers.mesh((path, None), &ignore_progress, token)?;
     let Some([least, greatest]) = loaded.mesh.bounds() else {
         return Err(AssetError::Malformed {
             path: path.to_owned(),

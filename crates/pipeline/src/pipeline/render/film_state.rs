@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::forecast::cost::{CellCost, JobCost, PixelShare};
 use super::forecast::samples::ExpectedSamples;
 use crate::film::{
-    Blocks, CELLS, Convergence, Film, FilmError, Part, Pixels, Previewer, RadianceImage, Rect,
+    CELLS, Convergence, Film, FilmError, PixelSubset, Pixels, Previewer, RadianceImage, Rect, SumOrder,
 };
 use crate::integrators::RayCounters;
 use crate::output::part::Trait;
@@ -83,13 +83,13 @@ impl FilmState {
     ) -> Result<Self, FilmError> {
         let blocks = match (&share, convergence) {
             (Some(share), _) => share.sums(),
-            (None, Convergence::Photons) => Blocks::Added,
-            (None, Convergence::Stratified) => Blocks::Whole,
+            (None, Convergence::Photons) => SumOrder::Blocked,
+            (None, Convergence::Stratified) => SumOrder::Sequential,
         };
         let film =
             Film::within(most_bytes, plan.settings.render.width, plan.settings.render.height, plan.crop)?
-                .converging(convergence)
-                .in_blocks(blocks)?;
+                .with_convergence(convergence)
+                .with_sum_order(blocks)?;
         let film_cells = film.cell_count();
         let goals = Goals::none(film_cells);
         let own = share.as_ref().map(|share| share.tiles(film.tile_count()));
@@ -246,7 +246,7 @@ impl FilmState {
                 match &halves {
                     [first, other] if first == other => jobs.push(job(rect.into(), first)),
                     halves => jobs.extend(
-                        (0..2).map(|half| job(Pixels { rect, part: Part::Half(half) }, &halves[half])),
+                        (0..2).map(|half| job(Pixels { rect, part: PixelSubset::Half(half) }, &halves[half])),
                     ),
                 }
             }
@@ -269,8 +269,8 @@ impl FilmState {
                 let (pixels, samples) = (job.pixels.part.count(rect.area()) as f64, job.samples.len() as f64);
                 self.costs[cell].note(JobCost { seconds, pixels, samples }, &mut self.pixel_share);
                 match job.pixels.part {
-                    Part::All => self.done[cell] = [job.samples.end; 2],
-                    Part::Half(half) => self.done[cell][half] = job.samples.end,
+                    PixelSubset::All => self.done[cell] = [job.samples.end; 2],
+                    PixelSubset::Half(half) => self.done[cell][half] = job.samples.end,
                 }
             }
         }

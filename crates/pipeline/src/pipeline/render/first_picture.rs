@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 use super::preview::Screen;
-use crate::film::stretch::Stretch;
+use crate::film::range_map::RangeMap;
 use crate::film::{RadianceImage, Rect};
 use crate::integrators::{PhotonMaps, RenderSettings};
 use crate::pipeline::plan::Plan;
@@ -95,7 +95,7 @@ impl<'a> FirstPictures<'a> {
     ) -> Result<(), Stop> {
         let is_whole = screen.bounds.is_some_and(|bounds| bounds.around.is_none());
         // Views of numbers are stretched, and one of them is of the photons themselves.
-        let is_of_light = self.plan.tone.stretch == Stretch::None;
+        let is_of_light = self.plan.tone.range_map == RangeMap::None;
         let Some(shown) = screen.size().filter(|_| is_whole && is_of_light) else { return Ok(()) };
         let Some(size) = self.sizes(shown).into_iter().next() else { return Ok(()) };
         let picture = self.picture(None, size, tick)?;

@@ -5,10 +5,10 @@
 //! samples are independent and about as noisy. A tenth of the bias is left, as a half that has stopped tells the other no more;
 //! at worst that is a thirtieth of the noise.
 
-use crate::film::{CELLS, Convergence, Film, HalfNoise, PILOT_SAMPLES, Pilot, samples_by};
+use crate::film::{CELLS, Convergence, Film, HalfNoise, PREPASS_SAMPLES, Prepass, samples_to_reduce_error};
 
 /// Samples before which noise is not asked for.
-pub(in crate::pipeline) const LEAST: u32 = PILOT_SAMPLES;
+pub(in crate::pipeline) const LEAST: u32 = PREPASS_SAMPLES;
 
 /// The part of the noise asked for that is aimed at: what is measured low by chance stops early.
 pub(in crate::pipeline) const AIM: f64 = 0.85;
@@ -29,7 +29,7 @@ pub(in crate::pipeline) struct Goals {
     pub(super) decided: Vec<[u32; 2]>,
     /// Samples at which each tile was judged last: once for each number.
     pub(super) judged: Vec<u32>,
-    /// Mean luminance of the picture's [`Pilot`], when noise was first asked for.
+    /// Mean luminance of the picture's [`Prepass`], when noise was first asked for.
     pub(super) brightness: Option<f64>,
 }
 
@@ -66,12 +66,12 @@ impl Goals {
     ) -> Option<Judgement> {
         let is_time = samples >= LEAST && !self.lacks_least(done);
         if is_time && self.brightness.is_none() {
-            self.brightness = Pilot::new(film.crop()).of_film(film);
+            self.brightness = Prepass::new(film.crop()).film_mean(film);
         }
         let brightness = self.brightness.or_else(|| film.mean_luminance())?;
         let aim = Aim { error, brightness, convergence: film.convergence() };
         let is_open = |tile: usize| self.judged[tile] < samples && self.is_open(tile, done, samples);
-        let noise = film.of_tiles(|tile| is_open(tile).then(|| TileNoise::of(film, tile)));
+        let noise = film.map_tiles(|tile| is_open(tile).then(|| TileNoise::of(film, tile)));
         if is_time {
             self.decide(&noise, done, samples, &aim);
             let judged = self.judged.iter_mut().zip(&noise).filter(|(_, noise)| noise.is_some());
@@ -84,7 +84,7 @@ impl Goals {
     /// pixels of one half alone does not hold that half up. And the noise of the worst of them.
     pub(in crate::pipeline) fn missed(&self, film: &Film, error: f64) -> Option<(usize, f64)> {
         let aim = Aim { error, brightness: self.brightness?, convergence: film.convergence() };
-        let noise = film.of_tiles(|tile| {
+        let noise = film.map_tiles(|tile| {
             let is_decided = |cell: &[u32; 2]| cell.iter().all(|goal| *goal < u32::MAX);
             let halves = || [0, 1].map(|half| film.tile_noise(tile, half)).into_iter().flatten();
             let count = halves().count() as f64;
@@ -184,10 +184,10 @@ impl Aim {
         let doubled = noise.samples.saturating_mul(2);
         // Up to the next power of two each sample counts as an independent one, there all of them are worth more.
         if 1.0 / (part * part) <= libm::exp2(noise.power) {
-            return samples_by(1.0, part, noise.samples).min(doubled);
+            return samples_to_reduce_error(1.0, part, noise.samples).min(doubled);
         }
         let power = noise.power.min(self.convergence.usual_power());
-        samples_by(power, part, noise.samples).max(doubled.saturating_add(1)).min(MOST)
+        samples_to_reduce_error(power, part, noise.samples).max(doubled.saturating_add(1)).min(MOST)
     }
 
     /// Noise over the brightness that it is held against.
@@ -199,7 +199,7 @@ impl Aim {
 #[cfg(test)]
 pub(in crate::pipeline) mod tests {
     use super::*;
-    use crate::film::{Part, Pixels, Rect, TileSamples};
+    use crate::film::{PixelSubset, Pixels, Rect, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit;
 
@@ -209,7 +209,7 @@ pub(in crate::pipeline) mod tests {
         let film = Film::new(COLUMNS, 2, None).expect("a film");
         let mut next = unit(3);
         for (half, (mean, spread)) in halves.into_iter().enumerate() {
-            let pixels = Pixels { rect: film.crop(), part: Part::Half(half) };
+            let pixels = Pixels { rect: film.crop(), part: PixelSubset::Half(half) };
             let sample = |_| Vec3::splat(mean + spread * (next() - 0.5));
             let radiance = (0..COLUMNS * samples).map(sample).collect();
             film.add(0, &TileSamples { pixels, samples, radiance, negative: None });
@@ -287,7 +287,7 @@ pub(in crate::pipeline) mod tests {
             for half in 0..2 {
                 let goal = goals.of(0, if by_own { 1 - half } else { half }).min(target);
                 let samples = goal.saturating_sub(done[0][half]);
-                let pixels = Pixels { rect: film.crop(), part: Part::Half(half) };
+                let pixels = Pixels { rect: film.crop(), part: PixelSubset::Half(half) };
                 let sample = |_| if next() < 0.01 { Vec3::splat(100.0) } else { Vec3::ZERO };
                 let radiance = (0..8 * samples).map(sample).collect();
                 film.add(0, &TileSamples { pixels, samples, radiance, negative: None });

@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 
 use super::film_state::FilmState;
 use crate::control::CancelToken;
-use crate::film::stretch::Stretch;
+use crate::film::range_map::RangeMap;
 use crate::film::tone::{ToneMapping, develop};
 use crate::film::{Previewer, Quantity, RadianceImage, Rect};
 use crate::pipeline::keys;
@@ -86,11 +86,11 @@ impl Screen<'_> {
     /// Shows a picture that lacks the light of photons, which are yet to come. It is of colours: no view of numbers gathers
     /// them.
     pub(in crate::pipeline) fn show_without_photons(&self, image: &RadianceImage) {
-        self.sink.preview_without_photons(develop(image, &self.plan.tone.of_picture(image)));
+        self.sink.preview_without_photons(develop(image, &self.plan.tone.resolved_for(image)));
     }
 
     fn send(&self, canvas: &FilmState, image: &RadianceImage, tone: &ToneMapping, section: Option<Section>) {
-        let range = tone.stretch.range().map(|range| range.ends());
+        let range = tone.range_map.range().map(|range| range.limits());
         let source = PreviewSource {
             image: keys::image(canvas.key, self.plan, canvas.number),
             is_finished: canvas.is_finished(self.plan),
@@ -106,10 +106,10 @@ impl Screen<'_> {
         const QUICK: usize = 1 << 18;
         let tone = self.plan.tone;
         let is_known = canvas.is_covered() && (has_time || canvas.film.crop().area() <= QUICK);
-        if tone.stretch == Stretch::None || !is_known {
-            return tone.of_picture(image);
+        if tone.range_map == RangeMap::None || !is_known {
+            return tone.resolved_for(image);
         }
-        tone.of_picture(&canvas.film.image(self.plan.settings.view.quantity()))
+        tone.resolved_for(&canvas.film.image(self.plan.settings.view.quantity()))
     }
 
     /// The pixels that are shown one by one.

@@ -13,7 +13,7 @@ use super::noise_goals::LEAST;
 use super::preview::Screen;
 use super::share::Share;
 use super::time_budget::next_round;
-use crate::film::{PILOT_SAMPLES, Pilot, Rect, TILE_SIZE, TileSamples};
+use crate::film::{PREPASS_SAMPLES, Prepass, Rect, TILE_SIZE, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters};
 use crate::math::Vec3;
 use crate::pipeline::pace::Clock;
@@ -168,16 +168,16 @@ impl<'a> Scheduler<'a> {
         if self.state.goals.brightness.is_some() {
             return Ok(());
         }
-        let pilot = Pilot::new(self.state.film.crop());
+        let pilot = Prepass::new(self.state.film.crop());
         let job = |number: u64| {
-            let (x, y) = pilot.place(number);
+            let (x, y) = pilot.position(number);
             let pixels = Rect { x, y, width: 1, height: 1 }.into();
             // The job's number stands for its tile.
-            Job { tile: number as usize, pixels, samples: 0..PILOT_SAMPLES }
+            Job { tile: number as usize, pixels, samples: 0..PREPASS_SAMPLES }
         };
         let jobs: Vec<Job> = (0..pilot.count()).map(job).collect();
         let mut luminances = vec![None; jobs.len()];
-        let keep = |_: &Job, samples: TileSamples| Pilot::luminance(samples);
+        let keep = |_: &Job, samples: TileSamples| Prepass::luminance(samples);
         self.rendering.tracer.run(&jobs, keep, |result| {
             if let Some((job, luminance, cost)) = result {
                 luminances[job.tile] = luminance;

@@ -6,8 +6,8 @@
 
 use std::ops::Range;
 
-use crate::film::{BLOCK, Blocks};
-use crate::math::random::scrambled;
+use crate::film::{BLOCK_SIZE, SumOrder};
+use crate::math::random::hash;
 
 /// A share of a picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ impl Share {
         if !has_photons {
             return Self { index, count, samples, blocks: None, of_tiles: (number, count) };
         }
-        let order = dealt(samples.div_ceil(BLOCK));
+        let order = dealt(samples.div_ceil(BLOCK_SIZE));
         let block_count = order.len() as u32;
         let (mut blocks, of_tiles) = if count <= block_count {
             let own = order.iter().skip(number as usize).step_by(count as usize);
@@ -55,18 +55,18 @@ impl Share {
     /// Numbers of the first of these samples of a pixel of its own, up to the end of their block.
     pub(in crate::pipeline) fn numbers(&self, own: Range<u32>) -> Range<u32> {
         let Some(blocks) = &self.blocks else { return own };
-        let Some(block) = blocks.get((own.start / BLOCK) as usize) else { return own };
-        let start = block * BLOCK + own.start % BLOCK;
-        start..(start + (own.end - own.start)).min(block * BLOCK + self.length(*block))
+        let Some(block) = blocks.get((own.start / BLOCK_SIZE) as usize) else { return own };
+        let start = block * BLOCK_SIZE + own.start % BLOCK_SIZE;
+        start..(start + (own.end - own.start)).min(block * BLOCK_SIZE + self.length(*block))
     }
 
     /// Order in which its samples are added up.
-    pub(in crate::pipeline) fn sums(&self) -> Blocks {
+    pub(in crate::pipeline) fn sums(&self) -> SumOrder {
         match &self.blocks {
-            None => Blocks::Whole,
-            Some(blocks) => {
-                Blocks::Apart(blocks.iter().filter(|block| self.length(**block) == BLOCK).count())
-            }
+            None => SumOrder::Sequential,
+            Some(blocks) => SumOrder::SeparateBlocks(
+                blocks.iter().filter(|block| self.length(**block) == BLOCK_SIZE).count(),
+            ),
         }
     }
 
@@ -77,7 +77,7 @@ impl Share {
 
     /// Number of blocks in the picture; 0 if tiles have all their samples.
     pub(in crate::pipeline) fn block_count(&self) -> u32 {
-        if self.blocks.is_some() { self.samples.div_ceil(BLOCK) } else { 0 }
+        if self.blocks.is_some() { self.samples.div_ceil(BLOCK_SIZE) } else { 0 }
     }
 
     /// Whether each of so many tiles is its own.
@@ -92,14 +92,14 @@ impl Share {
 
     /// Samples of a block.
     fn length(&self, block: u32) -> u32 {
-        (self.samples - block * BLOCK).min(BLOCK)
+        (self.samples - block * BLOCK_SIZE).min(BLOCK_SIZE)
     }
 }
 
 /// Numbers below `count` in the order in which they are dealt.
 fn dealt(count: u32) -> Vec<u32> {
     let mut order: Vec<u32> = (0..count).collect();
-    order.sort_by_key(|number| (scrambled(u64::from(*number)), *number));
+    order.sort_by_key(|number| (hash(u64::from(*number)), *number));
     order
 }
 
@@ -143,8 +143,8 @@ mod tests {
         let share = Share::new((1, 2), true, 4096);
         let first = share.blocks().iter().filter(|block| **block < 128).count();
         assert!((44..=84).contains(&first), "{first} of 128 in the first half");
-        assert_eq!(share.sums(), Blocks::Apart(128));
-        assert_eq!(Share::new((1, 1), true, 40).sums(), Blocks::Apart(2));
+        assert_eq!(share.sums(), SumOrder::SeparateBlocks(128));
+        assert_eq!(Share::new((1, 1), true, 40).sums(), SumOrder::SeparateBlocks(2));
         assert_eq!(Share::new((1, 1), true, 40).block_count(), 3);
     }
 }

@@ -104,7 +104,7 @@ fn halves(film: &Film, done: &[[u32; 2]], rays: &[u64], (known, most): (u32, u32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::film::{CELLS, Part, Pixels, TileSamples};
+    use crate::film::{CELLS, PixelSubset, Pixels, TileSamples};
     use crate::math::Vec3;
     use crate::math::random::unit;
 
@@ -114,7 +114,7 @@ mod tests {
     /// Add samples to a half of a cell.
     fn add(film: &Film, (cell, half): (usize, usize), samples: u32, mut sample: impl FnMut() -> f32) {
         let rect = film.cell_rect(cell).expect("a cell");
-        let pixels = Pixels { rect, part: Part::Half(half) };
+        let pixels = Pixels { rect, part: PixelSubset::Half(half) };
         let radiance = (0..pixels.count() as u32 * samples).map(|_| Vec3::splat(sample())).collect();
         film.add(cell / CELLS, &TileSamples { pixels, samples, radiance, negative: None });
     }

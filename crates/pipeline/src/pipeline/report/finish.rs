@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Counters, ImageReport, LightsReport, LightsSampled, PhotonsReport, Report, SampleCounts};
 use crate::control::CancelToken;
-use crate::film::stretch::Stretch;
+use crate::film::range_map::RangeMap;
 use crate::integrators::{RayCounters, receivers};
 use crate::output::write::atomic_until;
 use crate::output::{OutputError, json};
@@ -103,11 +103,11 @@ fn lights(finished: &Finished<'_>) -> LightsReport {
 
 fn range(finished: &Finished<'_>) -> Option<[f32; 2]> {
     let Finished { plan, canvas, .. } = finished;
-    if plan.tone.stretch == Stretch::None {
+    if plan.tone.range_map == RangeMap::None {
         return None;
     }
     let image = canvas.film.image(plan.settings.view.quantity());
-    plan.tone.of_picture(&image).stretch.range().map(|range| range.ends())
+    plan.tone.resolved_for(&image).range_map.range().map(|range| range.limits())
 }
 
 fn counters(finished: &Finished<'_>) -> Counters {

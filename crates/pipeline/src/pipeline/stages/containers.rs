@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::assets::gltf::{Container, ImageBytes, is_gltf};
 use crate::assets::mesh::load;
 use crate::assets::{AssetError, FileHash, LoadedMesh};
-use crate::control::{CancelToken, Progress, unwatched};
+use crate::control::{CancelToken, Progress, ignore_progress};
 
 /// The slot of a file, which is filled by whoever needs it first.
 type Slot = Arc<Mutex<Option<Arc<Container>>>>;
@@ -57,7 +57,7 @@ impl Containers {
         }
         let container = self.open(path, progress, token)?;
         match part {
-            Some(part) => container.part(part as usize, &unwatched, token),
+            Some(part) => container.part(part as usize, &ignore_progress, token),
             None => container.whole(token),
         }
     }
@@ -73,7 +73,7 @@ impl Containers {
         (path, number): (&Path, u32),
         token: &CancelToken,
     ) -> Result<(ImageInput, FileHash), AssetError> {
-        let container = self.open(path, &unwatched, token)?;
+        let container = self.open(path, &ignore_progress, token)?;
         let input = match container.image(number as usize)? {
             ImageBytes::Inside(bytes) => ImageInput::Bytes(bytes.into()),
             ImageBytes::File(path) => ImageInput::File(path),

@@ -105,7 +105,7 @@ pub(in crate::pipeline) fn meshes(
         };
         meshes.push(mesh);
     }
-    warn(loaded, warnings.in_words(), findings);
+    warn(loaded, warnings.describe_error(), findings);
     for object in loaded.scene.objects.iter().filter(|object| object.material.is_none()) {
         if let Some(mesh) = object.shape.mesh()
             && meshes[mesh.file].mesh.lacks_materials()
@@ -298,7 +298,7 @@ impl<'a> Warnings<'a> {
         }
     }
 
-    fn in_words(self) -> Vec<(&'a MeshFile, String)> {
+    fn describe_error(self) -> Vec<(&'a MeshFile, String)> {
         let words = |(file, warning): (&'a MeshFile, Warning)| {
             let words = match warning {
                 Warning::Words(words) => words,
@@ -556,7 +556,7 @@ mod tests {
         let mut warnings = Warnings::default();
         files.iter().for_each(|file| warnings.add(file, &mesh(149, "odd"), true));
         warnings.add(&other, &mesh(1, "odd"), true);
-        let said: Vec<String> = warnings.in_words().into_iter().map(|(_, said)| said).collect();
+        let said: Vec<String> = warnings.describe_error().into_iter().map(|(_, said)| said).collect();
         let expected = [
             "a.glb: left out 447 faces without area in 3 parts",
             "a.glb: odd",

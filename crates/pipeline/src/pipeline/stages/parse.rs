@@ -14,7 +14,7 @@ use crate::assets::gltf::{files_named, is_gltf};
 use crate::assets::mesh::load as load_mesh;
 use crate::assets::orbiter::load as load_orbiter;
 use crate::assets::{AssetError, OrbiterCamera};
-use crate::control::{CancelToken, Cancelled, unwatched};
+use crate::control::{CancelToken, Cancelled, ignore_progress};
 use crate::scene;
 use crate::scene::description::Camera;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -202,7 +202,7 @@ fn named(loaded: &scene::Loaded) -> Vec<PathBuf> {
     let is_read = |path: &&PathBuf| loaded.scene.mesh_files.iter().any(|file| file.value == **path);
     // What cannot be read names nothing that could be known.
     for path in loaded.named.iter().filter(|path| has_material_files(path) && !is_read(path)) {
-        if let Ok(mesh) = load_mesh(path, &unwatched, &CancelToken::new()) {
+        if let Ok(mesh) = load_mesh(path, &ignore_progress, &CancelToken::new()) {
             named.extend(mesh.companions.into_iter().map(|one| one.path).chain(mesh.pictures));
         }
     }

@@ -215,7 +215,7 @@ pub(in crate::pipeline) fn write_moving(
     let finish = finish(plan);
     let image = finish.image(&canvas.film);
     frames.0.truncate(turn.number as usize);
-    frames.0.push((develop(&image, &finish.tone.of_picture(&image)), canvas.film.samples()));
+    frames.0.push((develop(&image, &finish.tone.resolved_for(&image)), canvas.film.samples()));
     if !turn.is_last() {
         return Ok(Staged::skipped(false, format!("it is kept as frame {} of {}", turn.number + 1, turn.of)));
     }

@@ -11,7 +11,7 @@ use std::time::{Duration, SystemTime};
 use crate::assets::{Companion, FileHash};
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::fingerprint::Fingerprint;
-use crate::system::file::{self, Kind};
+use crate::system::file::{self, FileKind};
 
 /// A file that a request read or tried to read.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -186,10 +186,10 @@ impl Contents {
         token.check()?;
         let now = SystemTime::now();
         let metadata = match file::kind(path) {
-            Ok((Kind::Regular, metadata)) => metadata,
-            Ok((Kind::Folder, _)) => return Ok(Content::Unusable(Obstacle::Folder)),
-            Ok((Kind::Special, _)) => return Ok(Content::Unusable(Obstacle::Special)),
-            Ok((Kind::Kernel, _)) => return Ok(Content::Unusable(Obstacle::Kernel)),
+            Ok((FileKind::Regular, metadata)) => metadata,
+            Ok((FileKind::Folder, _)) => return Ok(Content::Unusable(Obstacle::Folder)),
+            Ok((FileKind::Special, _)) => return Ok(Content::Unusable(Obstacle::Special)),
+            Ok((FileKind::Kernel, _)) => return Ok(Content::Unusable(Obstacle::Kernel)),
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Content::Missing),
             Err(error) => return Ok(unreadable(&error)),
         };
@@ -236,9 +236,9 @@ fn hash(path: &Path, token: &CancelToken) -> Result<Content, Cancelled> {
     let mut file = match file::open(path) {
         Ok(Ok((file, _))) => file,
         // It has been replaced since the last look.
-        Ok(Err(Kind::Folder)) => return Ok(Content::Unusable(Obstacle::Folder)),
-        Ok(Err(Kind::Special)) => return Ok(Content::Unusable(Obstacle::Special)),
-        Ok(Err(Kind::Regular | Kind::Kernel)) => return Ok(Content::Unusable(Obstacle::Kernel)),
+        Ok(Err(FileKind::Folder)) => return Ok(Content::Unusable(Obstacle::Folder)),
+        Ok(Err(FileKind::Special)) => return Ok(Content::Unusable(Obstacle::Special)),
+        Ok(Err(FileKind::Regular | FileKind::Kernel)) => return Ok(Content::Unusable(Obstacle::Kernel)),
         Err(error) => return Ok(unreadable(&error)),
     };
     let mut hasher = blake3::Hasher::new();

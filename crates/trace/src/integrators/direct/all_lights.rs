@@ -12,7 +12,7 @@ use crate::materials::bsdf::BsdfValues;
 use crate::math::Vec3;
 use crate::math::color::luminance;
 use crate::math::lanes::{PACKET_SIZE, Simd, TRUE, Vec3x16, lane, mask_from_bits, set_lane};
-use crate::sampling::Decision;
+use crate::sampling::Dimension;
 use crate::scene::description::Shadows;
 use crate::world::SimdKernel;
 
@@ -130,7 +130,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
             for repetition in 0..count {
                 let u = match &sampler {
                     Some(sampler) if !is_single => {
-                        sampler.pairs(&self.row.path, Decision::Light(number), repetition, count)
+                        sampler.pairs(&self.row.path, Dimension::Light(number), repetition, count)
                     }
                     Some(_) | None => [[0.0; PACKET_SIZE]; 2],
                 };

@@ -10,7 +10,7 @@ use crate::lights::{LightRow, LightTree, Lobe, Middle, Picks, Receiver, Receiver
 use crate::materials::bsdf::NarrowLobe;
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, lane, set_lane};
-use crate::sampling::{Decision, SamplerPacket};
+use crate::sampling::{Dimension, SamplerPacket};
 use crate::scene::description::Shadows;
 use crate::world::SimdKernel;
 
@@ -123,7 +123,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         // Sort the random numbers of each group of picks.
         let mut numbers = vec![[0.0; PACKET_SIZE]; (end - first) as usize];
         for k in first..end {
-            let u = sampler.pairs(&row.path, Decision::Pick, k, count);
+            let u = sampler.pairs(&row.path, Dimension::LightChoice, k, count);
             let place = (k - first) as usize / group * group;
             // One pick of each group is in each part of [0, 1), so that they are sorted. Both numbers of a pair are the
             // digits of one number: a light among many has a small probability.
@@ -234,7 +234,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
         let (row, render) = (self.row, &self.tile.settings.render);
         let (lights, used) = pick.lights();
         // Sample a point on each picked light.
-        let u = sampler.pairs(&row.path, Decision::Picked, number, count);
+        let u = sampler.pairs(&row.path, Dimension::ChosenLight, number, count);
         let at = (&row.from, &row.normal);
         let (mut samples, mut inverse, lookups) = self.tile.world.lights.sample_each(&lights, at, used, &u);
         sums.rays.lookups += lookups;

@@ -10,7 +10,7 @@ use crate::integrators::view::LightAov;
 use crate::materials::bsdf::LobeSet;
 use crate::math::Vec3;
 use crate::math::lanes::{PACKET_SIZE, Simd, lane, set_lane};
-use crate::sampling::Decision;
+use crate::sampling::Dimension;
 use crate::scene::description::Shadows;
 use crate::world::{Hit, SimdKernel};
 
@@ -42,10 +42,10 @@ impl SimdKernel for LobeRays<'_> {
         };
         for repetition in 0..count {
             // Sample a direction in each lobe.
-            let u = sampler.pairs(&row.path, Decision::Direction, repetition, count);
+            let u = sampler.pairs(&row.path, Dimension::Direction, repetition, count);
             let mut choices = [0.0; PACKET_SIZE];
             if row.bsdf.sends_rays() {
-                [choices, _] = sampler.pairs(&row.path, Decision::Lobe, repetition, count);
+                [choices, _] = sampler.pairs(&row.path, Dimension::Lobe, repetition, count);
             }
             let wi = row.bsdf.sample(LobeSet::Narrow, &row.normal, &choices, &u, simd);
             let Response { bsdf, cosines } = row.response(&wi, simd);

@@ -32,7 +32,7 @@ use crate::materials::bsdf::LobeSet;
 use crate::materials::{Bsdf, Coated, Pane, Rough, RoughBsdf};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, lane, set_lane};
-use crate::sampling::{CAMERA_PATH, Decision, SamplerPacket};
+use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket};
 use crate::world::{BodyInParts, Hit, SimdKernel, World};
 
 /// Squared difference below which directions are equal within rounding.
@@ -531,8 +531,8 @@ impl SimdKernel for EmissionNumbers<'_> {
         let (xs, ys, samples) = self.tile.block.samples_of(&slots);
         let sampler = SamplerRow::new(self.tile.settings.render.seed, &xs, &ys, &samples);
         let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET_SIZE], decision, 0, 1);
-        let (light, aim) = (pairs(Decision::Lamp), pairs(Decision::Aim));
-        let (position, direction) = (pairs(Decision::Start), pairs(Decision::Sent));
+        let (light, aim) = (pairs(Dimension::PhotonLight), pairs(Dimension::PhotonTarget));
+        let (position, direction) = (pairs(Dimension::PhotonPosition), pairs(Dimension::PhotonDirection));
         std::array::from_fn(|i| Numbers {
             light: light.map(|row| row[i]),
             aim: aim.map(|row| row[i]),

@@ -13,7 +13,7 @@ use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::{LightAov, PathClasses};
 use crate::math::Vec3;
 use crate::math::lanes::{Simd, Vec3x16, set_lane};
-use crate::sampling::Decision;
+use crate::sampling::Dimension;
 use crate::world::SimdKernel;
 
 /// Probability of a lookup at a vertex that the camera does not see: a path has many such vertices, and photons there
@@ -45,7 +45,7 @@ impl SimdKernel for GatherPhotons<'_> {
     fn run(self, simd: impl Simd) -> Vec3x16 {
         let Self { tile, row, maps, depth, aov } = self;
         let mut sums = [[0.0; PACKET_SIZE]; 3];
-        let [looks, choices] = row.sampler(tile).pairs(&row.path, Decision::Gather, 0, 1);
+        let [looks, choices] = row.sampler(tile).pairs(&row.path, Dimension::Gather, 0, 1);
         let Some(most_depth) = tile.settings.render.max_depth.checked_sub(depth + 1) else { return sums };
         let PathClasses { caustic, indirect, .. } = aov.path_classes();
         let narrow = row.bsdf.narrow_lobes();

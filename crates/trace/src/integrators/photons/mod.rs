@@ -46,7 +46,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-use crate::control::{CancelToken, Cancelled, Progress, unwatched};
+use crate::control::{CancelToken, Cancelled, Progress, ignore_progress};
 use crate::film::Rect;
 use crate::geometry::{Aabb, ShapeHit};
 use crate::integrators::behavior::PathBehavior;
@@ -192,7 +192,7 @@ impl Photons {
         number: u32,
         token: &CancelToken,
     ) -> Result<PhotonPass, Cancelled> {
-        let sent = self.trace_photons((world, settings), number, &unwatched, token)?;
+        let sent = self.trace_photons((world, settings), number, &ignore_progress, token)?;
         self.build_maps(&sent, number, token)
     }
 

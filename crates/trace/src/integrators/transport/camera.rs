@@ -11,7 +11,7 @@ use crate::geometry::packet::{F32x16, RayPacket};
 use crate::math::lanes::{Simd, set_lane};
 use crate::math::{DVec2, Vec2, Vec3};
 use crate::sampling::filter::FilterSample;
-use crate::sampling::{CAMERA_PATH, Decision, SamplerPacket, warp};
+use crate::sampling::{CAMERA_PATH, Dimension, SamplerPacket, warp};
 use crate::world::{PACKET_SIZE, SimdKernel};
 
 /// Number of camera-ray packets generated in one loop, which hides the latency of each packet's random numbers.

@@ -11,7 +11,7 @@ use crate::geometry::packet::lanes;
 use crate::materials::bsdf::{LobeSet, SideSamples};
 use crate::math::Vec3;
 use crate::math::lanes::{F32x16, PACKET_SIZE, Simd, TRUE, Vec3x16, lane, set_lane};
-use crate::sampling::Decision;
+use crate::sampling::Dimension;
 use crate::world::SimdKernel;
 
 /// How the paths of a bounce continue.
@@ -52,7 +52,7 @@ impl Continuation {
     pub fn russian_roulette(self, tile: &TileContext<'_>, mut path: PathRay) -> Option<PathRay> {
         let chance = self.survival_probability(path.state.roulette_throughput);
         if chance < 1.0 {
-            if !(tile.sampler(path.slot).pair(path.path, Decision::Spared).x < chance) {
+            if !(tile.sampler(path.slot).pair(path.path, Dimension::SpecularRoulette).x < chance) {
                 return None;
             }
             path.throughput /= chance;
@@ -141,8 +141,11 @@ impl SimdKernel for SampleBsdf<'_> {
         // Sample a direction at each vertex.
         let u = sampler.pairs(&row.path, Decision::Direction, 0, 1);
         let are_narrow = row.bsdf.has_narrow_lobes();
-        let [lobe, _] =
-            if are_narrow { sampler.pairs(&row.path, Decision::Lobe, 0, 1) } else { [[0.0; PACKET_SIZE]; 2] };
+        let [lobe, _] = if are_narrow {
+            sampler.pairs(&row.path, Dimension::Lobe, 0, 1)
+        } else {
+            [[0.0; PACKET_SIZE]; 2]
+        };
         let sides = if row.has_two_sides { row.bsdf.sample_sides(&lobe, &u, simd) } else { None };
         let mut scattered = match sides {
             Some(sides) => self.sample_both_sides(&sides, simd),

@@ -4,7 +4,7 @@ use std::array;
 use std::ops::Range;
 
 use crate::control::CancelToken;
-use crate::film::{Part, Pixels};
+use crate::film::{PixelSubset, Pixels};
 use crate::integrators::RenderSettings;
 use crate::integrators::behavior::PathBehavior;
 use crate::lights::Receivers;
@@ -86,7 +86,7 @@ impl SampleBlock {
     pub fn sample_of(&self, slot: u32) -> (u32, u32, u32) {
         let samples = self.samples.len() as u32;
         let (pixel, sample) = (slot / samples, slot % samples);
-        let (x, y) = self.pixels.place(pixel);
+        let (x, y) = self.pixels.position(pixel);
         (x, y, self.samples.start + sample)
     }
 

@@ -14,7 +14,7 @@ use crate::geometry::{Ray, ShapeHit, SurfacePoint};
 use crate::integrators::RayCounters;
 use crate::materials::{Bsdf, GlassPoint, Pane};
 use crate::math::Vec3;
-use crate::sampling::Decision;
+use crate::sampling::Dimension;
 use crate::world::{Hit, MOST_STRAIGHT, Sides};
 
 /// Maximum number of surfaces without a change of medium that a ray passes in one walk.
@@ -338,6 +338,6 @@ impl TileContext<'_> {
     /// Randomly decides between reflection, with this probability, and refraction.
     #[inline]
     pub fn chooses_reflection(&self, path: &PathRay, reflectance: f32) -> bool {
-        self.sampler(path.slot).pair(path.path, Decision::Choice).x < reflectance
+        self.sampler(path.slot).pair(path.path, Dimension::Fresnel).x < reflectance
     }
 }

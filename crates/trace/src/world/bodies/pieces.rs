@@ -159,7 +159,7 @@ impl Pieces {
     ) {
         let mesh = &loaded.mesh;
         let place = placed.placed.transform().between(mesh.origin, self.origin);
-        let mirrors = place.mirrors();
+        let mirrors = place.flips_handedness();
         let is_glass = |triangle: usize| match glass {
             MeshGlass::All => true,
             MeshGlass::Some => mesh

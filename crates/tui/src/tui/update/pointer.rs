@@ -2,7 +2,7 @@
 
 use super::say::{notify, prompt, say};
 use super::{camera, history, overlay, rectangle};
-use crate::math::decimal::{rounded, step_at};
+use crate::math::decimal::{decimal_step, rounded};
 use crate::pipeline::protocol::{Command, Picked, Thing};
 use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
@@ -163,7 +163,7 @@ pub(super) fn picked(state: &mut State, picked: &Picked) -> Vec<Effect> {
 }
 
 fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
-    let distance = rounded(depth, step_at(depth));
+    let distance = rounded(depth, decimal_step(depth));
     if !(distance > 0.0) {
         return notify(state, "there is nothing to focus on");
     }

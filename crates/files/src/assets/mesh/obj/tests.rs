@@ -1,7 +1,7 @@
 use super::*;
 use crate::assets::Dropped;
 use crate::assets::mesh::load;
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 use crate::math::{Vec2, Vec3};
 use std::fs;
 
@@ -10,7 +10,7 @@ fn read_with(files: &[(&str, &[u8])]) -> Result<LoadedMesh, AssetError> {
     for (name, bytes) in files {
         fs::write(folder.path().join(name), bytes).expect("written");
     }
-    load(&folder.path().join(files[0].0), &unwatched, &CancelToken::new())
+    load(&folder.path().join(files[0].0), &ignore_progress, &CancelToken::new())
 }
 
 fn read(text: &str) -> Result<LoadedMesh, AssetError> {

@@ -2,12 +2,12 @@ use std::path::Path;
 
 use super::*;
 use crate::assets::read::Watch;
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 use crate::math::{Vec2, Vec3};
 
 fn read_bytes(bytes: &[u8]) -> Result<LoadedMesh, AssetError> {
     let token = CancelToken::new();
-    let watch = Watch { progress: &unwatched, token: &token };
+    let watch = Watch { progress: &ignore_progress, token: &token };
     parse(&Source { path: Path::new("a.ply"), bytes, watch })
 }
 

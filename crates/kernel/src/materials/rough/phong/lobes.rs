@@ -5,7 +5,7 @@
 use std::f32::consts::{FRAC_1_PI, PI};
 
 use crate::math::Vec3;
-use crate::math::elementary::{power_f64, sin_cos};
+use crate::math::elementary::{pow_f64, sin_cos};
 use crate::math::frame::Frame;
 
 /// The lobes of a Phong surface at one point, for one direction to the viewer.
@@ -30,7 +30,7 @@ impl Lobes {
         let is_diffuse = lobe < self.diffuse_share();
         let rest = 1.0 - u[0];
         // The cosine for cos^α is (1 − u)^1/(α + 1). In f64 its sine keeps the digits of narrow lobes.
-        let cosine = power_f64(f64::from(rest), 1.0 / (f64::from(self.shininess) + 1.0));
+        let cosine = pow_f64(f64::from(rest), 1.0 / (f64::from(self.shininess) + 1.0));
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt() as f32;
         let cosine = if is_diffuse { rest.sqrt() } else { cosine as f32 };
         let sine = if is_diffuse { u[0].sqrt() } else { sine };
@@ -84,7 +84,7 @@ pub fn about(axis: Vec3, sine: f32, cosine: f32, turn: f32) -> Vec3 {
 pub fn gloss(mirrored_eye: Vec3, direction: Vec3, shininess: f32) -> f32 {
     let cosine = 1.0 - 0.5 * f64::from((mirrored_eye - direction).length_squared());
     let is_ahead = cosine > 0.0;
-    let left = power_f64(if is_ahead { cosine } else { 1.0 }, f64::from(shininess)) as f32;
+    let left = pow_f64(if is_ahead { cosine } else { 1.0 }, f64::from(shininess)) as f32;
     if is_ahead { left } else { 0.0 }
 }
 

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::pace::Work;
-use crate::film::{Film, PictureNoise};
+use crate::film::{Film, ImageNoise};
 use crate::pipeline::protocol::NoiseProgress;
 use crate::pipeline::render::noise_goals::LEAST;
 
@@ -22,7 +22,7 @@ pub(in crate::pipeline) struct NoiseForecast {
 /// A measurement of noise.
 #[derive(Clone, Copy, Debug)]
 struct Measured {
-    noise: PictureNoise,
+    noise: ImageNoise,
     /// The work that was done.
     done: f64,
     /// Seconds of the stage.
@@ -51,7 +51,7 @@ impl NoiseForecast {
         rate: Option<f64>,
         left: Option<f64>,
     ) -> Option<NoiseProgress> {
-        let Measured { noise: PictureNoise { relative_error, power }, done, seconds } = self.told?;
+        let Measured { noise: ImageNoise { relative_error, power }, done, seconds } = self.told?;
         // The part of the noise that so many times the samples leave.
         let fall = |times: f64| libm::pow(times, -0.5 * power);
         let by_now = if done > 0.0 { relative_error * fall(work.done / done) } else { relative_error };
@@ -94,7 +94,7 @@ mod tests {
 
     /// Noise of independent samples, 2.1 % after 100 units of work and 9 seconds.
     fn measured() -> NoiseForecast {
-        let noise = PictureNoise { relative_error: 0.021, power: 1.0 };
+        let noise = ImageNoise { relative_error: 0.021, power: 1.0 };
         NoiseForecast { due: Instant::now(), told: Some(Measured { noise, done: 100.0, seconds: 9.0 }) }
     }
 

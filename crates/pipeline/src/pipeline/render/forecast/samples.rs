@@ -1,6 +1,6 @@
 //! The samples that each part of the picture will need for the error asked for, before its goal is decided.
 
-use crate::film::{CELLS, Convergence, samples_by};
+use crate::film::{CELLS, Convergence, samples_to_reduce_error};
 use crate::pipeline::render::noise_goals::{AIM, Goals, Judgement, LEAST, MOST, TileNoise};
 
 /// Fall of the variance from two to four samples and from four to eight, if nothing is known. In the bundled scenes half of the
@@ -108,7 +108,11 @@ impl NoiseFall {
         let fall = self.fall.unwrap_or_else(of_tile);
         let noise = noise * libm::pow(fall, -0.5 * f64::from(self.doublings));
         let samples = self.samples.saturating_mul(1 << self.doublings);
-        if noise > 0.0 { samples_by(self.power, bound / noise, samples).min(MOST) } else { self.samples }
+        if noise > 0.0 {
+            samples_to_reduce_error(self.power, bound / noise, samples).min(MOST)
+        } else {
+            self.samples
+        }
     }
 }
 

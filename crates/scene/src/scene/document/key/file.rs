@@ -9,8 +9,8 @@ use super::super::super::read::{MOST_FILES, is_link, neighbour};
 use super::super::super::sanitize::{shortened, visible};
 use super::super::context::Issue;
 use super::Key;
-use crate::system::file::{self, Kind};
-use crate::system::in_words;
+use crate::system::describe_error;
+use crate::system::file::{self, FileKind};
 
 impl Key<'_> {
     /// An existing file with one of these endings (none given: any), resolved against the scene's folder.
@@ -80,7 +80,7 @@ fn ending(text: &str) -> String {
 fn regular_file(path: &Path) -> Result<(), (String, bool)> {
     let shown = shortened(&path.to_string_lossy(), 200);
     match file::kind(path) {
-        Ok((Kind::Regular, _)) => Ok(()),
+        Ok((FileKind::Regular, _)) => Ok(()),
         Ok((kind, _)) => Err((format!("{shown} is {}, not a file", kind.words()), false)),
         Err(error) if error.kind() == io::ErrorKind::NotFound && is_link(path) => {
             Err((format!("{shown} is a symbolic link to a file that does not exist"), false))
@@ -88,7 +88,7 @@ fn regular_file(path: &Path) -> Result<(), (String, bool)> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             Err((format!("there is no file {shown}"), true))
         }
-        Err(error) => Err((format!("cannot read {shown}: {}", in_words(&error)), false)),
+        Err(error) => Err((format!("cannot read {shown}: {}", describe_error(&error)), false)),
     }
 }
 

@@ -4,46 +4,46 @@
 use crate::math::DVec3;
 
 /// Samples per block.
-pub const BLOCK: u32 = 16;
+pub const BLOCK_SIZE: u32 = 16;
 
 /// Summation order of a pixel's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Blocks {
+pub enum SumOrder {
     /// Adds all samples in sequence.
     #[default]
-    Whole,
-    /// Sums blocks of [`BLOCK`] samples and adds the block sums in sequence.
-    Added,
-    /// Sums blocks of [`BLOCK`] samples and keeps the sums separate, for at most this number of finished
+    Sequential,
+    /// Sums blocks of [`BLOCK_SIZE`] samples and adds the block sums in sequence.
+    Blocked,
+    /// Sums blocks of [`BLOCK_SIZE`] samples and keeps the sums separate, for at most this number of finished
     /// blocks.
-    Apart(usize),
+    SeparateBlocks(usize),
 }
 
-impl Blocks {
+impl SumOrder {
     /// Number of finished block sums kept per pixel.
     pub fn kept(self) -> usize {
         match self {
-            Self::Whole => 0,
-            Self::Added => 1,
-            Self::Apart(count) => count,
+            Self::Sequential => 0,
+            Self::Blocked => 1,
+            Self::SeparateBlocks(count) => count,
         }
     }
 
     /// Samples until the current block ends, for a pixel with `count` samples.
     pub(super) fn samples_to_end(self, count: u32) -> usize {
         match self {
-            Self::Whole => usize::MAX,
-            Self::Added | Self::Apart(_) => (BLOCK - count % BLOCK) as usize,
+            Self::Sequential => usize::MAX,
+            Self::Blocked | Self::SeparateBlocks(_) => (BLOCK_SIZE - count % BLOCK_SIZE) as usize,
         }
     }
 
     /// Index of the block sum that a block ending at `count` samples is added to, or `None` inside a block.
     pub(super) fn finished(self, count: u32) -> Option<usize> {
-        let is_end = count > 0 && count.is_multiple_of(BLOCK);
+        let is_end = count > 0 && count.is_multiple_of(BLOCK_SIZE);
         match self {
-            Self::Added if is_end => Some(0),
-            Self::Apart(_) if is_end => Some((count / BLOCK - 1) as usize),
-            Self::Whole | Self::Added | Self::Apart(_) => None,
+            Self::Blocked if is_end => Some(0),
+            Self::SeparateBlocks(_) if is_end => Some((count / BLOCK_SIZE - 1) as usize),
+            Self::Sequential | Self::Blocked | Self::SeparateBlocks(_) => None,
         }
     }
 }

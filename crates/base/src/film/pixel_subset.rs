@@ -8,12 +8,12 @@ pub struct Pixels {
     /// The enclosing rectangle.
     pub rect: Rect,
     /// The selected half, or all pixels.
-    pub part: Part,
+    pub part: PixelSubset,
 }
 
 impl From<Rect> for Pixels {
     fn from(rect: Rect) -> Self {
-        Self { rect, part: Part::All }
+        Self { rect, part: PixelSubset::All }
     }
 }
 
@@ -25,7 +25,7 @@ impl Pixels {
 
     /// Column and row in the image of the selected pixel `number`.
     #[inline]
-    pub fn place(&self, number: u32) -> (u32, u32) {
+    pub fn position(&self, number: u32) -> (u32, u32) {
         let index = self.part.index(number, self.rect);
         (self.rect.x + index % self.rect.width, self.rect.y + index / self.rect.width)
     }
@@ -34,14 +34,14 @@ impl Pixels {
 /// All pixels of a rectangle, or half of them: one pixel of each horizontal pair, alternating between left
 /// and right. No horizontal, vertical or diagonal edge is therefore in one half only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
+pub enum PixelSubset {
     /// Every pixel.
     All,
     /// Half 0 or half 1.
     Half(usize),
 }
 
-impl Part {
+impl PixelSubset {
     /// Number of selected pixels in a rectangle of `area` pixels.
     pub fn count(self, area: usize) -> usize {
         match self {
@@ -86,11 +86,11 @@ mod tests {
             let rect = Rect { x: 3, y: 8, width, height };
             let mut seen = vec![0; rect.area()];
             for half in 0..2 {
-                let pixels = Pixels { rect, part: Part::Half(half) };
+                let pixels = Pixels { rect, part: PixelSubset::Half(half) };
                 for number in 0..pixels.count() as u32 {
-                    let (x, y) = pixels.place(number);
+                    let (x, y) = pixels.position(number);
                     let index = (y - 8) * width + x - 3;
-                    assert_eq!(Part::half_of(index, rect), half, "{x} {y} of {rect:?}");
+                    assert_eq!(PixelSubset::half_of(index, rect), half, "{x} {y} of {rect:?}");
                     seen[index as usize] += 1;
                 }
             }
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn lines_are_split_between_both_halves() {
         let rect = Rect { x: 0, y: 0, width: 8, height: 8 };
-        let half = |x: u32, y: u32| Part::half_of(y * 8 + x, rect);
+        let half = |x: u32, y: u32| PixelSubset::half_of(y * 8 + x, rect);
         for line in 0..8 {
             let places = |at| [(at, line), (line, at), (at, (at + line) % 8), (at, (line + 7 - at) % 8)];
             for kind in 0..4 {

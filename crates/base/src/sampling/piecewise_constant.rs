@@ -3,7 +3,7 @@
 /// Samples a row, then a column in it, in proportion to the weights. Every cell with a nonzero weight gets at
 /// least a small share of its row's mean, so that `f32` numbers can reach it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Grid {
+pub struct PiecewiseConstant2D {
     columns: usize,
     /// Cumulative probabilities of the rows before each row, followed by 1.
     rows: Vec<f32>,
@@ -16,7 +16,7 @@ pub struct Grid {
 
 /// A sampled point of a grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InGrid {
+pub struct GridSample {
     /// The cell's column.
     pub column: usize,
     /// The cell's row.
@@ -28,7 +28,7 @@ pub struct InGrid {
 /// Smallest share of a cell or row with a nonzero weight, relative to the mean share.
 const LEAST: f64 = 1.0 / 64.0;
 
-impl Grid {
+impl PiecewiseConstant2D {
     /// Creates a distribution from rows of weights ≥ 0, all of the same length. Returns `None` if their sum
     /// is 0 or not finite.
     pub fn new(columns: usize, rows: impl Iterator<Item = Vec<f64>>) -> Option<Self> {
@@ -48,11 +48,11 @@ impl Grid {
 
     /// Samples a point with two numbers in [0, 1): the first selects the column, the second the row.
     #[inline(always)]
-    pub fn sample(&self, u: [f32; 2]) -> InGrid {
+    pub fn sample(&self, u: [f32; 2]) -> GridSample {
         let (row, across) = find(&self.rows, &self.row_guide, u[1]);
         let guide = &self.column_guide[row * self.columns..(row + 1) * self.columns];
         let (column, along) = find(self.columns_of(row), guide, u[0]);
-        InGrid { column, row, rest: [along, across] }
+        GridSample { column, row, rest: [along, across] }
     }
 
     /// Probability of sampling `row`.
@@ -132,13 +132,13 @@ mod tests {
     #[test]
     fn cells_are_sampled_in_proportion_to_weights() {
         let weights = [[0.0, 1.0, 0.0, 3.0], [0.0; 4], [4.0, 0.0, 8.0, 0.0]];
-        let grid = Grid::new(4, weights.iter().map(|row| row.to_vec())).expect("some weight");
+        let grid = PiecewiseConstant2D::new(4, weights.iter().map(|row| row.to_vec())).expect("some weight");
         let mut counts = [[0; 4]; 3];
         let mut rests = [0.0; 2];
         let side = 256;
         for (i, j) in (0..side).flat_map(|j| (0..side).map(move |i| (i, j))) {
             let at = |k: i32| (k as f32 + 0.5) / side as f32;
-            let InGrid { column, row, rest } = grid.sample([at(i), at(j)]);
+            let GridSample { column, row, rest } = grid.sample([at(i), at(j)]);
             counts[row][column] += 1;
             rests = [rests[0] + rest[0], rests[1] + rest[1]];
         }
@@ -160,7 +160,7 @@ mod tests {
     fn dark_cells_next_to_bright_ones_are_reachable() {
         let mut row = vec![1e-3; 4096];
         row[77] = 1e12;
-        let grid = Grid::new(4096, [row].into_iter()).expect("some weight");
+        let grid = PiecewiseConstant2D::new(4096, [row].into_iter()).expect("some weight");
         for column in [0, 76, 78, 4095] {
             let probability = grid.column_probability(0, column);
             assert!(probability > 1e-6, "{column}: {probability}");
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn empty_grids_have_no_distribution() {
-        assert_eq!(Grid::new(2, [vec![0.0, 0.0]].into_iter()), None);
-        assert_eq!(Grid::new(2, std::iter::empty()), None);
+        assert_eq!(PiecewiseConstant2D::new(2, [vec![0.0, 0.0]].into_iter()), None);
+        assert_eq!(PiecewiseConstant2D::new(2, std::iter::empty()), None);
     }
 }

@@ -4,12 +4,12 @@ use nix::time::{ClockId, clock_gettime};
 
 /// CPU seconds used by this thread, or 0 if the system does not measure them. Waiting time and other threads
 /// do not count.
-pub fn seconds_of_thread() -> f64 {
+pub fn thread_cpu_seconds() -> f64 {
     seconds_by(ClockId::CLOCK_THREAD_CPUTIME_ID)
 }
 
 /// CPU seconds used by all threads of this process, or 0 if the system does not measure them.
-pub fn seconds_of_process() -> f64 {
+pub fn process_cpu_seconds() -> f64 {
     seconds_by(ClockId::CLOCK_PROCESS_CPUTIME_ID)
 }
 
@@ -26,13 +26,13 @@ mod tests {
 
     #[test]
     fn sleeping_uses_no_cpu_time() {
-        let (begin, before) = (Instant::now(), seconds_of_thread());
+        let (begin, before) = (Instant::now(), thread_cpu_seconds());
         std::thread::sleep(Duration::from_millis(30));
-        let slept = seconds_of_thread() - before;
+        let slept = thread_cpu_seconds() - before;
         // Bound the loop, as the system may lack this clock.
-        let worked = (0..10_000_000).any(|_| seconds_of_thread() - before > slept + 0.01);
+        let worked = (0..10_000_000).any(|_| thread_cpu_seconds() - before > slept + 0.01);
         assert!(worked || before == 0.0, "{slept}");
         assert!(begin.elapsed().as_secs_f64() >= slept + 0.03, "{slept}");
-        assert!(seconds_of_process() >= seconds_of_thread() - 0.01, "other threads count there");
+        assert!(process_cpu_seconds() >= thread_cpu_seconds() - 0.01, "other threads count there");
     }
 }

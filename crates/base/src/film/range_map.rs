@@ -5,19 +5,19 @@ use crate::math::Vec3;
 
 /// Mapping of data values to brightness.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Stretch {
+pub enum RangeMap {
     /// Leaves the values unchanged.
     #[default]
     None,
-    /// A mapping whose range is still unknown; gives black until [`Stretch::of_picture`] sets it.
-    Unknown(Kind),
+    /// A mapping whose range is still unknown; gives black until [`RangeMap::resolved_for`] sets it.
+    Unresolved(DataKind),
     /// A mapping to the given range.
-    To(Kind, Range),
+    Resolved(DataKind, DataRange),
 }
 
 /// Meaning of the data values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum DataKind {
     /// Distances: the nearest is white, the farthest dark, and 0 (nothing hit) black.
     Distances,
     /// Amounts: 0 is black and the largest white.
@@ -26,12 +26,12 @@ pub enum Kind {
 
 /// Range of the values in view.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
+pub struct DataRange {
     /// Minimum, which is 0 for amounts.
     pub least: f32,
     /// Maximum.
     pub greatest: f32,
-    /// Bias b of the curve between them; see [`Range::part`].
+    /// Bias b of the curve between them; see [`DataRange::part`].
     bias: f32,
 }
 
@@ -44,20 +44,20 @@ const QUARTER: f32 = 0.25;
 /// Minimum bias, which limits the steepness of the curve.
 const LEAST_BIAS: f32 = 1e-3;
 
-impl Stretch {
+impl RangeMap {
     /// Sets the range from the values in an image.
-    pub fn of_picture(self, image: &RadianceImage) -> Self {
+    pub fn resolved_for(self, image: &RadianceImage) -> Self {
         match self {
-            Self::None | Self::To(..) => self,
-            Self::Unknown(kind) => Self::To(kind, Range::of(kind, image)),
+            Self::None | Self::Resolved(..) => self,
+            Self::Unresolved(kind) => Self::Resolved(kind, DataRange::of(kind, image)),
         }
     }
 
     /// Range of the mapping, or `None` if it is unknown or values are left unchanged.
-    pub fn range(&self) -> Option<Range> {
+    pub fn range(&self) -> Option<DataRange> {
         match self {
-            Self::None | Self::Unknown(_) => None,
-            Self::To(_, range) => Some(*range).filter(|range| range.least <= range.greatest),
+            Self::None | Self::Unresolved(_) => None,
+            Self::Resolved(_, range) => Some(*range).filter(|range| range.least <= range.greatest),
         }
     }
 
@@ -66,23 +66,23 @@ impl Stretch {
         let each = |of: &dyn Fn(f32) -> f32| Vec3::from_array(numbers.to_array().map(of));
         match self {
             Self::None => numbers,
-            Self::Unknown(_) => Vec3::ZERO,
-            Self::To(Kind::Distances, range) => each(&|x| range.nearness(x)),
-            Self::To(Kind::Amounts, range) => each(&|x| range.part(x)),
+            Self::Unresolved(_) => Vec3::ZERO,
+            Self::Resolved(DataKind::Distances, range) => each(&|x| range.nearness(x)),
+            Self::Resolved(DataKind::Amounts, range) => each(&|x| range.part(x)),
         }
     }
 }
 
-impl Range {
-    fn of(kind: Kind, image: &RadianceImage) -> Self {
+impl DataRange {
+    fn of(kind: DataKind, image: &RadianceImage) -> Self {
         let mut seen = match kind {
-            Kind::Distances => distances(image),
-            Kind::Amounts => image.pixels.iter().map(|pixel| pixel.x).filter(|x| *x > 0.0).collect(),
+            DataKind::Distances => distances(image),
+            DataKind::Amounts => image.pixels.iter().map(|pixel| pixel.x).filter(|x| *x > 0.0).collect(),
         };
         let greatest = seen.iter().copied().fold(0.0, f32::max);
         let least = match kind {
-            Kind::Distances => seen.iter().copied().fold(f32::INFINITY, f32::min),
-            Kind::Amounts => 0.0,
+            DataKind::Distances => seen.iter().copied().fold(f32::INFINITY, f32::min),
+            DataKind::Amounts => 0.0,
         };
         let linear = Self { least, greatest, bias: 1.0 };
         if seen.is_empty() {
@@ -96,7 +96,7 @@ impl Range {
     }
 
     /// Minimum and maximum.
-    pub fn ends(&self) -> [f32; 2] {
+    pub fn limits(&self) -> [f32; 2] {
         [self.least, self.greatest]
     }
 
@@ -142,9 +142,9 @@ mod tests {
         RadianceImage { width: numbers.len() as u32, height: 1, pixels }
     }
 
-    fn shown(kind: Kind, numbers: &[f32]) -> Vec<f32> {
-        let stretch = Stretch::Unknown(kind).of_picture(&picture(numbers));
-        numbers.iter().map(|x| stretch.apply(Vec3::splat(*x)).x).collect()
+    fn shown(kind: DataKind, numbers: &[f32]) -> Vec<f32> {
+        let map = RangeMap::Unresolved(kind).resolved_for(&picture(numbers));
+        numbers.iter().map(|x| map.apply(Vec3::splat(*x)).x).collect()
     }
 
     fn assert_near(values: &[f32], expected: &[f32]) {
@@ -154,27 +154,29 @@ mod tests {
 
     #[test]
     fn near_is_white_and_far_is_dark() {
-        assert_near(&shown(Kind::Distances, &[2.0, 4.0, 6.0]), &[1.0, 0.55, 0.1]);
-        assert_near(&shown(Kind::Distances, &[3.0; 4]), &[1.0; 4]);
-        assert_near(&shown(Kind::Distances, &[0.0; 4]), &[0.0; 4]);
-        let range = Stretch::Unknown(Kind::Distances).of_picture(&picture(&[2.0, 4.0, 6.0])).range();
+        assert_near(&shown(DataKind::Distances, &[2.0, 4.0, 6.0]), &[1.0, 0.55, 0.1]);
+        assert_near(&shown(DataKind::Distances, &[3.0; 4]), &[1.0; 4]);
+        assert_near(&shown(DataKind::Distances, &[0.0; 4]), &[0.0; 4]);
+        let range =
+            RangeMap::Unresolved(DataKind::Distances).resolved_for(&picture(&[2.0, 4.0, 6.0])).range();
         assert_eq!(range.map(|range| (range.least, range.greatest)), Some((2.0, 6.0)));
-        let nothing = Stretch::Unknown(Kind::Distances).of_picture(&picture(&[0.0; 4]));
+        let nothing = RangeMap::Unresolved(DataKind::Distances).resolved_for(&picture(&[0.0; 4]));
         assert_eq!(nothing.range(), None);
     }
 
     #[test]
     fn objects_thinner_than_pixels_have_a_range() {
-        let range =
-            Stretch::Unknown(Kind::Distances).of_picture(&picture(&[0.0, 2.0, 0.0, 6.0, 0.0])).range();
-        assert_eq!(range.map(|range| range.ends()), Some([2.0, 6.0]));
+        let range = RangeMap::Unresolved(DataKind::Distances)
+            .resolved_for(&picture(&[0.0, 2.0, 0.0, 6.0, 0.0]))
+            .range();
+        assert_eq!(range.map(|range| range.limits()), Some([2.0, 6.0]));
     }
 
     #[test]
     fn objects_before_a_horizon_keep_their_shades() {
         // A floor seen from a height of 1: row distances of 200/row, with the last ones far away.
         let numbers: Vec<f32> = (1..=200).map(|row| 200.0 / row as f32).collect();
-        let shown = shown(Kind::Distances, &numbers);
+        let shown = shown(DataKind::Distances, &numbers);
         assert!(shown[199] == 1.0 && (shown[0] - 0.1).abs() < 1e-6, "both ends are used");
         // Half of the rows are at 1 … 2: a linear mapping over 1 … 200 would make all of them white.
         assert!((shown[99] - (1.0 - 0.9 * 0.25)).abs() < 0.01, "{}", shown[99]);
@@ -183,11 +185,11 @@ mod tests {
 
     #[test]
     fn amounts_range_from_black_to_white() {
-        assert_near(&shown(Kind::Amounts, &[0.0, 1.0, 2.0, 4.0]), &[0.0, 0.25, 0.5, 1.0]);
-        assert_near(&shown(Kind::Amounts, &[16.0; 3]), &[1.0; 3]);
-        assert_near(&shown(Kind::Amounts, &[0.0; 3]), &[0.0; 3]);
+        assert_near(&shown(DataKind::Amounts, &[0.0, 1.0, 2.0, 4.0]), &[0.0, 0.25, 0.5, 1.0]);
+        assert_near(&shown(DataKind::Amounts, &[16.0; 3]), &[1.0; 3]);
+        assert_near(&shown(DataKind::Amounts, &[0.0; 3]), &[0.0; 3]);
         // One very large value does not turn the others black.
-        let shown = shown(Kind::Amounts, &[1.0, 1.0, 1.0, 1000.0]);
+        let shown = shown(DataKind::Amounts, &[1.0, 1.0, 1.0, 1000.0]);
         assert!((shown[0] - 0.25).abs() < 0.01 && shown[3] == 1.0, "{shown:?}");
     }
 }

@@ -1,23 +1,23 @@
 //! Brightness prepass: a fixed subset of pixels whose first samples estimate the image's brightness. Noise
 //! thresholds are relative to it, and all machines that render parts of an image compute the same value.
 
-use super::steps::luminance;
+use super::convergence::luminance;
 use super::{Film, Quantity, Rect, TileSamples};
-use crate::math::random::scrambled;
+use crate::math::random::hash;
 
 /// Number of prepass pixels, unless the image has fewer.
 const PIXELS: u64 = 4096;
 
 /// Samples per prepass pixel.
-pub const PILOT_SAMPLES: u32 = 16;
+pub const PREPASS_SAMPLES: u32 = 16;
 
 /// Brightness prepass of an image or crop.
 #[derive(Clone, Copy, Debug)]
-pub struct Pilot {
+pub struct Prepass {
     crop: Rect,
 }
 
-impl Pilot {
+impl Prepass {
     /// Creates the prepass for the pixels of `crop`.
     pub fn new(crop: Rect) -> Self {
         Self { crop }
@@ -30,18 +30,18 @@ impl Pilot {
 
     /// Column and row of a prepass pixel: pseudo-randomly chosen in one of `count` equal runs of the
     /// row-major pixels.
-    pub fn place(&self, number: u64) -> (u32, u32) {
+    pub fn position(&self, number: u64) -> (u32, u32) {
         let (area, count) = (self.crop.area() as u64, self.count().max(1));
         let (start, end) = (number * area / count, (number + 1) * area / count);
-        let index = start + scrambled(number) % (end - start).max(1);
+        let index = start + hash(number) % (end - start).max(1);
         let width = u64::from(self.crop.width.max(1));
         (self.crop.x + (index % width) as u32, self.crop.y + (index / width) as u32)
     }
 
     /// Mean luminance of the prepass pixels in a film, or `None` if one of them has no samples.
-    pub fn of_film(&self, film: &Film) -> Option<f64> {
+    pub fn film_mean(&self, film: &Film) -> Option<f64> {
         self.mean(|number| {
-            let (x, y) = self.place(number);
+            let (x, y) = self.position(number);
             film.pixel(Quantity::Radiance, x, y).map(|radiance| luminance(radiance.as_dvec3()))
         })
     }
@@ -73,8 +73,8 @@ mod tests {
     #[test]
     fn prepass_pixels_are_spread_over_the_image() {
         for crop in [(4096, 2048), (97, 501), (64, 64), (3, 5)] {
-            let pilot = Pilot::new(Rect { x: 7, y: 9, width: crop.0, height: crop.1 });
-            let places: HashSet<_> = (0..pilot.count()).map(|number| pilot.place(number)).collect();
+            let prepass = Prepass::new(Rect { x: 7, y: 9, width: crop.0, height: crop.1 });
+            let places: HashSet<_> = (0..prepass.count()).map(|number| prepass.position(number)).collect();
             assert_eq!(places.len() as u64, u64::from(crop.0 * crop.1).min(4096));
             let inside = |&(x, y): &(u32, u32)| (7..7 + crop.0).contains(&x) && (9..9 + crop.1).contains(&y);
             assert!(places.iter().all(inside));
@@ -97,14 +97,15 @@ mod tests {
         for tile in 0..film.tile_count() {
             film.add(tile, &samples(film.tile_rect(tile).expect("a tile")));
         }
-        let pilot = Pilot::new(crop);
-        let apart = pilot.mean(|number| {
-            let (x, y) = pilot.place(number);
-            Pilot::luminance(samples(Rect { x, y, width: 1, height: 1 }))
+        let prepass = Prepass::new(crop);
+        let apart = prepass.mean(|number| {
+            let (x, y) = prepass.position(number);
+            Prepass::luminance(samples(Rect { x, y, width: 1, height: 1 }))
         });
-        assert_eq!(pilot.of_film(&film), apart);
+        assert_eq!(prepass.film_mean(&film), apart);
         assert!(
-            apart.is_some() && Pilot::new(crop).of_film(&Film::new(40, 3, None).expect("a film")).is_none()
+            apart.is_some()
+                && Prepass::new(crop).film_mean(&Film::new(40, 3, None).expect("a film")).is_none()
         );
     }
 }

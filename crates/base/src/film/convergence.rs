@@ -3,7 +3,7 @@
 
 use super::CELLS;
 use crate::math::DVec3;
-use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_LEAST};
+use crate::math::color::{LUMINANCE_WEIGHTS, RELMSE_EPSILON};
 
 /// Relative luminance in double precision, so that sums of squares and squared sums are consistent.
 pub(super) fn luminance(radiance: DVec3) -> f64 {
@@ -43,9 +43,9 @@ struct LevelSums {
     inner: f64,
     /// Squares of the `outer` steps, which show how few pixels dominate the sum.
     outer_squares: f64,
-    /// Sum of the `outer` steps, each divided by luminance² + [`RELMSE_LEAST`].
+    /// Sum of the `outer` steps, each divided by luminance² + [`RELMSE_EPSILON`].
     relative: f64,
-    /// Sum of the `inner` steps, each divided by luminance² + [`RELMSE_LEAST`].
+    /// Sum of the `inner` steps, each divided by luminance² + [`RELMSE_EPSILON`].
     relative_inner: f64,
 }
 
@@ -151,7 +151,7 @@ impl Steps {
             // Half the difference of the last two quarters. Two samples have no quarters.
             let step = if level > 1 { 3.0 * half_way - last - 2.0 * mean } else { 0.0 };
             let inner = step * step;
-            let scale = 1.0 / (luminance * luminance + RELMSE_LEAST);
+            let scale = 1.0 / (luminance * luminance + RELMSE_EPSILON);
             let sums = &mut self.levels[level - 1][cell][half];
             sums.outer += outer;
             sums.outer_squares += outer * outer;
