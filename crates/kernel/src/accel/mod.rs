@@ -1,9 +1,9 @@
 //! Bounding volume hierarchies and kd-trees. [`bvh`] knows only boxes and ids; a closure tests the shape with
 //! an id. [`wide_bvh`] and its alternative [`kd_tree`] are trees over triangles, stored in their leaves.
 
-mod along;
 pub mod bvh;
 pub mod kd_tree;
+mod ray_interval;
 mod reference;
 pub mod wide_bvh;
 
@@ -16,9 +16,9 @@ mod triangle_list_tests;
 #[cfg(test)]
 mod watertight_packet_tests;
 
-pub use along::{Cell, Stretch};
 pub use bvh::{AnyTest, Bvh, ClosestTest};
 pub use kd_tree::KdTree;
+pub use ray_interval::{RayInterval, TreeNode};
 pub use wide_bvh::{InstructionSet, SimdKernel, WideBvh};
 
 pub use crate::geometry::packet::{F32x16, PACKET_SIZE};

@@ -10,7 +10,7 @@ use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 use crate::math::random::signed as random;
 
-type Mesh = Vec<[Vec3; 3]>;
+type TriangleSoup = Vec<[Vec3; 3]>;
 
 fn kd_tree(mesh: &[[Vec3; 3]]) -> KdTree {
     let tree = KdTree::build(mesh.len() as u32, |id| mesh[id as usize], &CancelToken::new());
@@ -23,7 +23,7 @@ fn wide_bvh(mesh: &[[Vec3; 3]]) -> WideBvh {
 }
 
 /// A closed box with `squares` squares along each edge.
-fn cuboid(squares: u32) -> Mesh {
+fn cuboid(squares: u32) -> TriangleSoup {
     let at = |face: usize, i: u32, j: u32| {
         let (u, v) = (i as f32 / squares as f32 * 2.0 - 1.0, j as f32 / squares as f32 * 2.0 - 1.0);
         let side = if face < 3 { 1.0 } else { -1.0 };
@@ -44,7 +44,7 @@ fn cuboid(squares: u32) -> Mesh {
 }
 
 /// Triangles of all sizes at random positions, some of them long.
-fn noise(seed: u64, count: usize) -> Mesh {
+fn noise(seed: u64, count: usize) -> TriangleSoup {
     let mut next = random(seed);
     let mut point = |size: f32| Vec3::new(next(), next(), next()) * size;
     let triangle = |i: usize| {
@@ -57,14 +57,15 @@ fn noise(seed: u64, count: usize) -> Mesh {
 
 /// More than fifty meshes: pathological meshes, boxes and noise, each as is, far from the origin, tiny and
 /// huge.
-fn scenes() -> Vec<Mesh> {
-    let shorten = |mesh: Mesh| mesh.into_iter().take(240).collect::<Mesh>();
-    let mut own: Vec<Mesh> = meshes().into_iter().map(shorten).collect();
+fn scenes() -> Vec<TriangleSoup> {
+    let shorten = |mesh: TriangleSoup| mesh.into_iter().take(240).collect::<TriangleSoup>();
+    let mut own: Vec<TriangleSoup> = meshes().into_iter().map(shorten).collect();
     own.extend([cuboid(1), cuboid(4), noise(1, 40), noise(2, 240), noise(3, 200)]);
     let far = Vec3::new(148_376.0, 1234.0, -223_423.0);
     let placed = |size: f32, at: Vec3| {
-        let place = move |mesh: &Mesh| mesh.iter().map(|t| t.map(|corner| corner * size + at)).collect();
-        own.iter().map(place).collect::<Vec<Mesh>>()
+        let place =
+            move |mesh: &TriangleSoup| mesh.iter().map(|t| t.map(|corner| corner * size + at)).collect();
+        own.iter().map(place).collect::<Vec<TriangleSoup>>()
     };
     let (tiny, huge) = (placed(2.0_f32.powi(-30), Vec3::ZERO), placed(2.0_f32.powi(30), Vec3::ZERO));
     let far = placed(1.0, far);

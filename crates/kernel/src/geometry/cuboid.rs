@@ -93,7 +93,7 @@ impl Cuboid {
         let ExactPoint { point, normal: outwards, reach } = self.exact(ray, hit);
         let chart = self.chart(hit.primitive);
         let uv = chart.uv(self.local(ray, hit));
-        let Chart { u, v, width, height } = chart;
+        let FaceMapping { u, v, width, height } = chart;
         let uv = uv.as_vec2();
         SurfacePoint::exact(point, outwards, uv, self.axes * (u * width), self.axes * (v * height), reach)
     }
@@ -107,9 +107,9 @@ impl Cuboid {
         self.chart(face).uv(local)
     }
 
-    fn chart(&self, face: u32) -> Chart {
+    fn chart(&self, face: u32) -> FaceMapping {
         let (u, v) = flat_axes(face_normal(face).1);
-        Chart { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
+        FaceMapping { u, v, width: 2.0 * self.half.dot(u.abs()), height: 2.0 * self.half.dot(v.abs()) }
     }
 
     /// Whether all faces but one are farther than `margin` from a point of the surface.
@@ -205,14 +205,14 @@ impl Cuboid {
 }
 
 /// Texture mapping of a face: local unit vectors along u and v, and the face's edge lengths.
-struct Chart {
+struct FaceMapping {
     u: DVec3,
     v: DVec3,
     width: f64,
     height: f64,
 }
 
-impl Chart {
+impl FaceMapping {
     fn uv(&self, local: DVec3) -> DVec2 {
         DVec2::new(0.5 + local.dot(self.u) / self.width, 0.5 + local.dot(self.v) / self.height)
     }

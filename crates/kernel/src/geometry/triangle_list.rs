@@ -38,7 +38,7 @@ pub const MOST: usize = 64;
 /// Error of the intersection with a plane, relative to the largest coordinate.
 const PLANE: f32 = 128.0 * UNIT_ROUNDOFF;
 
-/// Errors of t in the watertight test, relative to R² D/(2A) and to R D²/(2A).
+/// ErrorTerms of t in the watertight test, relative to R² D/(2A) and to R D²/(2A).
 const ALONG: [f32; 2] = [256.0 * UNIT_ROUNDOFF, 2048.0 * UNIT_ROUNDOFF];
 
 /// Error of barycentric coordinates in the watertight test, relative to R D/(2A).
@@ -105,7 +105,7 @@ struct Candidates {
 }
 
 /// Error terms of a packet.
-struct Errors {
+struct ErrorTerms {
     /// [`PLANE`] term of each ray.
     plane: F32x16,
     /// R.
@@ -207,7 +207,7 @@ impl TriangleList {
         except: &[u32; PACKET_SIZE],
         simd: impl Simd,
     ) -> Candidates {
-        let Errors { plane, far, across, length, end } = self.errors(rays);
+        let ErrorTerms { plane, far, across, length, end } = self.errors(rays);
         let mut found = Candidates {
             near: [f32::INFINITY; PACKET_SIZE],
             number: [0; PACKET_SIZE],
@@ -316,9 +316,9 @@ impl TriangleList {
 
     /// Computes the error terms of the rays.
     #[inline(always)]
-    fn errors(&self, rays: &RayPacket) -> Errors {
+    fn errors(&self, rays: &RayPacket) -> ErrorTerms {
         let none = [0.0; PACKET_SIZE];
-        let mut errors = Errors { plane: none, far: none, across: none, length: none, end: none };
+        let mut errors = ErrorTerms { plane: none, far: none, across: none, length: none, end: none };
         for i in 0..PACKET_SIZE {
             let (mut most, mut far, mut length) = (0.0, 0.0, 0.0);
             for axis in 0..3 {

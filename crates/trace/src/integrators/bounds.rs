@@ -6,7 +6,7 @@ use crate::control::Cancelled;
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
-use crate::world::{Cell, Stretch};
+use crate::world::{TreeNode, RayInterval};
 
 /// Line width in pixels.
 const LINE_WIDTH: f32 = 1.25;
@@ -62,7 +62,7 @@ fn nearest_edge(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Opt
     tile.world.geometry.along(ray, |local, Cell { bounds, depth, .. }, stretch| {
         let unit = local.direction.length();
         let pixel = |t: f32| t * spread * unit;
-        let Stretch { enter, leave } = *stretch;
+        let RayInterval { enter, leave } = *stretch;
         let size = bounds.extent().length();
         if size < MIN_BOX_SIZE * pixel(enter.0.max(0.0)) {
             return false;

@@ -1,14 +1,14 @@
 //! The trees of a scene along a ray.
 
 use super::{Geometry, Object};
-use crate::accel::{Cell, Stretch};
+use crate::accel::{TreeNode, RayInterval};
 use crate::geometry::Ray;
 
 impl Geometry {
     /// Visits the nodes of all trees whose boxes a ray meets. `visit` gets the ray in the coordinates of the node's tree, in which
     /// the direction of a unit ray is as long as the scene's unit, and says whether to descend. Depths are counted through both
     /// trees: a mesh's root is a step below the leaf that holds the mesh.
-    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &Cell, &Stretch) -> bool) {
+    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Ray, &TreeNode, &RayInterval) -> bool) {
         let mut below = Vec::new();
         self.visited().along(
             ray,
@@ -23,7 +23,7 @@ impl Geometry {
                     (None, None) => continue,
                 };
             tree.along(&local, |cell, stretch| {
-                visit(&local, &Cell { depth: above + cell.depth, ..*cell }, stretch)
+                visit(&local, &TreeNode { depth: above + cell.depth, ..*cell }, stretch)
             });
         }
     }

@@ -1,7 +1,7 @@
 //! Trees of either kind over triangles; both give the same hits, bit for bit.
 
 use crate::accel::wide_bvh::Quality;
-use crate::accel::{Cell, F32x16, KdTree, Stretch, WideBvh};
+use crate::accel::{TreeNode, F32x16, KdTree, RayInterval, WideBvh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;
@@ -67,7 +67,7 @@ impl TriangleTree {
     }
 
     /// Visits the nodes of the tree whose boxes a ray meets, parents first; `visit` says whether to descend.
-    pub fn along(&self, ray: &Ray, visit: impl FnMut(&Cell, &Stretch) -> bool) {
+    pub fn along(&self, ray: &Ray, visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         match self {
             Self::Boxes(tree) => tree.along(ray, visit),
             Self::Planes(tree) => tree.along(ray, visit),

@@ -3,7 +3,7 @@
 //! boxes, not on the threads.
 
 use super::top_node::TopNode;
-use super::{Bvh, Child, LEAF_SIZE, Node, SURFACE_AREA_LEVELS};
+use super::{BinaryNode, Bvh, ChildRef, LEAF_SIZE, SURFACE_AREA_LEVELS};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
@@ -31,8 +31,8 @@ impl Reference {
 }
 
 /// A finished subtree.
-struct Subtree {
-    root: Child,
+struct BuiltSubtree {
+    root: ChildRef,
     bounds: Aabb,
     /// Number of levels of nodes.
     depth: usize,
@@ -55,11 +55,16 @@ impl Bvh {
             return Ok(Self { nodes, order, bounds: Aabb::EMPTY, depth: 0, top: TopNode::EMPTY });
         }
         // A tree over n boxes has fewer than n nodes. Every subtree writes to its own slice.
-        let mut nodes = vec![Node::EMPTY; (references.len() - 1).max(1)];
-        let tree = build_subtree(&mut references, &mut nodes, Start { place: 0, node: 0, depth: 0 }, token)?;
+        let mut nodes = vec![BinaryNode::EMPTY; (references.len() - 1).max(1)];
+        let tree = build_subtree(
+            &mut references,
+            &mut nodes,
+            OutputPosition { place: 0, node: 0, depth: 0 },
+            token,
+        )?;
         if tree.root.count > 0 {
             // Only non-finite rays ever visit the other side, and their traversal ends there as well.
-            nodes[0] = Node { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root; 2] };
+            nodes[0] = BinaryNode { bounds: [tree.bounds, Aabb::EMPTY], child: [tree.root; 2] };
         }
         let order = references.iter().map(|reference| reference.id).collect();
         let top = TopNode::new((tree.bounds, tree.root), &nodes, &references);
@@ -69,7 +74,7 @@ impl Bvh {
 
 /// Output position of a subtree.
 #[derive(Clone, Copy)]
-struct Start {
+struct OutputPosition {
     /// Index of its first reference in leaf order.
     place: usize,
     /// Index of its first node.
@@ -81,24 +86,25 @@ struct Start {
 /// Builds a subtree with at most one node fewer than there are references.
 fn build_subtree(
     references: &mut [Reference],
-    nodes: &mut [Node],
-    start: Start,
+    nodes: &mut [BinaryNode],
+    start: OutputPosition,
     token: &CancelToken,
-) -> Result<Subtree, Cancelled> {
+) -> Result<BuiltSubtree, Cancelled> {
     let bounds = references.iter().fold(Aabb::EMPTY, |all, reference| all.union(reference.bounds));
     let Some(middle) = partition(references, bounds, &start) else {
-        let leaf = Child { first: start.place as u32, count: references.len() as u32 };
-        return Ok(Subtree { root: leaf, bounds, depth: 0 });
+        let leaf = ChildRef { first: start.place as u32, count: references.len() as u32 };
+        return Ok(BuiltSubtree { root: leaf, bounds, depth: 0 });
     };
     let parallel = references.len() > PARALLEL_SIZE;
     let (left, right) = references.split_at_mut(middle);
     let Some((node, rest)) = nodes.split_first_mut() else {
-        return Ok(Subtree { root: Child::NONE, bounds, depth: 0 });
+        return Ok(BuiltSubtree { root: ChildRef::NONE, bounds, depth: 0 });
     };
     let (left_nodes, right_nodes) = rest.split_at_mut(left.len() - 1);
     let depth = start.depth + 1;
-    let left_start = Start { place: start.place, node: start.node + 1, depth };
-    let right_start = Start { place: start.place + middle, node: start.node + 1 + left_nodes.len(), depth };
+    let left_start = OutputPosition { place: start.place, node: start.node + 1, depth };
+    let right_start =
+        OutputPosition { place: start.place + middle, node: start.node + 1 + left_nodes.len(), depth };
     let (left, right) = if parallel {
         token.check()?;
         rayon::join(
@@ -110,13 +116,13 @@ fn build_subtree(
         (left, build_subtree(right, right_nodes, right_start, token))
     };
     let (left, right) = (left?, right?);
-    *node = Node { bounds: [left.bounds, right.bounds], child: [left.root, right.root] };
-    let root = Child { first: start.node as u32, count: 0 };
-    Ok(Subtree { root, bounds, depth: 1 + left.depth.max(right.depth) })
+    *node = BinaryNode { bounds: [left.bounds, right.bounds], child: [left.root, right.root] };
+    let root = ChildRef { first: start.node as u32, count: 0 };
+    Ok(BuiltSubtree { root, bounds, depth: 1 + left.depth.max(right.depth) })
 }
 
 /// Partitions the references into two halves, or returns `None` if a leaf is cheaper.
-fn partition(references: &mut [Reference], bounds: Aabb, start: &Start) -> Option<usize> {
+fn partition(references: &mut [Reference], bounds: Aabb, start: &OutputPosition) -> Option<usize> {
     let count = references.len();
     if count == 1 {
         return None;

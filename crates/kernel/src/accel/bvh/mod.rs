@@ -27,7 +27,7 @@ const SHALLOW_STACK: usize = 12;
 #[derive(Clone, Debug)]
 pub struct Bvh {
     /// Nodes, starting with the root. Empty if there are no boxes.
-    nodes: Vec<Node>,
+    nodes: Vec<BinaryNode>,
     /// Box ids in leaf order.
     order: Vec<u32>,
     bounds: Aabb,
@@ -40,24 +40,24 @@ pub struct Bvh {
 /// Two children with their boxes, in one cache line.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-struct Node {
+struct BinaryNode {
     bounds: [Aabb; 2],
-    child: [Child; 2],
+    child: [ChildRef; 2],
 }
 
-impl Node {
+impl BinaryNode {
     /// A node without children.
-    const EMPTY: Self = Self { bounds: [Aabb::EMPTY; 2], child: [Child::NONE; 2] };
+    const EMPTY: Self = Self { bounds: [Aabb::EMPTY; 2], child: [ChildRef::NONE; 2] };
 }
 
 /// An inner node, or a leaf with `count` > 0 entries of [`Bvh::order`] starting at `first`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Child {
+struct ChildRef {
     first: u32,
     count: u32,
 }
 
-impl Child {
+impl ChildRef {
     const NONE: Self = Self { first: 0, count: 0 };
 }
 

@@ -8,7 +8,7 @@ use arrayvec::ArrayVec;
 use glimt_base::reduce;
 
 use super::top_node::Beam;
-use super::{Bvh, Child, DEEP_STACK};
+use super::{Bvh, ChildRef, DEEP_STACK};
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
 use crate::geometry::aabb::SLAB_PAD;
@@ -35,7 +35,7 @@ struct SlabPacket<'a> {
 }
 
 /// Interval of distances in which each ray is inside a box; empty if `near` > `far`.
-struct Stretches {
+struct SlabIntervals {
     near: F32x16,
     far: F32x16,
 }
@@ -49,9 +49,9 @@ impl<'a> SlabPacket<'a> {
     }
 
     #[inline(always)]
-    fn enter(&self, bounds: &Aabb, ends: &F32x16) -> Stretches {
+    fn enter(&self, bounds: &Aabb, ends: &F32x16) -> SlabIntervals {
         let (min, max) = (bounds.min.to_array(), bounds.max.to_array());
-        let mut stretches = Stretches { near: [0.0; PACKET_SIZE], far: [0.0; PACKET_SIZE] };
+        let mut stretches = SlabIntervals { near: [0.0; PACKET_SIZE], far: [0.0; PACKET_SIZE] };
         for (lane, &end) in ends.iter().enumerate() {
             let (mut near, mut far) = (0.0_f32, end * SLAB_PAD);
             for axis in 0..3 {
@@ -70,7 +70,7 @@ impl<'a> SlabPacket<'a> {
     }
 }
 
-impl Stretches {
+impl SlabIntervals {
     /// Smallest distance at which a ray that hits the box enters it. Compares bits, which sort like numbers ≥
     /// 0 and ignore NaN.
     #[inline(always)]
@@ -86,7 +86,7 @@ impl Stretches {
 
 /// Bits of the rays that hit a box before their end.
 #[inline(always)]
-fn met(stretches: &Stretches, simd: impl Simd) -> u32 {
+fn met(stretches: &SlabIntervals, simd: impl Simd) -> u32 {
     let mut met = [0; PACKET_SIZE];
     for lane in 0..PACKET_SIZE {
         met[lane] = if stretches.near[lane] <= stretches.far[lane] { TRUE } else { 0 };
@@ -94,7 +94,7 @@ fn met(stretches: &Stretches, simd: impl Simd) -> u32 {
     simd.movemask(&met)
 }
 
-/// Largest end of all rays, negative if no ray is traced. Compares bits as in [`Stretches::first`].
+/// Largest end of all rays, negative if no ray is traced. Compares bits as in [`SlabIntervals::first`].
 #[inline(always)]
 fn greatest(ends: &F32x16) -> f32 {
     let mut all = [0; PACKET_SIZE];
@@ -105,16 +105,16 @@ fn greatest(ends: &F32x16) -> f32 {
 }
 
 /// Traversal stack: a lower bound on the entry distance, the rays that may hit the child, and the child.
-type Waiting = ArrayVec<(f32, u32, Child), DEEP_STACK>;
+type PacketStack = ArrayVec<(f32, u32, ChildRef), DEEP_STACK>;
 
 /// Subtrees of the top node still to be visited, with the nearest last.
-struct Near {
+struct PendingSubtrees {
     entry: F32x16,
     order: [u8; PACKET_SIZE],
     count: usize,
 }
 
-impl Near {
+impl PendingSubtrees {
     #[inline(always)]
     fn sorted((met, entry): (u32, F32x16)) -> Self {
         let mut near = Self { entry, order: [0; PACKET_SIZE], count: 0 };
@@ -163,8 +163,8 @@ impl Bvh {
     ) {
         let slabs = SlabPacket::new(rays, simd);
         let (mut leaf, mut in_leaf) = (outside, traced);
-        let mut near = Near::sorted(self.top_met(&slabs, ends, traced, simd));
-        let mut stack = Waiting::new();
+        let mut near = PendingSubtrees::sorted(self.top_met(&slabs, ends, traced, simd));
+        let mut stack = PacketStack::new();
         loop {
             for &id in leaf {
                 closest.test(id, in_leaf, ends);
@@ -227,7 +227,7 @@ impl Bvh {
         let mut free = traced;
         let (mut leaf, mut in_leaf) = (outside, traced);
         let (mut subtrees, _) = self.top_met(&slabs, ends, traced, simd);
-        let mut stack = Waiting::new();
+        let mut stack = PacketStack::new();
         loop {
             for &id in leaf {
                 let met = in_leaf & free;

@@ -5,7 +5,7 @@
 //! [`SlabRay::enter`]: crate::geometry::aabb::SlabRay::enter
 
 use super::build::Reference;
-use super::{Bvh, Child, Node};
+use super::{BinaryNode, Bvh, ChildRef};
 use crate::accel::{F32x16, PACKET_SIZE};
 use crate::geometry::Aabb;
 use crate::geometry::aabb::SLAB_PAD;
@@ -18,7 +18,7 @@ use crate::math::lanes::{PortableSimd, Simd, TRUE};
 pub(super) struct TopNode {
     min: [F32x16; 3],
     max: [F32x16; 3],
-    child: [Child; PACKET_SIZE],
+    child: [ChildRef; PACKET_SIZE],
     /// Bits of the subtrees in use.
     used: u32,
 }
@@ -28,12 +28,12 @@ impl TopNode {
     pub(super) const EMPTY: Self = Self {
         min: [[f32::INFINITY; PACKET_SIZE]; 3],
         max: [[f32::NEG_INFINITY; PACKET_SIZE]; 3],
-        child: [Child::NONE; PACKET_SIZE],
+        child: [ChildRef::NONE; PACKET_SIZE],
         used: 0,
     };
 
     /// Opens the largest nodes, then the largest leaves, while there is room.
-    pub(super) fn new(root: (Aabb, Child), nodes: &[Node], references: &[Reference]) -> Self {
+    pub(super) fn new(root: (Aabb, ChildRef), nodes: &[BinaryNode], references: &[Reference]) -> Self {
         let mut open = vec![root];
         while let Some(place) = largest(&open, |child, room| child.count == 0 && room > 0) {
             let node = &nodes[open.swap_remove(place).1.first as usize];
@@ -43,8 +43,8 @@ impl TopNode {
         while let Some(place) =
             largest(&open, |child, room| child.count > 1 && room + 1 >= child.count as usize)
         {
-            let Child { first, count } = open.swap_remove(place).1;
-            let each = |first: u32| (references[first as usize].bounds, Child { first, count: 1 });
+            let ChildRef { first, count } = open.swap_remove(place).1;
+            let each = |first: u32| (references[first as usize].bounds, ChildRef { first, count: 1 });
             open.extend((first..first + count).map(each));
         }
         let mut top = Self::EMPTY;
@@ -60,7 +60,7 @@ impl TopNode {
 
     /// A subtree and its bounding box.
     #[inline(always)]
-    pub(super) fn subtree(&self, i: usize) -> (Aabb, Child) {
+    pub(super) fn subtree(&self, i: usize) -> (Aabb, ChildRef) {
         let corner = |rows: &[F32x16; 3]| Vec3::new(rows[0][i], rows[1][i], rows[2][i]);
         (Aabb { min: corner(&self.min), max: corner(&self.max) }, self.child[i])
     }
@@ -114,7 +114,7 @@ impl TopNode {
 
 /// Index of the largest box whose subtree may be opened. `may_open` receives the child and the number of free
 /// slots.
-fn largest(open: &[(Aabb, Child)], may_open: impl Fn(Child, usize) -> bool) -> Option<usize> {
+fn largest(open: &[(Aabb, ChildRef)], may_open: impl Fn(ChildRef, usize) -> bool) -> Option<usize> {
     let room = PACKET_SIZE - open.len();
     let each = open.iter().enumerate().filter(|(_, (_, child))| may_open(*child, room));
     each.max_by(|(_, (a, _)), (_, (b, _))| a.half_area().total_cmp(&b.half_area())).map(|(place, _)| place)
@@ -166,15 +166,15 @@ mod tests {
     use crate::math::random::signed as random;
 
     /// Records which primitives are tested, and for which rays.
-    struct Seen(Vec<u32>);
+    struct TestLog(Vec<u32>);
 
-    impl ClosestTest for Seen {
+    impl ClosestTest for TestLog {
         fn test(&mut self, id: u32, met: u32, _: &mut F32x16) {
             self.0[id as usize] |= met;
         }
     }
 
-    impl AnyTest for Seen {
+    impl AnyTest for TestLog {
         fn test(&mut self, id: u32, met: u32, _: &F32x16) -> u32 {
             self.0[id as usize] |= met;
             0
@@ -214,7 +214,7 @@ mod tests {
                 for lane in (0..rays.len()).filter(|lane| round % 5 == 0 && lane % 3 == 1) {
                     ends[lane] = -1.0;
                 }
-                let (mut closest, mut any) = (Seen(vec![0; count]), Seen(vec![0; count]));
+                let (mut closest, mut any) = (TestLog(vec![0; count]), TestLog(vec![0; count]));
                 let traced = traced(&ends, PortableSimd);
                 tree.closest_packet(&rows, &mut ends, traced, &[], &mut closest, PortableSimd);
                 tree.any_packet(&rows, &ends, traced, &[], &mut any, PortableSimd);

@@ -2,8 +2,8 @@
 
 use arrayvec::ArrayVec;
 
-use super::{Bvh, Child, DEEP_STACK, SHALLOW_STACK};
-use crate::accel::{Cell, Stretch};
+use super::{Bvh, ChildRef, DEEP_STACK, SHALLOW_STACK};
+use crate::accel::{RayInterval, TreeNode};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
 use crate::geometry::packet::lanes;
 use crate::geometry::{Aabb, Ray};
@@ -29,9 +29,9 @@ impl Bvh {
     ) {
         let slabs = SlabRay::new(ray.origin, ray.direction);
         let mut t_max = ray.t_max;
-        let mut stack = [(0.0_f32, Child::NONE); STACK_SIZE];
+        let mut stack = [(0.0_f32, ChildRef::NONE); STACK_SIZE];
         let mut size = 0;
-        let mut current = Child { first: 0, count: 0 };
+        let mut current = ChildRef { first: 0, count: 0 };
         if self.nodes.is_empty() {
             return;
         }
@@ -94,14 +94,14 @@ impl Bvh {
     pub fn along(
         &self,
         ray: &Ray,
-        mut visit: impl FnMut(&Cell, &Stretch) -> bool,
+        mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool,
         mut own: impl FnMut(u32, u32),
     ) {
-        let root = (self.bounds, Child { first: 0, count: 0 }, 0);
+        let root = (self.bounds, ChildRef { first: 0, count: 0 }, 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
         while let Some((bounds, child, depth)) = pending.pop() {
-            let Some(stretch) = Stretch::new(&bounds, ray) else { continue };
-            if !visit(&Cell { bounds, depth, shapes: child.count }, &stretch) {
+            let Some(stretch) = RayInterval::new(&bounds, ray) else { continue };
+            if !visit(&TreeNode { bounds, depth, shapes: child.count }, &stretch) {
                 continue;
             }
             if child.count > 0 {
@@ -117,7 +117,7 @@ impl Bvh {
 
     /// Visits every primitive in a leaf whose box overlaps `other`.
     pub fn meeting(&self, other: &Aabb, mut visit: impl FnMut(u32)) {
-        let mut stack = ArrayVec::<Child, DEEP_STACK>::new();
+        let mut stack = ArrayVec::<ChildRef, DEEP_STACK>::new();
         for subtree in lanes(self.top.meeting(other)) {
             stack.push(self.top.subtree(subtree).1);
             while let Some(current) = stack.pop() {
@@ -136,7 +136,7 @@ impl Bvh {
     #[inline]
     fn any_within<const STACK_SIZE: usize>(&self, ray: &Ray, mut test: impl FnMut(u32) -> bool) -> bool {
         let slabs = SlabRay::new(ray.origin, ray.direction);
-        let mut stack = [Child::NONE; STACK_SIZE];
+        let mut stack = [ChildRef::NONE; STACK_SIZE];
         let mut size = 1;
         if self.nodes.is_empty() {
             return false;

@@ -10,22 +10,22 @@ mod node;
 mod traverse;
 mod validate;
 
-use crate::accel::{Cell, Stretch};
+use crate::accel::{RayInterval, TreeNode};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 
-use node::{Kind, Node, Triangle};
+use node::{KdNode, LeafTriangle, NodeKind};
 
 /// A kd-tree over triangles.
 #[derive(Clone, Debug)]
 pub struct KdTree {
     /// Nodes: the root comes first, and a left child follows its parent. Empty if there are no triangles.
-    nodes: Vec<Node>,
+    nodes: Vec<KdNode>,
     /// Indices into `triangles`, leaf by leaf.
     references: Vec<u32>,
     /// Each triangle once, in the order in which leaves first refer to it.
-    triangles: Vec<Triangle>,
+    triangles: Vec<LeafTriangle>,
     bounds: Aabb,
 }
 
@@ -39,7 +39,8 @@ impl KdTree {
         corners: impl Fn(u32) -> [Vec3; 3] + Sync,
         token: &CancelToken,
     ) -> Result<Self, Cancelled> {
-        let build::Built { nodes, references, triangles, bounds } = build::build(count, corners, token)?;
+        let build::BuiltKdTree { nodes, references, triangles, bounds } =
+            build::build(count, corners, token)?;
         Ok(Self { nodes, references, triangles, bounds })
     }
 
@@ -63,7 +64,7 @@ impl KdTree {
         self.walk(|cell, kind| {
             let share = f64::from(cell.half_area()) / whole;
             visits.0 += share;
-            if let Kind::Leaf { count, .. } = kind {
+            if let NodeKind::Leaf { count, .. } = kind {
                 visits.1 += share * f64::from(count);
             }
         });
@@ -89,16 +90,16 @@ impl KdTree {
             let mut place = pending[size];
             loop {
                 match self.nodes[place as usize].kind() {
-                    Kind::Leaf { first, count } => {
+                    NodeKind::Leaf { first, count } => {
                         let own = &self.references[first as usize..][..count as usize];
                         if !own.iter().all(|&own| visit(self.triangles[own as usize].id)) {
                             return false;
                         }
                         break;
                     }
-                    Kind::Inner { axis, at, right } if other.min[axis] > at => place = right,
-                    Kind::Inner { axis, at, .. } if other.max[axis] < at => place += 1,
-                    Kind::Inner { right, .. } => {
+                    NodeKind::Inner { axis, at, right } if other.min[axis] > at => place = right,
+                    NodeKind::Inner { axis, at, .. } if other.max[axis] < at => place += 1,
+                    NodeKind::Inner { right, .. } => {
                         pending[size] = right;
                         size += 1;
                         place += 1;
@@ -111,19 +112,19 @@ impl KdTree {
 
     /// Visits the nodes whose cells a ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
-    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Cell, &Stretch) -> bool) {
+    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(self.bounds, 0_u32, 0)] };
         while let Some((bounds, place, depth)) = pending.pop() {
-            let Some(stretch) = Stretch::new(&bounds, ray) else { continue };
+            let Some(stretch) = RayInterval::new(&bounds, ray) else { continue };
             let kind = self.nodes[place as usize].kind();
             let shapes = match kind {
-                Kind::Inner { .. } => 0,
-                Kind::Leaf { count, .. } => count,
+                NodeKind::Inner { .. } => 0,
+                NodeKind::Leaf { count, .. } => count,
             };
-            if !visit(&Cell { bounds, depth, shapes }, &stretch) {
+            if !visit(&TreeNode { bounds, depth, shapes }, &stretch) {
                 continue;
             }
-            if let Kind::Inner { axis, at, right } = kind {
+            if let NodeKind::Inner { axis, at, right } = kind {
                 let [below, above] = halves(bounds, axis, at);
                 pending.extend([(above, right, depth + 1), (below, place + 1, depth + 1)]);
             }
@@ -131,12 +132,12 @@ impl KdTree {
     }
 
     /// Visits every node with its cell, parents first.
-    fn walk(&self, mut visit: impl FnMut(Aabb, Kind)) {
+    fn walk(&self, mut visit: impl FnMut(Aabb, NodeKind)) {
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![(0_u32, self.bounds)] };
         while let Some((place, cell)) = pending.pop() {
             let kind = self.nodes[place as usize].kind();
             visit(cell, kind);
-            if let Kind::Inner { axis, at, right } = kind {
+            if let NodeKind::Inner { axis, at, right } = kind {
                 let [below, above] = halves(cell, axis, at);
                 pending.extend([(right, above), (place + 1, below)]);
             }

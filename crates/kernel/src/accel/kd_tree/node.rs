@@ -10,7 +10,7 @@ pub const MOST: u32 = u32::MAX >> 2;
 
 /// An encoded node. The left child of an inner node is the next node.
 #[derive(Clone, Copy, Debug)]
-pub struct Node {
+pub struct KdNode {
     /// Bits of the plane's coordinate for an inner node, or index of the first reference for a leaf.
     payload: u32,
     /// Axis or [`LEAF`] in the two low bits; above them the right child, or the number of references.
@@ -19,7 +19,7 @@ pub struct Node {
 
 /// A decoded node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum NodeKind {
     /// An inner node, split by a plane.
     Inner {
         /// Axis of the plane's normal.
@@ -38,15 +38,15 @@ pub enum Kind {
     },
 }
 
-impl Node {
+impl KdNode {
     /// Encodes a node.
-    pub fn new(kind: Kind) -> Self {
+    pub fn new(kind: NodeKind) -> Self {
         match kind {
-            Kind::Inner { axis, at, right } => {
+            NodeKind::Inner { axis, at, right } => {
                 debug_assert!(axis < 3 && right <= MOST);
                 Self { payload: at.to_bits(), tag: right << 2 | axis as u32 }
             }
-            Kind::Leaf { first, count } => {
+            NodeKind::Leaf { first, count } => {
                 debug_assert!(count <= MOST);
                 Self { payload: first, tag: count << 2 | LEAF }
             }
@@ -55,27 +55,27 @@ impl Node {
 
     /// Decodes a node.
     #[inline(always)]
-    pub fn kind(self) -> Kind {
+    pub fn kind(self) -> NodeKind {
         let (low, high) = (self.tag & 3, self.tag >> 2);
         if low == LEAF {
-            Kind::Leaf { first: self.payload, count: high }
+            NodeKind::Leaf { first: self.payload, count: high }
         } else {
-            Kind::Inner { axis: low as usize, at: f32::from_bits(self.payload), right: high }
+            NodeKind::Inner { axis: low as usize, at: f32::from_bits(self.payload), right: high }
         }
     }
 
     /// The node with its indices offset by `nodes` preceding nodes and `references` preceding references.
     pub fn moved(self, nodes: u32, references: u32) -> Self {
         Self::new(match self.kind() {
-            Kind::Inner { axis, at, right } => Kind::Inner { axis, at, right: right + nodes },
-            Kind::Leaf { first, count } => Kind::Leaf { first: first + references, count },
+            NodeKind::Inner { axis, at, right } => NodeKind::Inner { axis, at, right: right + nodes },
+            NodeKind::Leaf { first, count } => NodeKind::Leaf { first: first + references, count },
         })
     }
 }
 
 /// A triangle and its index in the mesh.
 #[derive(Clone, Copy, Debug)]
-pub struct Triangle {
+pub struct LeafTriangle {
     pub corners: [Vec3; 3],
     pub id: u32,
 }

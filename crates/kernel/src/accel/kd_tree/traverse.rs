@@ -5,7 +5,7 @@
 //! distance from the ray's origin to the far end of the mesh.
 
 use super::KdTree;
-use super::node::Kind;
+use super::node::NodeKind;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Aabb, Ray, ShapeHit};
 
@@ -129,7 +129,7 @@ impl KdTree {
         let mut place = 0;
         loop {
             match self.nodes[place as usize].kind() {
-                Kind::Inner { axis, at, right } => {
+                NodeKind::Inner { axis, at, right } => {
                     let (low, high) = planes.meets(axis, at);
                     let (first, second) =
                         if planes.backward[axis] { (right, place + 1) } else { (place + 1, right) };
@@ -145,7 +145,7 @@ impl KdTree {
                     }
                     continue;
                 }
-                Kind::Leaf { first, count } => {
+                NodeKind::Leaf { first, count } => {
                     let references = &self.references[first as usize..][..count as usize];
                     let Some(t_max) = test(references) else { return };
                     let end = planes.end(t_max);

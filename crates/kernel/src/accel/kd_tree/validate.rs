@@ -1,7 +1,7 @@
 //! Validation of a kd-tree, independent of the code that builds it.
 
 use super::build::depth_limit;
-use super::node::Kind;
+use super::node::NodeKind;
 use super::{KdTree, halves};
 use crate::accel::reference::Polygon;
 use crate::geometry::Aabb;
@@ -53,7 +53,7 @@ impl KdTree {
             }
             reached += 1;
             match self.nodes[place as usize].kind() {
-                Kind::Inner { axis, at, right } => {
+                NodeKind::Inner { axis, at, right } => {
                     if !(at > cell.min[axis] && at < cell.max[axis]) {
                         return Err(format!("the plane of node {place} is outside its cell"));
                     }
@@ -64,7 +64,7 @@ impl KdTree {
                         pending.push(Visit { place, cell, depth: depth + 1, inside });
                     }
                 }
-                Kind::Leaf { first, count } => {
+                NodeKind::Leaf { first, count } => {
                     let ids = self.references[first as usize..][..count as usize].iter();
                     let ids: Vec<u32> = ids.map(|&at| self.triangles[at as usize].id).collect();
                     leaf(place, &cell, &inside, &ids, &corners)?;

@@ -14,15 +14,15 @@ use crate::math::Vec3;
 
 pub use simd::{InstructionSet, SimdKernel, pages};
 
-use crate::accel::{Cell, F32x16, PACKET_SIZE, Stretch};
+use crate::accel::{F32x16, PACKET_SIZE, RayInterval, TreeNode};
 
-use node::{Node, TrianglePack};
+use node::{TrianglePack, WideNode};
 
 /// An eight-wide BVH over triangles.
 #[derive(Clone, Debug)]
 pub struct WideBvh {
     /// Nodes, starting with the root. Empty if there are no triangles.
-    nodes: Vec<Node>,
+    nodes: Vec<WideNode>,
     packs: Vec<TrianglePack>,
     bounds: Aabb,
     instructions: InstructionSet,
@@ -106,11 +106,11 @@ impl WideBvh {
 
     /// Visits the nodes whose boxes a ray hits, parents first, in an order that depends only on the tree.
     /// `visit` returns whether to descend.
-    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&Cell, &Stretch) -> bool) {
+    pub fn along(&self, ray: &Ray, mut visit: impl FnMut(&TreeNode, &RayInterval) -> bool) {
         let root = (self.bounds, node::Child::Inner(0), 0);
         let mut pending = if self.nodes.is_empty() { Vec::new() } else { vec![root] };
         while let Some((bounds, child, depth)) = pending.pop() {
-            let Some(stretch) = Stretch::new(&bounds, ray) else { continue };
+            let Some(stretch) = RayInterval::new(&bounds, ray) else { continue };
             let shapes = match child {
                 node::Child::Inner(_) => 0,
                 node::Child::Leaf { first, count } => {
@@ -118,7 +118,7 @@ impl WideBvh {
                     packs.iter().map(|pack| pack.ids().count() as u32).sum()
                 }
             };
-            if !visit(&Cell { bounds, depth, shapes }, &stretch) {
+            if !visit(&TreeNode { bounds, depth, shapes }, &stretch) {
                 continue;
             }
             if let node::Child::Inner(place) = child {

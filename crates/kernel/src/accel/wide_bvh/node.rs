@@ -13,7 +13,7 @@ pub const PACK: usize = 4;
 /// Maximum number of packs per leaf.
 pub const MOST_PACKS: u32 = 8;
 
-/// Bit that marks a leaf in [`Node::children`]. The next three bits hold the number of packs minus one, and
+/// Bit that marks a leaf in [`WideNode::children`]. The next three bits hold the number of packs minus one, and
 /// the rest the index of the first pack.
 const LEAF: u32 = 1 << 31;
 
@@ -28,7 +28,7 @@ const _: () = assert!(TriangleMesh::MOST_TRIANGLES as u64 * 13 / 10 < 1 << FIRST
 /// Eight child boxes as arrays of their minimum and maximum coordinates, and the children.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub struct Node {
+pub struct WideNode {
     /// Minimum x, maximum x, minimum y, maximum y, minimum z and maximum z of each box. Empty boxes are ∞ …
     /// −∞, which finite arithmetic never hits.
     pub rows: [[f32; WIDTH]; 6],
@@ -72,7 +72,7 @@ impl Child {
     }
 }
 
-impl Node {
+impl WideNode {
     /// A node with eight empty boxes. If arithmetic overflows, all boxes are hit: empty boxes lead to the
     /// first pack, so that traversal still ends.
     pub const EMPTY: Self = {

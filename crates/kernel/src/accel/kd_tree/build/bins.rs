@@ -7,7 +7,7 @@ use std::array;
 
 use rayon::prelude::*;
 
-use super::cost::{Plane, Planes, Search};
+use super::cost::{Planes, Search, SplitPlane};
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec4;
 
@@ -58,7 +58,7 @@ impl Histogram {
 }
 
 /// Finds the cheapest plane. `None` if a leaf is at least as cheap.
-pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
+pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
     let around = Bounds::around(references);
     let extent = around.extent();
     let scale = |length: f32| {
@@ -88,5 +88,5 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
         search.offer(axis, false, &Planes { at: four(at), left: counts(left), right: counts(right) });
     }
     // References within the plane must not go to the side that should be empty.
-    search.cheapest().map(|plane| Plane { planar_right: plane.at <= around.min[plane.axis], ..plane })
+    search.cheapest().map(|plane| SplitPlane { planar_right: plane.at <= around.min[plane.axis], ..plane })
 }

@@ -18,7 +18,7 @@ const PLANAR_RIGHT: usize = 4;
 
 /// A splitting plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
+pub struct SplitPlane {
     pub axis: usize,
     pub at: f32,
     /// Whether triangles within the plane go to the right.
@@ -97,7 +97,7 @@ impl<const N: usize> Search<N> {
 
     /// Returns the cheapest plane, or `None` if a leaf is at least as cheap.
     #[inline(always)]
-    pub fn cheapest(mut self) -> Option<Plane> {
+    pub fn cheapest(mut self) -> Option<SplitPlane> {
         for i in 1..N {
             let (cost, at, tag) = (self.cost[i], self.at[i], self.tag[i]);
             self.take(0, cost, at, tag);
@@ -106,6 +106,6 @@ impl<const N: usize> Search<N> {
         let lane = (1..4).fold(0, |best, lane| if cost[lane] < cost[best] { lane } else { best });
         let tag = self.tag[0].to_array()[lane] as usize;
         let (axis, planar_right) = (tag % PLANAR_RIGHT, tag >= PLANAR_RIGHT);
-        (axis != LEAF).then_some(Plane { axis, at: self.at[0].to_array()[lane], planar_right })
+        (axis != LEAF).then_some(SplitPlane { axis, at: self.at[0].to_array()[lane], planar_right })
     }
 }

@@ -2,17 +2,17 @@
 
 use rayon::prelude::*;
 
-use super::cost::Plane;
-use super::subtree::Subtree;
-use crate::accel::kd_tree::node::{Kind, Node};
+use super::cost::SplitPlane;
+use super::subtree::KdSubtree;
+use crate::accel::kd_tree::node::{KdNode, NodeKind};
 use crate::accel::wide_bvh::pages;
 
 /// A part of the tree: an upper node or a subtree.
-pub enum Part {
+pub enum TreePart {
     /// A plane with the parts below and above it.
-    Halves { plane: Plane, size: Size, halves: Box<[Part; 2]> },
+    Halves { plane: SplitPlane, size: Size, halves: Box<[TreePart; 2]> },
     /// A subtree built by a single thread.
-    Built(Subtree),
+    Built(KdSubtree),
 }
 
 /// Number of nodes and of references to triangles.
@@ -22,9 +22,9 @@ pub struct Size {
     ids: usize,
 }
 
-impl Part {
+impl TreePart {
     /// Creates an upper node from its plane and both parts.
-    pub fn halves(plane: Plane, halves: [Self; 2]) -> Self {
+    pub fn halves(plane: SplitPlane, halves: [Self; 2]) -> Self {
         let [left, right] = halves.each_ref().map(Self::size);
         let size = Size { nodes: 1 + left.nodes + right.nodes, ids: left.ids + right.ids };
         Self::Halves { plane, size, halves: Box::new(halves) }
@@ -38,10 +38,10 @@ impl Part {
     }
 
     /// Joins all parts into one subtree, with nodes before their children and left before right.
-    pub fn join(self) -> Subtree {
+    pub fn join(self) -> KdSubtree {
         let size = self.size();
-        let mut all = Subtree { nodes: pages::large(size.nodes), ids: pages::large(size.ids) };
-        let nothing = Node::new(Kind::Leaf { first: 0, count: 0 });
+        let mut all = KdSubtree { nodes: pages::large(size.nodes), ids: pages::large(size.ids) };
+        let nothing = KdNode::new(NodeKind::Leaf { first: 0, count: 0 });
         rayon::join(
             || (0..size.nodes).into_par_iter().map(|_| nothing).collect_into_vec(&mut all.nodes),
             || (0..size.ids).into_par_iter().map(|_| 0).collect_into_vec(&mut all.ids),
@@ -51,7 +51,7 @@ impl Part {
     }
 
     /// Writes the part after `before` nodes and references.
-    fn write(self, nodes: &mut [Node], ids: &mut [u32], before: Size) {
+    fn write(self, nodes: &mut [KdNode], ids: &mut [u32], before: Size) {
         match self {
             Self::Built(subtree) => {
                 for (node, own) in nodes.iter_mut().zip(&subtree.nodes) {
@@ -68,7 +68,7 @@ impl Part {
                 let before_left = Size { nodes: before.nodes + 1, ..before };
                 let before_right = Size { nodes: before_left.nodes + size.nodes, ids: before.ids + size.ids };
                 let right_place = before_right.nodes as u32;
-                node[0] = Node::new(Kind::Inner { axis: plane.axis, at: plane.at, right: right_place });
+                node[0] = KdNode::new(NodeKind::Inner { axis: plane.axis, at: plane.at, right: right_place });
                 rayon::join(
                     || left.write(left_nodes, left_ids, before_left),
                     || right.write(right_nodes, right_ids, before_right),

@@ -13,7 +13,7 @@ mod sweep;
 
 use rayon::prelude::*;
 
-use super::node::{self, Node, Triangle};
+use super::node::{self, KdNode, LeafTriangle};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::geometry::mesh::TriangleMesh;
@@ -21,10 +21,10 @@ use crate::math::Vec3;
 use crate::math::elementary::log2;
 
 use crate::accel::reference::{Bounds, Reference};
-use cost::Plane;
-use join::Part;
+use cost::SplitPlane;
+use join::TreePart;
 use partition::Scratch;
-use subtree::Subtree;
+use subtree::KdSubtree;
 
 /// Maximum number of references in a cell built by a single thread. The token is polled between such cells.
 const TASK_SIZE: usize = 4096;
@@ -47,11 +47,11 @@ const FEW: u64 = 64;
 const NOWHERE: u32 = u32::MAX;
 
 /// Result of construction.
-pub struct Built {
-    pub nodes: Vec<Node>,
+pub struct BuiltKdTree {
+    pub nodes: Vec<KdNode>,
     /// Indices into `triangles`, leaf by leaf.
     pub references: Vec<u32>,
-    pub triangles: Vec<Triangle>,
+    pub triangles: Vec<LeafTriangle>,
     pub bounds: Aabb,
 }
 
@@ -68,7 +68,7 @@ pub fn build(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     token: &CancelToken,
-) -> Result<Built, Cancelled> {
+) -> Result<BuiltKdTree, Cancelled> {
     let room = MOST_ROOM.min(MOST_PER_TRIANGLE * (u64::from(count) + FEW));
     build_within(room, count, corners, token)
 }
@@ -79,11 +79,11 @@ fn build_within(
     count: u32,
     corners: impl Fn(u32) -> [Vec3; 3] + Sync,
     token: &CancelToken,
-) -> Result<Built, Cancelled> {
+) -> Result<BuiltKdTree, Cancelled> {
     let references = Reference::usable(count, &corners, token)?;
     if references.is_empty() {
         let (nodes, references, triangles) = Default::default();
-        return Ok(Built { nodes, references, triangles, bounds: Aabb::EMPTY });
+        return Ok(BuiltKdTree { nodes, references, triangles, bounds: Aabb::EMPTY });
     }
     let bounds = Bounds::around(&references);
     let levels = depth_limit(references.len());
@@ -91,8 +91,8 @@ fn build_within(
     let all = part.join();
     token.check()?;
     let (references, order) = by_first_use(all.ids, count);
-    let triangles = order.into_par_iter().map(|id| Triangle { corners: corners(id), id }).collect();
-    Ok(Built { nodes: all.nodes, references, triangles, bounds: bounds.aabb() })
+    let triangles = order.into_par_iter().map(|id| LeafTriangle { corners: corners(id), id }).collect();
+    Ok(BuiltKdTree { nodes: all.nodes, references, triangles, bounds: bounds.aabb() })
 }
 
 /// Orders the triangles by their first use in a leaf and rewrites `ids` as indices into that order.
@@ -122,7 +122,7 @@ struct Cell {
 
 impl Cell {
     /// Chooses the splitting plane. `None` for a leaf.
-    fn plane(&self, references: &[Reference]) -> Option<Plane> {
+    fn plane(&self, references: &[Reference]) -> Option<SplitPlane> {
         // A plane through all triangles doubles them.
         let has_room = 2 * leaf_room(references.len()) <= self.room;
         if self.levels == 0 || references.is_empty() || !has_room {
@@ -135,7 +135,7 @@ impl Cell {
     }
 
     /// The two halves of the cell, given the number of references in each.
-    fn halves(&self, plane: &Plane, counts: [usize; 2]) -> [Self; 2] {
+    fn halves(&self, plane: &SplitPlane, counts: [usize; 2]) -> [Self; 2] {
         let [left, right] = counts.map(leaf_room);
         // Divide the room proportionally: it suffices for both together, so each share suffices as well.
         let room = self.room * left / (left + right);
@@ -156,11 +156,11 @@ fn part(
     mut references: Vec<Reference>,
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
-) -> Result<Part, Cancelled> {
+) -> Result<TreePart, Cancelled> {
     token.check()?;
     let plane = if references.len() > TASK_SIZE { cell.plane(&references) } else { None };
     let Some(plane) = plane else {
-        return Ok(Part::Built(Subtree::build(cell, references, corners, token)?));
+        return Ok(TreePart::Built(KdSubtree::build(cell, references, corners, token)?));
     };
     let left = Scratch::default().partition(&mut references, 0, &plane, corners).to_vec();
     references.shrink_to_fit();
@@ -169,13 +169,13 @@ fn part(
         || part(&left_cell, left, corners, token),
         || part(&right_cell, references, corners, token),
     );
-    Ok(Part::halves(plane, [left?, right?]))
+    Ok(TreePart::halves(plane, [left?, right?]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::kd_tree::node::Kind;
+    use crate::accel::kd_tree::node::NodeKind;
 
     /// A disk of triangles around one vertex.
     fn fan(count: u32) -> impl Fn(u32) -> [Vec3; 3] + Sync {
@@ -206,7 +206,7 @@ mod tests {
         };
         let size = |room| {
             let built = build_within(room, 6000, fan, &CancelToken::new()).expect("nobody cancels");
-            let leaf = |node: &&Node| matches!(node.kind(), Kind::Leaf { .. });
+            let leaf = |node: &&KdNode| matches!(node.kind(), NodeKind::Leaf { .. });
             assert_eq!(built.triangles.len(), 6000);
             (built.nodes.iter().filter(leaf).count() + built.references.len()) as u64
         };

@@ -1,6 +1,6 @@
 //! Partitioning of a cell's references at a plane.
 
-use super::cost::Plane;
+use super::cost::SplitPlane;
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec3;
 
@@ -24,7 +24,7 @@ impl Scratch {
         &mut self,
         references: &mut Vec<Reference>,
         first: usize,
-        plane: &Plane,
+        plane: &SplitPlane,
         corners: &impl Fn(u32) -> [Vec3; 3],
     ) -> &[Reference] {
         match plane.axis {
@@ -38,7 +38,7 @@ impl Scratch {
         &mut self,
         references: &mut Vec<Reference>,
         first: usize,
-        plane: &Plane,
+        plane: &SplitPlane,
         corners: &impl Fn(u32) -> [Vec3; 3],
     ) -> &[Reference] {
         let own = &mut references[first..];
@@ -94,7 +94,7 @@ mod tests {
         let mut scratch = Scratch::default();
         for axis in 0..3 {
             for planar_right in [false, true] {
-                let plane = Plane { axis, at: 1.0, planar_right };
+                let plane = SplitPlane { axis, at: 1.0, planar_right };
                 let mut own = all.clone();
                 let left = scratch.partition(&mut own, 50, &plane, &corners).to_vec();
                 let expected = |is_there: &dyn Fn(f32, f32) -> bool| -> Vec<u32> {

@@ -2,19 +2,19 @@
 
 use super::Cell;
 use super::partition::Scratch;
-use crate::accel::kd_tree::node::{Kind, Node};
+use crate::accel::kd_tree::node::{KdNode, NodeKind};
 use crate::accel::reference::Reference;
 use crate::control::{CancelToken, Cancelled};
 use crate::math::Vec3;
 
 /// Nodes and references, with indices relative to the subtree.
 #[derive(Default)]
-pub struct Subtree {
-    pub nodes: Vec<Node>,
+pub struct KdSubtree {
+    pub nodes: Vec<KdNode>,
     pub ids: Vec<u32>,
 }
 
-impl Subtree {
+impl KdSubtree {
     /// Builds the subtree of a cell and its references.
     ///
     /// # Errors
@@ -34,7 +34,7 @@ impl Subtree {
 
 /// Builds a subtree in memory that is allocated once.
 struct Builder<'a, C> {
-    built: Subtree,
+    built: KdSubtree,
     /// References of all pending cells; those of the next cell come last.
     references: Vec<Reference>,
     scratch: Scratch,
@@ -48,8 +48,8 @@ impl<C: Fn(u32) -> [Vec3; 3]> Builder<'_, C> {
     fn add(&mut self, first: usize, cell: &Cell) -> Result<(), Cancelled> {
         let place = self.built.nodes.len();
         let own = &self.references[first..];
-        let leaf = Kind::Leaf { first: self.built.ids.len() as u32, count: own.len() as u32 };
-        self.built.nodes.push(Node::new(leaf));
+        let leaf = NodeKind::Leaf { first: self.built.ids.len() as u32, count: own.len() as u32 };
+        self.built.nodes.push(KdNode::new(leaf));
         let Some(plane) = cell.plane(own) else {
             self.built.ids.extend(own.iter().map(Reference::id));
             self.references.truncate(first);
@@ -64,7 +64,7 @@ impl<C: Fn(u32) -> [Vec3; 3]> Builder<'_, C> {
         self.references.extend_from_slice(left);
         self.add(middle, &left_cell)?;
         let right = self.built.nodes.len() as u32;
-        self.built.nodes[place] = Node::new(Kind::Inner { axis: plane.axis, at: plane.at, right });
+        self.built.nodes[place] = KdNode::new(NodeKind::Inner { axis: plane.axis, at: plane.at, right });
         self.add(first, &right_cell)
     }
 }

@@ -2,7 +2,7 @@
 //! Wald, Havran, *On building fast kd-trees for ray tracing, and on doing that in O(N log N)*, 2006). For so
 //! few triangles, recounting both sides of all planes with SIMD is faster than keeping them sorted.
 
-use super::cost::{Plane, Planes, Search};
+use super::cost::{Planes, Search, SplitPlane};
 use crate::accel::reference::{Bounds, Reference};
 use crate::math::Vec4;
 
@@ -10,7 +10,7 @@ use crate::math::Vec4;
 pub const SWEPT: usize = 24;
 
 /// Finds the cheapest plane. `None` if a leaf is at least as cheap.
-pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
+pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
     match references.len() {
         0..=4 => cheapest_of::<1>(references, cell),
         5..=8 => cheapest_of::<2>(references, cell),
@@ -20,10 +20,10 @@ pub fn cheapest(references: &[Reference], cell: &Bounds) -> Option<Plane> {
 }
 
 /// One number for each of 4·`N` references.
-type Row<const N: usize> = [[f32; 4]; N];
+type Values<const N: usize> = [[f32; 4]; N];
 
 /// [`cheapest`] for at most 4·`N` references.
-fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Option<Plane> {
+fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Option<SplitPlane> {
     let mut search = Search::<N>::new(cell, references.len());
     // Starts and ends of the boxes along each axis. Unused lanes start above every plane and end below it.
     let (mut starts, mut ends) = ([[[f32::INFINITY; 4]; N]; 3], [[[f32::NEG_INFINITY; 4]; N]; 3]);
@@ -48,8 +48,8 @@ fn cheapest_of<const N: usize>(references: &[Reference], cell: &Bounds) -> Optio
 #[inline(always)]
 fn offer<const N: usize>(
     axis: usize,
-    at: &Row<N>,
-    [starts, ends]: [&Row<N>; 2],
+    at: &Values<N>,
+    [starts, ends]: [&Values<N>; 2],
     count: usize,
     has_planar: bool,
     search: &mut Search<N>,
@@ -86,8 +86,8 @@ mod tests {
     use crate::math::random::signed as random;
 
     /// Cost of a plane by definition; infinite if the plane does not intersect the cell.
-    fn cost(references: &[Reference], cell: &Bounds, plane: &Plane) -> f32 {
-        let Plane { axis, at, planar_right } = *plane;
+    fn cost(references: &[Reference], cell: &Bounds, plane: &SplitPlane) -> f32 {
+        let SplitPlane { axis, at, planar_right } = *plane;
         if !(at > cell.min[axis] && at < cell.max()[axis]) {
             return f32::INFINITY;
         }
@@ -128,7 +128,7 @@ mod tests {
             let faces =
                 references.iter().flat_map(|reference| [reference.bounds.min, reference.bounds.max()]);
             let all = faces.flat_map(|corner| {
-                (0..6).map(move |i| Plane { axis: i % 3, at: corner[i % 3], planar_right: i < 3 })
+                (0..6).map(move |i| SplitPlane { axis: i % 3, at: corner[i % 3], planar_right: i < 3 })
             });
             let least = all.map(|plane| cost(&references, &cell, &plane)).fold(count as f32, f32::min);
             match cheapest(&references, &cell) {

@@ -2,17 +2,17 @@
 
 use rayon::prelude::*;
 
-use super::Part;
-use super::subtree::{Pack, Subtree};
+use super::TreePart;
+use super::subtree::{Pack, WideSubtree};
 use crate::accel::reference::Bounds;
-use crate::accel::wide_bvh::node::{Child, Node, WIDTH};
+use crate::accel::wide_bvh::node::{Child, WIDTH, WideNode};
 use crate::accel::wide_bvh::simd::pages;
 
 /// Joins all nodes, root first, and the contents of all packs.
-pub fn join(root: Part) -> (Vec<Node>, Vec<Pack>) {
+pub fn join(root: TreePart) -> (Vec<WideNode>, Vec<Pack>) {
     let mut top = Top::default();
     match root {
-        Part::Built(subtree) if matches!(subtree.root, Child::Inner(0)) => top.subtrees.push(subtree),
+        TreePart::Built(subtree) if matches!(subtree.root, Child::Inner(0)) => top.subtrees.push(subtree),
         root => {
             let bounds = root.bounds();
             top.node(bounds, root);
@@ -21,7 +21,7 @@ pub fn join(root: Part) -> (Vec<Node>, Vec<Pack>) {
     top.finish()
 }
 
-impl Part {
+impl TreePart {
     fn bounds(&self) -> Bounds {
         match self {
             Self::Built(subtree) => subtree.bounds,
@@ -45,39 +45,40 @@ enum Below {
 #[derive(Default)]
 struct Top {
     nodes: Vec<Vec<(Bounds, Below)>>,
-    subtrees: Vec<Subtree>,
+    subtrees: Vec<WideSubtree>,
 }
 
 impl Top {
     /// Creates the node over a part and everything below it, and returns its index.
-    fn node(&mut self, bounds: Bounds, part: Part) -> usize {
+    fn node(&mut self, bounds: Bounds, part: TreePart) -> usize {
         let place = self.nodes.len();
         self.nodes.push(Vec::new());
         let mut children = vec![(bounds, part)];
         while children.len() < WIDTH {
-            let inner = children.iter().enumerate().filter(|(_, (_, part))| matches!(part, Part::Halves(_)));
+            let inner =
+                children.iter().enumerate().filter(|(_, (_, part))| matches!(part, TreePart::Halves(_)));
             let largest = inner.max_by(|a, b| a.1.0.half_area().total_cmp(&b.1.0.half_area()));
             let Some(slot) = largest.map(|(slot, _)| slot) else { break };
-            if let (_, Part::Halves(halves)) = children.swap_remove(slot) {
+            if let (_, TreePart::Halves(halves)) = children.swap_remove(slot) {
                 children.extend(*halves);
             }
         }
         for (bounds, part) in children {
             let below = match part {
-                Part::Built(subtree) => {
+                TreePart::Built(subtree) => {
                     self.subtrees.push(subtree);
                     Below::Subtree(self.subtrees.len() - 1)
                 }
-                halves @ Part::Halves(_) => Below::Top(self.node(bounds, halves)),
+                halves @ TreePart::Halves(_) => Below::Top(self.node(bounds, halves)),
             };
             self.nodes[place].push((bounds, below));
         }
         place
     }
 
-    fn finish(self) -> (Vec<Node>, Vec<Pack>) {
+    fn finish(self) -> (Vec<WideNode>, Vec<Pack>) {
         let starts = self.starts();
-        let nodes_of_top: Vec<Node> =
+        let nodes_of_top: Vec<WideNode> =
             self.nodes.iter().map(|children| self.top_node(children, &starts)).collect();
         let total = starts.last().map_or(0, |end| end.node);
         let mut nodes = pages::large(total as usize);
@@ -94,8 +95,8 @@ impl Top {
     }
 
     /// Starts of all subtrees, followed by the end of the last one.
-    fn starts(&self) -> Vec<Start> {
-        let mut start = Start { node: self.nodes.len() as u32, pack: 0 };
+    fn starts(&self) -> Vec<SubtreeStart> {
+        let mut start = SubtreeStart { node: self.nodes.len() as u32, pack: 0 };
         let mut starts = vec![start];
         for subtree in &self.subtrees {
             start.node += subtree.nodes.len() as u32;
@@ -105,8 +106,8 @@ impl Top {
         starts
     }
 
-    fn top_node(&self, children: &[(Bounds, Below)], starts: &[Start]) -> Node {
-        let mut node = Node::EMPTY;
+    fn top_node(&self, children: &[(Bounds, Below)], starts: &[SubtreeStart]) -> WideNode {
+        let mut node = WideNode::EMPTY;
         for (slot, &(bounds, below)) in children.iter().enumerate() {
             let child = match below {
                 Below::Top(place) => Child::Inner(place as u32),
@@ -120,12 +121,12 @@ impl Top {
 
 /// Indices of a subtree's first node and pack.
 #[derive(Clone, Copy)]
-struct Start {
+struct SubtreeStart {
     node: u32,
     pack: u32,
 }
 
-impl Start {
+impl SubtreeStart {
     fn moved_child(&self, child: Child) -> Child {
         match child {
             Child::Inner(node) => Child::Inner(node + self.node),
@@ -133,7 +134,7 @@ impl Start {
         }
     }
 
-    fn moved(&self, node: &Node) -> Node {
+    fn moved(&self, node: &WideNode) -> WideNode {
         let mut moved = *node;
         for slot in 0..WIDTH {
             if node.bounds(slot).is_some() {

@@ -4,28 +4,28 @@
 //! The tree depends only on the triangles, not on the threads.
 
 mod join;
-mod pieces;
 pub mod split;
 mod subtree;
+mod triangle_splits;
 
 use rayon::prelude::*;
 
 use super::Quality;
-use super::node::{Node, TrianglePack};
+use super::node::{TrianglePack, WideNode};
 use crate::accel::reference::{Bounds, Reference};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::Aabb;
 use crate::math::Vec3;
 
 use split::{Segment, partition};
-use subtree::Subtree;
+use subtree::WideSubtree;
 
 /// Maximum number of triangles in a part built by a single thread. The token is polled between such parts.
 const TASK_SIZE: usize = 8192;
 
 /// Result of construction.
 pub struct Built {
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<WideNode>,
     pub packs: Vec<TrianglePack>,
     pub bounds: Aabb,
 }
@@ -45,7 +45,7 @@ pub fn build(
         return Ok(Built { nodes: Vec::new(), packs: Vec::new(), bounds: Aabb::EMPTY });
     }
     if quality == Quality::High {
-        references = pieces::in_pieces(&references, &corners, token)?;
+        references = triangle_splits::split_large(&references, &corners, token)?;
     }
     let whole = Segment::whole(&references);
     let bounds = whole.bounds.aabb();
@@ -63,11 +63,11 @@ pub fn build(
 }
 
 /// A part of the tree: an upper node or a subtree.
-enum Part {
+enum TreePart {
     /// Two halves, to be collapsed into a wide node.
-    Halves(Box<[(Bounds, Part); 2]>),
+    Halves(Box<[(Bounds, TreePart); 2]>),
     /// A subtree built by a single thread.
-    Built(Subtree),
+    Built(WideSubtree),
 }
 
 /// Splits parts in parallel until a single thread can take over. `start` is the index of the first reference
@@ -77,10 +77,10 @@ fn part(
     start: usize,
     segment: Segment,
     token: &CancelToken,
-) -> Result<Part, Cancelled> {
+) -> Result<TreePart, Cancelled> {
     token.check()?;
     let Some(split) = segment.split.as_ref().filter(|_| segment.count > TASK_SIZE) else {
-        return Ok(Part::Built(Subtree::build(references, start, segment)));
+        return Ok(TreePart::Built(WideSubtree::build(references, start, segment)));
     };
     let (left, right) = partition(references, &segment, split);
     let (left_bounds, right_bounds) = (left.bounds, right.bounds);
@@ -90,5 +90,5 @@ fn part(
         || part(left_references, start, left, token),
         || part(right_references, start + middle, right, token),
     );
-    Ok(Part::Halves(Box::new([(left_bounds, left?), (right_bounds, right?)])))
+    Ok(TreePart::Halves(Box::new([(left_bounds, left?), (right_bounds, right?)])))
 }

@@ -2,7 +2,7 @@
 
 use super::split::{Segment, partition};
 use crate::accel::reference::{Bounds, Reference};
-use crate::accel::wide_bvh::node::{Child, Node, PACK, WIDTH};
+use crate::accel::wide_bvh::node::{Child, PACK, WIDTH, WideNode};
 
 /// The references of a triangle pack.
 #[derive(Clone, Copy, Debug)]
@@ -15,14 +15,14 @@ pub struct Pack {
 
 /// Nodes and packs, with indices relative to the subtree.
 #[derive(Debug)]
-pub struct Subtree {
-    pub nodes: Vec<Node>,
+pub struct WideSubtree {
+    pub nodes: Vec<WideNode>,
     pub packs: Vec<Pack>,
     pub root: Child,
     pub bounds: Bounds,
 }
 
-impl Subtree {
+impl WideSubtree {
     /// Builds over references, the first of which has the index `start` among all.
     pub fn build(references: &mut [Reference], start: usize, segment: Segment) -> Self {
         let mut own = Self {
@@ -55,7 +55,7 @@ impl Subtree {
     /// Boulos, *Getting Rid of Packets*, 2008).
     fn node(&mut self, references: &mut [Reference], start: usize, segment: Segment) -> u32 {
         let place = self.nodes.len();
-        self.nodes.push(Node::EMPTY);
+        self.nodes.push(WideNode::EMPTY);
         let mut children: [Option<(usize, Segment)>; WIDTH] = [const { None }; WIDTH];
         children[0] = Some((0, segment));
         let mut count = 1;

@@ -9,9 +9,6 @@ pub mod binning;
 mod dispatch;
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code)]
-mod lanes;
-#[cfg(target_arch = "x86_64")]
-#[allow(unsafe_code)]
 mod packet;
 #[allow(unsafe_code)]
 pub mod pages;
@@ -27,6 +24,9 @@ mod single;
 mod stack;
 #[cfg(target_arch = "x86_64")]
 mod triangle;
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code)]
+mod vector;
 
 use std::sync::LazyLock;
 

@@ -1,7 +1,7 @@
 //! Portable traversal, the reference for all instruction sets.
 
 use super::super::WideBvh;
-use super::super::node::{Child, Node, PACK, TrianglePack, WIDTH};
+use super::super::node::{Child, PACK, TrianglePack, WIDTH, WideNode};
 use crate::geometry::aabb::{SLAB_PAD, SlabRay};
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
@@ -80,7 +80,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
 }
 
 /// Children that a ray hits, with their entry distances.
-fn met(node: &Node, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, Child)> {
+fn met(node: &WideNode, slabs: &SlabRay, t_max: f32) -> impl Iterator<Item = (f32, Child)> {
     (0..WIDTH).filter_map(move |slot| {
         let corner = |side: usize| {
             Vec3::new(node.rows[side][slot], node.rows[2 + side][slot], node.rows[4 + side][slot])

@@ -3,9 +3,9 @@
 
 use std::arch::x86_64::*;
 
-use super::lanes::{F4, F8, SimdVector};
 use super::triangle::{self, Hits};
-use crate::accel::wide_bvh::node::{Node, TrianglePack};
+use super::vector::{F4, F8, SimdVector};
+use crate::accel::wide_bvh::node::{TrianglePack, WideNode};
 use crate::geometry::aabb::{FAR_PAD, TRIANGLE_ERROR};
 use crate::geometry::{Aabb, Ray};
 
@@ -13,7 +13,7 @@ use crate::geometry::{Aabb, Ray};
 const LEAST_PART: f32 = 1.0 / (1_u64 << 40) as f32;
 
 /// A ray prepared for the boxes of nodes and the triangles of packs.
-pub struct Lines {
+pub struct SimdRay {
     /// Inverse direction.
     to_near: [F8; 3],
     /// Inverse direction, padded so that a far plane is never reached too early.
@@ -119,7 +119,7 @@ fn in_four(v: __m128) -> [F4; 3] {
     [F4(_mm_permute_ps::<0x00>(v)), F4(_mm_permute_ps::<0x55>(v)), F4(_mm_permute_ps::<0xaa>(v))]
 }
 
-impl Lines {
+impl SimdRay {
     /// Prepares a ray for triangles in `whole`.
     #[target_feature(enable = "avx2,fma")]
     #[inline]
@@ -174,7 +174,7 @@ impl Lines {
     /// Distances at which the ray enters the eight boxes, and the bits of the boxes that it hits before
     /// `end`. A NaN distance leaves the interval unchanged, as in `SlabRay::enter`.
     #[inline(always)]
-    pub fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
+    pub fn enter(&self, node: &WideNode, end: F8) -> (F8, u32) {
         let (mut near, mut far) = (end.like(0.0), end);
         for axis in 0..3 {
             // SAFETY: values of this type exist, so the processor has the instructions; both pointers are

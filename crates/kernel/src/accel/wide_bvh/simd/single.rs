@@ -2,13 +2,13 @@
 
 use std::arch::x86_64::*;
 
-use super::lanes::{F4, F8, SimdVector};
 use super::portable::nearer;
-use super::ray::{Lines, may_hit};
+use super::ray::{SimdRay, may_hit};
 use super::stack::{Stack, entry, key};
 use super::triangle::Hits;
+use super::vector::{F4, F8, SimdVector};
 use crate::accel::wide_bvh::WideBvh;
-use crate::accel::wide_bvh::node::{Child, LEAF_BITS, Node, PACK, TrianglePack};
+use crate::accel::wide_bvh::node::{Child, LEAF_BITS, PACK, TrianglePack, WideNode};
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
@@ -21,7 +21,7 @@ pub fn closest(tree: &WideBvh, ray: &Ray) -> Option<ShapeHit> {
     }
     // SAFETY: this function is compiled with these instructions.
     let like8 = unsafe { F8::splat(0.0) };
-    let lines = Lines::new(ray, &tree.bounds);
+    let lines = SimdRay::new(ray, &tree.bounds);
     let mut best: Option<ShapeHit> = None;
     let mut t_max = ray.t_max;
     let mut end = like8.like(t_max * SLAB_PAD);
@@ -94,7 +94,7 @@ fn nearer_of(pack: &TrianglePack, lane: usize, ray: &Ray, t_max: f32, best: &mut
 /// Pushes the children that the ray hits, farthest first, except the nearest, which is returned.
 #[target_feature(enable = "avx2,fma")]
 #[inline]
-fn push_ordered(tree: &WideBvh, node: &Node, near: F8, met: u32, stack: &mut Stack<u64>) -> Option<u32> {
+fn push_ordered(tree: &WideBvh, node: &WideNode, near: F8, met: u32, stack: &mut Stack<u64>) -> Option<u32> {
     if met == 0 {
         return None;
     }
@@ -150,7 +150,7 @@ pub fn any(tree: &WideBvh, ray: &Ray, except: Option<u32>) -> bool {
     }
     // SAFETY: this function is compiled with these instructions.
     let like8 = unsafe { F8::splat(0.0) };
-    let lines = Lines::new(ray, &tree.bounds);
+    let lines = SimdRay::new(ray, &tree.bounds);
     let end = like8.like(ray.t_max * SLAB_PAD);
     let mut stack: Stack<u32> = Stack::new();
     stack.push(0);

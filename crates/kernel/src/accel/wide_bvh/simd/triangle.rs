@@ -1,7 +1,7 @@
 //! SIMD watertight triangle test. Performs the operations of `ShearedRay::intersect` in the same order and
 //! without fused products, so the bits are equal.
 
-use super::lanes::SimdVector;
+use super::vector::SimdVector;
 use crate::geometry::watertight::ILL_CONDITIONED;
 use crate::math::float::gamma;
 
@@ -93,7 +93,7 @@ fn greatest<V: SimdVector>(corners: &Corners<V>, axis: usize) -> V {
 #[allow(unsafe_code)]
 mod tests {
     use super::*;
-    use crate::accel::wide_bvh::simd::lanes::F4;
+    use crate::accel::wide_bvh::simd::vector::F4;
     use crate::math::random::signed as random;
 
     /// Tests triangles at the limits of the filter in thinness and distance from the origin, and slightly

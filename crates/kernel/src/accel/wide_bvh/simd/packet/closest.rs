@@ -6,10 +6,10 @@ use super::rays::Packet;
 use super::rows::Rows;
 use crate::accel::F32x16;
 use crate::accel::wide_bvh::WideBvh;
-use crate::accel::wide_bvh::node::{Child, Node, PACK};
-use crate::accel::wide_bvh::simd::lanes::{F8, SimdVector};
+use crate::accel::wide_bvh::node::{Child, PACK, WideNode};
 use crate::accel::wide_bvh::simd::single::prefetch;
 use crate::accel::wide_bvh::simd::stack::{Stack, entry, key};
+use crate::accel::wide_bvh::simd::vector::{F8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 use crate::geometry::{Ray, ShapeHit};
 
@@ -66,7 +66,7 @@ pub fn closest<V: SimdVector>(
 #[inline(always)]
 fn push_ordered<V: SimdVector>(
     tree: &WideBvh,
-    node: &Node,
+    node: &WideNode,
     near: F8,
     met: u32,
     stack: &mut Stack<u64>,

@@ -1,8 +1,8 @@
 //! Frustum around the rays of a packet.
 
 use super::rays::Packet;
-use crate::accel::wide_bvh::node::Node;
-use crate::accel::wide_bvh::simd::lanes::{F8, SimdVector};
+use crate::accel::wide_bvh::node::WideNode;
+use crate::accel::wide_bvh::simd::vector::{F8, SimdVector};
 use crate::geometry::aabb::SLAB_PAD;
 
 /// Bounds that hold for every ray of a packet, tested against eight boxes at a time. Subtraction and
@@ -35,7 +35,7 @@ impl Frustum {
     /// A lower bound on the distance at which a ray enters each box, and the bits of the boxes that a ray may
     /// hit before `end`.
     #[inline(always)]
-    pub fn enter(&self, node: &Node, end: F8) -> (F8, u32) {
+    pub fn enter(&self, node: &WideNode, end: F8) -> (F8, u32) {
         let pad = end.like(SLAB_PAD);
         let (mut near, mut far) = (end.like(0.0), end);
         for axis in 0..3 {

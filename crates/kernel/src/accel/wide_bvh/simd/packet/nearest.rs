@@ -3,8 +3,8 @@
 use super::rays::Packet;
 use crate::accel::PACKET_SIZE as SIZE;
 use crate::accel::wide_bvh::node::TrianglePack;
-use crate::accel::wide_bvh::simd::lanes::SimdVector;
 use crate::accel::wide_bvh::simd::triangle;
+use crate::accel::wide_bvh::simd::vector::SimdVector;
 use crate::geometry::watertight::ShearedRay;
 use crate::geometry::{Ray, ShapeHit};
 

@@ -1,9 +1,9 @@
 //! The rays of a packet in registers, tested against one box or triangle at a time.
 
 use super::rows::Rows;
-use crate::accel::wide_bvh::node::{Node, TrianglePack};
-use crate::accel::wide_bvh::simd::lanes::SimdVector;
+use crate::accel::wide_bvh::node::{TrianglePack, WideNode};
 use crate::accel::wide_bvh::simd::triangle;
+use crate::accel::wide_bvh::simd::vector::SimdVector;
 use crate::geometry::Aabb;
 use crate::geometry::aabb::{SLAB_PAD, triangle_margin};
 use crate::geometry::watertight::ShearedRay;
@@ -94,7 +94,7 @@ impl<V: SimdVector> Packet<V> {
 
     /// Whether any ray hits the box in a slot before its end; SIMD version of `SlabRay::enter`.
     #[inline(always)]
-    pub fn meets(&self, node: &Node, slot: usize, end: V) -> bool {
+    pub fn meets(&self, node: &WideNode, slot: usize, end: V) -> bool {
         let pad = end.like(SLAB_PAD);
         let (mut near, mut far) = (end.like(0.0), end);
         for axis in 0..3 {

@@ -13,7 +13,7 @@ use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
 
 pub use eight::F8;
 pub use four::F4;
-pub use pair::Pair;
+pub use pair::VectorPair;
 pub use sixteen::F16;
 
 /// A SIMD vector of floats. Comparisons with NaN are false; `min` and `max` return their argument if either

@@ -6,9 +6,9 @@ use super::SimdVector;
 
 /// Two vectors used as one of twice the width.
 #[derive(Clone, Copy)]
-pub struct Pair<V>(V, V);
+pub struct VectorPair<V>(V, V);
 
-impl<V: SimdVector> Add for Pair<V> {
+impl<V: SimdVector> Add for VectorPair<V> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -16,7 +16,7 @@ impl<V: SimdVector> Add for Pair<V> {
     }
 }
 
-impl<V: SimdVector> Sub for Pair<V> {
+impl<V: SimdVector> Sub for VectorPair<V> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -24,7 +24,7 @@ impl<V: SimdVector> Sub for Pair<V> {
     }
 }
 
-impl<V: SimdVector> Mul for Pair<V> {
+impl<V: SimdVector> Mul for VectorPair<V> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -32,7 +32,7 @@ impl<V: SimdVector> Mul for Pair<V> {
     }
 }
 
-impl<M: BitAnd<Output = M>> BitAnd for Pair<M> {
+impl<M: BitAnd<Output = M>> BitAnd for VectorPair<M> {
     type Output = Self;
     #[inline(always)]
     fn bitand(self, other: Self) -> Self {
@@ -40,7 +40,7 @@ impl<M: BitAnd<Output = M>> BitAnd for Pair<M> {
     }
 }
 
-impl<M: BitOr<Output = M>> BitOr for Pair<M> {
+impl<M: BitOr<Output = M>> BitOr for VectorPair<M> {
     type Output = Self;
     #[inline(always)]
     fn bitor(self, other: Self) -> Self {
@@ -48,9 +48,9 @@ impl<M: BitOr<Output = M>> BitOr for Pair<M> {
     }
 }
 
-impl<V: SimdVector> SimdVector for Pair<V> {
+impl<V: SimdVector> SimdVector for VectorPair<V> {
     const COUNT: usize = 2 * V::COUNT;
-    type Mask = Pair<V::Mask>;
+    type Mask = VectorPair<V::Mask>;
 
     #[inline(always)]
     unsafe fn splat(x: f32) -> Self {
@@ -98,17 +98,17 @@ impl<V: SimdVector> SimdVector for Pair<V> {
 
     #[inline(always)]
     fn lt(self, other: Self) -> Self::Mask {
-        Pair(self.0.lt(other.0), self.1.lt(other.1))
+        VectorPair(self.0.lt(other.0), self.1.lt(other.1))
     }
 
     #[inline(always)]
     fn le(self, other: Self) -> Self::Mask {
-        Pair(self.0.le(other.0), self.1.le(other.1))
+        VectorPair(self.0.le(other.0), self.1.le(other.1))
     }
 
     #[inline(always)]
     fn eq(self, other: Self) -> Self::Mask {
-        Pair(self.0.eq(other.0), self.1.eq(other.1))
+        VectorPair(self.0.eq(other.0), self.1.eq(other.1))
     }
 
     #[inline(always)]
@@ -118,7 +118,7 @@ impl<V: SimdVector> SimdVector for Pair<V> {
 
     #[inline(always)]
     fn without(mask: Self::Mask, but: Self::Mask) -> Self::Mask {
-        Pair(V::without(mask.0, but.0), V::without(mask.1, but.1))
+        VectorPair(V::without(mask.0, but.0), V::without(mask.1, but.1))
     }
 
     #[inline(always)]
@@ -128,7 +128,7 @@ impl<V: SimdVector> SimdVector for Pair<V> {
 
     #[inline(always)]
     fn mask(bits: u32, like: Self) -> Self::Mask {
-        Pair(V::mask(bits, like.0), V::mask(bits >> V::COUNT, like.1))
+        VectorPair(V::mask(bits, like.0), V::mask(bits >> V::COUNT, like.1))
     }
 
     #[inline(always)]

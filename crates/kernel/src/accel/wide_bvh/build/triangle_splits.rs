@@ -22,7 +22,7 @@ const CHUNK: usize = 4096;
 ///
 /// # Errors
 /// [`Cancelled`] if the build was canceled.
-pub fn in_pieces(
+pub fn split_large(
     references: &[Reference],
     corners: &(impl Fn(u32) -> [Vec3; 3] + Sync),
     token: &CancelToken,
@@ -73,7 +73,7 @@ struct Grid {
 }
 
 /// A plane of the grid.
-struct Plane {
+struct GridPlane {
     axis: usize,
     at: f32,
     /// Level of the plane: 0 halves a cell of the finest grid, higher levels halve larger cells.
@@ -87,7 +87,7 @@ impl Grid {
     }
 
     /// The coarsest plane that intersects a box, or `None`.
-    fn plane(&self, bounds: &Bounds) -> Option<Plane> {
+    fn plane(&self, bounds: &Bounds) -> Option<GridPlane> {
         let cells = (1_u32 << LEVELS) as f32;
         let on_axis = |axis: usize| {
             let place = |x: f32| (x - self.start[axis]) / self.extent[axis] * cells;
@@ -96,9 +96,9 @@ impl Grid {
             let last = (place(bounds.max()[axis]).ceil() as u32).saturating_sub(1).max(first);
             let level = (first ^ last).checked_ilog2()?;
             let at = self.start[axis] + self.extent[axis] * ((last >> level << level) as f32 / cells);
-            (bounds.min[axis] < at && at < bounds.max()[axis]).then_some(Plane { axis, at, level })
+            (bounds.min[axis] < at && at < bounds.max()[axis]).then_some(GridPlane { axis, at, level })
         };
-        let length = |plane: &Plane| bounds.extent()[plane.axis];
+        let length = |plane: &GridPlane| bounds.extent()[plane.axis];
         (0..3).filter_map(on_axis).max_by(|a, b| a.level.cmp(&b.level).then(length(a).total_cmp(&length(b))))
     }
 
@@ -115,7 +115,7 @@ impl Grid {
     /// Cuts a triangle `cuts` times, longer parts more often.
     fn cut(&self, reference: Reference, cuts: u32, corners: [Vec3; 3], pieces: &mut Vec<Reference>) {
         let plane = if cuts == 0 { None } else { self.plane(&reference.bounds) };
-        let Some(Plane { axis, at, .. }) = plane else { return pieces.push(reference) };
+        let Some(GridPlane { axis, at, .. }) = plane else { return pieces.push(reference) };
         let halves = reference.split(axis, at, corners);
         let [left, right] = halves.map(|half| half.bounds.extent().truncate().max_element());
         let of_left = ((cuts - 1) as f32 * (left / (left + right)) + 0.5) as u32;
@@ -129,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_triangles_are_split_but_flat_ones_are_not() {
+    fn long_triangles_are_split() {
         let mesh: Vec<[Vec3; 3]> = (0..100)
             .map(|i| {
                 let at = Vec3::new((i % 10) as f32, (i / 10) as f32, 0.0);
@@ -143,7 +143,7 @@ mod tests {
         let references: Vec<_> =
             mesh.iter().zip(0..).map(|(&corners, id)| Reference::new(id, corners)).collect();
         let pieces =
-            in_pieces(&references, &|id| mesh[id as usize], &CancelToken::new()).expect("nobody cancels");
+            split_large(&references, &|id| mesh[id as usize], &CancelToken::new()).expect("nobody cancels");
         let of = |id: u32| pieces.iter().filter(move |piece| piece.id() == id);
         assert!(of(7).count() > 10 && pieces.len() <= 130, "{} of {}", of(7).count(), pieces.len());
         assert!((0..100).all(|id| id == 7 || of(id).count() == 1));

@@ -4,7 +4,7 @@ use crate::geometry::{Aabb, Ray};
 
 /// A tree node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cell {
+pub struct TreeNode {
     /// Bounding box.
     pub bounds: Aabb,
     /// Number of ancestors.
@@ -15,14 +15,14 @@ pub struct Cell {
 
 /// Interval of a ray inside a box.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stretch {
+pub struct RayInterval {
     /// Distance at which the ray enters and the axis of that face; negative if the ray starts inside.
     pub enter: (f32, usize),
     /// Distance at which the ray leaves and the axis of that face.
     pub leave: (f32, usize),
 }
 
-impl Stretch {
+impl RayInterval {
     /// Intersects a ray with a box. `None` if it misses the box between its ends. Uses the plain slab test:
     /// rays that only touch the box may hit or miss.
     #[inline]
