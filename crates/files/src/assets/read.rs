@@ -37,7 +37,7 @@ pub(crate) fn hash(bytes: &[u8]) -> FileHash {
 pub(crate) fn open(path: &Path, limit: u64) -> Result<(File, u64), AssetError> {
     let unreadable = |error: std::io::Error| AssetError::unreadable(path, describe_error(&error));
     let refused =
-        |kind: Kind| AssetError::unreadable(path, format!("it is {}, not a regular file", kind.words()));
+        |kind: FileKind| AssetError::unreadable(path, format!("it is {}, not a regular file", kind.words()));
     let (mut file, found) = file::open(path).map_err(unreadable)?.map_err(refused)?;
     if found.len() > limit {
         let reason = format!("it has {} bytes, more than the {} MiB that are read", found.len(), limit >> 20);

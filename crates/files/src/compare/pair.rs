@@ -106,7 +106,8 @@ impl Pair {
 }
 
 fn read(path: &Path) -> Result<RadianceImage, AssetError> {
-    let image = load(path, ImageEncoding::Raw, ImageLimits::default(), &ignore_progress, &CancelToken::new())?;
+    let image =
+        load(path, ImageEncoding::Raw, ImageLimits::default(), &ignore_progress, &CancelToken::new())?;
     let texels = image.texels;
     let (width, height) = (texels.width, texels.height);
     Ok(RadianceImage { width, height, pixels: texels.into_linear() })

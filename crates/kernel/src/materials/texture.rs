@@ -402,8 +402,8 @@ impl Texture {
     /// Bilinear look-ups of weighted texels, side by side.
     #[cold]
     #[inline(never)]
-    fn weighted_row(&self, folded: &[Lanes; 2], colors: &mut Lanes3) {
-        for i in 0..LANES {
+    fn weighted_row(&self, folded: &[F32x16; 2], colors: &mut Vec3x16) {
+        for i in 0..PACKET_SIZE {
             let color = self.bilinear(&self.texels, [folded[0][i], folded[1][i]]);
             set_lane(colors, i, color);
         }
@@ -768,9 +768,9 @@ mod tests {
                 assert!((texture.mean() - Vec3::Y).length() < 1e-6);
             }
             let texture = Texture { mipmaps: None, ..row(2, data, TextureFilter::Bilinear) };
-            let uv = [std::array::from_fn(|i| i as f64 / 15.0), [0.5; LANES]];
+            let uv = [std::array::from_fn(|i| i as f64 / 15.0), [0.5; PACKET_SIZE]];
             let lanes = texture.lookup_row(&uv);
-            for i in 0..LANES {
+            for i in 0..PACKET_SIZE {
                 let alone = texture.lookup(&TexturePoint::sharp(DVec2::new(uv[0][i], 0.5)));
                 assert_eq!(lane(&lanes, i), alone, "{i}");
             }

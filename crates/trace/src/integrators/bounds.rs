@@ -6,7 +6,7 @@ use crate::control::Cancelled;
 use crate::geometry::{Aabb, Ray};
 use crate::math::Vec3;
 use crate::math::elementary::exp2;
-use crate::world::{TreeNode, RayInterval};
+use crate::world::{RayInterval, TreeNode};
 
 /// Line width in pixels.
 const LINE_WIDTH: f32 = 1.25;

@@ -1,7 +1,7 @@
 //! The trees of a scene along a ray.
 
 use super::{Geometry, Object};
-use crate::accel::{TreeNode, RayInterval};
+use crate::accel::{RayInterval, TreeNode};
 use crate::geometry::Ray;
 
 impl Geometry {

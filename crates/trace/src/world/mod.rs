@@ -31,7 +31,7 @@ mod triangle_tree;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-pub use crate::accel::{TreeNode, PACKET_SIZE, SimdKernel, RayInterval};
+pub use crate::accel::{PACKET_SIZE, RayInterval, SimdKernel, TreeNode};
 pub use bodies::{Bodies, OpenGlass};
 pub use camera::Camera;
 pub use contact::{Meeting, Near, NearMemory, Sides};

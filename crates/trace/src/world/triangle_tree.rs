@@ -1,7 +1,7 @@
 //! Trees of either kind over triangles; both give the same hits, bit for bit.
 
 use crate::accel::wide_bvh::Quality;
-use crate::accel::{TreeNode, F32x16, KdTree, RayInterval, WideBvh};
+use crate::accel::{F32x16, KdTree, RayInterval, TreeNode, WideBvh};
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::{Aabb, Ray, ShapeHit};
 use crate::math::Vec3;

@@ -255,7 +255,11 @@ pub fn size_within(
     limits: ImageLimits,
     token: &CancelToken,
 ) -> Result<(u32, u32, u64), AssetError> {
-    size_of_source(Source::within(image, limits, token)?, encoding, Watch { progress: &ignore_progress, token })
+    size_of_source(
+        Source::within(image, limits, token)?,
+        encoding,
+        Watch { progress: &ignore_progress, token },
+    )
 }
 
 /// The mip levels of an image.
@@ -403,7 +407,8 @@ impl Source {
         }
         let mut bytes = BufReader::new(Counting::new(self.file, self.length, report));
         let is_hdr = bytes.fill_buf().map_err(|error| describe_error(&error))?.starts_with(hdr::MAGIC);
-        let mut reader = ImageReader::new(bytes).with_guessed_format().map_err(|error| describe_error(&error))?;
+        let mut reader =
+            ImageReader::new(bytes).with_guessed_format().map_err(|error| describe_error(&error))?;
         if is_hdr {
             reader.set_format(ImageFormat::Hdr);
         }

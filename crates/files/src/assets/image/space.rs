@@ -2,7 +2,7 @@
 
 use super::primaries::is_identity;
 use crate::math::color::srgb_to_linear;
-use crate::math::elementary::power_f64;
+use crate::math::elementary::pow_f64;
 use crate::math::{DMat3, DVec3};
 
 /// A curve from samples in [0, 1] to linear light.
@@ -70,7 +70,7 @@ fn power(x: f64, exponent: f64) -> f64 {
     match x {
         _ if x < f64::MIN_POSITIVE => 0.0,
         _ if exponent == 1.0 => x,
-        _ => power_f64(x, exponent),
+        _ => pow_f64(x, exponent),
     }
 }
 

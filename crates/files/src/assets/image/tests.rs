@@ -33,7 +33,7 @@ fn warned(name: &str, bytes: &[u8], encoding: ImageEncoding) -> Vec<String> {
     let path = folder.path().join(name);
     fs::write(&path, bytes).expect("written");
     let loaded =
-        load(&path, encoding, ImageLimits::default(), &unwatched, &CancelToken::new()).expect("read");
+        load(&path, encoding, ImageLimits::default(), &ignore_progress, &CancelToken::new()).expect("read");
     let folder = format!("{}/", folder.path().display());
     loaded.warnings.iter().map(|warning| warning.replace(&folder, "")).collect()
 }
@@ -251,8 +251,8 @@ fn the_memory_limit_holds() {
     let path = folder.path().join("a.png");
     fs::write(&path, small_png()).expect("written");
     let limits = ImageLimits { side: 16384, memory_bytes: 23 };
-    let error = load(&path, ImageEncoding::Color, limits, &ignore_progress, &CancelToken::new())
-        .expect_err("24 bytes");
+    let error =
+        load(&path, ImageEncoding::Color, limits, &ignore_progress, &CancelToken::new()).expect_err("24 bytes");
     assert!(error.to_string().contains("a.png: "), "{error}");
 }
 

@@ -73,7 +73,7 @@ impl MtlMaterial {
 /// # Errors
 /// The errors of reading, and [`AssetError::Malformed`] with the line.
 pub(super) fn load(path: &Path, watch: Watch<'_>) -> Result<Library, AssetError> {
-    let quiet = Watch { progress: &crate::control::unwatched, ..watch };
+    let quiet = Watch { progress: &crate::control::ignore_progress, ..watch };
     let bytes = read::text(path, FILE_LIMIT, quiet)?;
     let hash = read::hash(&bytes);
     let bytes = with_line_feeds(without_mark(&bytes));

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::assets::{FileMaterial, FileTexture, PhysicalMaterial};
-use crate::control::{CancelToken, unwatched};
+use crate::control::{CancelToken, ignore_progress};
 use crate::materials::{Channel, PixelNumber};
 use crate::math::{DVec2, Vec2, Vec3};
 
@@ -17,7 +17,7 @@ fn warned(text: &[u8]) -> Vec<String> {
     std::fs::write(&path, text).expect("written");
     let token = CancelToken::new();
     let Library { materials, ignored, .. } =
-        load(&path, Watch { progress: &unwatched, token: &token }).expect("whole");
+        load(&path, Watch { progress: &ignore_progress, token: &token }).expect("whole");
     warnings(Path::new("a.mtl"), ignored, materials.iter())
 }
 
@@ -26,7 +26,7 @@ fn read(text: &str) -> Result<Vec<FileMaterial>, AssetError> {
     let path = folder.path().join("a.mtl");
     std::fs::write(&path, text).expect("written");
     let token = CancelToken::new();
-    let found = load(&path, Watch { progress: &unwatched, token: &token })?.materials;
+    let found = load(&path, Watch { progress: &ignore_progress, token: &token })?.materials;
     Ok(found.iter().map(|found| material(found, Path::new("models"))).collect())
 }
 
@@ -159,7 +159,7 @@ fn the_pictures_of_all_maps_are_known() {
     let statements = maps.map(|map| format!("{map} {map}.png\n")).concat();
     std::fs::write(&path, format!("newmtl a\n{statements}refl -type sphere map_Kd.png\n")).expect("written");
     let token = CancelToken::new();
-    let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole").materials;
+    let found = load(&path, Watch { progress: &ignore_progress, token: &token }).expect("whole").materials;
     let mut expected = maps.map(|map| PathBuf::from(format!("models/{map}.png")));
     expected.sort();
     let mut pictures: Vec<_> = found[0].pictures(Path::new("models")).collect();
@@ -188,7 +188,7 @@ fn a_comment_may_follow_a_file() {
     let path = folder.path().join("a.mtl");
     std::fs::write(&path, text).expect("written");
     let token = CancelToken::new();
-    let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole").materials;
+    let found = load(&path, Watch { progress: &ignore_progress, token: &token }).expect("whole").materials;
     let found = material(&found[0], folder.path());
     assert_eq!(found.diffuse_texture, file("wall.png"));
     assert_eq!(found.specular_texture, file("Map #1.png"));
@@ -353,7 +353,7 @@ fn latin_1_names_are_found_by_their_bytes() {
     let path = folder.path().join("a.mtl");
     std::fs::write(&path, mtl).expect("written");
     let token = CancelToken::new();
-    let found = load(&path, Watch { progress: &unwatched, token: &token }).expect("whole").materials;
+    let found = load(&path, Watch { progress: &ignore_progress, token: &token }).expect("whole").materials;
     let [a, b] = [0, 1].map(|index| material(&found[index], folder.path()));
     assert_eq!(a.name, "gr\u{fc}n");
     assert_eq!(super::tests::path(&a.diffuse_texture), Some(latin1(b"caf\xe9.png").as_path()));
