@@ -74,7 +74,7 @@
 //!
 //! 1. `mod.rs`: takes the tile's samples and the settings that count; `behavior.rs` derives what paths do; `transport/tile.rs` stores all.
 //! 2. `transport/camera.rs` makes rows of sixteen rays; `camera_paths.rs` follows them bounce by bounce.
-//! 3. `transport/packet.rs` intersects a row: `world/geometry.rs`, then the trees of `accel/wide_bvh/`, or `geometry/facets.rs` for few
+//! 3. `transport/packet.rs` intersects a row: `world/geometry.rs`, then the trees of `accel/wide_bvh/`, or `geometry/triangle_list.rs` for few
 //!    triangles.
 //! 4. `transport/packet.rs` puts surfaces of simple materials into rows of sixteen vertices, `transport/batch.rs`; all BSDFs of a row are of
 //!    one kind, `materials/rough/mod.rs`.

@@ -86,8 +86,9 @@ fn options() -> BenchOptions {
             "--embree" => options.embree = arguments.next().map(PathBuf::from),
             "--instructions" => {
                 let name = arguments.next().unwrap_or_default();
-                options.instructions =
-                    InstructionSet::ALL.into_iter().find(|own| format!("{own:?}").eq_ignore_ascii_case(&name));
+                options.instructions = InstructionSet::ALL
+                    .into_iter()
+                    .find(|own| format!("{own:?}").eq_ignore_ascii_case(&name));
             }
             "--high" => options.high = true,
             "--build" => options.build_only = true,

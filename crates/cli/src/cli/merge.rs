@@ -231,7 +231,7 @@ impl Merge<'_> {
                 let merged = self.merged(parts, true, "show")?;
                 self.pool.install(|| {
                     let image = finish.image(&merged.film);
-                    let picture = develop(&image, &finish.tone.of_picture(&image));
+                    let picture = develop(&image, &finish.tone.resolved_for(&image));
                     printed(&[Named { name: words.to_string(), picture }], self.args.color, true)
                 })
             }

@@ -325,12 +325,12 @@ fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
             ToneMapping { exposure_stops: exposure, curve, ..Default::default() }
         }
         AovSource::FirstHit(FirstHit::Depth) => {
-            ToneMapping { stretch: Stretch::Unknown(Kind::Distances), ..ToneMapping::DATA }
+            ToneMapping { range_map: RangeMap::Unresolved(DataKind::Distances), ..ToneMapping::DATA }
         }
         AovSource::Light(LightAov::TraversalCost)
         | AovSource::FirstHit(FirstHit::Photons)
         | AovSource::Film(Quantity::Samples | Quantity::Error) => {
-            ToneMapping { stretch: Stretch::Unknown(Kind::Amounts), ..ToneMapping::DATA }
+            ToneMapping { range_map: RangeMap::Unresolved(DataKind::Amounts), ..ToneMapping::DATA }
         }
         AovSource::FirstHit(FirstHit::Normal | FirstHit::Barycentric | FirstHit::Uv | FirstHit::Albedo) => {
             ToneMapping::DATA

@@ -51,7 +51,7 @@ fn photons(maps: &PhotonMaps, tile: &TileContext<'_>, slot: u32, vertex: &Vertex
     let look = GatherPoint { point: vertex.surface.point, normal: vertex.normal, most_depth: u32::MAX };
     let (_, _, sample) = tile.block.sample_of(slot);
     let pass = maps.pass(sample);
-    [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PlainFolds) as f32).iter().sum()
+    [&pass.caustic, &pass.bounced].map(|map| map.count_near(&look, PortableSimd) as f32).iter().sum()
 }
 
 /// Depth along the view axis.

@@ -59,7 +59,7 @@ pub fn draw(
 /// over smaller ones.
 fn nearest_edge(tile: &TileContext<'_>, ray: &Ray, end: f32, spread: f32) -> Option<BoxEdge> {
     let mut best: Option<BoxEdge> = None;
-    tile.world.geometry.along(ray, |local, Cell { bounds, depth, .. }, stretch| {
+    tile.world.geometry.along(ray, |local, TreeNode { bounds, depth, .. }, stretch| {
         let unit = local.direction.length();
         let pixel = |t: f32| t * spread * unit;
         let RayInterval { enter, leave } = *stretch;
@@ -100,7 +100,7 @@ mod tests {
         let cube = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
         let distance = |origin: Vec3, direction: Vec3| {
             let ray = Ray::new(origin, direction);
-            let stretch = Stretch::new(&cube, &ray).expect("the ray hits the cube");
+            let stretch = RayInterval::new(&cube, &ray).expect("the ray hits the cube");
             edge_distance(&cube, &ray, stretch.enter)
         };
         assert!((distance(Vec3::new(0.2, 0.7, -3.0), Vec3::Z) - 0.2).abs() < 1e-6);

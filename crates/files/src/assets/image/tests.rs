@@ -251,8 +251,8 @@ fn the_memory_limit_holds() {
     let path = folder.path().join("a.png");
     fs::write(&path, small_png()).expect("written");
     let limits = ImageLimits { side: 16384, memory_bytes: 23 };
-    let error =
-        load(&path, ImageEncoding::Color, limits, &ignore_progress, &CancelToken::new()).expect_err("24 bytes");
+    let error = load(&path, ImageEncoding::Color, limits, &ignore_progress, &CancelToken::new())
+        .expect_err("24 bytes");
     assert!(error.to_string().contains("a.png: "), "{error}");
 }
 

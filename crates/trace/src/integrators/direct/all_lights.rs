@@ -322,12 +322,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// The unoccluded contribution of each sample, the mask of nonzero ones, and the response of its vertex.
     #[inline(always)]
-    pub fn contributions(
-        &self,
-        samples: &LightRow,
-        share: f32,
-        simd: impl Simd,
-    ) -> (Vec3x16, u32, Response) {
+    pub fn contributions(&self, samples: &LightRow, share: f32, simd: impl Simd) -> (Vec3x16, u32, Response) {
         let response = self.row.response(&samples.directions, simd);
         let Response { bsdf: BsdfValues { f, .. }, cosines } = &response;
         let mut arriving = samples.weights;
@@ -373,7 +368,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 pub fn add_traversal_cost(
     tile: &TileContext<'_>,
     rays: &RayPacket,
-    ends: &Ends,
+    ends: &F32x16,
     traced: u32,
     sums: &mut Vec3x16,
 ) {

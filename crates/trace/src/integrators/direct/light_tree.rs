@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::all_lights::{LightSums, SampleAllLights, add_where};
 use super::shadow_rays::ShadowRayQueue;
-use crate::geometry::rows::lanes;
+use crate::geometry::packet::lanes;
 use crate::integrators::view::LightAov;
 use crate::lights::{LightRow, LightTree, Lobe, Middle, Picks, Receiver, ReceiverRow, Selection};
 use crate::materials::bsdf::NarrowLobe;
@@ -76,7 +76,8 @@ struct PickSink<'a> {
 }
 
 impl LightPicks {
-    const EMPTY: Self = Self { lights: [0; PACKET_SIZE], shares: [0.0; PACKET_SIZE], weighed: [0.0; PACKET_SIZE] };
+    const EMPTY: Self =
+        Self { lights: [0; PACKET_SIZE], shares: [0.0; PACKET_SIZE], weighed: [0.0; PACKET_SIZE] };
 
     /// Replaces probabilities with the reciprocals of expected sample counts, or 0 for a probability of 0.
     #[inline(always)]
@@ -183,7 +184,13 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
 
     /// Picks from a tree of any size, one vertex at a time.
     #[inline(always)]
-    fn pick_by_cuts(&self, tree: &LightTree, way: Picks, numbers: &[[f64; PACKET_SIZE]], picks: &mut [LightPicks]) {
+    fn pick_by_cuts(
+        &self,
+        tree: &LightTree,
+        way: Picks,
+        numbers: &[[f64; PACKET_SIZE]],
+        picks: &mut [LightPicks],
+    ) {
         let (row, group) = (self.row, way.count as usize);
         let (mut cut, mut without) = (way.cut(tree), MIS.then(|| way.cut(tree)));
         for i in lanes(self.used) {
@@ -225,7 +232,7 @@ impl<const MIS: bool> SampleAllLights<'_, MIS> {
     fn sample_pick(
         &self,
         pick: &LightPicks,
-        sampler: &SamplerRow<PACKET_SIZE>,
+        sampler: &SamplerPacket<PACKET_SIZE>,
         (number, count): (u32, u32),
         sink: &mut PickSink<'_>,
         simd: impl Simd,

@@ -2,7 +2,7 @@
 
 use super::all_lights::{ReflectedLight, add_traversal_cost};
 use super::unshadowed::UnshadowedLobeRay;
-use crate::geometry::rows::{RayPacket, lanes};
+use crate::geometry::packet::{RayPacket, lanes};
 use crate::integrators::transport::batch::{Response, VertexBatch};
 use crate::integrators::transport::interiors::{InteriorLists, absorption};
 use crate::integrators::transport::tile::TileContext;

@@ -2,7 +2,7 @@
 //! whereas the rays of one packet diverge.
 
 use super::all_lights::{LightSums, add_where, transmitted};
-use crate::geometry::rows::{Ends, RayPacket, lanes};
+use crate::geometry::packet::{F32x16, RayPacket, lanes};
 use crate::integrators::transport::tile::TileContext;
 use crate::integrators::view::LightAov;
 use crate::lights::{Source, SourceRow};
@@ -14,7 +14,7 @@ struct QueuedShadowRays {
     /// Index of the packet of vertices.
     row: u32,
     rays: RayPacket,
-    ends: Ends,
+    ends: F32x16,
     /// Mask of rays to trace.
     traced: u32,
     sources: SourceRow,
@@ -159,7 +159,7 @@ impl SimdKernel for TraceShadowRays<'_> {
 fn attenuate(
     world: &World,
     aov: LightAov,
-    (packet, ends, traced): (&RayPacket, &Ends, u32),
+    (packet, ends, traced): (&RayPacket, &F32x16, u32),
     sources: &SourceRow,
     (rows, rays): (&mut [QueuedShadowRays], &[u32]),
 ) -> u32 {

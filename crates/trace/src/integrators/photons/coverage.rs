@@ -6,8 +6,8 @@ use arrayvec::ArrayVec;
 
 use super::kernel::weight_over;
 use super::map::{GatherPoint, MIN_COSINE, REACH};
-use crate::geometry::local_form::{Extent, Ground, Piece};
-use crate::geometry::{Aabb, LocalForm, Shape, ShapeHit};
+use crate::geometry::kernel_domain::{Extent, FlatPolygon, Ground};
+use crate::geometry::{Aabb, KernelDomain, Shape, ShapeHit};
 use crate::materials::{Material, Rough};
 use crate::math::frame::Frame;
 use crate::math::{DVec2, DVec3};
@@ -103,7 +103,7 @@ struct KernelNeighborhood {
     /// Tangents, divided by the radius.
     tangents: [DVec3; 2],
     /// Pieces of the kernel's plane that receive photons.
-    pieces: ArrayVec<Piece, PIECES>,
+    pieces: ArrayVec<FlatPolygon, PIECES>,
     /// Number of surfaces that contain the whole kernel.
     whole: u32,
     walls: ArrayVec<Wall, WALLS>,
@@ -131,7 +131,7 @@ impl KernelNeighborhood {
     }
 
     /// The corners of a piece relative to the center, projected onto the plane, in radii.
-    fn project_piece(&self, piece: &Piece) -> ArrayVec<DVec2, 4> {
+    fn project_piece(&self, piece: &FlatPolygon) -> ArrayVec<DVec2, 4> {
         piece.iter().map(|&corner| self.project(corner - self.point)).collect()
     }
 
@@ -204,7 +204,7 @@ impl KernelNeighborhood {
     }
 
     /// Adds a flat piece; returns whether the coverage still has a closed form.
-    fn add_piece(&mut self, piece: &Piece, receives: impl Fn() -> bool) -> bool {
+    fn add_piece(&mut self, piece: &FlatPolygon, receives: impl Fn() -> bool) -> bool {
         let normal = (piece[1] - piece[0]).cross(piece[2] - piece[0]);
         let from = piece[0] - self.point;
         let (size, distance, cosine) = (normal.length_squared(), normal.dot(from), normal.dot(self.normal));

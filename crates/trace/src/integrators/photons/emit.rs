@@ -529,7 +529,7 @@ impl SimdKernel for EmissionNumbers<'_> {
     fn run(self, _: impl Simd) -> Self::Output {
         let slots = std::array::from_fn(|i| self.first + i as u32);
         let (xs, ys, samples) = self.tile.block.samples_of(&slots);
-        let sampler = SamplerRow::new(self.tile.settings.render.seed, &xs, &ys, &samples);
+        let sampler = SamplerPacket::new(self.tile.settings.render.seed, &xs, &ys, &samples);
         let pairs = |decision| sampler.pairs(&[CAMERA_PATH; PACKET_SIZE], decision, 0, 1);
         let (light, aim) = (pairs(Dimension::PhotonLight), pairs(Dimension::PhotonTarget));
         let (position, direction) = (pairs(Dimension::PhotonPosition), pairs(Dimension::PhotonDirection));
@@ -558,8 +558,8 @@ impl SimdKernel for RouletteNumbers<'_> {
             (slots[i], paths[i]) = (ray.slot, ray.path);
         }
         let (xs, ys, samples) = self.tile.block.samples_of(&slots);
-        let sampler = SamplerRow::new(self.tile.settings.render.seed, &xs, &ys, &samples);
-        let [risks, _] = sampler.pairs(&paths, Decision::Roulette, 0, 1);
+        let sampler = SamplerPacket::new(self.tile.settings.render.seed, &xs, &ys, &samples);
+        let [risks, _] = sampler.pairs(&paths, Dimension::Roulette, 0, 1);
         risks
     }
 }

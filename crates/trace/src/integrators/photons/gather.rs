@@ -6,7 +6,7 @@ use super::map::{GatherPoint, PhotonMap};
 use super::occlusion::is_occluded;
 use super::reservoir::PhotonPosition;
 use super::trials::inverse_coverage;
-use crate::geometry::rows::lanes;
+use crate::geometry::packet::lanes;
 use crate::integrators::PACKET_SIZE;
 use crate::integrators::transport::batch::VertexBatch;
 use crate::integrators::transport::tile::TileContext;
@@ -105,7 +105,7 @@ fn coverage_factor(
         }
         by_trials @ (KernelCoverage::Clipped | KernelCoverage::Crowded) => {
             let sampler = tile.sampler(row.slot[i]);
-            let pair = |number| sampler.pair(row.path[i], Decision::Trial(number));
+            let pair = |number| sampler.pair(row.path[i], Dimension::Trial(number));
             inverse_coverage(tile.world, look, radius, by_trials, pair)
         }
     }

@@ -329,7 +329,8 @@ fn radius_for_count(
         let map = PhotonMap::new(&some, radius, token)?;
         // Do not count the photon itself.
         let count = |&Photon { point, normal, .. }: &Photon| {
-            map.count_near(&GatherPoint { point, normal, most_depth: u32::MAX }, PlainFolds).saturating_sub(1)
+            map.count_near(&GatherPoint { point, normal, most_depth: u32::MAX }, PortableSimd)
+                .saturating_sub(1)
         };
         let mut counts: Vec<u32> = some.iter().step_by(some.len().div_ceil(LOOKS)).map(count).collect();
         counts.sort_unstable();

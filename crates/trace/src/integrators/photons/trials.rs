@@ -78,7 +78,7 @@ fn receives_photons(world: &World, look: &GatherPoint, place: Vec3, radius: f32)
         // Find the next surface below that may receive photons.
         let Some(hit) = world.geometry.closest_of(&ray, may_receive) else { return false };
         let bare = SurfaceRequest { uv: false, shadow_point: false };
-        let surface = world.geometry.asked_surface(&ray, &hit, bare);
+        let surface = world.geometry.requested_surface(&ray, &hit, bare);
         // Succeed if it does receive them, has about the same normal, and is not occluded.
         let cosine = surface.normal.dot(look.normal);
         let normal = if cosine < 0.0 { -surface.normal } else { surface.normal };

@@ -3,7 +3,7 @@
 use super::tile::TileContext;
 use super::vertex::{Lift, ShadingVertex};
 use crate::geometry::Ray;
-use crate::geometry::rows::lanes;
+use crate::geometry::packet::lanes;
 use crate::integrators::view::{Components, LightAov};
 use crate::materials::bsdf::{BsdfValues, Place};
 use crate::materials::{BsdfRow, RoughKind};
@@ -108,7 +108,7 @@ impl VertexBatch {
             is_run &= slots[i] == slots[0] + i as u32;
         }
         let (xs, ys, samples) = if is_run { block.samples_from(slots[0]) } else { block.samples_of(slots) };
-        SamplerRow::new(tile.settings.render.seed, &xs, &ys, &samples)
+        SamplerPacket::new(tile.settings.render.seed, &xs, &ys, &samples)
     }
 
     /// A packet without vertices.
@@ -369,7 +369,7 @@ impl VertexBatch {
                 hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
             }
         }
-        simd.bits(&hidden) & self.has_horizon
+        simd.movemask(&hidden) & self.has_horizon
     }
 }
 

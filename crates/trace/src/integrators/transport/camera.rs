@@ -87,9 +87,9 @@ impl TileContext<'_> {
         let paths = [CAMERA_PATH; PACKET_SIZE];
         let (settings, camera) = (self.settings, &self.world.camera);
         let (xs, ys, samples) = self.block.samples_from(first);
-        let sampler = SamplerRow::new(settings.render.seed, &xs, &ys, &samples);
+        let sampler = SamplerPacket::new(settings.render.seed, &xs, &ys, &samples);
         // Sample positions in the pixels.
-        let mut in_pixel = sampler.pairs(&paths, Decision::Pixel, 0, 1);
+        let mut in_pixel = sampler.pairs(&paths, Dimension::Pixel, 0, 1);
         let mut negative = 0;
         settings.render.filter.sample_row(&mut in_pixel, |lane, sample: FilterSample| {
             negative |= u32::from(sample.is_negative) << lane;
@@ -104,7 +104,7 @@ impl TileContext<'_> {
         // Generate rays through them, from points on the lens if it has an aperture.
         let (mut origin, mut direction) = ([[0.0; PACKET_SIZE]; 3], [[0.0; PACKET_SIZE]; 3]);
         if settings.dof && camera.aperture > 0.0 {
-            let lens = sample_lens(sampler.pairs(&paths, Decision::Lens, 0, 1));
+            let lens = sample_lens(sampler.pairs(&paths, Dimension::Lens, 0, 1));
             for lane in 0..PACKET_SIZE {
                 let place = DVec2::new(places[0][lane], places[1][lane]);
                 let ray = camera.ray(place, Vec2::new(lens[0][lane], lens[1][lane]));
@@ -143,7 +143,7 @@ impl SimdKernel for GenerateCameraRays<'_> {
 
 /// Maps pairs of random numbers to the unit disk.
 #[inline(always)]
-fn sample_lens([u, v]: [Row; 2]) -> [Row; 2] {
+fn sample_lens([u, v]: [F32x16; 2]) -> [F32x16; 2] {
     let mut points = [u, v];
     for lane in 0..PACKET_SIZE {
         let point = warp::disk(Vec2::new(u[lane], v[lane]));

@@ -8,6 +8,7 @@ use super::camera::CameraRow;
 use super::ray::PathRay;
 use super::tile::TileContext;
 use super::vertex::lift_segment;
+use crate::geometry::packet::{self, HitPacket, RayPacket};
 use crate::geometry::ray::offset_origin;
 use crate::geometry::surface_packet::SurfacePacket;
 use crate::geometry::{Ray, SurfacePoint};
@@ -451,11 +452,11 @@ impl VertexBatch {
         }
         // Decide which vertices are lifted now, and which only if the segment is unoccluded.
         let of = mask_from_bits(surface.smooth);
-        let above = simd.bits(&above) & surface.smooth;
+        let above = simd.movemask(&above) & surface.smooth;
         let rises = match lifts {
             LiftMode::All => mask_from_bits(above),
             LiftMode::IfFree(only_specular_before) => {
-                self.has_horizon |= simd.bits(&bent) & surface.smooth;
+                self.has_horizon |= simd.movemask(&bent) & surface.smooth;
                 self.may_lift |= above & only_specular_before;
                 [0; PACKET_SIZE]
             }
@@ -471,8 +472,8 @@ impl VertexBatch {
             select(&of, &normals[axis], &mut self.normal[axis]);
         }
         select_u32(&rises, &[Ray::NO_TRIANGLE; PACKET_SIZE], &mut self.start);
-        take(&of, &ends, &mut self.lift_end);
-        take(&of, &[UNPERTURBED; PACKET_SIZE], &mut self.shading_normal_cosine);
+        select(&of, &ends, &mut self.lift_end);
+        select(&of, &[UNPERTURBED; PACKET_SIZE], &mut self.shading_normal_cosine);
         self.has_facet |= surface.smooth;
     }
 

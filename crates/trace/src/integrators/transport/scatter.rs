@@ -139,7 +139,7 @@ impl SimdKernel for SampleBsdf<'_> {
         let Self { tile, row, used, continuation } = self;
         let sampler = row.sampler(tile);
         // Sample a direction at each vertex.
-        let u = sampler.pairs(&row.path, Decision::Direction, 0, 1);
+        let u = sampler.pairs(&row.path, Dimension::Direction, 0, 1);
         let are_narrow = row.bsdf.has_narrow_lobes();
         let [lobe, _] = if are_narrow {
             sampler.pairs(&row.path, Dimension::Lobe, 0, 1)
@@ -154,7 +154,7 @@ impl SimdKernel for SampleBsdf<'_> {
         scattered.alive &= used;
         // Apply Russian roulette.
         if continuation.uses_roulette {
-            let [risk, _] = sampler.pairs(&row.path, Decision::Roulette, 0, 1);
+            let [risk, _] = sampler.pairs(&row.path, Dimension::Roulette, 0, 1);
             for i in 0..PACKET_SIZE {
                 let chance = continuation.survival_probability(scattered.roulette_throughput[i]);
                 let bit = 1 << i;
@@ -227,12 +227,12 @@ impl SampleBsdf<'_> {
             let cosine = lane(&row.horizon, i).dot(lane(wi, i)) * sides[i];
             hidden[i] = if cosine > 0.0 { 0 } else { TRUE };
         }
-        alive &= !(simd.bits(&hidden) & row.has_horizon);
+        alive &= !(simd.movemask(&hidden) & row.has_horizon);
         Scattered {
             alive,
             wi: *wi,
             starts: [Ray::NO_TRIANGLE; PACKET_SIZE],
-            beyond: simd.bits(beyond),
+            beyond: simd.movemask(beyond),
             narrow: row.bsdf.narrow_lobes(),
             pdfs: *pdfs,
             factors,

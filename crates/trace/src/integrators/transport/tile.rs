@@ -92,7 +92,10 @@ impl SampleBlock {
 
     /// Columns, rows and sample indices of slots; arbitrary for a slot without a sample.
     #[inline(always)]
-    pub fn samples_of(&self, slots: &[u32; PACKET_SIZE]) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
+    pub fn samples_of(
+        &self,
+        slots: &[u32; PACKET_SIZE],
+    ) -> ([u32; PACKET_SIZE], [u32; PACKET_SIZE], [u32; PACKET_SIZE]) {
         let [mut xs, mut ys, mut samples] = [[0; PACKET_SIZE]; 3];
         let Pixels { rect, part } = self.pixels;
         let (by_samples, by_width) = (Divisor::new(self.samples.len() as u32), Divisor::new(rect.width));
@@ -105,7 +108,7 @@ impl SampleBlock {
             samples[lane] = self.samples.start.wrapping_add(slots[lane].wrapping_sub(first));
         }
         // Map them to indices within the rectangle. This branch is outside the other loops so that these have none.
-        if part != Part::All {
+        if part != PixelSubset::All {
             index = index.map(|pixel| part.index(pixel, rect));
         }
         for lane in 0..PACKET_SIZE {
@@ -127,7 +130,7 @@ impl SampleBlock {
             }
             return ([x; PACKET_SIZE], [y; PACKET_SIZE], samples);
         }
-        if self.pixels.part != Part::All {
+        if self.pixels.part != PixelSubset::All {
             return self.samples_of(&array::from_fn(|lane| first + lane as u32));
         }
         let rect = self.pixels.rect;

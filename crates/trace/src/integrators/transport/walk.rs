@@ -299,7 +299,7 @@ pub fn opacity_at(path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> f32
 /// Randomly decides whether the surface is opaque here, by its opacity.
 fn is_opaque(tile: &TileContext<'_>, path: &PathRay, vertex: &Vertex<'_>, lookups: &mut u64) -> bool {
     let chance = opacity_at(path, vertex, lookups);
-    chance >= 1.0 || tile.sampler(path.slot).pair(path.path, Decision::Opacity).x < chance
+    chance >= 1.0 || tile.sampler(path.slot).pair(path.path, Dimension::Opacity).x < chance
 }
 
 /// The path after a null interaction.
