@@ -196,7 +196,7 @@ mod tests {
         let of = referents(&scene, &[], None);
         (
             geometry(&scene, &of, DVec3::ZERO),
-            lights(&scene, &of, DVec3::ZERO, (None, &[])),
+            lights(&scene, &of, (DVec3::ZERO, &[]), (None, &[])),
             world(&surfaces(&scene, &of, &[]), &scene.camera, &of),
         )
     }

@@ -142,7 +142,8 @@ pub(super) fn lifts(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec
 pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     let mesh = &loaded.mesh;
     let emits = |triangle: u32| {
-        let material = mesh.materials.get(triangle as usize).and_then(|own| loaded.materials.get(*own as usize));
+        let material =
+            mesh.materials.get(triangle as usize).and_then(|own| loaded.materials.get(*own as usize));
         material.is_some_and(file_emits)
     };
     if !loaded.materials.iter().any(file_emits) {
@@ -165,7 +166,8 @@ pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
         .filter(|(_, light)| others.iter().any(|other| coincide(light, other)))
         .map(|(id, light)| (*id, light.normal))
         .collect();
-    let greatest = |face: &Face| face.corners.iter().fold(face.size(), |most, at| most.max(at.abs().max_element()));
+    let greatest =
+        |face: &Face| face.corners.iter().fold(face.size(), |most, at| most.max(at.abs().max_element()));
     let height = LIFT * lights.iter().map(|(_, light)| greatest(light)).fold(0.0, f64::max);
     // Give them vertices of their own.
     let mut lifted = loaded.clone();
@@ -274,7 +276,7 @@ fn each_face(
         Shape::Box { center, size, rotate } => {
             let cuboid = Cuboid::new(center, size, rotate);
             for face in 0..6 {
-                let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y].map(|u| cuboid.place(face, u));
+                let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y].map(|u| cuboid.sample(face, u));
                 let mut face = polygon(corners.map(|corner| corner.point).to_vec());
                 if let Some(face) = &mut face {
                     face.normal = corners[0].normal;
@@ -309,7 +311,7 @@ fn each_face(
                 if region.is_some_and(|region| are_apart(bounds, region)) {
                     continue;
                 }
-                let corners = if transform.mirrors() { vec![a, c, b] } else { vec![a, b, c] };
+                let corners = if transform.flips_handedness() { vec![a, c, b] } else { vec![a, b, c] };
                 visit(polygon(corners), if material.is_some() { emits } else { own(triangle) });
             }
         }

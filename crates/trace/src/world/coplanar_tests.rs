@@ -190,7 +190,10 @@ fn lights_of_a_mesh_file_are_lifted_off_its_other_faces() {
     for triangle in 2..4 {
         for (before, after) in loaded.mesh.corners(triangle).into_iter().zip(lifted.corners(triangle)) {
             let moved = after - before;
-            assert!(moved.y * down > 0.0 && moved.y.abs() < 1e-4 && moved.x == 0.0 && moved.z == 0.0, "{moved}");
+            assert!(
+                moved.y * down > 0.0 && moved.y.abs() < 1e-4 && moved.x == 0.0 && moved.z == 0.0,
+                "{moved}"
+            );
         }
     }
     // Without a light, or with one elsewhere, the mesh stays as it is.

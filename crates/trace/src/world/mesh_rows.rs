@@ -60,7 +60,7 @@ impl MeshInstance {
             doubtful[i] = if facet.is_doubtful() { TRUE } else { 0 };
         }
         // Few are beside an edge, or of a huge triangle.
-        let doubtful = simd.bits(&doubtful) & of;
+        let doubtful = simd.movemask(&doubtful) & of;
         for i in lanes(doubtful) {
             let uv = [hits.u[i], hits.v[i]];
             let [point, error] =
@@ -227,18 +227,19 @@ mod tests {
                     let [x, z] = if i % 2 == 0 { [0.5, 0.5] } else { [next(), next()] };
                     Ray::new(Vec3::new(x, 1.0 + height, z), Vec3::new(next() * 0.5, -1.0, next() * 0.5))
                 };
-                let rays: Vec<Ray> = (0..PACKET).map(ray).collect();
-                let mut hits = HitRows::none();
+                let rays: Vec<Ray> = (0..PACKET_SIZE).map(ray).collect();
+                let mut hits = HitPacket::none();
                 for (i, ray) in rays.iter().enumerate() {
                     let hit = mesh.tree.triangles().closest(&mesh.local_ray(ray)).expect("the ground");
                     hits.put(i, &hit);
                 }
-                let (of, set) = (u32::MAX >> (32 - PACKET), UvSet::First);
+                let (of, set) = (u32::MAX >> (32 - PACKET_SIZE), UvSet::First);
                 let filling = Filling { mesh: &mesh, rays: &rays, hits: &hits, of, set };
-                let row = Instructions::best().run(filling);
+                let row = InstructionSet::best().run(filling);
                 for (i, ray) in rays.iter().enumerate() {
                     let exact = ray.origin.as_dvec3() + ray.direction.as_dvec3();
-                    let surface = mesh.surface(&ray.to_f64(), &hits.get(i).expect("a hit"), Asked::ALL);
+                    let surface =
+                        mesh.surface(&ray.to_f64(), &hits.get(i).expect("a hit"), SurfaceRequest::ALL);
                     let off = (surface.point.as_dvec3() - exact).abs().max_element();
                     assert!(off < 2e-6 + f64::from(size) * 1e-14, "{size}: {off}");
                     assert!(surface.error.y < 2e-5 + size * 1e-14, "{size}: {}", surface.error);

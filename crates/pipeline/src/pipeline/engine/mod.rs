@@ -70,7 +70,7 @@ use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
 use crate::system::priority;
-use crate::system::threads::{check_room, start_failure};
+use crate::system::threads::{check_stack_space, start_failure};
 use crate::world::{Bodies, Coplanar, Lookups, World};
 
 /// Means of an engine; tests replace some of them.
