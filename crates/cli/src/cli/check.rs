@@ -11,6 +11,7 @@ use super::info::instead_of_scene;
 use crate::output::json::in_a_line;
 use crate::pipeline::protocol::Failure;
 use crate::pipeline::{Checked, check};
+use crate::scene::report::Locator;
 
 pub(super) fn run(scene: &Path, sets: &[String], is_json: bool, console: &Console) -> Exit {
     if is_json {
@@ -40,7 +41,8 @@ fn in_json(scene: &Path, sets: &[String], console: &Console) -> Exit {
         Err(Failure::Scene(diagnostics)) => (Exit::WRONG, diagnostics),
         Err(Failure::Work(message)) => return console.fail(Exit::FAILED, &message),
     };
-    let all: Vec<Value> = diagnostics.iter().map(diagnostic).collect();
+    let mut places = Locator::default();
+    let all: Vec<Value> = diagnostics.iter().map(|one| diagnostic(one, &mut places)).collect();
     let scene = scene.to_string_lossy();
     let report = json!({ "scene": scene, "ok": exit == Exit::DONE, "diagnostics": all });
     match in_a_line(&report) {

@@ -3,15 +3,15 @@
 use serde_json::{Value, json};
 
 use crate::scene::diagnostic::{Diagnostic, Severity};
-use crate::scene::report::line_and_column;
+use crate::scene::report::Locator;
 
 /// A diagnostic. Lines and columns count from 1, columns in characters; the end is exclusive. A value that it does not have is null.
-pub(super) fn diagnostic(one: &Diagnostic) -> Value {
+pub(super) fn diagnostic(one: &Diagnostic, places: &mut Locator) -> Value {
     let severity = match one.severity {
         Severity::Error => "error",
         Severity::Warning => "warning",
     };
-    let at = |offset| one.place.as_ref().map(|place| line_and_column(&place.source, offset));
+    let mut at = |offset| one.place.as_ref().map(|place| places.locate(&place.source, offset));
     let span = one.place.as_ref().map(|place| place.span.clone());
     let (start, end) = (span.clone().and_then(|span| at(span.start)), span.and_then(|span| at(span.end)));
     let label = one.place.as_ref().map(|place| place.label.as_str()).filter(|label| !label.is_empty());
@@ -39,7 +39,7 @@ mod tests {
         let text = "[camera]\nposition = [0, 1, 4]\nlook_at = [0, 0, 0]\n[materials.a]\ntype = \"metl\"\n";
         let outcome = crate::scene::parse(text.into(), Path::new("a.toml"));
         let error = outcome.diagnostics.iter().find(|one| one.severity == Severity::Error).expect("an error");
-        let value = diagnostic(error);
+        let value = diagnostic(error, &mut Locator::default());
         let places = ["line", "column", "end_line", "end_column"].map(|key| value[key].as_u64());
         assert_eq!(places, [Some(5), Some(8), Some(5), Some(14)], "{value}");
         assert_eq!((&value["file"], &value["severity"]), (&json!("a.toml"), &json!("error")));

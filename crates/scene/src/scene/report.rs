@@ -48,6 +48,23 @@ pub fn summary(diagnostics: &[Diagnostic]) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
+/// Finds lines and columns of many places, most of them in one text.
+#[derive(Default)]
+pub struct Locator(Option<(Arc<str>, LineIndex)>);
+
+impl Locator {
+    /// [`line_and_column`] of a text that was most likely the last one.
+    pub fn locate(&mut self, source: &Arc<str>, offset: usize) -> (usize, usize) {
+        let (source, lines) = self.lines(source);
+        lines.locate(source, offset)
+    }
+
+    fn lines(&mut self, source: &Arc<str>) -> &(Arc<str>, LineIndex) {
+        self.0 = self.0.take().filter(|(known, _)| Arc::ptr_eq(known, source));
+        self.0.get_or_insert_with(|| (Arc::clone(source), LineIndex::new(source)))
+    }
+}
+
 /// Line and column of a byte of a text, both from 1; columns count characters.
 pub fn line_and_column(source: &str, offset: usize) -> (usize, usize) {
     LineIndex::new(source).locate(source, offset)
@@ -60,7 +77,7 @@ fn render_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) ->
     let renderer = renderer.clone().term_width(width.max(MIN_WIDTH)).decor_style(DecorStyle::Ascii);
     let mut sorted: Vec<&Diagnostic> = diagnostics.iter().collect();
     sorted.sort_by_key(|one| (&one.path, one.place.as_ref().map(|place| place.span.start)));
-    let mut index: Option<(Arc<str>, LineIndex)> = None;
+    let mut index = Locator::default();
     let mut text = String::new();
     for diagnostic in sorted {
         text.push_str(&one(diagnostic, width.max(MIN_WIDTH), &renderer, &mut index));
@@ -74,12 +91,7 @@ fn render_with(diagnostics: &[Diagnostic], width: usize, renderer: &Renderer) ->
 /// Narrower terminals get a report of this width.
 const MIN_WIDTH: usize = 30;
 
-fn one(
-    diagnostic: &Diagnostic,
-    width: usize,
-    renderer: &Renderer,
-    index: &mut Option<(Arc<str>, LineIndex)>,
-) -> String {
+fn one(diagnostic: &Diagnostic, width: usize, renderer: &Renderer, index: &mut Locator) -> String {
     let level = match diagnostic.severity {
         Severity::Error => Level::ERROR,
         Severity::Warning => Level::WARNING,
@@ -89,10 +101,7 @@ fn one(
     let mut snippet = None;
     let mut note = None;
     if let Some(place) = &diagnostic.place {
-        if index.as_ref().is_none_or(|(source, _)| !Arc::ptr_eq(source, &place.source)) {
-            *index = Some((Arc::clone(&place.source), LineIndex::new(&place.source)));
-        }
-        let Some((source, lines)) = index else { return String::new() };
+        let (source, lines) = index.lines(&place.source);
         let (line, column) = lines.locate(source, place.span.start);
         origin = origin.line(line).char_column(column);
         let whole = lines.span(line - 1, source).unwrap_or_default();
@@ -186,7 +195,7 @@ fn floor_char(source: &str, offset: usize) -> usize {
 }
 
 /// Beginnings of a text's lines.
-pub(super) struct LineIndex {
+pub(crate) struct LineIndex {
     starts: Vec<usize>,
 }
 

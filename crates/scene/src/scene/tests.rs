@@ -243,6 +243,29 @@ fn a_flood_of_errors_is_counted_and_cut() {
     assert_eq!(messages[500], "and 200 more like these");
 }
 
+#[test]
+fn warnings_of_any_number_hide_no_error() {
+    let table =
+        |number: usize| format!("[materials.m{number}]\ndiffuse = 0.9\nspecular = 0.9\nshininess = 5\n");
+    let flood = |count: usize| (0..count).map(table).collect::<String>();
+    let errors = |outcome: &Outcome| -> Vec<String> {
+        let errors = outcome.diagnostics.iter().filter(|one| one.severity == diagnostic::Severity::Error);
+        errors.map(|one| one.message.clone()).collect()
+    };
+    let one = outcome(&format!("{}{CAMERA}", flood(1)));
+    let of_each = one.diagnostics.iter().filter(|one| one.message.contains("reflect")).count();
+    assert_eq!(of_each, 1, "{:?}", one.diagnostics);
+    for count in [600, 11_000] {
+        let many = outcome(&format!("{}{CAMERA}", flood(count)));
+        assert_eq!(many.diagnostics.len(), 501);
+        assert!(many.scene.is_some() && errors(&many).is_empty(), "{:?}", errors(&many));
+        assert!(many.diagnostics[500].message.ends_with("more like these"));
+        let wrong = outcome(&format!("{}bogus = 1\n{CAMERA}", flood(count)));
+        assert!(wrong.scene.is_none());
+        assert!(errors(&wrong).len() == 1 && errors(&wrong)[0].contains("bogus"), "{:?}", errors(&wrong));
+    }
+}
+
 mod properties {
     use super::super::diagnostic::Diagnostic;
     use super::super::report::{Style, lines, render};

@@ -24,6 +24,7 @@ use super::Reporter;
 use crate::output::json::in_a_line;
 use crate::pipeline::protocol::{CheckpointNews, Event, Failure};
 use crate::scene::diagnostic::Diagnostic;
+use crate::scene::report::Locator;
 
 pub(super) struct Json;
 
@@ -137,8 +138,9 @@ fn failed(failure: &Failure) -> Value {
 
 /// Diagnostics as in `check --json`; `path` is `file`, or null without one.
 fn diagnostics(all: &[Diagnostic]) -> Vec<Value> {
+    let mut places = Locator::default();
     let with_path = |one: &Diagnostic| {
-        let mut value = diagnostic(one);
+        let mut value = diagnostic(one, &mut places);
         value["path"] = json!(path(one));
         value
     };

@@ -14,7 +14,8 @@ pub(super) struct Context<'a> {
     path: &'a Path,
     lines: OnceCell<LineIndex>,
     issues: RefCell<Vec<Issue>>,
-    uncollected: Cell<usize>,
+    /// Number of errors and of warnings.
+    counts: Cell<[usize; 2]>,
     searches: Cell<Searches>,
 }
 
@@ -93,8 +94,8 @@ impl Issue {
 
 impl<'a> Context<'a> {
     pub(super) fn new(source: Source, path: &'a Path) -> Self {
-        let (lines, issues, uncollected, searches) = Default::default();
-        Self { source, path, lines, issues, uncollected, searches }
+        let (lines, issues, counts, searches) = Default::default();
+        Self { source, path, lines, issues, counts, searches }
     }
 
     /// Adds to the list.
@@ -102,14 +103,16 @@ impl<'a> Context<'a> {
         self.report_with(|| issue);
     }
 
-    /// Adds an issue to the list; if the list is too long already, counts it without making it.
+    /// Adds an issue to the list; if the list has enough errors, or enough warnings, only counts it.
     pub(super) fn report_with(&self, make: impl FnOnce() -> Issue) {
-        if self.issues.borrow().len() < MOST_COLLECTED {
-            let issue = make();
+        let issue = make();
+        let mut counts = self.counts.get();
+        let count = &mut counts[usize::from(issue.severity == Severity::Warning)];
+        *count += 1;
+        if *count <= MOST_COLLECTED {
             self.issues.borrow_mut().push(issue);
-        } else {
-            self.uncollected.set(self.uncollected.get() + 1);
         }
+        self.counts.set(counts);
     }
 
     pub(super) fn has_errors(&self) -> bool {
@@ -180,13 +183,21 @@ impl<'a> Context<'a> {
                 }
             });
         }
-        issues.sort_by_key(|issue| (issue.span.start, issue.severity == Severity::Warning));
-        let unshown = issues.len().saturating_sub(MOST_ISSUES) + self.uncollected.get();
+        // Warnings never hide an error: what is left out of a long list are the last warnings, then the last errors.
+        let place = |issue: &Issue| (issue.span.start, issue.severity == Severity::Warning);
+        issues.sort_by_key(|issue| (issue.severity == Severity::Warning, issue.span.start));
+        let collected = |severity| issues.iter().filter(|issue| issue.severity == severity).count();
+        let [errors, warnings] = [Severity::Error, Severity::Warning].map(collected);
+        let uncollected = self.counts.get().map(|count| count.saturating_sub(MOST_COLLECTED));
+        let unshown_errors = errors.saturating_sub(MOST_ISSUES) + uncollected[0];
+        let unshown = (errors + warnings).saturating_sub(MOST_ISSUES) + uncollected[0] + uncollected[1];
         issues.truncate(MOST_ISSUES);
+        issues.sort_by_key(place);
         if unshown > 0 {
             let message = format!("and {unshown} more like these");
             let end = self.source.text().len();
-            issues.push(Issue::error(end..end, message));
+            let make = if unshown_errors > 0 { Issue::error } else { Issue::warning };
+            issues.push(make(end..end, message));
         }
         let (path, source) = (self.path, self.source);
         issues.into_iter().map(|issue| issue.into_diagnostic(path, &source)).collect()
@@ -202,7 +213,7 @@ const MOST_SEARCHES: usize = 48;
 /// No search begins after this many names were compared.
 const MOST_COMPARISONS: usize = 200_000;
 
-/// Enough to find the first of them in the order of the file, in all files but monstrous ones.
+/// Enough errors, and enough warnings, to find the first of them in the order of the file, in all files but monstrous ones.
 const MOST_COLLECTED: usize = 10_000;
 
 impl Issue {
