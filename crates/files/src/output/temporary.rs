@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use nix::fcntl::OFlag;
+use rustix::fs::Dir;
 
 use crate::system::machine::ProcessIdentity;
 
@@ -127,24 +128,28 @@ fn nameless(_: &Path) -> io::Result<()> {
 /// Removes the temporary files of this machine's killed writers from a directory. Files of other machines, of earlier boots and
 /// of living writers stay, and so do kept ones. A file that cannot be removed stays too: it must not prevent the write.
 pub(super) fn remove_stale(directory: &Path, is_kept: &dyn Fn(&Path) -> bool) {
-    let Ok(entries) = fs::read_dir(directory) else { return };
-    for entry in entries.flatten() {
-        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
-        if is_file && has_dead_writer(&entry.file_name()) && !is_kept(&entry.path()) {
-            let _ = remove_if_stale(&entry.path(), |path| fs::remove_file(path));
+    for path in stale(directory) {
+        if path.symlink_metadata().is_ok_and(|found| found.is_file()) && !is_kept(&path) {
+            let _ = remove_if_stale(&path, |path| fs::remove_file(path));
         }
     }
 }
 
 /// Removes the temporary folders of this machine's killed writers from a directory, with their contents.
 pub(super) fn remove_stale_folders(directory: &Path) {
-    let Ok(entries) = fs::read_dir(directory) else { return };
-    for entry in entries.flatten() {
-        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
-        if is_folder && has_dead_writer(&entry.file_name()) {
-            let _ = remove_if_stale(&entry.path(), |path| fs::remove_dir_all(path));
+    for path in stale(directory) {
+        if path.symlink_metadata().is_ok_and(|found| found.is_dir()) {
+            let _ = remove_if_stale(&path, |path| fs::remove_dir_all(path));
         }
     }
+}
+
+/// Everything in a directory that is named after a dead writer. (`std::fs::read_dir` panics if the directory cannot be closed.)
+fn stale(directory: &Path) -> Vec<PathBuf> {
+    let opened = File::open(directory).ok().and_then(|opened| Dir::read_from(&opened).ok());
+    let names = opened.into_iter().flatten().flatten();
+    let names = names.map(|entry| OsStr::from_bytes(entry.file_name().to_bytes()).to_owned());
+    names.filter(|name| has_dead_writer(name)).map(|name| directory.join(name)).collect()
 }
 
 fn has_dead_writer(name: &OsStr) -> bool {
