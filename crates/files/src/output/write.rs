@@ -17,6 +17,7 @@ use super::place::{self, Place, Target};
 use super::temporary::{self, Temporary};
 use super::{FileIdentity, Losses, OutputError, stoppable};
 use crate::control::CancelToken;
+use crate::system::in_words;
 
 /// Standard output. It is already open: opening it by this name would fail for a socket.
 pub const STDOUT: &str = "/dev/stdout";
@@ -144,9 +145,17 @@ fn replace(
                     }
                 },
             };
-            match durability {
-                Durability::Process => {}
-                Durability::Power => sync_directory(target.directory()).map_err(named)?,
+            let synced = match durability {
+                Durability::Process => Ok(()),
+                Durability::Power => sync_directory(target.directory()),
+            };
+            if let (Err(error), Losses::Told(tell)) = (synced, &guard.losses) {
+                // The file has its name: only a loss of power could take it back.
+                tell(format!(
+                    "{}: it is written, but its folder could not be synchronized: {}",
+                    path.display(),
+                    in_words(&error)
+                ));
             }
             if let (Losses::Told(tell), false) = (guard.losses, lost.is_empty()) {
                 tell(format!("{}: {} could not be kept", path.display(), lost.join(" and ")));

@@ -3,7 +3,7 @@
 
 use std::io;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, SyncSender};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -21,17 +21,20 @@ static LEFT: Mutex<Vec<JoinHandle<()>>> = Mutex::new(Vec::new());
 
 /// Reports the progress of the work.
 #[derive(Clone)]
-pub(super) struct Reporter(SyncSender<u64>);
+pub(super) struct Reporter(Option<SyncSender<u64>>);
 
 impl Reporter {
     /// Reports the progress so far. Returns an error if nobody waits any more: then the work may end.
     pub(super) fn reached(&self, done: u64) -> io::Result<()> {
-        self.0.send(done).map_err(|_| io::Error::other(Cancelled))
+        match &self.0 {
+            Some(receiver) => receiver.send(done).map_err(|_| io::Error::other(Cancelled)),
+            None => Ok(()),
+        }
     }
 }
 
-/// Does `work` on another thread and passes its reports on, out of `total`. `None` if no thread could be started or the
-/// work panicked.
+/// Does `work` on another thread and passes its reports on, out of `total`. `None` if the work panicked. Where no thread can be
+/// started, the work is done here: without reports, and a cancel waits for its end.
 ///
 /// Abandoned work holds memory: new work begins only when all of it has ended.
 pub(super) fn run<T: Send + 'static>(
@@ -42,11 +45,17 @@ pub(super) fn run<T: Send + 'static>(
     wait_for_left(watch.token)?;
     let (report, reports) = mpsc::sync_channel(WAITING);
     let (send, result) = mpsc::channel();
+    // A thread that does not start drops what it was given.
+    let work = Arc::new(Mutex::new(Some(work)));
+    let take = |work: &Mutex<Option<_>>| work.lock().unwrap_or_else(PoisonError::into_inner).take();
+    let shared = Arc::clone(&work);
     let run = move || {
-        let _ = send.send(work(Reporter(report)));
+        if let Some(work) = take(&shared) {
+            let _ = send.send(work(Reporter(Some(report))));
+        }
     };
     let Ok(thread) = thread::Builder::new().name("glimt-image".to_owned()).spawn(run) else {
-        return Ok(None);
+        return Ok(take(&work).map(|work| work(Reporter(None))));
     };
     let waited = wait(&reports, &result, watch, total);
     if waited.is_err() {

@@ -1,7 +1,7 @@
 //! Writing a part: tile after tile, so that no more than a tile is in memory beside the film.
 
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::sync::mpsc::{self, SyncSender};
 
@@ -43,10 +43,13 @@ fn write(
     let (sender, chunks) = mpsc::sync_channel(4);
     std::thread::scope(|scope| {
         let named = std::thread::Builder::new().name("glimt-part".to_owned());
-        let make = move || {
+        let make_chunks = move || {
             make(&mut Chunks { sender, bytes: Vec::with_capacity(TOGETHER) }, head, film, state, token)
         };
-        let making = named.spawn_scoped(scope, make)?;
+        let Ok(making) = named.spawn_scoped(scope, make_chunks) else {
+            // Without a thread it takes longer, but hours of work are not lost.
+            return make(&mut BufWriter::with_capacity(TOGETHER, file), head, film, state, token);
+        };
         // If this fails, nobody takes further bytes, and the other thread ends.
         for chunk in chunks {
             file.write_all(&chunk)?;
