@@ -3,6 +3,8 @@
 use std::io;
 use std::path::PathBuf;
 
+use nix::errno::Errno;
+
 use crate::system::describe_error;
 
 /// A part by its number and the number of parts.
@@ -103,6 +105,14 @@ pub enum PartError {
     /// The work was stopped.
     #[error("cancelled")]
     Cancelled(#[from] crate::control::Cancelled),
+}
+
+impl PartError {
+    /// Whether the process, or the machine, has too many open files: further files would fail for the same reason.
+    pub fn is_out_of_files(&self) -> bool {
+        let Self::Unreadable { source, .. } = self else { return false };
+        matches!(source.raw_os_error().map(Errno::from_raw), Some(Errno::EMFILE | Errno::ENFILE))
+    }
 }
 
 /// `2 of 8 parts are missing: 3/8, 4/8`: the names of some of them.

@@ -53,6 +53,23 @@ pub struct Trait {
 }
 
 impl Head {
+    /// Whether a render can have written these numbers.
+    pub(super) fn is_possible(&self) -> bool {
+        /// Most pixels a side, and most parts.
+        const MOST: u32 = 1 << 17;
+        let Self { share, picture, .. } = self;
+        let [x, y, width, height] = picture.crop;
+        let is_inside = |at: u32, length: u32, whole: u32| {
+            length > 0 && whole <= MOST && at.checked_add(length).is_some_and(|end| end <= whole)
+        };
+        is_inside(x, width, picture.width)
+            && is_inside(y, height, picture.height)
+            && (1..=share.count).contains(&share.index)
+            && share.blocks.is_sorted()
+            && share.blocks.last().is_none_or(|last| *last < share.block_count)
+            && picture.tone.exposure.is_finite()
+    }
+
     /// The name of a file that the picture was made of and that has this hash, in hexadecimal digits. `None` if there is none.
     pub(super) fn input_of_hash(&self, hash: &str) -> Option<&str> {
         let is_it = |one: &&Trait| one.name.starts_with(FILE) && one.value == hash;

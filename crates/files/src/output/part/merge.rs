@@ -50,10 +50,26 @@ fn unlike(own: &Head, other: &Head) -> Vec<String> {
         unlike.push(format!("it is one of {} parts here and of {} there", counts.0, counts.1));
     }
     let (picture, there) = (&own.picture, &other.picture);
+    if unlike.is_empty() {
+        unlike.extend(metadata_differences(&picture.metadata, &there.metadata));
+    }
     if unlike.is_empty() && (picture != there || own.share.block_count != other.share.block_count) {
-        unlike.push("the picture is finished in another way".to_owned());
+        unlike.push("the image is finished in another way".to_owned());
     }
     unlike
+}
+
+/// Differences between the names and values that two images get, a phrase for each.
+fn metadata_differences(own: &[(String, String)], other: &[(String, String)]) -> Vec<String> {
+    let value = |all: &[(String, String)], name: &str| all.iter().find(|(known, _)| known == name).cloned();
+    let names = own.iter().chain(other.iter().filter(|(name, _)| value(own, name).is_none()));
+    let words = |(name, _): &(String, String)| {
+        let [here, there] = [own, other].map(|all| value(all, name).map(|(_, value)| value));
+        let shown = |value: Option<String>| value.unwrap_or_else(|| "missing".to_owned());
+        let label = name.strip_prefix("glimt:").unwrap_or(name);
+        (here != there).then(|| format!("its {label} is {} here and {} there", shown(here), shown(there)))
+    };
+    names.filter_map(words).collect()
 }
 
 /// Joins parts, whatever their order. If some are missing, `is_partial` joins the others: what is missing stays black, or has fewer

@@ -239,7 +239,11 @@ impl Reader<'_> {
         if digest(&Digest::default(), &[&start]) != found {
             return Err(self.damaged("its head is not what was written"));
         }
-        let head = serde_json::from_slice(&text).map_err(|_| self.damaged("its head makes no sense"))?;
+        let head: Head =
+            serde_json::from_slice(&text).map_err(|_| self.damaged("its head makes no sense"))?;
+        if !head.is_possible() {
+            return Err(self.damaged("its head has impossible numbers"));
+        }
         Ok((head, found))
     }
 

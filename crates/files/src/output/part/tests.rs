@@ -149,6 +149,48 @@ fn other_files_are_told_from_parts() {
 }
 
 #[test]
+fn heads_with_impossible_numbers_are_damaged() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let film = film(1, 2);
+    let right = head(1, 2, &film);
+    assert!(opened(&put(folder.path(), "right", &right, &film)).is_ok());
+    let changes: [fn(&mut Head); 9] = [
+        |head| head.share.index = 0,
+        |head| head.share.index = 3,
+        |head| head.share.count = 0,
+        |head| head.share.blocks = vec![0],
+        |head| head.picture.width = 0,
+        |head| head.picture.height = u32::MAX,
+        |head| head.picture.crop = [0, 0, 0, 40],
+        |head| head.picture.crop = [u32::MAX, 0, 70, 40],
+        |head| head.picture.crop = [1, 0, 70, 40],
+    ];
+    for (number, change) in changes.into_iter().enumerate() {
+        let mut head = right.clone();
+        change(&mut head);
+        let path = put(folder.path(), "wrong", &head, &film);
+        assert!(
+            matches!(opened(&path), Err(PartError::Damaged { why, .. }) if why.contains("impossible")),
+            "{number}"
+        );
+    }
+}
+
+#[test]
+fn what_two_images_say_of_themselves_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let part = |index, scene: &str| {
+        let film = film(index, 2);
+        let mut head = head(index, 2, &film);
+        head.picture.metadata = vec![("glimt:scene".to_owned(), scene.to_owned())];
+        opened(&put(folder.path(), scene, &head, &film)).expect("a part")
+    };
+    let parts = [part(1, "a.toml"), part(2, "b.toml")];
+    let said = merge::check(&parts).expect_err("two scenes").to_string();
+    assert!(said.contains("its scene is b.toml here and a.toml there"), "{said}");
+}
+
+#[test]
 fn parts_of_two_builds_do_not_fit() {
     let of = |build: &str| vec![Trait::setting("glimt", build), Trait::setting("width", "4")];
     let [one, other] = ["0.1.0 (build 1)", "0.1.0 (build 2)"].map(of);
