@@ -65,7 +65,9 @@ pub fn conductor(cos_incident: f32, eta: f32, k: f32) -> f32 {
     let smaller = product * product / larger.max(f32::MIN_POSITIVE);
     let a = if real > 0.0 { larger } else { smaller }.sqrt();
     let (even, odd) = (sum + cos2, 2.0 * a * cos_incident);
-    let perpendicular = (even - odd) / (even + odd);
+    // Rounding must not make it negative where nothing is reflected, at an index of 1.
+    let rest = if even > odd { even - odd } else { 0.0 };
+    let perpendicular = rest / (even + odd).max(f32::MIN_POSITIVE);
     let (even, odd) = (cos2 * sum + sin2 * sin2, odd * sin2);
     // An index of 0 reflects all, at normal incidence too.
     let ratio = if even > 0.0 { (even - odd) / (even + odd) } else { 1.0 };
@@ -148,6 +150,13 @@ mod tests {
                 let exact = conductor_of_complex_numbers(cosine.into(), eta.into(), k.into());
                 let found = f64::from(conductor(cosine, eta, k));
                 assert!((exact - found).abs() < 2e-5, "{eta} + {k}i at {cosine}: {found} is not {exact}");
+            }
+        }
+        // Nothing is reflected where both sides have one index; rounding makes no less of it.
+        for eta in [1.0_f32, 1.0 - f32::EPSILON, 1.0 + f32::EPSILON, 1.001] {
+            for step in 0..=1000_u16 {
+                let found = conductor(f32::from(step) / 1000.0, eta, 0.0);
+                assert!((0.0..=1.0).contains(&found), "{eta} at {step}: {found}");
             }
         }
         // Gold at normal incidence: ((η − 1)² + k²)/((η + 1)² + k²).
