@@ -375,23 +375,36 @@ pub(super) fn is_there() -> bool {
 /// The size of the window; the aspect of a cell as given, else from the window's size in pixels, else 2.
 pub(super) fn window(cell_aspect: Option<f32>) -> Window {
     match terminal::window_size() {
-        Ok(size) => Window {
+        Ok(size) => bounded(Window {
             columns: size.columns,
             rows: size.rows,
             cell_aspect: cell_aspect
                 .unwrap_or_else(|| aspect((size.columns, size.rows), (size.width, size.height))),
             cell_pixels: cell_pixels((size.columns, size.rows), (size.width, size.height)),
-        },
+        }),
         Err(_) => {
             let (columns, rows) = terminal::size().unwrap_or((80, 24));
-            Window {
+            bounded(Window {
                 columns,
                 rows,
                 cell_aspect: cell_aspect.unwrap_or(DEFAULT_CELL_ASPECT),
                 cell_pixels: DEFAULT_CELL_PIXELS,
-            }
+            })
         }
     }
+}
+
+/// Most columns that are drawn: more than a wall of screens has.
+const MOST_COLUMNS: u16 = 4096;
+/// Most cells that are drawn. Each takes some hundred bytes, and terminals may report 65,535 columns and rows.
+const MOST_CELLS: u32 = 1 << 20;
+
+/// The part of a window that is drawn.
+fn bounded(window: Window) -> Window {
+    let columns = window.columns.min(MOST_COLUMNS);
+    let most_rows = MOST_CELLS / u32::from(columns.max(1));
+    let rows = u16::try_from(most_rows).map_or(window.rows, |most| window.rows.min(most));
+    Window { columns, rows, ..window }
 }
 
 /// Height over width of a cell. Sizes in pixels are often zero or nonsense; values within 3% of 2 are 2, so that
@@ -475,6 +488,23 @@ mod tests {
         assert_eq!(aspect((0, 0), (640, 480)), 2.0);
         assert_eq!(aspect((80, 24), (80, 24)), 2.0);
         assert_eq!(aspect((100, 50), (1000, 1010)), 2.0);
+    }
+
+    #[test]
+    fn a_window_of_any_size_has_a_bounded_number_of_cells() {
+        let of = |columns, rows| {
+            let cell_pixels = DEFAULT_CELL_PIXELS;
+            let drawn = bounded(Window { columns, rows, cell_aspect: DEFAULT_CELL_ASPECT, cell_pixels });
+            (drawn.columns, drawn.rows)
+        };
+        for usual in [(80, 24), (640, 360), (4096, 256), (0, 0), (0, 24), (1, u16::MAX)] {
+            assert_eq!(of(usual.0, usual.1), usual);
+        }
+        for (columns, rows) in [(32_767, 32_767), (u16::MAX, u16::MAX), (u16::MAX, 1), (300, u16::MAX)] {
+            let drawn = of(columns, rows);
+            assert!(u32::from(drawn.0) * u32::from(drawn.1) <= MOST_CELLS, "{drawn:?}");
+            assert!(drawn.0 >= columns.min(300) && drawn.1 >= rows.min(256), "{drawn:?}");
+        }
     }
 
     #[test]
