@@ -54,6 +54,9 @@ fn as_json(path: &Path, made: &Made) -> Value {
     })
 }
 
+/// Most columns of the names of settings; longer names move their values to the right.
+const MOST_WIDTH: usize = 40;
+
 /// A line about the file, then one for each setting.
 fn as_text(path: &Path, made: &Made) -> String {
     let name = path.to_string_lossy();
@@ -67,9 +70,26 @@ fn as_text(path: &Path, made: &Made) -> String {
     if !channels.is_empty() {
         lines.push(("channels", &channels));
     }
-    let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    // A name may be as long as its file; formats take no widths above 65,535.
+    let width = lines.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).min(MOST_WIDTH);
     for (name, value) in lines {
         text += &format!("  {:width$}  {}\n", visible(name), visible(value));
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setting_with_an_endless_name_is_shown() {
+        for length in [39, 41, 65_535, 65_536, 200_000] {
+            let name = "n".repeat(length);
+            let made = Made { settings: vec![(name.clone(), "value".to_owned())], ..Made::default() };
+            let text = as_text(Path::new("a.png"), &made);
+            assert!(text.contains(&format!("{name}  value\n")) || length < 40, "{length}");
+            assert!(text.contains("value"), "{length}");
+        }
+    }
 }

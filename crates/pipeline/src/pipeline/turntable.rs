@@ -2,6 +2,8 @@
 
 use std::collections::HashSet;
 use std::ffi::OsString;
+use std::ops::Range;
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Path, PathBuf};
 
 use crate::math::DVec3;
@@ -13,7 +15,7 @@ use crate::scene::description::Pose;
 pub const MOST: u32 = 10_000;
 
 /// The sign in a file's name that stands for a digit.
-const DIGIT: char = '#';
+const DIGIT: u8 = b'#';
 
 /// One picture of a turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,8 +88,14 @@ pub fn suggested(path: &Path) -> PathBuf {
 /// The file of a picture: the name with the picture's number, from 1, in place of its last run of `#`. `None` if it has none.
 pub(super) fn numbered(path: &Path, turn: Turn) -> Option<PathBuf> {
     let (before, digits, after) = numbers(path)?;
-    let number = format!("{:0digits$}", turn.number + 1);
-    Some(path.with_file_name(OsString::from(format!("{before}{number}{after}"))))
+    Some(path.with_file_name(with_number(before, (turn.number + 1, digits), after)))
+}
+
+/// A name with a number of at least so many digits in it. Formats take no widths above 65,535.
+fn with_number(before: &[u8], (number, digits): (u32, usize), after: &[u8]) -> OsString {
+    let number = number.to_string();
+    let zeros = vec![b'0'; digits.saturating_sub(number.len())];
+    OsString::from_vec([before, &zeros, number.as_bytes(), after].concat())
 }
 
 /// The first file that would hold two pictures of a turntable of so many. `None` if each has a file of its own.
@@ -99,24 +107,27 @@ pub fn twin(outputs: &[PathBuf], of: u32) -> Option<PathBuf> {
 
 /// Files that have the next numbers behind the last picture of a turntable: those of a longer one before.
 pub fn left_over(last: &Path, turn: Turn) -> Vec<PathBuf> {
-    let Some(name) = last.file_name().and_then(|name| name.to_str()) else { return Vec::new() };
+    let name = last.file_name().unwrap_or_default().as_bytes();
     // Find the picture's number: the last run of digits that is it.
-    let is_digit = |c: char| c.is_ascii_digit();
-    let mut runs =
-        name.match_indices(is_digit).map(|(at, _)| at).filter(|at| !name[..*at].ends_with(is_digit));
-    let number = |at: usize| name[at..].split(|c| !is_digit(c)).next().unwrap_or_default();
-    let Some(at) = runs.rfind(|at| number(*at).parse() == Ok(turn.number + 1)) else { return Vec::new() };
-    let (before, digits, after) = (&name[..at], number(at).len(), &name[at + number(at).len()..]);
-    let file = |next: u32| last.with_file_name(format!("{before}{next:0digits$}{after}"));
+    let ends_run = |at: usize| at + 1 == name.len() || !name[at + 1].is_ascii_digit();
+    let is_end = |at: &usize| name[*at].is_ascii_digit() && ends_run(*at);
+    let run = |end: usize| name[..end].iter().rposition(|byte| !byte.is_ascii_digit()).map_or(0, |at| at + 1);
+    let runs = (0..name.len()).rev().filter(is_end).map(|end| run(end)..end + 1);
+    let number = |run: &Range<usize>| std::str::from_utf8(&name[run.clone()]).ok()?.parse::<u32>().ok();
+    let Some(run) = runs.into_iter().find(|run| number(run) == Some(turn.number + 1)) else {
+        return Vec::new();
+    };
+    let file =
+        |next: u32| last.with_file_name(with_number(&name[..run.start], (next, run.len()), &name[run.end..]));
     (turn.number + 2..=MOST).map(file).take_while(|path| path.symlink_metadata().is_ok()).collect()
 }
 
-/// Text before the last run of `#` in a file's name, the length of the run, and the text behind it.
-fn numbers(path: &Path) -> Option<(&str, usize, &str)> {
-    let name = path.file_name()?.to_str()?;
-    let (head, after) = name.rsplit_once(DIGIT)?;
-    let before = head.trim_end_matches(DIGIT);
-    Some((before, head.len() - before.len() + 1, after))
+/// Bytes before the last run of `#` in a file's name, the length of the run, and the bytes behind it.
+fn numbers(path: &Path) -> Option<(&[u8], usize, &[u8])> {
+    let name = path.file_name()?.as_bytes();
+    let end = name.iter().rposition(|byte| *byte == DIGIT)? + 1;
+    let start = name[..end].iter().rposition(|byte| *byte != DIGIT).map_or(0, |at| at + 1);
+    Some((&name[..start], end - start, &name[end..]))
 }
 
 #[cfg(test)]
@@ -134,6 +145,9 @@ mod tests {
         let found = |name: &str| left_over(&path(name), last);
         assert_eq!(found("a2_002.png"), [path("a2_003.png"), path("a2_004.png")]);
         assert_eq!(found("w_2.png"), [path("w_3.png")]);
+        let raw = |bytes: &[u8]| folder.path().join(OsString::from_vec(bytes.to_vec()));
+        std::fs::write(raw(b"\xff_3.png"), "").expect("written");
+        assert_eq!(left_over(&raw(b"\xff_2.png"), last), [raw(b"\xff_3.png")]);
         assert_eq!((found("w_02.png"), found("w.png")), (Vec::new(), Vec::new()));
     }
 
@@ -160,6 +174,14 @@ mod tests {
         assert_eq!(name("a#.exr", 99), Some("a100.exr".into()), "it grows where it must");
         assert_eq!(name("#1_##_b.png", 0), Some("#1_01_b.png".into()));
         assert_eq!(name("##/a.png", 0), None, "folders are not counted");
+        assert_eq!(name("##a##_###", 4), Some("##a##_005".into()));
+        let endless = numbered(Path::new(&"#".repeat(65_536)), Turn { number: 6, of: 9 }).expect("a name");
+        let endless = endless.into_os_string().into_string().expect("digits");
+        assert!(endless.len() == 65_536 && endless.ends_with("007"));
+        let raw = |bytes: &[u8]| PathBuf::from(OsString::from_vec(bytes.to_vec()));
+        let of_raw = numbered(&raw(b"\xff_##\xfe.png"), Turn { number: 6, of: 9 });
+        assert_eq!(of_raw, Some(raw(b"\xff_07\xfe.png")), "a name that is not UTF-8");
+        assert_eq!(check_name(&raw(b"\xff_##\xfe.png")), Ok(()));
         assert_eq!(suggested(Path::new("x/a.b.png")), Path::new("x/a.b_####.png"));
     }
 
