@@ -15,7 +15,7 @@ use crate::compare::{self, Bias, Errors, Measured, PIXELS_PER_DEGREE, Pair};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::output::write::{self, Guard};
-use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError};
+use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError, is_one_file};
 use crate::system::threads::start_failure;
 use crate::tui::wrapped;
 
@@ -134,9 +134,7 @@ impl<'a> Diff<'a> {
 
 /// The target, which leads to `real`, must not be A or B.
 fn check_no_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), OutputError> {
-    let Some(identity) = FileIdentity::of(real) else { return Ok(()) };
-    let inputs = [&args.a, &args.b];
-    match inputs.into_iter().find(|input| FileIdentity::of(input).as_ref() == Some(&identity)) {
+    match [&args.a, &args.b].into_iter().find(|input| is_one_file(real, input)) {
         Some(input) => {
             let other = if path == input { String::new() } else { format!("{}, ", input.display()) };
             let name = path.display();

@@ -19,7 +19,7 @@ use crate::film::Film;
 use crate::film::tone::develop;
 use crate::output::part::{self, Merged, PartError, PartFile};
 use crate::output::write::{Guard, atomic_until};
-use crate::output::{self, FileIdentity, Finish, Format, Losses, OutputError};
+use crate::output::{self, Finish, Format, Losses, OutputError, is_one_file};
 use crate::scene::sanitize::{shortened, visible};
 use crate::system::threads::start_failure;
 use crate::tui::{Named, printed};
@@ -120,6 +120,10 @@ impl Merge<'_> {
         for (index, path) in self.args.parts.iter().enumerate() {
             match PartFile::open(path, self.token) {
                 Ok(part) => parts.push(part),
+                Err(error) if error.is_out_of_files() => {
+                    bar.end();
+                    return Err(self.too_many_files(parts.len()));
+                }
                 Err(PartError::Unreadable { source, .. })
                     if self.args.partial && source.kind() == std::io::ErrorKind::NotFound => {}
                 Err(PartError::Cancelled(_)) => return Err(Exit::FAILED),
@@ -136,6 +140,15 @@ impl Merge<'_> {
         }
     }
 
+    /// Every further part would fail for the same reason.
+    fn too_many_files(&self, opened: usize) -> Exit {
+        let all = self.args.parts.len();
+        let message = format!(
+            "too many open files: {opened} of {all} parts could be opened; raise the limit on open files (ulimit -n)"
+        );
+        self.console.fail(Exit::FAILED, &message)
+    }
+
     /// Waits until all parts are there and whole, and shows what is there.
     fn watched(&self) -> Result<Vec<PartFile>, Exit> {
         let mut parts: Vec<PartFile> = Vec::new();
@@ -145,7 +158,11 @@ impl Merge<'_> {
         loop {
             let mut rest = Vec::new();
             for mut awaited in waiting {
-                match awaited.look(self.token).map_err(|error| self.refuse(&error))? {
+                let looked = awaited.look(self.token).map_err(|error| match error.is_out_of_files() {
+                    true => self.too_many_files(parts.len()),
+                    false => self.refuse(&error),
+                });
+                match looked? {
                     Some(part) => parts.push(part),
                     None => rest.push(awaited),
                 }
@@ -303,11 +320,6 @@ impl Merge<'_> {
             self.console.say(&format!("warning: {missing}; the picture is made of the others"));
         }
     }
-}
-
-fn is_one_file(one: &Path, other: &Path) -> bool {
-    let identity = FileIdentity::of(one);
-    identity.is_some() && identity == FileIdentity::of(other)
 }
 
 /// A part that is waited for.

@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::place::{directory_of, follow};
 
@@ -55,6 +55,59 @@ impl FileIdentity {
     }
 }
 
+/// Properties of an existing file by which it is known where its identity is not enough: some file systems that ignore case have no
+/// stable inodes, such as FAT and some network mounts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Likeness {
+    real: PathBuf,
+    /// The folder in lower case.
+    folder: PathBuf,
+    /// The name in lower case.
+    name: OsString,
+    length: u64,
+    modified: (i64, i64),
+}
+
+impl Likeness {
+    /// The likeness of the path's file. `None` if it is not an existing regular file.
+    pub fn of(path: &Path) -> Option<Self> {
+        let found = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
+        let real = path.canonicalize().ok()?;
+        let lower = PathBuf::from(real.to_string_lossy().to_lowercase());
+        Some(Self {
+            folder: lower.parent()?.to_owned(),
+            name: lower.file_name()?.to_owned(),
+            length: found.len(),
+            modified: (found.mtime(), found.mtime_nsec()),
+            real,
+        })
+    }
+
+    /// Whether both have to be taken for one file: they are in one folder, and their names differ in case at most, or they have the same
+    /// length, time and content.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let is_stamp_same = || (self.length, self.modified) == (other.length, other.modified);
+        self.folder == other.folder
+            && (self.name == other.name || is_stamp_same() && have_one_content(&self.real, &other.real))
+    }
+}
+
+fn have_one_content(one: &Path, other: &Path) -> bool {
+    let hash = |path: &Path| {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update_reader(File::open(path).ok()?).ok()?;
+        Some(hasher.finalize())
+    };
+    hash(one).is_some_and(|hash_of_one| Some(hash_of_one) == hash(other))
+}
+
+/// Whether two paths lead to one file, existing or not, or to files that have to be taken for one ([`Likeness`]).
+pub fn is_one_file(one: &Path, other: &Path) -> bool {
+    let Some(identity) = FileIdentity::of(one) else { return false };
+    let are_alike = || Some(Likeness::of(one)?.is_like(&Likeness::of(other)?));
+    FileIdentity::of(other) == Some(identity) || are_alike().unwrap_or(false)
+}
+
 #[cfg(test)]
 mod tests {
     use std::os::unix::fs::symlink;
@@ -95,6 +148,38 @@ mod tests {
         assert_ne!(of("new"), of("far/away/new"));
         assert_ne!(of("near/../new"), of("new"));
         assert_eq!(of("nowhere/new"), None, "nothing can be written there");
+    }
+
+    #[test]
+    fn files_that_may_be_one_are_taken_for_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("other")).expect("a folder");
+        // A file system that distinguishes case stands for one whose inodes do not tell.
+        let files =
+            [("t.png", "one"), ("T.PNG", "longer"), ("a.png", "one"), ("b.png", "two"), ("c.png", "one")];
+        for (name, text) in files.into_iter().chain([("other/t.png", "one")]) {
+            fs::write(at(name), text).expect("written");
+        }
+        let stamp = fs::metadata(at("t.png")).and_then(|found| found.modified()).expect("a time");
+        let later = stamp + std::time::Duration::from_secs(1);
+        for (name, time) in [("a.png", stamp), ("b.png", stamp), ("c.png", later), ("other/t.png", stamp)] {
+            let file = File::options().write(true).open(at(name));
+            file.and_then(|file| file.set_modified(time)).expect("set");
+        }
+        for (name, is_one) in [
+            ("t.png", true),
+            ("T.PNG", true),
+            ("a.png", true),
+            ("b.png", false),
+            ("c.png", false),
+            ("other/t.png", false),
+            ("none", false),
+        ] {
+            assert_eq!(is_one_file(&at(name), &at("t.png")), is_one, "{name}");
+        }
+        assert!(!is_one_file(folder.path(), folder.path()), "a folder is not a file");
+        assert!(is_one_file(&at("none"), &at("other/../none")), "one that does not exist yet");
     }
 
     #[test]

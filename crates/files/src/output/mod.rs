@@ -35,7 +35,7 @@ pub use error::OutputError;
 pub use exr::mean_luminance_error;
 pub use finish::Finish;
 pub use format::{BitDepth, Format, MovingFormat};
-pub use identity::FileIdentity;
+pub use identity::{FileIdentity, Likeness, is_one_file};
 pub use origin::{Replaced, replaced_json, replaced_picture, replaced_plot, replaced_table, signed};
 
 use crate::control::CancelToken;

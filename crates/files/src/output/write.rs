@@ -17,7 +17,7 @@ use super::place::{self, Place, Target};
 use super::temporary::{self, Temporary};
 use super::{FileIdentity, Losses, OutputError, stoppable};
 use crate::control::CancelToken;
-use crate::system::in_words;
+use crate::system::describe_error;
 
 /// Standard output. It is already open: opening it by this name would fail for a socket.
 pub const STDOUT: &str = "/dev/stdout";
@@ -154,7 +154,7 @@ fn replace(
                 tell(format!(
                     "{}: it is written, but its folder could not be synchronized: {}",
                     path.display(),
-                    in_words(&error)
+                    describe_error(&error)
                 ));
             }
             if let (Losses::Told(tell), false) = (guard.losses, lost.is_empty()) {

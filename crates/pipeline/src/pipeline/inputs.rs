@@ -9,7 +9,7 @@ use super::stages::meshes::Meshes;
 use super::stages::parse::Parsed;
 use super::watch::content::FileRead;
 use crate::assets::gltf::is_gltf;
-use crate::output::FileIdentity;
+use crate::output::{FileIdentity, Likeness};
 use crate::scene::description::Camera;
 use crate::scene::{Loaded, is_model};
 
@@ -94,19 +94,58 @@ impl Inputs {
         self.0.extend(others.0.into_iter().filter(|other| !known.contains(&other.path)));
     }
 
-    /// Current identities of the files.
-    pub(super) fn identities(&self) -> HashMap<FileIdentity, &Input> {
-        let mut identities = HashMap::new();
+    /// The files as they are on disk now.
+    pub(super) fn on_disk(&self) -> OnDisk<'_> {
+        let mut on_disk = OnDisk { by_identity: HashMap::new(), alike: Vec::new() };
         for input in &self.0 {
             if let Some(identity) = FileIdentity::of(&input.path) {
-                identities.entry(identity).or_insert(input);
+                on_disk.by_identity.entry(identity).or_insert(input);
             }
+            on_disk.alike.extend(Likeness::of(&input.path).map(|likeness| (likeness, input)));
         }
-        identities
+        on_disk
     }
 
     /// Whether this path leads to one of them now.
     pub(super) fn contain(&self, path: &Path) -> bool {
-        FileIdentity::of(path).is_some_and(|identity| self.identities().contains_key(&identity))
+        FileIdentity::of(path).is_some_and(|_| self.on_disk().find(path).is_some())
+    }
+}
+
+/// Inputs by everything that tells whether a file is one of them.
+pub(super) struct OnDisk<'a> {
+    by_identity: HashMap<FileIdentity, &'a Input>,
+    alike: Vec<(Likeness, &'a Input)>,
+}
+
+impl<'a> OnDisk<'a> {
+    /// The input that a path leads to, or has to be taken for.
+    pub(super) fn find(&self, path: &Path) -> Option<&'a Input> {
+        if let Some(input) = self.by_identity.get(&FileIdentity::of(path)?) {
+            return Some(input);
+        }
+        let own = Likeness::of(path)?;
+        self.alike.iter().find(|(likeness, _)| own.is_like(likeness)).map(|(_, input)| *input)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_file_that_differs_from_an_input_in_case_is_that_input() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| folder.path().join(name);
+        for (name, text) in [("t.png", "one"), ("T.PNG", "longer"), ("other.png", "two")] {
+            fs::write(at(name), text).expect("written");
+        }
+        let inputs = Inputs(vec![Input { path: at("t.png"), role: "a texture".to_owned(), place: None }]);
+        for (name, is_input) in [("t.png", true), ("T.PNG", true), ("other.png", false), ("none.png", false)]
+        {
+            assert_eq!(inputs.contain(&at(name)), is_input, "{name}");
+        }
     }
 }

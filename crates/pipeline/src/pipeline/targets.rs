@@ -5,8 +5,9 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 
-use super::inputs::{Input, Inputs};
+use super::inputs::{Input, Inputs, OnDisk};
 use super::plan::{NamedBy, Plan};
+use super::render::keeping::path_of as checkpoint_of;
 use super::report::Marks;
 use super::sink::Sink;
 use crate::output::part::{self, PartFile};
@@ -31,8 +32,17 @@ enum Kind {
 /// Everything that keeps the files of this plan from being written, one for each of them. It is what holds now: links
 /// and files may change.
 pub(super) fn conflicts(plan: &Plan, inputs: &Inputs) -> Vec<Diagnostic> {
-    let inputs = inputs.identities();
-    let each = targets(plan).filter_map(|target| conflict(plan, target, target.path, &inputs));
+    let inputs = inputs.on_disk();
+    // Numbers keep those apart that are still to come.
+    let mut first = HashMap::new();
+    for target in targets_now(plan) {
+        if let Some(identity) = FileIdentity::of(target.path) {
+            first.entry(identity).or_insert(target);
+        }
+    }
+    let twin =
+        |target: Target<'_>, at: &FileIdentity| first.get(at).copied().filter(|first| *first != target);
+    let each = targets(plan).filter_map(|target| conflict(plan, target, target.path, &inputs, twin));
     each.chain(linked(plan)).collect()
 }
 
@@ -65,9 +75,14 @@ pub(super) fn guarded<T>(
     write: impl FnOnce(&Guard<'_>) -> Result<T, OutputError>,
 ) -> Result<T, OutputError> {
     let may_replace = |real: &Path| {
-        let inputs = inputs.identities();
+        let inputs = inputs.on_disk();
+        // Targets were compared when the write stage began; since then only links can have changed.
+        let twin = |target: Target<'_>, at: &FileIdentity| {
+            let mut others = targets_now(plan).filter(|other| real != path && *other != target);
+            others.find(|other| FileIdentity::of(other.path).as_ref() == Some(at))
+        };
         let mut found = targets(plan).filter(|target| target.path == path);
-        match found.find_map(|target| conflict(plan, target, real, &inputs)) {
+        match found.find_map(|target| conflict(plan, target, real, &inputs, twin)) {
             Some(conflict) => Err(OutputError::Refused { reason: in_a_line(&conflict) }),
             None => Ok(()),
         }
@@ -99,24 +114,33 @@ fn targets_now(plan: &Plan) -> impl Iterator<Item = Target<'_>> {
     pictures.map(PathBuf::as_path).map(picture).chain(report)
 }
 
-/// Why this target, which leads to `at`, must not be written.
-fn conflict(
-    plan: &Plan,
-    target: Target<'_>,
+/// Why this target, which leads to `at`, must not be written; `twin` finds another target of the same file.
+fn conflict<'a>(
+    plan: &'a Plan,
+    target: Target<'a>,
     at: &Path,
-    inputs: &HashMap<FileIdentity, &Input>,
+    inputs: &OnDisk<'_>,
+    twin: impl Fn(Target<'a>, &FileIdentity) -> Option<Target<'a>>,
 ) -> Option<Diagnostic> {
     if let Some(identity) = FileIdentity::of(at) {
-        if let Some(input) = inputs.get(&identity) {
+        if let Some(input) = inputs.find(at) {
             return Some(is_input(plan, target, input));
         }
-        // Numbers keep those apart that are still to come.
-        let mut earlier = targets_now(plan).take_while(|other| *other != target);
-        if let Some(twin) = earlier.find(|other| FileIdentity::of(other.path).as_ref() == Some(&identity)) {
+        if let Some(twin) = twin(target, &identity) {
             return Some(is_twin(plan, target, twin.path));
+        }
+        if let Some(output) = plan.outputs.first().filter(|output| has_checkpoint_at(output, &identity)) {
+            let (name, output) = (target.path.display(), output.display());
+            let message = format!("cannot write {name}: it is the checkpoint of {output}");
+            return Some(of_call(message, Some(way_out(plan, target.kind).to_owned())));
         }
     }
     if plan.replaces_foreign { None } else { is_foreign(plan, target, at) }
+}
+
+/// Whether the checkpoint of an output is written to this file.
+fn has_checkpoint_at(output: &Path, identity: &FileIdentity) -> bool {
+    FileIdentity::of(&checkpoint_of(output)).as_ref() == Some(identity)
 }
 
 fn is_input(plan: &Plan, target: Target<'_>, input: &Input) -> Diagnostic {

@@ -11,8 +11,10 @@ use crate::cli::exit::Exit;
 use crate::cli::lower::STANDARD;
 use crate::control::CancelToken;
 use crate::output::write::{self, Guard};
-use crate::output::{self, FileIdentity, Losses, OutputError, replaced_json, replaced_plot, replaced_table};
-use crate::system::{describe_error, file};
+use crate::output::{
+    self, FileIdentity, Losses, OutputError, is_one_file, replaced_json, replaced_plot, replaced_table,
+};
+use crate::system::{file, describe_error};
 
 /// Files to write, and files that must not be written.
 pub(super) struct Outputs {
@@ -75,8 +77,10 @@ impl Outputs {
 
     /// The file of this number, which leads to `real`, must be no input and no other output.
     fn may_replace(&self, index: usize, real: &Path) -> Result<(), OutputError> {
-        let Some(identity) = FileIdentity::of(real) else { return Ok(()) };
-        let is_it = |path: &Path| FileIdentity::of(path).as_ref() == Some(&identity);
+        if FileIdentity::of(real).is_none() {
+            return Ok(());
+        }
+        let is_it = |path: &Path| is_one_file(real, path);
         let (option, path, _) = &self.files[index];
         let refused = |what: &str| {
             let reason = format!(

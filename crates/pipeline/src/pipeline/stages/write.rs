@@ -101,7 +101,8 @@ fn find_targets(
     match plan.shard {
         // A part has any ending.
         Some(_) => plan.outputs.iter().try_for_each(|path| place(path))?,
-        None => plan.outputs.iter().try_for_each(check)?,
+        // Nothing that is in the way of a later image of a turntable is found when hours of work are done.
+        None => plan.outputs.iter().chain(&plan.to_come).try_for_each(check)?,
     }
     plan.moving.iter().try_for_each(|path| place(path))?;
     plan.report.iter().try_for_each(|path| place(path))

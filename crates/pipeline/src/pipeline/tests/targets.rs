@@ -9,6 +9,9 @@ use crate::control::{CancelToken, Cancelled};
 use crate::film::{Pixels, TileSamples};
 use crate::integrators::{PhotonMaps, RayCounters, RenderSettings};
 use crate::output::FileIdentity;
+use crate::pipeline::protocol::CheckpointNews;
+use crate::pipeline::settings::Checkpoints;
+use crate::pipeline::turntable::Turn;
 use crate::world::World;
 
 /// The first conflicts reported, and the end of the request.
@@ -158,4 +161,56 @@ fn while_the_scene_is_broken_only_what_this_run_wrote_is_replaced() {
     fs::remove_file(&output).expect("removed");
     bench.worker.send(Command::Write);
     assert!(matches!(bench.next(), Event::Written { .. }));
+}
+
+#[test]
+fn a_finished_part_is_never_taken_for_a_checkpoint() {
+    let mut bench = Bench::new(SCENE);
+    let (out, part) = (bench.path("out"), bench.path("out.checkpoint"));
+    bench.overrides.shard = Some((2, 2));
+    bench.overrides.outputs = vec![part.clone()];
+    bench.done();
+    let before = fs::read(&part).expect("a part");
+    bench.overrides.shard = Some((1, 2));
+    bench.overrides.outputs = vec![out.clone()];
+    bench.overrides.checkpoints = Checkpoints { seconds: 1e-9, are_kept: true, ..Checkpoints::default() };
+    let of = bench.send();
+    let events = bench.until_end(of);
+    assert_eq!(fs::read(&part).expect("a part"), before);
+    assert!(matches!(events.last(), Some(Event::Done { .. })) && out.exists());
+    let failed = events.iter().find_map(|event| match event {
+        Event::Checkpoint { news: CheckpointNews::Failed { message }, .. } => Some(message),
+        _ => None,
+    });
+    assert!(failed.is_some_and(|message| message.contains("is a finished part")), "{failed:?}");
+}
+
+#[test]
+fn a_report_beside_a_checkpoint_is_refused_before_the_work() {
+    let mut bench = Bench::with(SCENE, unused);
+    bench.overrides.report = Some(bench.path("out.ppm.checkpoint"));
+    let Failure::Scene(errors) = bench.failed() else { panic!("a conflict") };
+    assert!(errors[0].message.contains("it is the checkpoint of"), "{errors:?}");
+}
+
+#[test]
+fn a_later_image_of_a_turntable_that_is_blocked_is_found_before_the_work() {
+    let mut bench = Bench::with(SCENE, unused);
+    bench.overrides.outputs = vec![bench.path("a_##.ppm")];
+    bench.overrides.turn = Some(Turn { number: 0, of: 12 });
+    fs::create_dir(bench.path("a_09.ppm")).expect("a folder");
+    let Failure::Work(message) = bench.failed() else { panic!("a target") };
+    assert!(message.contains("a_09.ppm") && message.contains("directory"), "{message}");
+}
+
+/// A kernel that no test reaches.
+fn unused(
+    _: Option<&PhotonMaps>,
+    _: &World,
+    _: &RenderSettings,
+    _: Pixels,
+    _: Range<u32>,
+    _: &CancelToken,
+) -> Result<(TileSamples, RayCounters), Cancelled> {
+    panic!("the work begins");
 }

@@ -213,6 +213,7 @@ impl<'a> Keeping<'a> {
         let Some((head, there)) = kept_in(&self.path) else {
             return match PartFile::head(&self.path) {
                 Err(PartError::Version { .. }) => self.move_aside(|_| false),
+                Ok(head) if head.kind == Kind::Part => Err(is_finished_part(&self.path)),
                 Ok(_)
                 | Err(
                     PartError::Unreadable { .. }
@@ -275,6 +276,9 @@ impl<'a> Keeping<'a> {
         let damaged = |why: &str| PartError::Damaged { path: path.clone(), why: why.to_owned() };
         let read: State =
             serde_json::from_value(file.state.clone()).map_err(|_| damaged("its state makes no sense"))?;
+        if !read.is_possible() {
+            return Err(damaged("its state has impossible numbers"));
+        }
         if !read.fits(state) {
             return Err(damaged("its state is that of another film"));
         }
@@ -394,6 +398,9 @@ impl<'a> Keeping<'a> {
                     "cannot write {}: the file of this name is no checkpoint",
                     path.display()
                 )),
+                Ok(_) if PartFile::head(at).is_ok_and(|head| head.kind == Kind::Part) => {
+                    Err(OutputError::Refused { reason: is_finished_part(path) })
+                }
                 // Another process may have come first since the last look.
                 Ok(_) if claim.borrow().is_of_another(at) => refused(held_by_another(path)),
                 Ok(_) | Err(_) => Ok(()),
@@ -420,6 +427,10 @@ impl<'a> Keeping<'a> {
     fn tell(&self, news: CheckpointNews) {
         self.around.sink.checkpoint(news);
     }
+}
+
+fn is_finished_part(path: &Path) -> String {
+    format!("{} is a finished part; name another file with -o", path.display())
 }
 
 fn held_by_another(path: &Path) -> String {
@@ -449,5 +460,6 @@ fn why(error: &PartError) -> String {
 fn kept_in(path: &Path) -> Option<(Head, State)> {
     let file = PartFile::open(path, &CancelToken::new()).ok()?;
     file.check_kind(Kind::Checkpoint).ok()?;
-    Some((file.head, serde_json::from_value(file.state).ok()?))
+    let state: State = serde_json::from_value(file.state).ok()?;
+    state.is_possible().then_some((file.head, state))
 }

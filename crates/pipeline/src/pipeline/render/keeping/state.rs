@@ -51,6 +51,21 @@ impl State {
         camera_rays
     }
 
+    /// Whether a render can have left these numbers. Others would overflow sums, or make a render wait for ever.
+    pub(super) fn is_possible(&self) -> bool {
+        /// Some 30,000 years.
+        const MOST_SECONDS: f64 = 1e12;
+        const MOST_RAYS: u64 = 1 << 56;
+        let is_time = |seconds: f64| (0.0..=MOST_SECONDS).contains(&seconds);
+        let sum = |rays: &[u64]| rays.iter().try_fold(0_u64, |sum, rays| sum.checked_add(*rays));
+        let have_rays = |rays: &[u64]| sum(rays).is_some_and(|sum| sum <= MOST_RAYS);
+        is_time(self.seconds)
+            && is_time(self.processor_seconds)
+            && self.brightness.is_none_or(|brightness| brightness.is_finite() && brightness >= 0.0)
+            && have_rays(&self.rays)
+            && have_rays(&self.cell_rays)
+    }
+
     /// Whether it is of a film of this size.
     pub(super) fn fits(&self, state: &FilmState) -> bool {
         self.goals.len() == state.done.len()
@@ -81,5 +96,36 @@ impl State {
         state.render_seconds = self.seconds;
         state.seconds = self.processor_seconds;
         Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn state() -> State {
+        State {
+            goals: vec![[4, 4]],
+            judged: vec![2],
+            brightness: Some(0.5),
+            cell_rays: vec![70],
+            rays: [10, 20, 30, 0, 5, 5],
+            seconds: 3.5,
+            processor_seconds: 7.0,
+        }
+    }
+
+    #[test]
+    fn impossible_numbers_are_found() {
+        assert!(state().is_possible());
+        for seconds in [-1e300, -1e-9, 1e300, f64::NAN, f64::INFINITY] {
+            assert!(!State { seconds, ..state() }.is_possible(), "{seconds}");
+            assert!(!State { processor_seconds: seconds, ..state() }.is_possible(), "{seconds}");
+        }
+        for brightness in [-1.0, f64::NAN, f64::INFINITY] {
+            assert!(!State { brightness: Some(brightness), ..state() }.is_possible(), "{brightness}");
+        }
+        assert!(!State { rays: [u64::MAX, 1, 0, 0, 0, 0], ..state() }.is_possible());
+        assert!(!State { cell_rays: vec![1 << 57], ..state() }.is_possible());
     }
 }
