@@ -6,6 +6,7 @@ pub mod abort;
 pub mod cpu_time;
 pub mod file;
 pub mod machine;
+pub mod memory;
 pub mod priority;
 pub mod text;
 pub mod threads;

@@ -4,10 +4,13 @@ use std::path::Path;
 
 use clap::Parser;
 
-use super::args::{Args, Engine, FarmArgs, Switch};
+use super::args::{Args, Engine, FarmArgs, RenderArgs, Switch};
 use super::console::Console;
 use super::exit::Exit;
 use crate::output::Format;
+use crate::pipeline::memory_needed;
+use crate::pipeline::protocol::Failure;
+use crate::system::text::is_plain;
 
 pub(super) fn run(args: &FarmArgs, console: &Console) -> Exit {
     if let Err(error) = Format::of(&args.output) {
@@ -15,21 +18,23 @@ pub(super) fn run(args: &FarmArgs, console: &Console) -> Exit {
     }
     let paths = [args.scene.to_str(), args.output.to_str()];
     let words = args.options.iter().chain(&args.hosts).map(String::as_str).chain(paths.into_iter().flatten());
-    // A line of a name could end a document in the script.
-    if paths.contains(&None) || words.into_iter().any(|word| word.contains(['\n', '\0'])) {
+    // A line of a name could end a document in the script, and a script is shown on terminals.
+    let words = words.chain([args.image.as_str(), args.claim.as_str()]);
+    if paths.contains(&None) || words.into_iter().any(|word| !word.chars().all(is_plain)) {
         return console
             .fail(Exit::WRONG, "a script cannot hold this name: use names of letters, digits, - and _");
     }
     if !args.scene.is_file() {
         return console.fail(Exit::WRONG, &format!("{}: no such file", args.scene.display()));
     }
-    if let Err(message) = check_options(args) {
-        return console.fail(Exit::WRONG, &format!("behind `--`: {message}"));
-    }
+    let options = match check_options(args) {
+        Ok(options) => options,
+        Err(message) => return console.fail(Exit::WRONG, &format!("behind `--`: {message}")),
+    };
     console.text(&match args.engine {
         Engine::Slurm => slurm(args),
         Engine::Parallel => parallel(args),
-        Engine::Kubernetes => kubernetes(args),
+        Engine::Kubernetes => kubernetes(args, memory(args, &options, console)),
     });
     Exit::DONE
 }
@@ -38,12 +43,12 @@ pub(super) fn run(args: &FarmArgs, console: &Console) -> Exit {
 ///
 /// # Errors
 /// One is unknown or wrong, or is not the same for all parts.
-fn check_options(args: &FarmArgs) -> Result<(), String> {
+fn check_options(args: &FarmArgs) -> Result<RenderArgs, String> {
     let (program, scene) = ("glimt".to_owned(), file(&args.scene));
     let words = [program, scene].into_iter().chain(args.options.iter().cloned());
     let render = match Args::try_parse_from(words) {
         Ok(Args { command: None, render }) => render,
-        Ok(_) => return Err("a command is no option of a render".to_owned()),
+        Ok(Args { command: Some(_), .. }) => return Err("a command is no option of a render".to_owned()),
         Err(error) => return Err(first_words(&error)),
     };
     let photons_by_error =
@@ -60,7 +65,26 @@ fn check_options(args: &FarmArgs) -> Result<(), String> {
         (render.time.is_some(), "--time has no parts: machines differ in speed"),
         (photons_by_error, "photons with a noise threshold have no parts: each pass judges the whole image"),
     ];
-    faults.iter().find(|(is_there, _)| *is_there).map_or(Ok(()), |(_, message)| Err((*message).to_owned()))
+    match faults.iter().find(|(is_there, _)| *is_there) {
+        Some((_, message)) => Err((*message).to_owned()),
+        None => Ok(render),
+    }
+}
+
+/// Mebibytes that a container needs: those of a part, with a quarter to spare. `None`, with a warning, if the scene cannot be read.
+fn memory(args: &FarmArgs, options: &RenderArgs, console: &Console) -> Option<u64> {
+    let mut overrides = options.overrides();
+    (overrides.shard, overrides.outputs) = (Some((1, args.shards)), vec![args.output.clone()]);
+    let why = match memory_needed(&args.scene, &overrides) {
+        Ok(bytes) => return Some((bytes + bytes / 4).div_ceil(1 << 20)),
+        Err(Failure::Work(why)) => why,
+        Err(Failure::Scene(diagnostics)) => {
+            console.diagnostics(&diagnostics);
+            "the scene has errors".to_owned()
+        }
+    };
+    console.say(&format!("warning: the jobs state no memory: {why}"));
+    None
 }
 
 /// The words of an error about arguments, without the usage below them.
@@ -154,11 +178,16 @@ seq {count} | while read -r index; do printf '{format}\\n' {render}; done |
     )
 }
 
-fn kubernetes(args: &FarmArgs) -> String {
+fn kubernetes(args: &FarmArgs, mebibytes: Option<u64>) -> String {
     let (count, render, merge) =
         (args.shards, render(args, "$index"), merge(args, "--watch --progress plain "));
     let (image, claim) = (yaml(&args.image), yaml(&args.claim));
     let render = command(&format!("index=$((JOB_COMPLETION_INDEX + 1)); exec {render}"));
+    let resources = mebibytes.map_or(String::new(), |size| {
+        format!(
+            "        resources:\n          requests:\n            memory: {size}Mi\n          limits:\n            memory: {size}Mi\n"
+        )
+    });
     let job = |name: &str, indexed: &str, command: &str| {
         format!(
             "\
@@ -176,7 +205,7 @@ spec:
         image: {image}
         workingDir: /work
         command: [\"sh\", \"-c\", {command}]
-        volumeMounts:
+{resources}        volumeMounts:
         - name: work
           mountPath: /work
       volumes:
@@ -299,7 +328,7 @@ mod tests {
     fn names_survive_kubernetes_and_its_shell() {
         let (scene, picture) = ("$(HOME) $$ $$(HOME).toml", "o $$ $(JOB_COMPLETION_INDEX).exr");
         let args = args(&format!("{} -o {} --shards 8 --engine kubernetes", word(scene), word(picture)));
-        let script = kubernetes(&args);
+        let script = kubernetes(&args, None);
         let commands: Vec<String> = script
             .lines()
             .filter_map(|line| line.trim().strip_prefix("command: "))
@@ -324,7 +353,12 @@ mod tests {
 
     #[test]
     fn a_job_of_kubernetes_is_yaml_with_strings_of_json() {
-        let script = kubernetes(&args("a.toml -o 'a \"b\".exr' --shards 8 --engine kubernetes"));
+        let args = args("a.toml -o 'a \"b\".exr' --shards 8 --engine kubernetes");
+        let bare = kubernetes(&args, None);
+        let script = kubernetes(&args, Some(640));
+        assert_eq!((script.matches("memory: 640Mi").count(), bare.contains("memory")), (4, false));
+        let stated = "        resources:\n          requests:\n            memory: 640Mi\n          limits:\n            memory: 640Mi\n";
+        assert_eq!(script.replace(stated, ""), bare);
         assert!(script.contains("completions: 8") && script.contains("completionMode: Indexed"));
         let commands = script.lines().filter_map(|line| line.trim().strip_prefix("command: "));
         for command in commands {

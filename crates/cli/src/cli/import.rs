@@ -10,7 +10,7 @@ use super::signals;
 use crate::control::CancelToken;
 use crate::output::OutputError;
 use crate::output::staged::new_files;
-use crate::pipeline::{Imported, import};
+use crate::pipeline::{ImportError, Imported, import};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 
 pub(super) fn run(args: &ImportArgs, console: &Console) -> Exit {
@@ -50,7 +50,8 @@ fn make(args: &ImportArgs, console: &Console, token: &CancelToken) -> Exit {
     let imported = match import(&args.file, &folder, token) {
         Ok(imported) => imported,
         Err(_) if token.is_cancelled() => return Exit::FAILED,
-        Err(message) => return console.fail(Exit::WRONG, &message),
+        Err(ImportError::File(message)) => return console.fail(Exit::WRONG, &message),
+        Err(ImportError::Work(message)) => return console.fail(Exit::FAILED, &message),
     };
     tell_notes(&args.file, &imported.notes, console);
     if args.strict && !imported.notes.is_empty() {

@@ -5,7 +5,10 @@ use std::sync::Arc;
 use std::sync::mpsc;
 
 use super::engine::{Engine, Means};
+use super::memory::Foretold;
+use super::plan::plan;
 use super::protocol::{Failure, PreviewSlot};
+use super::settings::Overrides;
 use super::sink::Sink;
 use super::stages::meshes::Meshes;
 use super::stages::parse::Parsed;
@@ -48,15 +51,30 @@ impl Default for Checker {
     }
 }
 
+/// Bytes of memory that a render is estimated to need, on the safe side. Reads all files of the scene.
+///
+/// # Errors
+/// All errors of the scene and its files.
+pub fn memory_needed(path: &Path, overrides: &Overrides) -> Result<u64, Failure> {
+    let Checker(mut engine) = Checker::default();
+    let token = CancelToken::new();
+    let (parsed, meshes, textures, _) = engine.read_all(path, &overrides.sets, &silent_sink(), &token)?;
+    let plan = plan(&parsed.loaded.scene, path, overrides).map_err(|error| Failure::Scene(vec![*error]))?;
+    Ok(Foretold::of_scene(&plan, &plan.scene, &meshes, textures.memory_bytes).bytes())
+}
+
+fn silent_sink() -> Sink {
+    let (events, _) = mpsc::channel();
+    Sink { generation: 0, events, previews: PreviewSlot::default(), within: None }
+}
+
 impl Checker {
     /// Checks a scene with all files that it names, used or not.
     ///
     /// # Errors
     /// All errors and warnings of the scene and its files; a failure of the work if the token is cancelled.
     pub fn check(&mut self, path: &Path, sets: &[String], token: &CancelToken) -> Result<Checked, Failure> {
-        let (events, _) = mpsc::channel();
-        let sink = Sink { generation: 0, events, previews: PreviewSlot::default(), within: None };
-        let (parsed, meshes, textures, warnings) = self.0.read_all(path, sets, &sink, token)?;
+        let (parsed, meshes, textures, warnings) = self.0.read_all(path, sets, &silent_sink(), token)?;
         Ok(checked(&parsed, &meshes, &textures, warnings))
     }
 }

@@ -54,7 +54,9 @@ impl Depends<'_> {
         add("filter", render.filter.name().to_owned());
         add("seed", render.seed.to_string());
         add("depth of field", if dof { "on" } else { "off" }.to_owned());
-        add("view", view.sampled().name().to_owned());
+        // Parts agree about the view itself, checkpoints only about its samples.
+        let sampled = if self.divided.is_some() { view } else { view.sampled() };
+        add("view", sampled.name().to_owned());
         add(
             "photons",
             match photons {
@@ -73,7 +75,6 @@ impl Depends<'_> {
         );
         if let Some(samples) = self.divided {
             add("samples", samples.to_string());
-            add("view", self.plan.settings.view.name().to_owned());
             add("exposure", self.plan.tone.exposure_stops.to_string());
             add("tonemap", self.plan.tone.curve.name().to_owned());
             add("bits per channel", self.plan.bit_depth.to_string());

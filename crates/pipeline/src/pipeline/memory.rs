@@ -10,6 +10,7 @@ use super::stages::meshes::Meshes;
 use crate::film::{Film, Rect, SumOrder};
 use crate::integrators::PhotonSettings;
 use crate::scene::description::{Accel, Scene};
+use crate::system::memory::{Limit, limit};
 
 /// Bytes of the program itself, with its threads.
 const PROGRAM: u64 = 24 << 20;
@@ -71,12 +72,22 @@ impl Foretold {
         Self(items)
     }
 
-    /// Refuses what takes more than the call allows.
+    /// Bytes of all parts.
+    pub(super) fn bytes(&self) -> u64 {
+        self.0.iter().fold(0, |sum: u64, (_, bytes)| sum.saturating_add(*bytes))
+    }
+
+    /// Refuses what takes more than the call, or else the system, allows.
     ///
     /// # Errors
     /// The work would need more, with the numbers and a way out.
     pub(super) fn check(&self, plan: &Plan) -> Result<(), Stop> {
-        let all: u64 = self.0.iter().map(|(_, bytes)| bytes).sum();
+        self.check_within(plan, limit)
+    }
+
+    /// [`Self::check`] where the system has this limit.
+    fn check_within(&self, plan: &Plan, limit: impl FnOnce() -> Option<Limit>) -> Result<(), Stop> {
+        let all = self.bytes();
         let frames = self.0.iter().find(|(name, bytes)| *name == FRAMES && *bytes > MOST_FRAMES);
         if let (Some((_, bytes)), None) = (frames, plan.memory) {
             return Err(Stop::work(format!(
@@ -86,7 +97,11 @@ impl Foretold {
                 allowance(all)
             )));
         }
-        let Some(most) = plan.memory.filter(|most| all > *most) else { return Ok(()) };
+        // A size that the call names counts in place of the system's: the estimate is on the safe side.
+        let limit = plan.memory.map(|bytes| Limit { bytes, setting: "--memory".to_owned() }).or_else(limit);
+        let Some(Limit { bytes: most, setting }) = limit.filter(|limit| all > limit.bytes) else {
+            return Ok(());
+        };
         let mut largest = self.0.clone();
         largest.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
         let items = largest.iter().filter(|(_, bytes)| *bytes * 100 > all);
@@ -104,11 +119,13 @@ impl Foretold {
             true => "a size without a unit is in bytes: give one, as in 8GiB",
             false => way_out,
         };
+        let try_anyway = format!(", raise the limit, or try anyway with --memory {}", allowance(all));
         Err(Stop::work(format!(
-            "the render needs about {} of memory ({}), more than the {} of --memory; {way_out}",
+            "the render needs about {} of memory ({}), more than the {} of {setting}; {way_out}{}",
             words(all),
             items.join(", "),
-            words(most)
+            words(most),
+            if plan.memory.is_some() { "" } else { &try_anyway }
         )))
     }
 }
@@ -183,6 +200,23 @@ mod tests {
         let crop = Some(Rect { x: 10, y: 10, width: 500, height: 500 });
         let part = Overrides { crop, memory: Some(1 << 30), ..large };
         assert!(Foretold::of_picture(&planned(&part)).check(&planned(&part)).is_ok());
+    }
+
+    #[test]
+    fn a_limit_of_the_system_counts_unless_the_call_names_one() {
+        let limit = || Some(Limit { bytes: 8 << 20, setting: "the control group (x)".to_owned() });
+        let check = |overrides: &Overrides| {
+            let plan = planned(overrides);
+            Foretold::of_picture(&plan).check_within(&plan, limit)
+        };
+        let said = match check(&Overrides::default()) {
+            Err(Stop::Failed(Failure::Work(said))) => said,
+            other => panic!("{other:?}"),
+        };
+        assert!(said.contains("needs about 41 MiB of memory"), "{said}");
+        assert!(said.contains("more than the 8 MiB of the control group (x); "), "{said}");
+        assert!(said.ends_with("raise the limit, or try anyway with --memory 1GiB"), "{said}");
+        assert!(check(&Overrides { memory: Some(1 << 30), ..Overrides::default() }).is_ok());
     }
 
     #[test]

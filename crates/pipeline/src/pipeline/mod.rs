@@ -39,7 +39,7 @@ mod worker;
 mod tests;
 
 pub use build::BUILD;
-pub use check::{Checked, Checker, check};
-pub use model::import::{Imported, import};
+pub use check::{Checked, Checker, check, memory_needed};
+pub use model::import::{ImportError, Imported, import};
 pub use watch::content::{Content, FileRead};
 pub use worker::{Handle, Remote, start};

@@ -88,7 +88,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
             .unwrap_or(scene.photons.enabled)
             .then(|| photons(&scene.photons, (render.width, render.height))),
     };
-    let threads = overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores);
+    let threads = threads(overrides);
     let (outputs, named_by) = outputs(scene.output.as_ref(), path, overrides);
     let is_usual = named_by == NamedBy::Nobody && overrides.turn.is_some();
     let usual_names = outputs.first().filter(|_| is_usual).cloned();
@@ -341,6 +341,10 @@ fn tone(exposure: f32, curve: Tonemap, view: View) -> ToneMapping {
 }
 
 /// Threads that this machine runs at once.
+pub(super) fn threads(overrides: &Overrides) -> usize {
+    overrides.threads.filter(|count| *count > 0).unwrap_or_else(cores)
+}
+
 pub(super) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }

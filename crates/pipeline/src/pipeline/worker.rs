@@ -302,6 +302,7 @@ struct Worker {
 
 impl Worker {
     fn work(self) {
+        let _last_words = LastWords(&self.remote);
         let mut engine = Engine::new(self.means, self.contents.clone());
         let mut sink = Sink {
             generation: 0,
@@ -334,6 +335,20 @@ impl Worker {
     }
 }
 
+/// Reports the newest request as failed if the thread itself gives up: its front end waits for an end.
+struct LastWords<'a>(&'a Remote);
+
+impl Drop for LastWords<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            let generation = self.0.lock().newest;
+            let failure = Failure::Work("internal error: the renderer gave up".to_owned());
+            // A front end that is gone needs no events.
+            let _ = self.0.events.send(Event::Failed { generation, failure });
+        }
+    }
+}
+
 fn reason(payload: &(dyn Any + Send)) -> &str {
     let text = payload.downcast_ref::<String>().map(String::as_str);
     text.or_else(|| payload.downcast_ref::<&str>().copied()).unwrap_or("a part of the renderer gave up")
@@ -361,6 +376,20 @@ mod tests {
             Task::Render(_, token, _) => token,
             _ => panic!("a request waits"),
         }
+    }
+
+    #[test]
+    fn a_worker_that_gives_up_ends_its_request() {
+        let (events, received) = mpsc::channel();
+        let remote = Remote { mailbox: Arc::default(), events };
+        remote.send(render(7));
+        let gives_up = remote.clone();
+        let thread = std::thread::spawn(move || {
+            let _last_words = LastWords(&gives_up);
+            panic!("outside of a request");
+        });
+        assert!(thread.join().is_err());
+        assert!(matches!(received.try_recv(), Ok(Event::Failed { generation: 7, .. })));
     }
 
     #[test]

@@ -31,7 +31,7 @@ use super::keys;
 use super::memory::Foretold;
 use super::model::Show;
 use super::pace::Stopwatch;
-use super::plan::{NamedBy, Plan, cores, plan};
+use super::plan::{NamedBy, Plan, cores, plan, threads};
 use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Status, Writing};
 use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
@@ -382,9 +382,11 @@ impl Engine {
     ) -> Result<Ready, Stop> {
         let containers = Containers::default();
         let show = Show::of(&request.overrides);
+        // The scene cannot change the number of threads, and a model is read by all of them.
+        let pool = self.pool(threads(&request.overrides))?;
         let parsed = table.run(Stage::Parse, || {
             let origin = Origin { path: &request.scene, sets: &request.overrides.sets, show };
-            parse(origin, (contents, &containers), &mut self.parsed, findings, token)
+            pool.install(|| parse(origin, (contents, &containers), &mut self.parsed, findings, token))
         })?;
         let text = parsed.loaded.source.shared_text();
         table.sink.send(Event::Text { generation: request.generation, text });
@@ -653,9 +655,9 @@ impl Engine {
             let contents = &Snapshot::of(Arc::clone(&self.contents));
             let containers = Containers::default();
             let origin = Origin { path, sets, show: Show::default() };
-            let parsed =
-                parse(origin, (contents, &containers), &mut self.parsed, &mut findings, token)?.value;
             let pool = self.pool(cores())?;
+            let read = || parse(origin, (contents, &containers), &mut self.parsed, &mut findings, token);
+            let parsed = pool.install(read)?.value;
             let reading = Reading { sink, token, contents, pool: &pool, containers: &containers };
             let loaded = &parsed.loaded;
             let found = meshes(loaded, &mut self.meshes, &mut findings, &reading)?.value;

@@ -2,15 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
 use super::gltf::{Content, Naming};
 use super::{ModelText, Show, in_its_scene};
 use crate::assets::AssetError;
 use crate::assets::gltf::is_gltf;
 use crate::assets::mesh::ply::write;
 use crate::control::{CancelToken, ignore_progress};
+use crate::pipeline::plan::cores;
 use crate::pipeline::stages::containers::Containers;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::load_made;
+use crate::system::threads::{check_stack_space, start_failure};
 
 /// A scene that can be written.
 #[derive(Debug)]
@@ -23,14 +27,25 @@ pub struct Imported {
     pub notes: Vec<String>,
 }
 
+/// Reasons for which a file is not imported, in words.
+#[derive(Debug)]
+pub enum ImportError {
+    /// Something is wrong with the file, or with the call.
+    File(String),
+    /// The work failed: there is no memory, or no thread.
+    Work(String),
+}
+
 /// Reads a file of another program as a scene whose other files are in a folder of this name.
 ///
 /// # Errors
-/// What is wrong with the file, in words; or the token is cancelled.
-pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported, String> {
+/// What is wrong with the file or the machine; or the token is cancelled.
+pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported, ImportError> {
     if !is_gltf(path) {
-        return Err(format!("{} is no file that can be imported: .gltf or .glb", path.display()));
+        let message = format!("{} is no file that can be imported: .gltf or .glb", path.display());
+        return Err(ImportError::File(message));
     }
+    let pool = pool().map_err(|error| ImportError::Work(start_failure("threads", false, &error)))?;
     let containers = Containers::default();
     let naming = Naming::Folder(folder.to_owned());
     let read = || {
@@ -52,7 +67,18 @@ pub fn import(path: &Path, folder: &str, token: &CancelToken) -> Result<Imported
         }
         Ok(Imported { text, files, notes })
     };
-    read().map_err(|error: AssetError| error.to_string())
+    pool.install(read).map_err(|error: AssetError| match error {
+        AssetError::OutOfMemory { .. } => ImportError::Work(error.to_string()),
+        AssetError::Unreadable { .. } | AssetError::Malformed { .. } | AssetError::Cancelled(_) => {
+            ImportError::File(error.to_string())
+        }
+    })
+}
+
+/// Threads to read with, one per core.
+fn pool() -> Result<ThreadPool, String> {
+    check_stack_space(cores()).map_err(|error| error.to_string())?;
+    ThreadPoolBuilder::new().num_threads(cores()).build().map_err(|error| error.to_string())
 }
 
 /// Refuses a scene that `glimt check` would refuse. It reads the text that `glimt MODEL` shows, whose files are there.

@@ -1,0 +1,101 @@
+//! Limits that the system sets on the memory of this process.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
+
+/// The most memory that this process may have.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Limit {
+    /// Bytes.
+    pub bytes: u64,
+    /// The setting, to follow "the … of".
+    pub setting: String,
+}
+
+/// The lowest limit, of the address space or of a control group. `None` if there is none.
+pub fn limit() -> Option<Limit> {
+    let of_space =
+        getrlimit(Resource::RLIMIT_AS).ok().map(|(bytes, _)| bytes).filter(|bytes| *bytes < RLIM_INFINITY);
+    let of_space = of_space.map(|bytes| Limit { bytes, setting: "`ulimit -v`".to_owned() });
+    let groups = fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
+    let of_group = of_groups(Path::new("/sys/fs/cgroup"), &groups);
+    of_space.into_iter().chain(of_group).min_by_key(|limit| limit.bytes)
+}
+
+/// The lowest limit of the control groups that `/proc/self/cgroup` lists, version 1 or 2, and of those above them.
+fn of_groups(root: &Path, groups: &str) -> Option<Limit> {
+    let of_line = |line: &str| {
+        let [_, controllers, path] = <[&str; 3]>::try_from(line.splitn(3, ':').collect::<Vec<_>>()).ok()?;
+        let (root, file) = match controllers {
+            "" => (root.to_owned(), "memory.max"),
+            _ if controllers.split(',').any(|one| one == "memory") => {
+                (root.join("memory"), "memory.limit_in_bytes")
+            }
+            _ => return None,
+        };
+        lowest(&root, path, file)
+    };
+    groups.lines().filter_map(of_line).min_by_key(|limit| limit.bytes)
+}
+
+/// The lowest limit from a group up to the root. In a container the path may be that of the host, and the root its own group.
+fn lowest(root: &Path, path: &str, file: &str) -> Option<Limit> {
+    /// Version 1 says "none" with the largest number of pages.
+    const NONE: u64 = 1 << 60;
+    let group = root.join(path.trim_start_matches('/'));
+    let folders = group.ancestors().take_while(|folder| folder.starts_with(root));
+    let read = |folder: &Path| -> Option<(u64, PathBuf)> {
+        let file = folder.join(file);
+        let bytes = fs::read_to_string(&file).ok()?.trim().parse().ok()?;
+        (bytes < NONE).then_some((bytes, file))
+    };
+    let (bytes, file) = folders.filter_map(read).min_by_key(|(bytes, _)| *bytes)?;
+    Some(Limit { bytes, setting: format!("the control group ({})", file.display()) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn write(root: &Path, file: &str, text: &str) {
+        let path = root.join(file);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+        fs::write(path, text).expect("written");
+    }
+
+    #[test]
+    fn the_lowest_limit_of_a_control_group_and_its_ancestors_counts() {
+        let root = tempfile::tempdir().expect("a folder");
+        let root = root.path();
+        let bytes = |groups: &str| of_groups(root, groups).map(|limit| limit.bytes);
+        assert_eq!(bytes("0::/a/b\n"), None);
+        write(root, "a/b/memory.max", "max\n");
+        assert_eq!(bytes("0::/a/b\n"), None);
+        write(root, "a/memory.max", "4096000\n");
+        assert_eq!(bytes("0::/a/b\n"), Some(4_096_000));
+        write(root, "a/b/memory.max", "8192000\n");
+        assert_eq!(bytes("0::/a/b\n"), Some(4_096_000), "the group above allows less");
+        write(root, "a/b/memory.max", "1024000\n");
+        assert_eq!(bytes("0::/a/b\n"), Some(1_024_000));
+        let said = of_groups(root, "0::/a/b\n").expect("a limit").setting;
+        assert!(said.ends_with("/a/b/memory.max)"), "{said}");
+        // A container sees its own group as the root, and may know it by the host's path.
+        write(root, "memory.max", "512000\n");
+        for groups in ["0::/\n", "0::/kubepods/pod1\n", "1:cpu:/x\n0::/\n"] {
+            assert_eq!(bytes(groups), Some(512_000), "{groups}");
+        }
+    }
+
+    #[test]
+    fn version_1_has_a_folder_of_its_own() {
+        let root = tempfile::tempdir().expect("a folder");
+        let root = root.path();
+        let groups = "12:cpu,cpuacct:/job\n7:memory:/job\n0::/job\n";
+        write(root, "memory/memory.limit_in_bytes", "9223372036854771712\n");
+        assert_eq!(of_groups(root, groups), None);
+        write(root, "memory/job/memory.limit_in_bytes", "2048000\n");
+        assert_eq!(of_groups(root, groups).map(|limit| limit.bytes), Some(2_048_000));
+    }
+}
