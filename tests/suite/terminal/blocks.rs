@@ -59,7 +59,7 @@ fn pixels_leave_the_words_as_they_are_and_half_blocks_stand_in_under_words() {
             let own = vt100::Color::Default;
             screen.cell(10, 0).is_some_and(|cell| cell.fgcolor() != own || cell.bgcolor() != own)
         };
-        assert!(!terminal.settled(has_blocks), "{protocol}: the picture is in pixels");
+        terminal.wait("pixels", |screen| !has_blocks(screen));
         terminal.press("?");
         terminal.wait("half blocks beside the help", has_blocks);
         terminal.press("?");

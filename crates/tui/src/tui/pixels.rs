@@ -3,7 +3,6 @@
 use std::time::{Duration, Instant};
 
 use super::graphics::{Protocol, wrapped};
-use super::known::Answer;
 use super::terminals::Terminal;
 
 /// Number of the image in the question about kitty's protocol.
@@ -33,14 +32,6 @@ pub(super) struct PixelRequest {
     pub(super) passage: Passage,
     /// Whether the environment names a terminal that has the protocol.
     pub(super) is_known: bool,
-}
-
-/// What an answer says about a request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Verdict {
-    Nothing,
-    Has,
-    Lacks,
 }
 
 impl PixelRequest {
@@ -74,31 +65,11 @@ impl PixelRequest {
         if self.passage == Passage::Closed { now } else { now + PATIENCE }
     }
 
-    /// Answers come in the order of the questions, those of device attributes last. But tmux answers for these before what it
-    /// passes on.
-    pub(super) fn verdict(self, answer: Answer) -> Verdict {
-        let is_last = match (self.protocol, self.passage) {
+    /// Whether an answer about device attributes comes after all others. tmux answers for these before what it passes on.
+    pub(super) fn ends_with_attributes(self) -> bool {
+        match (self.protocol, self.passage) {
             (Protocol::Sixel, _) | (_, Passage::Direct) => true,
             (Protocol::Kitty | Protocol::Iterm, Passage::Tmux | Passage::Closed) => false,
-        };
-        match answer {
-            Answer::Images(protocol) if protocol == self.protocol => Verdict::Has,
-            Answer::Name(terminal)
-                if self.protocol == Protocol::Iterm && terminal.brand.has_iterm_images() =>
-            {
-                Verdict::Has
-            }
-            Answer::Attributes if is_last => Verdict::Lacks,
-            Answer::Images(_)
-            | Answer::Name(_)
-            | Answer::Attributes
-            | Answer::Ready
-            | Answer::Synchronized { .. }
-            | Answer::Focus { .. }
-            | Answer::TrueColor
-            | Answer::Background(_)
-            | Answer::Ink { .. }
-            | Answer::Other => Verdict::Nothing,
         }
     }
 
@@ -153,13 +124,10 @@ mod tests {
     fn tmux_answers_for_itself_too_early() {
         for protocol in [Protocol::Kitty, Protocol::Iterm] {
             let tmux = request(protocol, &[("TMUX", "/tmp/tmux,1,0")], false);
-            assert_eq!(tmux.verdict(Answer::Attributes), Verdict::Nothing);
+            assert!(!tmux.ends_with_attributes());
             assert!(tmux.refusal().contains("allow-passthrough"), "{}", tmux.refusal());
-            assert_eq!(request(protocol, &[], false).verdict(Answer::Attributes), Verdict::Lacks);
+            assert!(request(protocol, &[], false).ends_with_attributes());
         }
-        let sixel = request(Protocol::Sixel, &[("TMUX", "/tmp/tmux,1,0")], false);
-        assert_eq!(sixel.verdict(Answer::Images(Protocol::Sixel)), Verdict::Has);
-        assert_eq!(sixel.verdict(Answer::Images(Protocol::Kitty)), Verdict::Nothing);
-        assert_eq!(sixel.verdict(Answer::Attributes), Verdict::Lacks);
+        assert!(request(Protocol::Sixel, &[("TMUX", "/tmp/tmux,1,0")], false).ends_with_attributes());
     }
 }

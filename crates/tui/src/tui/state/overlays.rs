@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::scene::diagnostic::Diagnostic;
+use crate::scene::is_absence;
 
 /// Errors because of which the picture does not show the current file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,6 +58,11 @@ pub(in crate::tui) struct OverlayState {
 }
 
 impl OverlayState {
+    /// Whether the scene file does not exist.
+    pub(in crate::tui) fn is_scene_missing(&self) -> bool {
+        self.problems.as_ref().is_some_and(|problems| problems.diagnostics.iter().any(is_absence))
+    }
+
     /// Shows the list of views for a moment more.
     pub(in crate::tui) fn list_views(&mut self, now: Instant) {
         const MOMENT: Duration = Duration::from_secs(4);

@@ -4,9 +4,10 @@ use super::request::resized_preview;
 use super::say::say_until_key;
 use crate::tui::color::{ColorDepth, Shades};
 use crate::tui::event::Effect;
+use crate::tui::graphics::Protocol;
 use crate::tui::known::Answer;
 use crate::tui::known::Blocks;
-use crate::tui::pixels::Verdict;
+use crate::tui::pixels::PixelRequest;
 use crate::tui::preview_kind::PreviewKind;
 use crate::tui::state::State;
 use crate::tui::terminals::Terminal;
@@ -41,10 +42,39 @@ pub(super) fn learn(state: &mut State, answer: Answer) -> Vec<Effect> {
     effects
 }
 
+/// What an answer says about requested pixels.
+enum Verdict {
+    Nothing,
+    Has,
+    Lacks,
+}
+
+fn verdict(request: PixelRequest, answer: Answer) -> Verdict {
+    match answer {
+        Answer::Images(protocol) if protocol == request.protocol => Verdict::Has,
+        Answer::Name(terminal)
+            if request.protocol == Protocol::Iterm && terminal.brand.has_iterm_images() =>
+        {
+            Verdict::Has
+        }
+        Answer::Attributes if request.ends_with_attributes() => Verdict::Lacks,
+        Answer::Images(_)
+        | Answer::Name(_)
+        | Answer::Attributes
+        | Answer::Ready
+        | Answer::Synchronized { .. }
+        | Answer::Focus { .. }
+        | Answer::TrueColor
+        | Answer::Background(_)
+        | Answer::Ink { .. }
+        | Answer::Other => Verdict::Nothing,
+    }
+}
+
 /// Draws in pixels from now on if the answer says that the terminal has them.
 fn judge(state: &mut State, answer: Answer) -> Vec<Effect> {
     let Some(request) = state.display.pixels else { return Vec::new() };
-    match request.verdict(answer) {
+    match verdict(request, answer) {
         Verdict::Nothing => Vec::new(),
         Verdict::Lacks => {
             lack_pixels(state);
@@ -111,9 +141,8 @@ mod tests {
     use crate::tui::color::XTERM;
     use crate::tui::event::Event;
     use crate::tui::fixtures::{Desk, state, state_with};
-    use crate::tui::graphics::Protocol;
     use crate::tui::known::Ask;
-    use crate::tui::pixels::{Passage, PixelRequest};
+    use crate::tui::pixels::Passage;
     use crate::tui::terminals::{Abilities, Brand};
     use crate::tui::update::start;
 

@@ -7,13 +7,13 @@ use ratatui::layout::Rect;
 
 use super::layout::{BLOCK, Layout};
 use super::message;
+use super::stages::at_work;
 use super::text::{Tone, columns, counted, number, percent, put, put_right, rest, running, seconds};
 use crate::choice::Choice;
-use crate::pipeline::protocol::{RenderProgress, Status};
+use crate::pipeline::protocol::RenderProgress;
 use crate::pipeline::settings::View;
 use crate::pipeline::words::Eta;
 use crate::scene::diagnostic::Severity;
-use crate::scene::is_absence;
 use crate::scene::sanitize::visible;
 use crate::tui::action::Action;
 use crate::tui::history::ago;
@@ -79,16 +79,10 @@ fn work(state: &State) -> (&'static str, &'static str, Tone) {
         Activity::Done if state.saving.unwritten.is_some() => ("!", "unwritten", Tone::Error),
         Activity::Done => ("✓", "done", Tone::Good),
         Activity::Waiting => ("…", "waiting", Tone::Warning),
-        Activity::Broken if is_missing(state) => ("✗", "missing", Tone::Error),
+        Activity::Broken if state.overlays.is_scene_missing() => ("✗", "missing", Tone::Error),
         Activity::Broken => ("✗", "broken", Tone::Error),
         Activity::Cancelled => ("■", "stopped", Tone::Warning),
     }
-}
-
-/// Whether the scene file does not exist.
-pub(super) fn is_missing(state: &State) -> bool {
-    let problems = state.overlays.problems.as_ref();
-    problems.is_some_and(|problems| problems.diagnostics.iter().any(is_absence))
 }
 
 /// The word for the work, whatever picture is looked at.
@@ -199,7 +193,9 @@ fn figures(state: &State) -> Vec<String> {
             vec![format!("{time} · run {}", state.work.renders), time]
         }
         (Activity::Waiting, _, _) => vec!["for the file to be whole".to_owned()],
-        (Activity::Broken, _, _) if is_missing(state) => vec!["waiting for the file".to_owned()],
+        (Activity::Broken, _, _) if state.overlays.is_scene_missing() => {
+            vec!["waiting for the file".to_owned()]
+        }
         (Activity::Broken, _, _) => vec![errors(state)],
         (Activity::Done | Activity::Cancelled, _, _) => Vec::new(),
     }
@@ -224,12 +220,6 @@ fn eta(state: &State, progress: &RenderProgress) -> String {
         Some(Eta::Seconds(eta)) => running(Duration::try_from_secs_f64(eta).unwrap_or_default()),
     };
     if state.work.paused { String::new() } else { format!("  ETA {eta}") }
-}
-
-/// The stage that is at work.
-pub(super) fn at_work(state: &State) -> Option<&'static str> {
-    let mut stages = state.work.stages.iter().flatten();
-    stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
 }
 
 /// Number of errors, and of warnings if there are any.

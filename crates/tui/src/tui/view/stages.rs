@@ -143,6 +143,12 @@ fn in_one_line_of(state: &State, is_long: bool, counts: impl Fn(&StageReport) ->
     line
 }
 
+/// The stage that is at work.
+pub(super) fn at_work(state: &State) -> Option<&'static str> {
+    let mut stages = state.work.stages.iter().flatten();
+    stages.find(|stage| stage.status == Status::Running).map(|stage| stage.name.name())
+}
+
 /// Loaded fraction of an asset.
 pub(super) fn fraction(asset: &AssetBar) -> f64 {
     let progress = &asset.progress;

@@ -4,10 +4,8 @@ use ratatui::buffer::Buffer;
 use ratatui::layout::Rect;
 
 use super::drawn::Drawn;
-use super::header::{at_work, is_missing};
 use super::layout::Layout;
-use super::message;
-use super::stages;
+use super::stages::{self, at_work};
 use super::text::{
     Tone, about, bytes, columns, duration, gauge, percent, put, put_right, rest, running, share,
 };
@@ -25,8 +23,8 @@ const SHORT_HINT_OF_MODEL: &str = "rendered again on changes";
 /// A shorter bar says nothing.
 const LEAST_BAR: u16 = 6;
 
-pub(super) fn draw(state: &State, layout: &Layout, buffer: &mut Buffer, drawn: &mut Drawn) {
-    let area = message::left_under(state, layout);
+/// Draws it in the part of the line that a message leaves.
+pub(super) fn draw(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, drawn: &mut Drawn) {
     match content(state) {
         Content::Nothing => {}
         Content::Bar => bar(state, layout, area, buffer),
@@ -58,7 +56,8 @@ fn content(state: &State) -> Content {
             Content::Words(format!("the last good scene goes on: {} %", percent(progress.fraction)))
         }
         Activity::Broken if state.picture.shown.is_some() => {
-            let until = if is_missing(state) { "the file is back" } else { "the errors are fixed" };
+            let until =
+                if state.overlays.is_scene_missing() { "the file is back" } else { "the errors are fixed" };
             Content::Words(format!("the last good picture stays until {until}"))
         }
         Activity::Broken => Content::Words(hint(state)),
