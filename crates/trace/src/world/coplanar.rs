@@ -3,7 +3,7 @@
 //! No ray can tell which of two surfaces in one plane comes first. A light there would be hit on one path and missed on another, and the
 //! two estimates of its light would disagree. Such a light is lifted off the plane by a hair, towards the side to which it emits.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use super::lower::file_emits;
 use crate::assets::LoadedMesh;
@@ -21,7 +21,7 @@ const LIFT: f64 = 1.0 / (1 << 16) as f64;
 const PARALLEL: f64 = 1e-5;
 /// Most sizes of the light that count as its surroundings.
 const SURROUNDINGS: f64 = 16.0;
-/// Most pairs of a light's face and another face that are compared; further faces of a scene with more are not.
+/// Most pairs of a light and a face that are compared; in a scene with more, the others are not.
 const MOST_PAIRS: usize = 1 << 26;
 
 /// A light in the plane of a surface that it overlaps.
@@ -75,42 +75,74 @@ impl Face {
     }
 }
 
+/// The faces that emit, by their least x.
+struct Lights {
+    faces: Vec<Face>,
+    bounds: Vec<[DVec3; 2]>,
+    /// Greatest extent in x.
+    widest: f64,
+    /// Box around all, a little larger.
+    region: [DVec3; 2],
+}
+
+impl Lights {
+    /// `None` without faces.
+    fn new(mut faces: Vec<Face>) -> Option<Self> {
+        let least_x = |face: &Face| face.bounds().map_or(f64::NEG_INFINITY, |[least, _]| least.x);
+        faces.sort_by(|a, b| least_x(a).total_cmp(&least_x(b)));
+        let bounds: Vec<[DVec3; 2]> = faces.iter().filter_map(Face::bounds).collect();
+        let joined = |a: [DVec3; 2], b: &[DVec3; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let [least, greatest] = bounds.iter().fold(*bounds.first()?, joined);
+        let margin = (greatest - least).max_element() * COINCIDENT;
+        let widest = bounds.iter().map(|[least, greatest]| greatest.x - least.x).fold(0.0, f64::max) + margin;
+        Some(Self { faces, bounds, widest, region: [least - margin, greatest + margin] })
+    }
+
+    /// Whether no light is near a box.
+    fn are_apart_from(&self, bounds: [DVec3; 2]) -> bool {
+        are_apart(bounds, self.region)
+    }
+
+    /// The lights whose boxes touch that of a face. Adds the number of compared lights to `pairs`.
+    fn near<'a>(&'a self, face: &Face, pairs: &mut usize) -> impl Iterator<Item = &'a Face> {
+        let [least, greatest] = face.bounds().unwrap_or(self.region);
+        let margin = (self.region[1] - self.region[0]).max_element() * COINCIDENT;
+        let bounds = [least - margin, greatest + margin];
+        let start = self.bounds.partition_point(|light| light[0].x < bounds[0].x - self.widest);
+        let end = self.bounds.partition_point(|light| light[0].x <= bounds[1].x);
+        *pairs += end - start;
+        let range = start..end;
+        range.filter(move |index| !are_apart(self.bounds[*index], bounds)).map(|index| &self.faces[index])
+    }
+}
+
 /// Lights that lie in the plane of a surface and overlap it, in coordinates that start at `origin`. `meshes` are those of the scene's
 /// mesh files.
 pub fn coplanar_lights(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec<Coplanar> {
-    let mut lights = Vec::new();
-    for object in 0..scene.objects.len() {
-        if may_emit(scene, meshes, object) {
-            each_face(scene, meshes, (object, origin), None, |face| {
-                if face.emits.is_some() && !face.corners.is_empty() {
-                    lights.push(face.clone());
-                }
-            });
-        }
+    let mut faces = Vec::new();
+    for object in (0..scene.objects.len()).filter(|object| may_emit(scene, meshes, *object)) {
+        each_face(scene, meshes, (object, origin), None, |face| {
+            if face.emits.is_some() && !face.corners.is_empty() {
+                faces.push(face.clone());
+            }
+        });
     }
-    let all = lights.iter().filter_map(Face::bounds);
-    let Some([least, greatest]) = all.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]) else {
-        return Vec::new();
-    };
-    let margin = (greatest - least).max_element() * COINCIDENT;
-    let region = [least - margin, greatest + margin];
-    let mut found: Vec<Coplanar> = Vec::new();
+    let Some(lights) = Lights::new(faces) else { return Vec::new() };
+    let mut found = BTreeMap::new();
     let mut pairs = 0;
     for object in 0..scene.objects.len() {
-        each_face(scene, meshes, (object, origin), Some(region), |face| {
-            if face.bounds().is_some_and(|bounds| are_apart(bounds, region)) || pairs > MOST_PAIRS {
+        each_face(scene, meshes, (object, origin), Some(&lights), |face| {
+            if pairs > MOST_PAIRS {
                 return;
             }
-            pairs += lights.len();
-            for light in &lights {
-                if coincide(light, face) && is_lifted(light, face) {
+            for light in lights.near(face, &mut pairs) {
+                if is_lifted(light, face) && coincide(light, face) {
                     add(&mut found, light, face);
                 }
             }
         });
     }
-    found.sort_by_key(|pair| (pair.light, pair.surface));
-    found
+    found.into_values().flatten().collect()
 }
 
 /// Whether two boxes, of their least and greatest coordinates, have no point in common.
@@ -129,8 +161,8 @@ pub(super) fn lifts(scene: &Scene, meshes: &[&LoadedMesh], origin: DVec3) -> Vec
     for Coplanar { light, lift, .. } in found.into_iter().filter(|pair| pair.light != pair.surface) {
         // Several surfaces in one plane lift a light once.
         let direction = lift.normalize_or_zero();
-        let is_known = |known: &(usize, DVec3)| known.0 == light && known.1.dot(direction) > 1.0 - PARALLEL;
-        if !directions.iter().any(is_known) {
+        directions.retain(|(other, _)| *other == light);
+        if !directions.iter().any(|(_, known)| known.dot(direction) > 1.0 - PARALLEL) {
             directions.push((light, direction));
             lifts[light] += lift;
         }
@@ -152,35 +184,33 @@ pub fn with_lifted_lights(loaded: &LoadedMesh) -> Option<LoadedMesh> {
     // Find the triangles to lift.
     let face = |triangle: u32| {
         let face = Face::new(mesh.corners(triangle).map(|corner| corner.as_dvec3()).to_vec())?;
-        Some(Face { emits: emits(triangle).then_some(EmissionSides::Front), ..face })
+        Some(Face { object: triangle as usize, ..face })
     };
     let all = 0..mesh.triangles.len() as u32;
-    let lights: Vec<(u32, Face)> =
-        all.clone().filter(|id| emits(*id)).filter_map(|id| Some((id, face(id)?))).collect();
-    let others: Vec<Face> = all.filter(|id| !emits(*id)).filter_map(face).collect();
-    if lights.len().saturating_mul(others.len()) > MOST_PAIRS {
-        return None;
+    let lights = Lights::new(all.clone().filter(|id| emits(*id)).filter_map(face).collect())?;
+    let (mut found, mut pairs) = (BTreeMap::new(), 0);
+    for other in all.filter(|id| !emits(*id)).filter_map(face) {
+        if pairs > MOST_PAIRS {
+            break;
+        }
+        let near = lights.near(&other, &mut pairs).filter(|light| coincide(light, &other));
+        found.extend(near.map(|light| (light.object, light.normal)));
     }
-    let found: Vec<(u32, DVec3)> = lights
-        .iter()
-        .filter(|(_, light)| others.iter().any(|other| coincide(light, other)))
-        .map(|(id, light)| (*id, light.normal))
-        .collect();
     let greatest =
         |face: &Face| face.corners.iter().fold(face.size(), |most, at| most.max(at.abs().max_element()));
-    let height = LIFT * lights.iter().map(|(_, light)| greatest(light)).fold(0.0, f64::max);
+    let height = LIFT * lights.faces.iter().map(greatest).fold(0.0, f64::max);
     // Give them vertices of their own.
     let mut lifted = loaded.clone();
     let mut known = HashMap::new();
     for (triangle, normal) in &found {
         let direction = (*normal * 1e4).round().to_array().map(|part| part as i32);
-        let corners = mesh.triangles[*triangle as usize].map(|corner| {
+        let corners = mesh.triangles[*triangle].map(|corner| {
             *known.entry((corner, direction)).or_insert_with(|| {
                 let at = mesh.positions[corner as usize].as_dvec3() + *normal * height;
                 copy_vertex(&mut lifted.mesh, corner as usize, at.as_vec3())
             })
         });
-        lifted.mesh.triangles[*triangle as usize] = corners;
+        lifted.mesh.triangles[*triangle] = corners;
     }
     (!found.is_empty()).then_some(lifted)
 }
@@ -200,16 +230,15 @@ fn copy_vertex(mesh: &mut TriangleMesh, vertex: usize, at: Vec3) -> u32 {
 }
 
 /// Adds a pair of objects, with the greatest lift of their faces in one direction.
-fn add(found: &mut Vec<Coplanar>, light: &Face, face: &Face) {
+fn add(found: &mut BTreeMap<(usize, usize), Vec<Coplanar>>, light: &Face, face: &Face) {
     let size = light.size();
     let around = face.size().max(light.point.abs().max_element()).min(SURROUNDINGS * size);
     let lift = light.normal * (LIFT * size.max(around));
-    let pair = (light.object, face.object);
-    let is_same = |known: &&mut Coplanar| (known.light, known.surface) == pair && known.lift.dot(lift) > 0.0;
-    match found.iter_mut().find(is_same) {
+    let of_pair = found.entry((light.object, face.object)).or_default();
+    match of_pair.iter_mut().find(|known| known.lift.dot(lift) > 0.0) {
         Some(known) if known.lift.length_squared() < lift.length_squared() => known.lift = lift,
         Some(_) => {}
-        None => found.push(Coplanar { light: light.object, surface: face.object, lift }),
+        None => of_pair.push(Coplanar { light: light.object, surface: face.object, lift }),
     }
 }
 
@@ -250,12 +279,12 @@ fn may_emit(scene: &Scene, meshes: &[&LoadedMesh], object: usize) -> bool {
     }
 }
 
-/// Visits the flat faces of an object; of a mesh, those that may have a point in the region.
+/// Visits the flat faces of an object; of a mesh, those near some lights.
 fn each_face(
     scene: &Scene,
     meshes: &[&LoadedMesh],
     (number, origin): (usize, DVec3),
-    region: Option<[DVec3; 2]>,
+    near: Option<&Lights>,
     mut visit: impl FnMut(&Face),
 ) {
     let object = &scene.objects[number];
@@ -308,7 +337,7 @@ fn each_face(
                 let corners = loaded.mesh.corners(triangle as u32);
                 let [a, b, c] = corners.map(|at| transform.point(at.as_dvec3() + loaded.mesh.origin));
                 let bounds = [a.min(b).min(c) - origin, a.max(b).max(c) - origin];
-                if region.is_some_and(|region| are_apart(bounds, region)) {
+                if near.is_some_and(|lights| lights.are_apart_from(bounds)) {
                     continue;
                 }
                 let corners = if transform.flips_handedness() { vec![a, c, b] } else { vec![a, b, c] };
