@@ -5,7 +5,7 @@ use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
-/// First bytes of a part of an image and of a checkpoint. Whoever reads another kind of file recognizes them, too.
+/// First bytes of image parts and checkpoints, which readers of other file types also recognize.
 pub const PART_MARK: [u8; 12] = *b"\x89GLIMT\r\n\x1a\n\0\0";
 
 /// File type of a path.

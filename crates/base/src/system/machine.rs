@@ -8,7 +8,7 @@ use nix::errno::Errno;
 use nix::sys::signal::kill;
 use nix::unistd::{Pid, gethostname};
 
-/// A process, told apart from all processes of other machines and of earlier boots.
+/// A process, identified uniquely among all processes of other machines and of earlier boots.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProcessIdentity {
     /// Hash of the host name, the boot and the namespace of process numbers.

@@ -35,7 +35,7 @@ impl KdSubtree {
 /// Builds a subtree in memory that is allocated once.
 struct Builder<'a, C> {
     built: KdSubtree,
-    /// References of all pending cells; those of the next cell come last.
+    /// References of all pending cells, with the next cell's references last.
     references: Vec<Reference>,
     scratch: Scratch,
     corners: &'a C,
