@@ -13,24 +13,25 @@ use nix::unistd::{Pid, gethostname};
 pub struct ProcessIdentity {
     /// Hash of the host name, the boot and the namespace of process numbers.
     pub machine: u64,
-    /// The process number, which means something only on `machine`.
+    /// Process number, which is only meaningful on `machine`.
     pub process: u32,
 }
 
 impl ProcessIdentity {
-    /// This process.
+    /// Returns the identity of this process.
     pub fn current() -> Self {
         Self { machine: machine(), process: std::process::id() }
     }
 
-    /// Whether this process is certain to have ended. Processes of other machines never are: nobody here can see them.
+    /// Whether this process has certainly ended. Always false for processes of other machines, which are not
+    /// visible from here.
     pub fn has_ended(&self) -> bool {
         let Ok(number) = i32::try_from(self.process) else { return false };
         self.machine == machine() && number > 0 && kill(Pid::from_raw(number), None) == Err(Errno::ESRCH)
     }
 }
 
-/// Hash of everything that tells this machine from others. Containers of one machine differ in their host name or in their
+/// Hash that identifies this machine. Containers on one machine differ in their host name or in their
 /// namespace of process numbers.
 fn machine() -> u64 {
     static MACHINE: OnceLock<u64> = OnceLock::new();
