@@ -146,7 +146,7 @@ fn rays_meet_the_light_first_from_its_front_and_the_surface_from_behind() {
 #[test]
 fn tilted_and_distant_planes_are_no_exception() {
     let mut next = random(12);
-    for round in 0..40 {
+    for round in 0..40_u32 {
         let mut vector = || DVec3::new(next().into(), next().into(), next().into());
         let (x, y) = (vector().normalize(), vector());
         let y = (y - x * x.dot(y)).normalize() * 1.7;
@@ -161,8 +161,8 @@ fn tilted_and_distant_planes_are_no_exception() {
         let geometry = built(&scene(&tables), Accel::Bvh);
         assert_eq!(geometry.lifts().len(), 2, "{tables}");
         for _ in 0..50 {
-            let target = center + vector() * 0.0 + (x * vector().x + y * vector().x) * 0.9;
-            let from = target + x.cross(y) * (2.0 + round as f64) + vector() * 2.0;
+            let target = center + (x * vector().x + y * vector().x) * 0.9;
+            let from = target + x.cross(y) * (2.0 + f64::from(round)) + vector() * 2.0;
             let ray = Ray::new(from.as_vec3(), (target - from).as_vec3());
             assert_eq!(geometry.closest(&ray).expect("both").object, 1, "{tables} {from}");
         }

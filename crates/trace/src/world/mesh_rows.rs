@@ -224,7 +224,7 @@ mod tests {
                 let mut next = random(3);
                 // Some start on the edge that the two triangles share.
                 let ray = |i: usize| {
-                    let [x, z] = if i % 2 == 0 { [0.5, 0.5] } else { [next(), next()] };
+                    let [x, z] = if i.is_multiple_of(2) { [0.5, 0.5] } else { [next(), next()] };
                     Ray::new(Vec3::new(x, 1.0 + height, z), Vec3::new(next() * 0.5, -1.0, next() * 0.5))
                 };
                 let rays: Vec<Ray> = (0..PACKET_SIZE).map(ray).collect();

@@ -327,7 +327,7 @@ fn texture_coordinates_of_corners_are_read() {
     let several = "the faces have several textures (`texnumber`): all show those of one material";
     assert_eq!(
         uvs(&numbered, &["3 0 1 2 6 0 0 1 0 1 1 0", "3 0 2 3 6 0 0 1 1 0 1 1"]),
-        (both.clone(), vec![several.to_owned()])
+        (both, vec![several.to_owned()])
     );
     // Those of a face are for all of its corners.
     let one = vec![Vec2::new(0.5, 0.25); 6];

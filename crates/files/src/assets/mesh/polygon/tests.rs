@@ -195,8 +195,8 @@ fn holes_joined_by_an_edge_in_both_directions_stay_open() {
     }
     let sieve = sieve(12);
     let triangles = cut(&sieve);
-    for hole in 0..144 {
-        let (x, y) = (3.0 * (hole % 12) as f64 + 1.9, 3.0 * (hole / 12) as f64 + 1.8);
+    for hole in 0..144_u32 {
+        let (x, y) = (3.0 * f64::from(hole % 12) + 1.9, 3.0 * f64::from(hole / 12) + 1.8);
         assert_eq!(layers(&sieve, &triangles, x, y), 0);
         assert_eq!(layers(&sieve, &triangles, x - 1.3718, y + 0.1234), 1);
     }
