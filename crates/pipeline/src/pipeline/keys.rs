@@ -5,7 +5,7 @@ use crate::film::Rect;
 use crate::integrators::{PhotonSettings, RenderSettings};
 use crate::math::DVec3;
 use crate::pipeline::plan::Plan;
-use crate::scene::description::{Accel, Camera, Render, Scene};
+use crate::scene::description::{Accel, Camera, Object, Render, Scene, Shape};
 use crate::scene::fingerprint::{Fingerprint, Key, Referents};
 
 /// Textures, meshes and orbiter that descriptions refer to by index.
@@ -31,7 +31,8 @@ pub(in crate::pipeline) fn geometry(scene: &Scene, of: &Referents<'_>, origin: D
 pub(in crate::pipeline) fn coplanar(scene: &Scene, of: &Referents<'_>) -> Key {
     let mut key = Fingerprint::new("coplanar");
     key.key(&shapes(scene, of));
-    for object in &scene.objects {
+    let is_round = |object: &&Object| matches!(object.shape, Shape::Sphere { .. } | Shape::Torus { .. });
+    for object in scene.objects.iter().filter(|object| !is_round(object)) {
         let material = object.material.map(|index| &scene.materials[index]);
         let emission = material.filter(|material| material.emits()).map(|material| material.emission.sides);
         key.flag(object.material.is_some()).flag(emission.is_some());
@@ -226,6 +227,9 @@ mod tests {
         assert_eq!(lit.0, keys(BALL).0);
         assert_ne!(lit.1, keys(BALL).1);
         assert_ne!(keys(&BALL.replace("center = [0", "center = [1")).0, keys(BALL).0);
+        // A flat light may be in the plane of another surface.
+        let disk = BALL.replace("sphere", "disk").replace("radius", "normal = [0, 1, 0]\nradius");
+        assert_ne!(keys(&disk.replace("diffuse", "emission")).0, keys(&disk).0);
     }
 
     #[test]

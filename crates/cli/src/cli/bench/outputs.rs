@@ -14,7 +14,7 @@ use crate::output::write::{self, Guard};
 use crate::output::{
     self, FileIdentity, Losses, OutputError, is_one_file, replaced_json, replaced_plot, replaced_table,
 };
-use crate::system::{file, describe_error};
+use crate::system::{describe_error, file};
 
 /// Files to write, and files that must not be written.
 pub(super) struct Outputs {
