@@ -20,7 +20,7 @@ pub(super) fn run(args: &FarmArgs, console: &Console) -> Exit {
     let words = args.options.iter().chain(&args.hosts).map(String::as_str).chain(paths.into_iter().flatten());
     // A line of a name could end a document in the script, and a script is shown on terminals.
     let words = words.chain([args.image.as_str(), args.claim.as_str()]);
-    if paths.contains(&None) || words.into_iter().any(|word| !word.chars().all(is_plain)) {
+    if paths.contains(&None) || words.into_iter().any(|word| !is_plain_word(word)) {
         return console
             .fail(Exit::WRONG, "a script cannot hold this name: use names of letters, digits, - and _");
     }
@@ -37,6 +37,11 @@ pub(super) fn run(args: &FarmArgs, console: &Console) -> Exit {
         Engine::Kubernetes => kubernetes(args, memory(args, &options, console)),
     });
     Exit::DONE
+}
+
+/// Whether a script can hold a word and a terminal show it.
+fn is_plain_word(word: &str) -> bool {
+    word.chars().all(is_plain)
 }
 
 /// Reads the options of every render as the renders will.
@@ -245,6 +250,16 @@ mod tests {
         match Args::try_parse_from(words).expect("right").command {
             Some(Subcommand::Farm(args)) => *args,
             other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn words_with_control_characters_are_refused() {
+        for word in ["a\nb", "\0", "\u{1b}]52;c;eA==\u{7}", "\u{9b}31m", "\u{202e}gnp.exr", "a\tb", "\r"] {
+            assert!(!is_plain_word(word), "{word:?}");
+        }
+        for word in ["", "my scene.toml", "Würfel.exr", "$(x) `y` 'z'"] {
+            assert!(is_plain_word(word), "{word:?}");
         }
     }
 

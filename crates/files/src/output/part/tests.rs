@@ -177,6 +177,20 @@ fn heads_with_impossible_numbers_are_damaged() {
 }
 
 #[test]
+fn too_many_open_files_are_told_from_other_errors() {
+    let of = |number| PartError::Unreadable {
+        path: "a".into(),
+        source: std::io::Error::from_raw_os_error(number),
+    };
+    use nix::errno::Errno;
+    for number in [Errno::EMFILE, Errno::ENFILE] {
+        assert!(of(number as i32).is_out_of_files(), "{number}");
+    }
+    assert!(!of(Errno::ENOENT as i32).is_out_of_files());
+    assert!(!PartError::Foreign { path: "a".into() }.is_out_of_files());
+}
+
+#[test]
 fn what_two_images_say_of_themselves_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let part = |index, scene: &str| {

@@ -138,3 +138,17 @@ fn labels_are_never_cut() {
             .all(|line| { line.iter().map(|piece| piece.text.chars().count()).sum::<usize>() <= 60 })
     );
 }
+
+#[test]
+fn a_locator_finds_places_of_several_texts() {
+    let texts: [Arc<str>; 2] = ["a\nbä\n\nc".into(), "\u{feff}x\r\ny".into()];
+    let mut locator = Locator::default();
+    for round in 0..2 {
+        for text in &texts {
+            for offset in 0..=text.len() {
+                let found = locator.locate(text, offset);
+                assert_eq!(found, line_and_column(text, offset), "{text:?} at {offset}, round {round}");
+            }
+        }
+    }
+}
