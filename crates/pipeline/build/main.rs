@@ -1,5 +1,7 @@
 //! Sets `GLIMT_BUILD`, the identity of the sources that decide what an image looks like.
 
+#![allow(clippy::print_stdout, reason = "a build script speaks to cargo on stdout")]
+
 mod sources;
 
 use std::path::Path;
