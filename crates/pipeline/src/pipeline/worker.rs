@@ -383,7 +383,7 @@ mod tests {
         let (events, received) = mpsc::channel();
         let remote = Remote { mailbox: Arc::default(), events };
         remote.send(render(7));
-        let gives_up = remote.clone();
+        let gives_up = remote;
         let thread = std::thread::spawn(move || {
             let _last_words = LastWords(&gives_up);
             panic!("outside of a request");
