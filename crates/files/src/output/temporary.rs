@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use nix::fcntl::OFlag;
 use rustix::fs::Dir;
 
+use super::move_new::move_new;
 use crate::system::machine::ProcessIdentity;
 
 /// Longest file name of nearly every file system.
@@ -65,36 +66,19 @@ impl Temporary {
         Ok(file)
     }
 
-    /// [`Self::rename_to`] in place of a file with this content. If it had another one in that moment, it is put back as it was,
-    /// and the return value is `None`. File systems that cannot exchange two names replace the file whatever it has.
-    pub(super) fn exchange_with(mut self, target: &Path, expected: &[u8]) -> io::Result<Option<File>> {
-        match exchange(&self.path, target) {
-            Ok(()) => {}
-            Err(error) if error.kind() == ErrorKind::PermissionDenied => return Err(error),
-            Err(_) => return self.rename_to(target).map(Some),
-        }
-        // The file of before has the temporary name now.
-        let is_expected = fs::read(&self.path).is_ok_and(|content| content == expected);
-        if !is_expected {
-            // Whatever happens next, nobody removes what came out.
-            self.kept = true;
-            exchange(&self.path, target)?;
-            self.kept = false;
-            return Ok(None);
-        }
-        self.file.try_clone().map(Some)
+    /// Gives it a name that no file has.
+    pub(super) fn move_to_new(&mut self, target: &Path) -> io::Result<()> {
+        move_new(&self.path, target)?;
+        self.kept = true;
+        Ok(())
     }
-}
 
-#[cfg(target_os = "linux")]
-fn exchange(one: &Path, other: &Path) -> io::Result<()> {
-    use rustix::fs::{CWD, RenameFlags, renameat_with};
-    Ok(renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE)?)
-}
-
-#[cfg(not(target_os = "linux"))]
-fn exchange(_: &Path, _: &Path) -> io::Result<()> {
-    Err(ErrorKind::Unsupported.into())
+    /// Gives it its temporary name back.
+    pub(super) fn take_back(&mut self, from: &Path) -> io::Result<()> {
+        move_new(from, &self.path)?;
+        self.kept = false;
+        Ok(())
+    }
 }
 
 impl Drop for Temporary {

@@ -15,7 +15,7 @@ use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use super::attributes::{Attributes, Carried};
 use super::place::{self, Place, Target};
 use super::temporary::{self, Temporary};
-use super::{FileIdentity, Losses, OutputError, stoppable};
+use super::{FileIdentity, Losses, OutputError, held, stoppable};
 use crate::control::CancelToken;
 use crate::system::describe_error;
 
@@ -137,7 +137,7 @@ fn replace(
             (guard.may_replace)(&target.path)?;
             let file = match expected {
                 None => new.rename_to(&target.path).map_err(named)?,
-                Some(expected) => match new.exchange_with(&target.path, expected).map_err(named)? {
+                Some(expected) => match held::replace(new, &target.path, expected).map_err(named)? {
                     Some(file) => file,
                     None => {
                         (guard.may_replace)(&target.path)?;

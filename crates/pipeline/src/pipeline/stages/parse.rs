@@ -15,6 +15,7 @@ use crate::assets::mesh::load as load_mesh;
 use crate::assets::orbiter::load as load_orbiter;
 use crate::assets::{AssetError, OrbiterCamera};
 use crate::control::{CancelToken, Cancelled, ignore_progress};
+use crate::output::held::{self, Held};
 use crate::scene;
 use crate::scene::description::Camera;
 use crate::scene::diagnostic::{Diagnostic, Severity};
@@ -98,6 +99,11 @@ pub(in crate::pipeline) fn parse(
     token: &CancelToken,
 ) -> Result<Staged<Arc<Parsed>>, Stop> {
     let Origin { path, show, .. } = origin;
+    if let Held::Differs(held) = held::recover(path) {
+        let help =
+            Some("compare both, save what you need as the scene, and remove the other file".to_owned());
+        findings.warnings.push(Diagnostic { help, ..of_file(path, Severity::Warning, held::words(&held)) });
+    }
     let content = contents.read(path, token)?;
     let is_model = is_model(path);
     if !is_model && (show.from.is_some() || show.up.is_some()) {

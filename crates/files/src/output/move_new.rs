@@ -1,0 +1,55 @@
+//! Moves a file or a folder to a name that nothing has.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+
+/// Moves a file or a folder to a place where nothing is.
+#[cfg(any(target_os = "linux", target_vendor = "apple"))]
+pub(super) fn move_new(from: &Path, to: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    use rustix::io::Errno;
+    match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
+        // The file system, or the kernel, does not know it.
+        Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => move_by_steps(from, to),
+        moved => moved.map_err(io::Error::from),
+    }
+}
+
+#[cfg(not(any(target_os = "linux", target_vendor = "apple")))]
+pub(super) fn move_new(from: &Path, to: &Path) -> io::Result<()> {
+    move_by_steps(from, to)
+}
+
+/// [`move_new`] by calls that fail where something is.
+fn move_by_steps(from: &Path, to: &Path) -> io::Result<()> {
+    if from.is_dir() {
+        // A folder may take the place of this one only, which is empty.
+        fs::create_dir(to)?;
+        fs::rename(from, to)
+    } else {
+        drop(File::create_new(to)?);
+        fs::rename(from, to)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_replace_nothing() {
+        let directory = tempfile::tempdir().expect("a folder");
+        let at = |name: &str| directory.path().join(name);
+        fs::create_dir_all(at("from/in")).expect("a folder");
+        fs::create_dir(at("to")).expect("a folder");
+        assert!(move_by_steps(&at("from"), &at("to")).is_err() && at("from/in").exists());
+        move_by_steps(&at("from"), &at("new")).expect("moved");
+        fs::write(at("file"), "1").expect("a file");
+        fs::write(at("other"), "2").expect("a file");
+        assert!(move_by_steps(&at("file"), &at("other")).is_err());
+        assert_eq!(fs::read(at("other")).expect("a file"), b"2");
+        move_by_steps(&at("file"), &at("last")).expect("moved");
+        assert!(at("new/in").exists() && at("last").exists());
+    }
+}
