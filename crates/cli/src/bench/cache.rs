@@ -3,14 +3,17 @@
 //! A line of JSON, the pixels of both pictures as little-endian floats, and the fingerprint of all before it.
 
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use crate::compare::Pair;
+use crate::control::CancelToken;
 use crate::film::RadianceImage;
 use crate::math::Vec3;
-use crate::output::{OutputError, write};
+use crate::output::write::Guard;
+use crate::output::{Losses, OutputError, staged, write};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
 /// The folder for references: below `XDG_CACHE_HOME`, else `~/.cache`. `None` if neither is set.
@@ -20,15 +23,36 @@ pub fn folder() -> Option<PathBuf> {
     Some(caches.join("glimt").join("references"))
 }
 
-/// The scene that `glimt new` writes, as a file in this folder.
+/// The scene that `glimt new` writes, as a file below this folder. Files that exist stay as they are.
 ///
 /// # Errors
-/// The folder cannot be made or the file not be written.
+/// The folder cannot be made, the file cannot be written, or another one has its name.
 pub fn starter(folder: &Path) -> Result<PathBuf, OutputError> {
-    make(folder)?;
+    let text = crate::scene::starter().as_bytes();
+    // Each version of the scene has a folder of its own: one beside the references may be the user's.
+    let folder = folder
+        .join(format!("starter-{}", &Fingerprint::new("starter").bytes(text).finish().to_string()[..16]));
+    make(&folder)?;
     let path = folder.join("starter.toml");
-    write::atomic(&path, crate::scene::starter().as_bytes())?;
-    Ok(path)
+    let is_there = || fs::read(&path).is_ok_and(|found| found == text);
+    if is_there() {
+        return Ok(path);
+    }
+    match staged::new_files(&folder, &[("starter.toml".into(), text)], &CancelToken::new()) {
+        // Another process may have written it meanwhile.
+        Err(_) if is_there() => Ok(path),
+        Err(_) if path.symlink_metadata().is_ok() => Err(refused(&path, "the starter scene")),
+        written => written.map(|()| path),
+    }
+}
+
+/// A file that glimt did not write has this name.
+fn refused(path: &Path, what: &str) -> OutputError {
+    let reason = format!(
+        "cannot write {}: the file of this name is not {what}; move it away, or name another folder with --cache",
+        path.display()
+    );
+    OutputError::Refused { reason }
 }
 
 fn make(folder: &Path) -> Result<(), OutputError> {
@@ -99,7 +123,20 @@ pub(super) fn store(folder: &Path, key: &Key, stored: &Stored) -> Result<(), Out
     }
     let seal = seal_of(&bytes);
     bytes.extend(seal.as_bytes());
-    write::atomic(&path, &bytes)
+    let may_replace =
+        |real: &Path| if is_replaceable(real) { Ok(()) } else { Err(refused(&path, "a reference")) };
+    let guard = Guard { is_kept: &|_| false, may_replace: &may_replace, losses: Losses::Told(&|_| ()) };
+    write::atomic_until(&path, &bytes, &guard, &CancelToken::new())
+}
+
+/// Whether a file is missing, empty, or a reference, damaged or not.
+fn is_replaceable(path: &Path) -> bool {
+    const HEAD_BYTES: u64 = 1 << 10;
+    let Ok(file) = fs::File::open(path) else { return path.symlink_metadata().is_err() };
+    let mut start = Vec::new();
+    let is_read = file.take(HEAD_BYTES).read_to_end(&mut start).is_ok();
+    let line = start.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    is_read && (start.is_empty() || serde_json::from_slice::<Head>(line).is_ok())
 }
 
 fn seal_of(content: &[u8]) -> String {
@@ -119,6 +156,34 @@ mod tests {
             |value| RadianceImage { width: 3, height: 2, pixels: vec![Vec3::new(value, -0.5, 1e-30); 6] };
         let pair = Pair::new([Path::new("a"), Path::new("b")], image(1.0), image(2.0)).expect("a pair");
         Stored { pair, cost: Cost { samples: 12.5, seconds: 3.25 } }
+    }
+
+    #[test]
+    fn files_of_others_are_kept() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let own = folder.path().join("starter.toml");
+        fs::write(&own, "a scene of the user").expect("written");
+        let scene = starter(folder.path()).expect("a scene");
+        assert_eq!(fs::read_to_string(&own).expect("a scene"), "a scene of the user");
+        assert_eq!(fs::read_to_string(&scene).expect("a scene"), crate::scene::starter());
+        assert_eq!(starter(folder.path()).expect("it exists"), scene);
+        fs::write(&scene, "edited").expect("written");
+        let why = starter(folder.path()).expect_err("edited").to_string();
+        assert!(why.contains("is not the starter scene") && why.contains("--cache"), "{why}");
+        assert_eq!(fs::read_to_string(&scene).expect("a scene"), "edited");
+        // References replace references only.
+        let key = Fingerprint::new("x").finish();
+        let path = file(folder.path(), &key);
+        fs::write(&path, "notes").expect("written");
+        assert!(store(folder.path(), &key, &stored()).is_err());
+        assert_eq!(fs::read_to_string(&path).expect("notes"), "notes");
+        for replaceable in
+            ["", "{\"width\":4,\"height\":4,\"cost\":{\"samples\":1.0,\"seconds\":1.0}}\ndamaged"]
+        {
+            fs::write(&path, replaceable).expect("written");
+            store(folder.path(), &key, &stored()).expect("stored");
+            assert!(load(folder.path(), &key).is_some());
+        }
     }
 
     #[test]

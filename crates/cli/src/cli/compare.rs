@@ -14,6 +14,7 @@ use super::exit::Exit;
 use crate::compare::{self, Bias, Errors, Measured, PIXELS_PER_DEGREE, Pair};
 use crate::control::CancelToken;
 use crate::film::RadianceImage;
+use crate::output::part::is_part;
 use crate::output::write::{self, Guard};
 use crate::output::{self, EncodeOptions, FileIdentity, Format, Losses, OutputError, is_one_file};
 use crate::system::threads::start_failure;
@@ -134,6 +135,13 @@ impl<'a> Diff<'a> {
 
 /// The target, which leads to `real`, must not be A or B.
 fn check_no_input(path: &Path, real: &Path, args: &CompareArgs) -> Result<(), OutputError> {
+    if is_part(real) {
+        let reason = format!(
+            "cannot write {}: it is a part or a checkpoint; name another file with --diff FILE",
+            path.display()
+        );
+        return Err(OutputError::Refused { reason });
+    }
     match [&args.a, &args.b].into_iter().find(|input| is_one_file(real, input)) {
         Some(input) => {
             let other = if path == input { String::new() } else { format!("{}, ", input.display()) };

@@ -293,7 +293,8 @@ impl Merge<'_> {
         let (out, token) = (&self.args.out, self.token);
         let film = &merged.film;
         let may_replace = |real: &Path| {
-            let is_part = self.args.parts.iter().any(|part| is_one_file(part, real));
+            let is_given = self.args.parts.iter().any(|part| is_one_file(part, real));
+            let is_part = is_given || part::is_part(real);
             let why = is_part.then(|| format!("cannot write {}: it is a part", out.display()));
             let why = why.or_else(|| self.refused_input(parts, real));
             why.map_or(Ok(()), |reason| Err(OutputError::Refused { reason }))
