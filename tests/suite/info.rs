@@ -28,7 +28,7 @@ fn every_format_says_how_it_was_made() {
         assert_eq!((&json["width"], &json["height"]), (&16.into(), &12.into()), "{name}");
         assert_eq!(json["is_by_glimt"], true);
         let settings = &json["settings"];
-        assert_eq!(settings["scene"], "ball.toml", "{name}");
+        assert_eq!(settings["scene"], "./ball.toml", "{name}");
         assert_eq!((&settings["seed"], &settings["integrator"]), (&"7".into(), &"whitted".into()));
         assert!(text.contains("  seed        7\n"), "{text}");
         match *name {

@@ -4,7 +4,7 @@ use std::fs;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::Path;
 
-use super::desk::Desk;
+use super::desk::{Desk, SCENE};
 
 /// A file of somebody else whose name has the ending of a report.
 const PACKAGE: &str = "{\n  \"name\": \"somebody\",\n  \"glimt\": \"0.1.0\"\n}\n";
@@ -214,4 +214,42 @@ fn a_folder_s_default_list_gives_a_replaced_file_no_more_rights_than_it_had() {
     assert_eq!(fs::metadata(desk.path("a.png")).expect("a file").mode() & 0o777, 0o640);
     desk.expect("ball.toml --once -o new.png", 0);
     assert!(attribute(&desk.path("new.png"), ACCESS).is_some(), "a new file has the folder's");
+}
+
+#[test]
+fn scenes_of_one_name_do_not_share_a_default_image() {
+    let desk = Desk::new();
+    for folder in ["a", "b"] {
+        std::fs::create_dir(desk.path(folder)).expect("made");
+        desk.write(&format!("{folder}/scene.toml"), SCENE);
+    }
+    desk.expect("a/scene.toml --once --samples 1", 0);
+    let first = desk.bytes("scene.png");
+    let said = desk.expect("b/scene.toml --once --samples 1", 2);
+    assert!(
+        said.contains("cannot write scene.png: it is the image of another scene, a/scene.toml"),
+        "{said}"
+    );
+    assert!(said.contains("-o") && said.contains("--force"), "{said}");
+    assert_eq!(desk.bytes("scene.png"), first);
+    // The same scene by another name, and from another folder by the absolute one.
+    desk.expect("./b/../a/scene.toml --once --samples 2", 0);
+    let absolute = desk.path("a/scene.toml");
+    desk.expect(&format!("{} --once --samples 1", absolute.display()), 0);
+    assert_eq!(desk.bytes("scene.png"), first);
+    for way_out in ["-o b.png", "--force", "-o scene.png"] {
+        desk.expect(&format!("b/scene.toml --once --samples 1 {way_out}"), 0);
+    }
+    // Turntables have their names checked, too.
+    desk.expect("a/scene.toml --once --samples 1 --turntable 2", 0);
+    let said = desk.expect("b/scene.toml --once --samples 1 --turntable 2", 2);
+    assert!(said.contains("another scene, a/scene.toml"), "{said}");
+    // Both are moved together.
+    std::fs::create_dir(desk.path("moved")).expect("made");
+    desk.expect("a/scene.toml --once --samples 1 --force", 0);
+    for name in ["a", "scene.png"] {
+        std::fs::rename(desk.path(name), desk.path(&format!("moved/{name}"))).expect("moved");
+    }
+    let moved = desk.glimt("a/scene.toml --once --samples 2").current_dir(desk.path("moved")).output();
+    assert_eq!(moved.expect("it runs").status.code(), Some(0));
 }

@@ -19,7 +19,7 @@ use crate::film::Film;
 use crate::film::tone::develop;
 use crate::output::part::{self, Merged, PartError, PartFile};
 use crate::output::write::{Guard, atomic_until};
-use crate::output::{self, Finish, Format, Losses, OutputError, is_one_file};
+use crate::output::{self, Finish, Format, Losses, OutputError, is_one_file, scene_path};
 use crate::scene::sanitize::{shortened, visible};
 use crate::system::threads::start_failure;
 use crate::tui::{Named, printed};
@@ -70,7 +70,7 @@ impl Merge<'_> {
         let Some(finish) = parts.first().and_then(|part| part.head.picture.finish()) else {
             return Err(self.console.fail(Exit::WRONG, "the parts do not say how their picture is finished"));
         };
-        self.write(format, &finish, &merged, &parts)?;
+        self.write(format, finish, &merged, &parts)?;
         self.say_missing(&merged);
         Ok(Exit::DONE)
     }
@@ -286,11 +286,12 @@ impl Merge<'_> {
     fn write(
         &self,
         format: Format,
-        finish: &Finish,
+        mut finish: Finish,
         merged: &Merged,
         parts: &[PartFile],
     ) -> Result<(), Exit> {
         let (out, token) = (&self.args.out, self.token);
+        name_scene(&mut finish, out);
         let film = &merged.film;
         let may_replace = |real: &Path| {
             let is_given = self.args.parts.iter().any(|part| is_one_file(part, real));
@@ -320,6 +321,15 @@ impl Merge<'_> {
             let missing = part::missing_parts(&merged.missing, merged.count);
             self.console.say(&format!("warning: {missing}; the picture is made of the others"));
         }
+    }
+}
+
+/// Names the scene as a render beside it does: parts have only its file name, as they come from many folders.
+fn name_scene(finish: &mut Finish, out: &Path) {
+    let Some((_, scene)) = finish.metadata.iter_mut().find(|(name, _)| name == "glimt:scene") else { return };
+    let beside = out.with_file_name(scene.as_str());
+    if !scene.contains('/') && beside.is_file() {
+        *scene = scene_path::relative(&beside, out);
     }
 }
 

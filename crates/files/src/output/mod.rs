@@ -23,6 +23,7 @@ mod place;
 mod png;
 mod ppm;
 mod protection;
+pub mod scene_path;
 pub mod settings;
 pub mod staged;
 mod stoppable;
@@ -38,7 +39,9 @@ pub use exr::mean_luminance_error;
 pub use finish::Finish;
 pub use format::{BitDepth, Format, MovingFormat};
 pub use identity::{FileIdentity, Likeness, is_one_file};
-pub use origin::{Replaced, replaced_json, replaced_picture, replaced_plot, replaced_table, signed};
+pub use origin::{
+    Replaced, replaced_json, replaced_picture, replaced_plot, replaced_table, scene_of_picture, signed,
+};
 
 use crate::control::CancelToken;
 use crate::film::RadianceImage;

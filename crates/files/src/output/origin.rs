@@ -66,6 +66,16 @@ pub fn replaced_picture(path: &Path) -> Replaced {
     Replaced::of(replaced(path), "a picture", is_own_picture)
 }
 
+/// The scene that a PNG of glimt names. `None` for a file that does not exist and for a picture that names none.
+pub fn scene_of_picture(path: &Path) -> Option<String> {
+    const KEY: &str = "glimt:scene";
+    let reader = png_header(replaced(path)?.ok()?)?;
+    let info = reader.info();
+    let latin = info.uncompressed_latin1_text.iter().find(|text| text.keyword == KEY);
+    let utf8 = || info.utf8_text.iter().find(|text| text.keyword == KEY)?.get_text().ok();
+    latin.map(|text| text.text.clone()).or_else(utf8)
+}
+
 /// Whether a file of JSON may be replaced: one that is `T` as a whole and passes the test, or an empty file.
 pub fn replaced_json<T: DeserializeOwned>(
     path: &Path,
@@ -115,11 +125,16 @@ fn replaced(path: &Path) -> Option<io::Result<File>> {
     }
 }
 
-fn is_own_picture(file: File) -> bool {
+/// A PNG up to its first pixel.
+fn png_header(file: File) -> Option<png::Reader<BufReader<File>>> {
     let limits = png::Limits { bytes: HEADER_BYTES };
     let mut decoder = png::Decoder::new_with_limits(BufReader::new(file), limits);
     decoder.set_ignore_iccp_chunk(true);
-    let Ok(reader) = decoder.read_info() else { return false };
+    decoder.read_info().ok()
+}
+
+fn is_own_picture(file: File) -> bool {
+    let Some(reader) = png_header(file) else { return false };
     let texts = &reader.info().uncompressed_latin1_text;
     texts.iter().any(|text| text.keyword == "Software" && is_program(&text.text))
 }

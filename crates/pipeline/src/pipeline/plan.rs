@@ -20,7 +20,9 @@ use crate::scene::diagnostic::{Diagnostic, Severity};
 /// Everything that a request's later stages go by.
 #[derive(Clone, Debug)]
 pub(super) struct Plan {
-    /// The scene's file name, for pictures to carry.
+    /// The scene file, or the model.
+    pub(super) path: PathBuf,
+    /// Its file name, for parts to carry.
     pub(super) name: String,
     /// The scene; where the overrides ask for it, with another acceleration structure. All other overrides are in the
     /// settings.
@@ -107,6 +109,7 @@ pub(super) fn plan(scene: &Arc<Scene>, path: &Path, overrides: &Overrides) -> Re
         }
     }
     Ok(Plan {
+        path: path.to_owned(),
         name: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         settings,
         threads,

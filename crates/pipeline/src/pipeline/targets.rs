@@ -12,7 +12,10 @@ use super::report::Marks;
 use super::sink::Sink;
 use crate::output::part::{self, PartFile};
 use crate::output::write::Guard;
-use crate::output::{FileIdentity, Losses, OutputError, replaced_json, replaced_picture};
+use crate::output::{
+    FileIdentity, Losses, OutputError, Replaced, replaced_json, replaced_picture, scene_of_picture,
+    scene_path,
+};
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::is_mesh;
 
@@ -172,7 +175,13 @@ fn is_foreign(plan: &Plan, target: Target<'_>, at: &Path) -> Option<Diagnostic> 
                 Some(names) => format!("'{}'", names.display()),
                 None => name.to_string(),
             };
-            (replaced_picture(at), format!("{way_out}; -o {own} or --force replaces it"))
+            let help = format!("{way_out}; -o {own} or --force replaces it");
+            let replaced = replaced_picture(at);
+            if let (Replaced::Own, Some(other)) = (&replaced, other_scene(plan, at)) {
+                let message = format!("cannot write {name}: it is the image of another scene, {other}");
+                return Some(of_call(message, Some(help)));
+            }
+            (replaced, help)
         }
         Kind::Report => {
             let replaced = replaced_json(at, "a report", Marks::have_all_stages);
@@ -181,6 +190,11 @@ fn is_foreign(plan: &Plan, target: Target<'_>, at: &Path) -> Option<Diagnostic> 
         Kind::Picture(NamedBy::Call | NamedBy::Scene) => return is_other_part(plan, target, at),
     };
     Some(of_call(format!("cannot write {name}: {}", replaced.why_kept()?), Some(help)))
+}
+
+/// The scene of a picture that glimt wrote, unless it is this one.
+fn other_scene(plan: &Plan, at: &Path) -> Option<String> {
+    scene_of_picture(at).filter(|named| !scene_path::is_same(named, &plan.path, at))
 }
 
 /// A checkpoint, or another part of as many: hours of work that look like an output. Parts of another number are those of a

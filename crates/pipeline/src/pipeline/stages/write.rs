@@ -22,13 +22,21 @@ use crate::film::{Picture, RadianceImage, Rect, SampleStats};
 use crate::integrators::{AovSource, LightAov};
 use crate::output::part::{self, Kind};
 use crate::output::write::{Durability, Guard};
-use crate::output::{self, BitDepth, Finish, Format, LayerImage, OutputError};
+use crate::output::{self, BitDepth, Finish, Format, LayerImage, OutputError, scene_path};
 use crate::output::{MovingFormat, moving};
 use crate::scene::fingerprint::{Fingerprint, Key};
 
-/// Files that glimt wrote, with the picture's key and the file's content at that time.
+/// Name of the scene in the metadata.
+const SCENE: &str = "glimt:scene";
+
+/// Files that glimt wrote.
 #[derive(Debug, Default)]
-pub(in crate::pipeline) struct Written(HashMap<PathBuf, (Key, Content)>);
+pub(in crate::pipeline) struct Written {
+    /// Each with the picture's key and the file's content at that time.
+    files: HashMap<PathBuf, (Key, Content)>,
+    /// The scene's own image, if all its files hold it.
+    pub(in crate::pipeline) own: Option<Key>,
+}
 
 impl Written {
     /// The first of these paths that exists and holds something else than glimt wrote there.
@@ -221,7 +229,7 @@ pub(in crate::pipeline) fn write_moving(
         return Ok(Staged::skipped(false, format!("it is kept as frame {} of {}", turn.number + 1, turn.of)));
     }
     let (frames, samples): (Vec<_>, Vec<_>) = std::mem::take(frames).0.into_iter().unzip();
-    let metadata = finish.metadata_with(SampleStats {
+    let samples = SampleStats {
         min: samples.iter().map(|one| one.min).min().unwrap_or(0),
         mean: samples.iter().map(|one| one.mean).sum::<f64>() / samples.len() as f64,
         max: samples.iter().map(|one| one.max).max().unwrap_or(0),
@@ -229,6 +237,7 @@ pub(in crate::pipeline) fn write_moving(
     for path in &plan.moving {
         let Some(format) = MovingFormat::of(path) else { continue };
         let write = || {
+            let metadata = finish_at(plan, path).metadata_with(samples);
             let bytes = moving::encode(&frames, &metadata, format, token)?;
             let write = |guard: &Guard<'_>| output::write::atomic_until(path, &bytes, guard, token);
             guarded(plan, inputs, path, sink, write)?;
@@ -250,7 +259,7 @@ fn write_one(
     path: &Path,
     token: &CancelToken,
 ) -> Result<u64, OutputError> {
-    let mut finish = finish(plan);
+    let mut finish = finish_at(plan, path);
     // A budget that suffices changes nothing.
     if let Some(seconds) = canvas.ended_by {
         finish.metadata.push(("glimt:time".to_owned(), format!("{seconds} s")));
@@ -286,11 +295,21 @@ pub(in crate::pipeline) fn finish(plan: &Plan) -> Finish {
     }
 }
 
+/// [`finish`] for an image at a path, which names the scene relative to itself.
+fn finish_at(plan: &Plan, path: &Path) -> Finish {
+    let mut finish = finish(plan);
+    let scene = finish.metadata.iter_mut().find(|(name, _)| name == SCENE);
+    if let Some((_, value)) = scene {
+        *value = scene_path::relative(&plan.path, path);
+    }
+    finish
+}
+
 /// Metadata of a picture: enough to make it again, beside what its film tells.
 fn metadata(plan: &Plan) -> Vec<(String, String)> {
     let settings = &plan.effective;
     let pairs = [
-        ("glimt:scene", plan.name.clone()),
+        (SCENE, plan.name.clone()),
         ("glimt:integrator", settings.integrator.name().to_owned()),
         ("glimt:shadows", settings.shadows.name().to_owned()),
         ("glimt:max_depth", plan.settings.render.max_depth.to_string()),

@@ -1,0 +1,122 @@
+//! The scene's path in the metadata of an image: relative to the image, so that both can be moved together.
+
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+use super::place::directory_of;
+
+/// Returns the path of a scene as seen from an image, with `/` between its names. In the image's own folder it starts with `./`: a
+/// bare file name comes from an earlier version, which did not tell the folder.
+pub fn relative(scene: &Path, image: &Path) -> String {
+    let folders = fs::canonicalize(directory_of(scene)).ok().zip(fs::canonicalize(directory_of(image)).ok());
+    let (Some(name), Some((to, from))) = (scene.file_name(), folders) else { return bare(scene) };
+    let shared = to.components().zip(from.components()).take_while(|(one, other)| one == other).count();
+    let up = from.components().skip(shared).map(|_| Component::ParentDir);
+    let down = to.components().skip(shared);
+    let path: PathBuf = up.chain(down).collect::<PathBuf>().join(name);
+    let names: Vec<_> = path.components().map(|it| it.as_os_str().to_string_lossy()).collect();
+    if names.len() == 1 { format!("./{}", names.concat()) } else { names.join("/") }
+}
+
+/// Whether the metadata of an image names this scene.
+pub fn is_same(named: &str, scene: &Path, image: &Path) -> bool {
+    if !named.contains('/') {
+        return named == bare(scene);
+    }
+    let Ok(scene_file) = fs::canonicalize(scene) else { return named == relative(scene, image) };
+    // The image may be a link: it has been written by its own name or by that of its target.
+    let target = fs::canonicalize(image).ok();
+    [Some(image), target.as_deref()].into_iter().flatten().any(|image| {
+        let file = fs::canonicalize(directory_of(image).join(named));
+        named == relative(scene, image) || file.is_ok_and(|file| file == scene_file)
+    })
+}
+
+/// The file name alone.
+fn bare(scene: &Path) -> String {
+    scene.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::symlink;
+
+    use super::*;
+
+    /// A folder with some files.
+    fn folder(files: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().expect("a folder");
+        for file in files {
+            let path = folder.path().join(file);
+            fs::create_dir_all(path.parent().expect("a folder")).expect("made");
+            fs::write(path, file).expect("written");
+        }
+        folder
+    }
+
+    #[test]
+    fn paths_are_relative_to_the_image() {
+        let folder = folder(&["a/scene.toml", "a/b/x", "c/x"]);
+        let at = |path: &str| folder.path().join(path);
+        let scene = at("a/scene.toml");
+        for (image, expected) in [
+            ("a/scene.png", "./scene.toml"),
+            ("scene.png", "a/scene.toml"),
+            ("a/b/scene.png", "../scene.toml"),
+            ("c/scene.png", "../a/scene.toml"),
+            ("a/b/../b/../scene.png", "./scene.toml"),
+        ] {
+            assert_eq!(relative(&scene, &at(image)), expected, "{image}");
+            assert!(is_same(expected, &scene, &at(image)), "{image}");
+            assert!(!is_same(expected, &at("c/x"), &at(image)), "{image}");
+        }
+        assert_eq!(relative(&scene, &at("none/scene.png")), "scene.toml", "nothing better is known");
+    }
+
+    #[test]
+    fn scenes_of_one_name_differ_and_old_images_count_by_it() {
+        let folder = folder(&["a/scene.toml", "b/scene.toml"]);
+        let at = |path: &str| folder.path().join(path);
+        let (one, other, image) = (at("a/scene.toml"), at("b/scene.toml"), at("scene.png"));
+        let named = relative(&one, &image);
+        assert!(is_same(&named, &one, &image) && !is_same(&named, &other, &image));
+        assert!(is_same("scene.toml", &one, &image) && is_same("scene.toml", &other, &image));
+        assert!(!is_same("room.toml", &one, &image) && !is_same("./scene.toml", &one, &image));
+    }
+
+    #[test]
+    fn links_and_moves_keep_a_scene_with_its_image() {
+        let folder = folder(&["a/scene.toml", "big/x"]);
+        let at = |path: &str| folder.path().join(path);
+        // A folder, a scene and an image by links.
+        symlink(at("a"), at("link")).expect("a link");
+        symlink(at("a/scene.toml"), at("other.toml")).expect("a link");
+        let image = at("scene.png");
+        assert!(is_same(&relative(&at("a/scene.toml"), &image), &at("link/scene.toml"), &image));
+        assert!(is_same(&relative(&at("a/scene.toml"), &image), &at("other.toml"), &image));
+        assert!(is_same(&relative(&at("other.toml"), &image), &at("a/scene.toml"), &image));
+        fs::write(at("big/scene.png"), "").expect("written");
+        symlink(at("big/scene.png"), &image).expect("a link");
+        let scene = at("a/scene.toml");
+        assert!(is_same(&relative(&scene, &image), &scene, &image));
+        assert!(is_same(&relative(&scene, &at("big/scene.png")), &scene, &image));
+        // Both are moved together; then the scene alone.
+        let named = relative(&scene, &at("a/scene.png"));
+        fs::rename(at("a"), at("moved")).expect("moved");
+        assert!(is_same(&named, &at("moved/scene.toml"), &at("moved/scene.png")));
+        fs::create_dir(at("elsewhere")).expect("made");
+        fs::rename(at("moved/scene.toml"), at("elsewhere/scene.toml")).expect("moved");
+        assert!(!is_same(&named, &at("elsewhere/scene.toml"), &at("moved/scene.png")));
+    }
+
+    #[test]
+    fn names_that_are_no_text_are_the_same_as_themselves() {
+        use std::ffi::OsStr;
+        use std::os::unix::ffi::OsStrExt;
+        let folder = folder(&["x"]);
+        let scene = folder.path().join(OsStr::from_bytes(b"sc\xffne.toml"));
+        fs::write(&scene, "").expect("written");
+        let image = folder.path().join("a.png");
+        assert!(is_same(&relative(&scene, &image), &scene, &image));
+    }
+}
