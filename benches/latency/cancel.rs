@@ -55,6 +55,7 @@ fn send(worker: &Handle, scene: &Path, generation: &mut u64) {
         overrides,
         preview: Some(PreviewSize { width: 118, height: 74, around: None }),
         write: Writing::No,
+        own: None,
         force: false,
         first: None,
     })));

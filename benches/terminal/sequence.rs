@@ -33,6 +33,7 @@ pub(crate) fn render(
         overrides: Overrides::default(),
         preview: Some(size),
         write: Writing::No,
+        own: None,
         force: false,
         first: None,
     };
@@ -63,6 +64,7 @@ pub(crate) fn render(
             | Event::WriteFailed { .. }
             | Event::NotKept { .. }
             | Event::Checkpoint { .. }
+            | Event::OwnImage { .. }
             | Event::WritePostponed { .. }
             | Event::WriteDone { .. }
             | Event::LastGoodEnded { .. }

@@ -55,6 +55,7 @@ impl Studio {
             overrides,
             preview: Some(self.preview),
             write: Writing::No,
+            own: None,
             force: false,
             first: None,
         };

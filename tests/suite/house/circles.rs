@@ -7,7 +7,7 @@ use super::imports::{Module, Modules};
 use super::{all_sources, root};
 
 /// Two files that import from each other, and why they do.
-const PAIRS: [(&str, &str, &str); 8] = [
+const PAIRS: [(&str, &str, &str); 9] = [
     (
         "accel/bvh/build",
         "accel/bvh/top_node",
@@ -26,6 +26,11 @@ const PAIRS: [(&str, &str, &str); 8] = [
         "a fingerprint looks up the textures that materials name",
     ),
     ("scene/document/key", "scene/document/table", "a key may hold a table, a table holds keys"),
+    (
+        "pipeline/watch/content",
+        "pipeline/watch/outputs",
+        "contents are shared with the outputs, whose contents tell whether they are lost",
+    ),
     ("world/geometry", "world/isolated", "the geometry keeps what is found out of it"),
     ("world/mesh_instance", "world/mesh_rows", "rows of hits and single hits are interpolated alike"),
 ];

@@ -61,9 +61,9 @@ fn the_focus_goes_to_the_crosshair_and_into_the_file() {
     terminal.press("f");
     terminal.wait_for("click where to focus");
     terminal.press("f");
-    terminal.wait_for("away: shown, not written");
+    terminal.wait_for("(preview only)");
     let text = terminal.text();
-    let focus = text.split("focus ").nth(1).and_then(|it| it.split(' ').next()).expect("a distance");
+    let focus = text.split("focus at ").nth(1).and_then(|it| it.split(' ').next()).expect("a distance");
     let depth: f64 = focus.parse().expect("a number");
     assert!((depth - 3.0).abs() < 0.01, "{depth}");
     // Before its end, what there is would be written.
@@ -74,7 +74,7 @@ fn the_focus_goes_to_the_crosshair_and_into_the_file() {
     assert_eq!(folder.bytes("scene.png"), expected);
     assert_ne!(expected, folder.once(&[]), "it shows");
     terminal.press("c");
-    terminal.wait_for("the camera is in scene.toml now");
+    terminal.wait_for("camera saved to scene.toml");
     let written = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     assert_eq!(written, centred().replace("focus = 4.0", &format!("focus = {focus}")));
 }

@@ -144,7 +144,7 @@ fn after_a_dropped_line_it_goes_on_where_it_was() {
     // The same one goes on, ends with the same pixels, and clears up.
     folder.write("scene.toml", &slow);
     let terminal = folder.terminal();
-    terminal.wait_for("going on from");
+    terminal.wait_for("resuming from");
     terminal.wait_for_render(1);
     assert_eq!(folder.bytes("scene.png"), folder.once(&[]));
     terminal.wait("the checkpoint to go", |_| !checkpoint.exists());

@@ -19,9 +19,9 @@ fn numbers(folder: &Folder, key: &str) -> Vec<f64> {
 /// Value of a key of the file after these keys and `c`. The file is then restored, and its picture is on disk.
 fn kept(folder: &Folder, terminal: &mut Terminal, own: &[u8], keys: &str, key: &str) -> Vec<f64> {
     terminal.press(keys);
-    terminal.wait_for("camera moved: shown, not written");
+    terminal.wait_for("camera moved (preview only)");
     terminal.press("c");
-    terminal.wait_for("the camera is in scene.toml now");
+    terminal.wait_for("camera saved to scene.toml");
     let kept = numbers(folder, key);
     let expected = folder.once(&[]);
     assert_ne!(expected, own, "{keys:?} shows");
@@ -102,7 +102,7 @@ fn a_hand_that_begins_beside_the_picture_moves_nothing() {
     terminal.wait_for_render(1);
     terminal.press(&dragged((20, 1), (30, 10)));
     terminal.press("0");
-    terminal.wait_for("the keys have changed nothing");
+    terminal.wait_for("nothing to reset");
 }
 
 #[test]
@@ -116,7 +116,7 @@ fn all_that_keys_changed_goes_back_at_once() {
         ("]", "exposure +0.25"),
         ("l", "camera moved"),
         ("<", "camera moved"),
-        ("v", "view normal: shown, not written"),
+        ("v", "view normal (preview only)"),
     ] {
         terminal.press(key);
         terminal.wait_for(words);
@@ -124,7 +124,7 @@ fn all_that_keys_changed_goes_back_at_once() {
     terminal.wait_for("done");
     fs::remove_file(folder.path("scene.png")).expect("removed");
     terminal.press("0");
-    terminal.wait_for("back to the scene's own settings");
+    terminal.wait_for("reset to the scene's settings");
     terminal.wait("the scene's own picture", |_| {
         fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own)
     });
@@ -144,9 +144,9 @@ fn an_orbiter_becomes_position_and_view_when_it_is_written() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("+");
-    terminal.wait_for("camera moved: shown, not written");
+    terminal.wait_for("camera moved (preview only)");
     terminal.press("c");
-    terminal.wait_for("the camera is in scene.toml now");
+    terminal.wait_for("camera saved to scene.toml");
     assert_eq!(numbers(&folder, "position").len(), 3);
     let written = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     assert!(written.contains("look_at = [") && !written.contains("orbiter"), "{written}");

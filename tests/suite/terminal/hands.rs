@@ -33,14 +33,14 @@ fn the_mouse_turns_goes_nearer_and_asks() {
     terminal.wait_for_render(1);
     let before = red(&terminal);
     terminal.press(&(press(20, 10) + &drag(26, 10) + &drag(32, 10) + &release(32, 10)));
-    terminal.wait_for("camera moved: shown, not written");
+    terminal.wait_for("camera moved (preview only)");
     terminal.wait("a narrower board", |screen| Colors::of(screen).red + 20 < before);
     terminal.press("0");
     terminal.wait("the board as before", |screen| Colors::of(screen).red == before);
     terminal.press("\x1b[<64;20;10M\x1b[<64;20;10M");
     terminal.wait("a larger board", |screen| Colors::of(screen).red > before + 20);
     terminal.press("0");
-    terminal.wait_for("back to the scene's own settings");
+    terminal.wait_for("reset to the scene's settings");
     terminal.press(&(press(20, 16) + &release(20, 16)));
     let line = SCENE.lines().position(|line| line == "[[quad]]").expect("a quad") + 1;
     let place = format!("scene.toml:{line}");
@@ -76,11 +76,11 @@ fn the_camera_goes_into_the_file_and_is_the_scene_s_own_then() {
     let mut terminal = folder.terminal();
     terminal.wait_for_render(1);
     terminal.press("c");
-    terminal.wait_for("there is nothing to write");
+    terminal.wait_for("camera unchanged: nothing to keep");
     terminal.press(">");
     terminal.wait_for_render(2);
     terminal.press("c");
-    terminal.wait_for("the camera is in scene.toml now");
+    terminal.wait_for("camera saved to scene.toml");
     let kept = fs::read_to_string(folder.path("scene.toml")).expect("a scene");
     assert_eq!(kept, text.replace("focus = 4.0\n", "focus = 4.0\nfov = 42\n"));
     terminal.wait("not moved any more", |screen| !screen.contents().contains("camera moved"));
@@ -102,9 +102,9 @@ fn the_focus_goes_where_was_clicked() {
     terminal.press("f");
     terminal.wait_for("click where to focus");
     terminal.press(&(press(20, 16) + &release(20, 16)));
-    terminal.wait_for("focus 4 away: shown, not written");
+    terminal.wait_for("focus at 4 (preview only)");
     terminal.press("ff");
-    terminal.wait_for("focus 4 away: shown, not written");
+    terminal.wait_for("focus at 4 (preview only)");
 }
 
 /// An editor that prints its arguments, reads a line of keys, and changes the scene.

@@ -69,12 +69,12 @@ fn a_long_render_that_is_left_is_kept_and_the_last_line_says_so() {
     long.wait_for("ETA");
     std::thread::sleep(std::time::Duration::from_millis(400));
     long.press("q");
-    assert_eq!(long.end_saying("scene.png.checkpoint has what was rendered: call glimt again to go on"), 0);
+    assert_eq!(long.end_saying("continues"), 0);
     assert!(folder.path("scene.png.checkpoint").is_file());
     let mut again = terminal(&folder, &[]);
-    again.wait_for("going on from");
+    again.wait_for("resuming from");
     again.press("q");
-    assert_eq!(again.end_saying("scene.png.checkpoint has what was rendered"), 0);
+    assert_eq!(again.end_saying("continues"), 0);
     // A short one is not worth it.
     fs::remove_file(folder.path("scene.png.checkpoint")).expect("removed");
     let mut short = terminal(&folder, &["--checkpoint", "1000"]);

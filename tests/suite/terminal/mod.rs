@@ -21,6 +21,7 @@ pub(crate) mod pty;
 mod relay;
 mod saving;
 mod screen;
+mod sequences;
 #[cfg(target_os = "linux")]
 mod soak;
 mod strip;

@@ -134,6 +134,11 @@ impl Folder {
         Terminal::open(&[PROGRAM, "scene.toml"], &[], self.0.path(), size(columns, rows), None)
     }
 
+    /// A program in a terminal of 200×24 cells.
+    pub fn wide_terminal_with(&self, command: &[&str]) -> Terminal {
+        Terminal::open(command, &[], self.0.path(), size(200, 24), None)
+    }
+
     pub fn program(&self) -> &'static str {
         PROGRAM
     }
@@ -269,6 +274,14 @@ impl Terminal {
             assert!(Instant::now() < deadline, "it does not end\n{}", self.text());
             std::thread::sleep(Duration::from_millis(5));
         }
+    }
+
+    /// Lines that a program which has ended left on the screen.
+    pub fn last_lines(&self) -> String {
+        self.wait("the screen from before", |screen| {
+            !screen.alternate_screen() && !screen.contents().trim().is_empty()
+        });
+        self.settled(|screen| screen.contents().trim().to_owned())
     }
 
     /// Traffic of the thin line.

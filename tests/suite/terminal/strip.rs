@@ -165,11 +165,11 @@ fn u_takes_back_what_c_wrote_and_no_edit_of_a_person() {
     terminal.wait_for_render(1);
     let own = folder.bytes("scene.png");
     terminal.press("u");
-    terminal.wait_for("there is nothing to undo");
+    terminal.wait_for("nothing to undo");
     terminal.press("+");
-    terminal.wait_for("camera moved: shown, not written");
+    terminal.wait_for("camera moved (preview only)");
     terminal.press("c");
-    terminal.wait_for("the camera is in scene.toml now; u undoes c");
+    terminal.wait_for("camera saved to scene.toml · u: undo");
     let kept = text();
     assert_ne!(kept, SCENE);
     // Somebody edits it: it stays as it is.
@@ -186,11 +186,11 @@ fn u_takes_back_what_c_wrote_and_no_edit_of_a_person() {
     terminal.wait("the camera that was kept", |screen| Colors::of(screen).is_most("red"));
     terminal.wait_for("done");
     terminal.press("u");
-    terminal.wait_for("scene.toml is as it was before c");
+    terminal.wait_for("undone: scene.toml restored");
     assert_eq!(text(), SCENE);
     terminal
         .wait("the picture on disk", |_| fs::read(folder.path("scene.png")).is_ok_and(|bytes| bytes == own));
     terminal.press("u");
-    terminal.wait_for("there is nothing to undo");
+    terminal.wait_for("nothing to undo");
     assert_eq!(text(), SCENE);
 }

@@ -1,6 +1,6 @@
 //! The terminal UI: worker, watcher and front end wired together.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -8,9 +8,10 @@ use std::time::Duration;
 use super::console::Console;
 use super::exit::Exit;
 use super::lower::Order;
+use crate::output::held;
 use crate::pipeline::protocol::{CheckpointNews, Command, Event, Failure, Stage, Status};
 use crate::pipeline::start;
-use crate::pipeline::watch::{Watcher, missing_folder};
+use crate::pipeline::watch::{Lost, Watcher, missing_folder};
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::sanitize::visible;
 use crate::scene::{SAME_TEXT, is_absence, text_now};
@@ -22,6 +23,8 @@ use crate::tui::{self, Ended, ExitStatus, Options, TuiError};
 const PATIENCE: Duration = Duration::from_secs(2);
 
 pub(super) fn run(order: Order, console: &Console) -> Exit {
+    // A text that an interrupted replacement has left may be all there is.
+    held::recover(&order.scene);
     if let Some(absent) = absent(&order.scene) {
         console.diagnostics(&[absent]);
         return Exit::WRONG;
@@ -47,7 +50,7 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     let heard = writes.clone();
     let tap = move || tap(&from_worker, &watcher, &heard, |event| forward.send(event).is_ok());
     let tap = std::thread::Builder::new().name("glimt-events".to_owned()).spawn(tap).map_err(no_thread)?;
-    let remote = worker.remote();
+    let (remote, contents) = (worker.remote(), worker.contents());
     let asked = writes.clone();
     let outcome = tui::run(Options {
         scene: order.scene,
@@ -89,12 +92,8 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
         let _ = tap.join();
     }
     if let Ok(ended) = &outcome {
-        let mut said = last_words(&writes, ended, has_ended);
-        // After SIGHUP nobody reads it.
-        if ended.status != ExitStatus::HANGUP {
-            said.extend(writes.checkpoint());
-        }
-        said.iter().for_each(|line| console.say(line));
+        let lost = contents.outputs.lost(&contents);
+        last_words(&writes, ended, (has_ended, &lost, &call())).iter().for_each(|line| console.say(line));
     }
     let exit = |ended: Ended| match ended.status {
         ExitStatus::QUIT if ended.is_unwritten => Exit::FAILED,
@@ -106,15 +105,44 @@ fn live(order: Order, console: &Console) -> Result<Exit, (Exit, String)> {
     })
 }
 
-/// Outcomes of writing that a person does not know of. After `q` the summary follows if there are none, and if an order to write
-/// was not carried out while files of before are there.
-fn last_words(writes: &Writes, ended: &Ended, has_ended: bool) -> Vec<String> {
+/// Outcomes of writing that the user does not know of. After `q` the summary follows if there are none, and if an order to write
+/// was not carried out while earlier files exist. Then the checkpoint, and changes by keys that are lost. `lost`: outputs that
+/// other programs have changed. `call`: this call, in words for a shell.
+fn last_words(
+    writes: &Writes,
+    ended: &Ended,
+    (has_ended, lost, call): (bool, &[(PathBuf, Lost)], &str),
+) -> Vec<String> {
     let mut lines = writes.said(ended.is_write_unanswered, has_ended);
-    let has_files_of_before = ended.is_write_unanswered && ended.has_written && !writes.has_written();
-    if ended.status == ExitStatus::QUIT && (lines.is_empty() || has_files_of_before) {
-        lines.push(ended.summary.clone());
+    let has_earlier_files = ended.is_write_unanswered && ended.has_written && !writes.has_written();
+    let has_quit = ended.status == ExitStatus::QUIT;
+    let has_summary = has_quit && (lines.is_empty() || has_earlier_files);
+    if has_summary {
+        let lost = lost.iter().map(|(path, lost)| format!("; {} {} since", path.display(), lost.words()));
+        lines.push(ended.summary.clone() + &lost.collect::<String>());
     }
+    // After SIGHUP nobody reads it.
+    match writes.checkpoint().filter(|_| ended.status != ExitStatus::HANGUP) {
+        Some(Ok(_)) if has_summary => {
+            lines.iter_mut().rev().take(1).for_each(|line| *line = format!("{line}; {call} continues"));
+        }
+        Some(Ok(path)) => {
+            lines.push(format!("progress saved in {}; run glimt again to resume", path.display()));
+        }
+        Some(Err(message)) => lines.push(format!("warning: {message}")),
+        None => {}
+    }
+    lines.extend(ended.not_kept.clone().filter(|_| has_quit));
     lines
+}
+
+/// This call, in words for a shell.
+fn call() -> String {
+    let words = std::env::args().skip(1).map(|word| match shlex::try_quote(&word) {
+        Ok(quoted) => quoted.into_owned(),
+        Err(_) => word.clone(),
+    });
+    format!("glimt {}", words.collect::<Vec<_>>().join(" "))
 }
 
 /// Error about a scene that does not exist at the start; glimt waits for a scene that disappears later.
@@ -137,7 +165,7 @@ struct Heard {
     has_written: bool,
     has_left: bool,
     /// The checkpoint that was written after the front end was left, or the reason why there is none.
-    checkpoint: Option<String>,
+    checkpoint: Option<Result<PathBuf, String>>,
     /// Whether a request is at its last stage.
     is_last_stage: bool,
 }
@@ -188,11 +216,8 @@ impl Writes {
                 heard.is_last_stage = false;
             }
             Event::Checkpoint { news, .. } if has_left => match news {
-                CheckpointNews::Written { path } => {
-                    let line = format!("{} has what was rendered: call glimt again to go on", path.display());
-                    heard.checkpoint = Some(line);
-                }
-                CheckpointNews::Failed { message } => heard.checkpoint = Some(format!("warning: {message}")),
+                CheckpointNews::Written { path } => heard.checkpoint = Some(Ok(path.clone())),
+                CheckpointNews::Failed { message } => heard.checkpoint = Some(Err(message.clone())),
                 CheckpointNews::Resumed { .. }
                 | CheckpointNews::Absent { .. }
                 | CheckpointNews::Ignored { .. }
@@ -209,6 +234,7 @@ impl Writes {
             | Event::Preview { .. }
             | Event::WritePostponed { .. }
             | Event::WriteDone { .. }
+            | Event::OwnImage { .. }
             | Event::LastGoodEnded { .. }
             | Event::Checkpoint { .. }
             | Event::Text { .. }
@@ -219,8 +245,8 @@ impl Writes {
         }
     }
 
-    /// A line about the checkpoint of a render that was left.
-    fn checkpoint(&self) -> Option<String> {
+    /// The checkpoint of a render that was left, or the reason why there is none.
+    fn checkpoint(&self) -> Option<Result<PathBuf, String>> {
         self.heard().checkpoint.clone()
     }
 
@@ -245,6 +271,9 @@ fn tap(events: &Receiver<Event>, watcher: &Watcher, writes: &Writes, forward: im
         // The front end is gone: only what is still written counts.
         if !is_heard {
             continue;
+        }
+        if matches!(event, Event::Written { .. }) {
+            watcher.watch_outputs();
         }
         if let Event::Files { files, read, since, .. } = &event {
             let (read, before) = files.split_at((*read).min(files.len()));
@@ -287,18 +316,49 @@ mod tests {
             summary: summary.to_owned(),
             has_written,
             is_unwritten: false,
+            not_kept: None,
         };
         let writes = Writes::default();
-        writes.hear(&Event::Written { generation: 1, path: "a.png".into(), bytes: 1 });
+        writes.hear(&Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
         writes.order();
         writes.leave();
         let message = "the newest picture is not written".to_owned();
         writes.hear(&Event::WriteFailed { generation: 2, path: None, message });
         let error = "error: the newest picture is not written";
-        assert_eq!(last_words(&writes, &ended(true), true), [error, summary]);
-        assert_eq!(last_words(&writes, &ended(false), true), [error]);
-        writes.hear(&Event::Written { generation: 2, path: "a.png".into(), bytes: 1 });
-        assert_eq!(last_words(&writes, &ended(true), true), [error, "wrote a.png"]);
+        let said = |ended: Ended| last_words(&writes, &ended, (true, &[], "glimt a.toml"));
+        assert_eq!(said(ended(true)), [error, summary]);
+        assert_eq!(said(ended(false)), [error]);
+        writes.hear(&Event::Written { generation: 2, path: "a.png".into(), bytes: 1, is_own: true });
+        assert_eq!(said(ended(true)), [error, "wrote a.png"]);
+    }
+
+    #[test]
+    fn the_last_line_lists_changes_and_the_summary_says_what_became_of_the_files() {
+        let ended = |status| Ended {
+            status,
+            is_write_unanswered: false,
+            summary: "a.png not finished (10 %)".to_owned(),
+            has_written: false,
+            is_unwritten: false,
+            not_kept: Some("not kept: --shadows off".to_owned()),
+        };
+        let writes = Writes::default();
+        let lost = [(PathBuf::from("a.png"), Lost::Removed)];
+        let said = |status, lost: &[(PathBuf, Lost)]| {
+            last_words(&writes, &ended(status), (true, lost, "glimt a.toml --seed 1"))
+        };
+        let not_kept = "not kept: --shadows off";
+        assert_eq!(said(ExitStatus::QUIT, &[]), ["a.png not finished (10 %)", not_kept]);
+        let removed = "a.png not finished (10 %); a.png was removed since";
+        assert_eq!(said(ExitStatus::QUIT, &lost), [removed, not_kept]);
+        writes.leave();
+        let news = CheckpointNews::Written { path: "a.png.checkpoint".into() };
+        writes.hear(&Event::Checkpoint { generation: 1, news });
+        let continues = "a.png not finished (10 %); glimt a.toml --seed 1 continues";
+        assert_eq!(said(ExitStatus::QUIT, &[]), [continues, not_kept]);
+        let saved = "progress saved in a.png.checkpoint; run glimt again to resume";
+        assert_eq!(said(ExitStatus::TERMINATED, &[]), [saved]);
+        assert_eq!(said(ExitStatus::HANGUP, &[]), [""; 0]);
     }
 
     #[test]

@@ -74,6 +74,7 @@ pub(super) fn run(order: &Order, console: &Console) -> Exit {
             overrides,
             preview: None,
             write: Writing::Must,
+            own: None,
             force: false,
             first: None,
         })));
@@ -243,6 +244,7 @@ fn follow(
             | Event::Preview { .. }
             | Event::NotKept { .. }
             | Event::Refused { .. }
+            | Event::OwnImage { .. }
             | Event::WritePostponed { .. }
             | Event::WriteDone { .. }
             | Event::LastGoodEnded { .. }

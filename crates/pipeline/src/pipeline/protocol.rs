@@ -64,6 +64,9 @@ pub struct Request {
     pub preview: Option<PreviewSize>,
     /// Whether the finished picture is written to disk.
     pub write: Writing,
+    /// Overrides of the scene's own image, where this request shows something else: its film and its checkpoint are kept. `None`
+    /// for a request of that image.
+    pub own: Option<Box<Overrides>>,
     /// Render again even where nothing changed.
     pub force: bool,
     /// The part of the picture that gets its samples before the rest; the picture is the same in the end.
@@ -174,6 +177,15 @@ pub enum Event {
         path: PathBuf,
         /// Its size.
         bytes: u64,
+        /// Whether it is the scene's own image, not one that keys changed.
+        is_own: bool,
+    },
+    /// State of the scene's own image, in a request that shows something else.
+    OwnImage {
+        /// Number of the request.
+        generation: u64,
+        /// The state.
+        state: OwnState,
     },
     /// A picture or a report could not be written; a render under way goes on.
     WriteFailed {
@@ -270,6 +282,20 @@ pub enum Event {
         /// Number of the request.
         generation: u64,
     },
+}
+
+/// State of the scene's own image: the image of the scene file as saved, with the overrides of the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OwnState {
+    /// Its files hold it.
+    Written,
+    /// Some of its samples are there.
+    Begun {
+        /// Whether the request adds samples to it: it shows the same film in another way.
+        is_rendering: bool,
+    },
+    /// Nothing of it has been rendered.
+    NotBegun,
 }
 
 /// News about a checkpoint.

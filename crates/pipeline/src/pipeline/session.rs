@@ -43,6 +43,7 @@ impl Session {
             preview: None,
             first: None,
             write: Writing::No,
+            own: None,
             force: true,
         };
         // Nobody listens: what came of it is given back.

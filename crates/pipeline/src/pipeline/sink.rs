@@ -7,8 +7,8 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 use super::protocol::{
-    AssetProgress, CheckpointNews, Event, LatestPreview, PreviewSlot, PreviewSource, RenderProgress, Section,
-    StageReport,
+    AssetProgress, CheckpointNews, Event, LatestPreview, OwnState, PreviewSlot, PreviewSource,
+    RenderProgress, Section, StageReport,
 };
 use super::watch::content::FileRead;
 use crate::film::Picture;
@@ -51,8 +51,12 @@ impl Sink {
         self.send(Event::Files { generation: self.generation, files, read, since });
     }
 
-    pub(super) fn written(&self, path: &Path, bytes: u64) {
-        self.send(Event::Written { generation: self.generation, path: path.to_owned(), bytes });
+    pub(super) fn written(&self, path: &Path, bytes: u64, is_own: bool) {
+        self.send(Event::Written { generation: self.generation, path: path.to_owned(), bytes, is_own });
+    }
+
+    pub(super) fn own_image(&self, state: OwnState) {
+        self.send(Event::OwnImage { generation: self.generation, state });
     }
 
     pub(super) fn write_done(&self, paths: Vec<PathBuf>) {

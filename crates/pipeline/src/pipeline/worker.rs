@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use super::engine::{Engine, Interruption, Means, Meanwhile, Orders};
 use super::errands::Errand;
 use super::protocol::{Command, Event, Failure, PreviewSize, PreviewSlot, Request, Writing};
-use super::settings::{CameraChange, View};
+use super::settings::Overrides;
 use super::sink::Sink;
 use super::watch::content::Contents;
 use crate::control::CancelToken;
@@ -117,8 +117,8 @@ struct Mailbox {
     is_write_postponed: bool,
     /// The order to write came when the request that waits was there: it is meant.
     is_write_of_waiting: bool,
-    /// View and camera of the request under way.
-    shown: (Option<View>, CameraChange),
+    /// Settings of the request under way that keys change.
+    shown: Overrides,
     /// Another size of the previews.
     preview: Option<Option<PreviewSize>>,
     errands: VecDeque<Errand>,
@@ -136,9 +136,10 @@ struct Mailbox {
     newest: u64,
 }
 
-/// View and camera of a request.
-fn shown(request: &Request) -> (Option<View>, CameraChange) {
-    (request.overrides.view, request.overrides.camera)
+/// Settings of a request that keys change.
+fn shown(request: &Request) -> Overrides {
+    let Overrides { shadows, integrator, dof, photons, view, camera, exposure, .. } = request.overrides;
+    Overrides { shadows, integrator, dof, photons, view, camera, exposure, ..Overrides::default() }
 }
 
 /// Next task of the worker.
@@ -220,8 +221,8 @@ impl Remote {
         self.mailbox.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Keeps an order to write for the waiting request, if it is meant, or if it shows the same view as the current picture and
-    /// that has holes. Returns whether the order is kept.
+    /// Keeps an order to write for the waiting request, if it is meant, or if it has the settings of the current picture and that
+    /// has holes. Returns whether the order is kept.
     fn postpone_write(&self, can_write: bool) -> bool {
         let mut mailbox = self.lock();
         let is_meant = mailbox.is_write_of_waiting;
@@ -312,7 +313,10 @@ impl Worker {
         };
         loop {
             let outcome = match self.remote.next() {
-                Task::Quit => break,
+                Task::Quit => {
+                    engine.keep_own(&sink, self.remote.interruption());
+                    break;
+                }
                 Task::Write if self.remote.postpone_write(engine.can_write()) => continue,
                 Task::Write => catch_unwind(AssertUnwindSafe(|| engine.write_now(&sink))),
                 Task::Preview(size, token) => {
@@ -357,7 +361,7 @@ fn reason(payload: &(dyn Any + Send)) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::settings::Overrides;
+    use crate::pipeline::settings::View;
 
     fn render(generation: u64) -> Command {
         Command::Render(Box::new(Request {
@@ -366,6 +370,7 @@ mod tests {
             overrides: Default::default(),
             preview: None,
             write: Writing::No,
+            own: None,
             force: false,
             first: None,
         }))

@@ -109,6 +109,19 @@ impl Lookups {
         by_delta: false,
     };
 
+    /// The lookups of two pictures.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            diffuse: self.diffuse || other.diffuse,
+            specular: self.specular || other.specular,
+            ambient: self.ambient || other.ambient,
+            lights: self.lights || other.lights,
+            normals: self.normals || other.normals,
+            by_delta: self.by_delta || other.by_delta,
+        }
+    }
+
     /// Whether textures of a role are looked up, in a material that is δ or not.
     fn has(self, role: TextureRole, is_delta: bool) -> bool {
         match role {

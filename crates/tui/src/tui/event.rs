@@ -8,7 +8,7 @@ use std::time::Duration;
 use crossterm::event::{KeyCode, KeyModifiers};
 
 use super::known::Answer;
-use super::options::{Changed, News};
+use super::options::{Changed, News, OutputChange};
 use crate::film::Picture;
 use crate::pipeline::protocol::{self, PreviewSource, Section};
 
@@ -47,6 +47,8 @@ pub(super) enum Event {
     Changed(Changed),
     /// Nobody is writing the changed files any more.
     Settled,
+    /// A file that glimt wrote was changed, or is as glimt wrote it again.
+    Output(OutputChange),
     /// A signal, or what amounts to one.
     Signal(Signal),
     /// A frame with the picture of this generation is on the screen.
@@ -69,6 +71,7 @@ impl Event {
         match news {
             News::Changed(changed) => Self::Changed(changed),
             News::Settled => Self::Settled,
+            News::Output(change) => Self::Output(change),
         }
     }
 }
@@ -210,17 +213,4 @@ pub(super) struct Unwritten {
     pub generation: u64,
     /// Whether it is refused, for a reason that is among the errors and warnings.
     pub is_refused: bool,
-}
-
-/// A picture that was written.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Written {
-    pub path: PathBuf,
-    pub bytes: u64,
-    /// Number of the request.
-    pub generation: u64,
-    /// Description of the file, in words, as far as it is known.
-    pub made: String,
-    /// Whether a later picture could not be written there: nobody knows what the file holds.
-    pub is_stale: bool,
 }

@@ -1,66 +1,110 @@
 //! The line that stays when the screen is given back.
 
-use super::event::{Unwritten, Written};
-use super::state::{Activity, State};
+use super::event::Unwritten;
+use super::state::{Activity, OwnImage, State, Toggles, Written};
 use crate::choice::Choice;
-use crate::pipeline::protocol::Report;
-use crate::pipeline::settings::View;
+use crate::pipeline::protocol::{OwnState, Report};
+use crate::pipeline::settings::{CameraChange, View};
 use crate::pipeline::words::seconds;
 use crate::scene::sanitize::visible;
 
-/// The files written, with their samples and seconds; events after them; and changes that are discarded.
+/// The files written, with their samples and seconds, and what happened after that.
 pub(super) fn words(state: &State) -> String {
-    let files = match &state.saving.write_failed {
+    match &state.saving.write_failed {
         Some(failed) => unwritten(state, failed),
+        None if state.saving.written.is_empty() => unfinished(state),
         None => files(&state.saving.written) + &since(state),
-    };
-    let is_kept =
+    }
+}
+
+/// Changes by keys that are neither in the scene nor in an image, as options of the next call.
+pub(super) fn not_kept(state: &State) -> Option<String> {
+    let shown = state.request.toggles;
+    let is_in_file = state.saving.written.iter().any(|written| written.shows == Some(shown));
+    let is_in_scene =
         state.saving.camera_of_model.is_some() && state.saving.camera_of_model == state.request.viewpoint();
-    let is_discarded = state.request.toggles.camera.is_any() && !is_kept;
-    let not_kept = if is_discarded { "; camera changes discarded" } else { "" };
-    files + not_kept
+    let camera = if is_in_scene { CameraChange::default() } else { shown.camera };
+    let has_orbiter = state.request.text.as_ref().is_some_and(|text| text.contains("orbiter"));
+    let options = Toggles { camera, ..shown }.options(has_orbiter);
+    (!options.is_empty() && !is_in_file).then(|| format!("not kept: {}", options.join(" ")))
+}
+
+/// Names of the image's files. `None` until the scene has been read.
+pub(super) fn image_name(state: &State) -> Option<String> {
+    let outputs = &state.request.effective.as_ref()?.outputs;
+    let names: Vec<_> = outputs.iter().map(|path| visible(&path.to_string_lossy()).into_owned()).collect();
+    (!names.is_empty()).then(|| names.join(", "))
+}
+
+/// Why this run has written no image.
+fn unfinished(state: &State) -> String {
+    if is_broken(state) {
+        return format!("no image written; {} has errors", scene_name(state));
+    }
+    let Some(name) = image_name(state) else { return "no image written".to_owned() };
+    match state.saving.own {
+        OwnImage { state: OwnState::Written, .. } => format!("{name} is up to date"),
+        OwnImage { fraction, .. } if fraction > 0.0 => {
+            format!("{name} not finished ({} %)", (fraction * 100.0).floor())
+        }
+        OwnImage { .. } => format!("{name} not finished"),
+    }
 }
 
 /// Events after the files were written.
 fn since(state: &State) -> String {
-    let is_after = state.saving.written.iter().any(|written| written.generation != state.request.generation);
+    if is_broken(state) {
+        return format!("; {} has errors since", scene_name(state));
+    }
+    let written = &state.saving.written;
+    let is_older = written.iter().all(|written| written.generation < state.saving.saved_at);
+    if !state.request.is_own() {
+        let is_by_hand = written.iter().any(|written| written.shows.is_some());
+        return match state.saving.own {
+            OwnImage { state: OwnState::Written, .. } => String::new(),
+            OwnImage { .. } if is_older => " (older than your last edit)".to_owned(),
+            OwnImage { .. } if is_by_hand => String::new(),
+            OwnImage { fraction, .. } => {
+                format!("; the render after it is not finished ({:.0} %)", (fraction * 100.0).floor())
+            }
+        };
+    }
+    let is_after = written.iter().any(|written| written.generation != state.request.generation);
     let next = if is_after { "the render after it" } else { "the render" };
     match (state.work.activity, &state.work.progress) {
-        // Views and moved cameras are shown, not written.
-        (Activity::Done, _) if is_saved_since(state) => "; that was before the last save".to_owned(),
-        (Activity::Done, _) => String::new(),
         (Activity::Running { .. } | Activity::Cancelled, Some(progress)) => {
             format!("; {next} was stopped at {:.0} %", (progress.fraction * 100.0).floor())
         }
         (Activity::Running { .. } | Activity::Cancelled, None) => format!("; {next} was stopped"),
-        (Activity::Waiting | Activity::Broken, _) => {
-            let name = state.request.scene.file_name().unwrap_or_default().to_string_lossy();
-            let since = if state.saving.written.is_empty() { "" } else { " since" };
-            format!("; {} has errors{since}", visible(&name))
-        }
+        (Activity::Done | Activity::Waiting | Activity::Broken, _) => String::new(),
     }
 }
 
-/// Whether the scene has changed since the files were written.
-fn is_saved_since(state: &State) -> bool {
-    let newest = state.saving.written.iter().map(|written| written.generation).max();
-    !state.request.is_written()
-        && newest.zip(state.saving.last_visible_edit).is_some_and(|(newest, saved)| newest < saved)
+fn is_broken(state: &State) -> bool {
+    matches!(state.work.activity, Activity::Waiting | Activity::Broken)
 }
 
-/// The files written and their descriptions; files of the same picture stand together.
+fn scene_name(state: &State) -> String {
+    let name = state.request.scene.file_name().unwrap_or_default().to_string_lossy();
+    visible(&name).into_owned()
+}
+
+/// The files written and their descriptions, grouped by image.
 fn files(written: &[Written]) -> String {
-    let alike = written.chunk_by(|one, next| one.made == next.made);
+    let alike = written.chunk_by(|one, next| one.made == next.made && one.shows == next.shows);
     let said: Vec<String> = alike
         .map(|files| {
             let names: Vec<_> =
                 files.iter().map(|it| visible(&it.path.to_string_lossy()).into_owned()).collect();
             let made = files.first().map_or("", |it| &it.made);
             let colon = if made.is_empty() { "" } else { ": " };
-            format!("wrote {}{colon}{made}", names.join(", "))
+            let shows = files.first().and_then(|it| it.shows).unwrap_or_default();
+            let changes = Toggles { view: None, ..shows }.differences(&Toggles::default(), false).join(", ");
+            let with = if changes.is_empty() { String::new() } else { format!(", with {changes}") };
+            format!("wrote {}{colon}{made}{with}", names.join(", "))
         })
         .collect();
-    if said.is_empty() { "nothing is written".to_owned() } else { said.join("; ") }
+    said.join("; ")
 }
 
 /// The picture that is not on disk, and why; and the other files written, of the same picture and of earlier ones.
@@ -80,10 +124,10 @@ fn unwritten(state: &State, failed: &Unwritten) -> String {
 }
 
 /// A picture and its cost, in words. A picture whose samples were there already had its cost before.
-pub(super) fn made(report: &Report) -> String {
+pub(super) fn made(report: &Report, shown: View) -> String {
     let image = &report.image;
     let time = seconds(report.seconds.max(image.render_seconds));
-    let view = view(report.settings.view);
+    let view = view(shown);
     let comma = if view.is_empty() { "" } else { ", " };
     let samples = if image.samples.min == image.samples.max {
         image.samples.max.to_string()
@@ -123,7 +167,7 @@ mod tests {
         let begun = desk.state.request.generation;
         desk.worker(Event::Started { generation: begun });
         desk.press('l');
-        desk.worker(Event::Written { generation: begun, path: "big.png".into(), bytes: 1 });
+        desk.worker(Event::Written { generation: begun, path: "big.png".into(), bytes: 1, is_own: true });
         assert!(
             words(&desk.state).starts_with("wrote big.png; the render after it"),
             "{}",
@@ -132,8 +176,8 @@ mod tests {
         desk.worker(done(begun, Vec::new(), false));
         desk.finish([30, 30, 200]);
         let made = "wrote big.png: 640×480, 64 samples, 1.93 s";
-        assert_eq!(words(&desk.state), format!("{made}; camera changes discarded"));
-        assert!(desk.text().contains("unwritten: w writes it"), "of the one at hand: {}", desk.text());
+        assert_eq!(words(&desk.state), format!("{made}; the render after it is not finished (0 %)"));
+        assert!(desk.text().contains("not saved · w saves it"), "of the one at hand: {}", desk.text());
     }
 
     #[test]
@@ -142,7 +186,7 @@ mod tests {
         let write = |desk: &mut Desk, seconds: f64, rendered: f64| {
             let generation = desk.state.request.generation;
             desk.worker(Event::Started { generation });
-            desk.worker(Event::Written { generation, path: "dof.png".into(), bytes: 1 });
+            desk.worker(Event::Written { generation, path: "dof.png".into(), bytes: 1, is_own: true });
             desk.worker(done_as(generation, |report| {
                 (report.seconds, report.image.render_seconds) = (seconds, rendered);
             }));
@@ -158,7 +202,7 @@ mod tests {
     #[test]
     fn a_view_that_was_written_is_said_to_be_one() {
         let mut desk = Desk::new();
-        desk.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1 });
+        desk.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
         desk.finish([200, 30, 30]);
         let own = words(&desk.state);
         desk.press('v');
@@ -171,7 +215,7 @@ mod tests {
         }));
         assert_eq!(words(&desk.state), own, "that is what is written");
         desk.press('w');
-        desk.worker(Event::Written { generation, path: "a.png".into(), bytes: 1 });
+        desk.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
         assert_eq!(words(&desk.state), "wrote a.png: view normal, 640×480, 64 samples, 500 ms");
     }
 
@@ -180,7 +224,7 @@ mod tests {
         let made = "wrote a.png: 640×480, 64 samples, 1.93 s";
         for key in ['v', 'l'] {
             let mut desk = Desk::new();
-            desk.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1 });
+            desk.worker(Event::Written { generation: 1, path: "a.png".into(), bytes: 1, is_own: true });
             desk.finish([200, 30, 30]);
             desk.press(key);
             desk.finish([200, 30, 30]);
@@ -189,8 +233,8 @@ mod tests {
             desk.event(crate::tui::event::Event::Changed(Changed { noticed: desk.now }));
             desk.finish([30, 30, 200]);
             let after = words(&desk.state);
-            assert!(after.starts_with(&format!("{made}; that was before the last save")), "{key}: {after}");
-            assert_eq!(after.contains("camera changes discarded"), key == 'l', "{after}");
+            assert_eq!(after, format!("{made} (older than your last edit)"), "{key}");
+            assert_eq!(not_kept(&desk.state).is_some_and(|it| it.contains("camera.position")), key == 'l');
             // A save that changes nothing does not make it newer.
             desk.event(crate::tui::event::Event::Changed(Changed { noticed: desk.now }));
             let generation = desk.state.request.generation;
@@ -248,10 +292,14 @@ mod tests {
     #[test]
     fn it_tells_what_was_written_and_what_was_not() {
         let mut desk = Desk::new();
-        assert_eq!(words(&desk.state), "nothing is written; the render was stopped");
+        assert_eq!(words(&desk.state), "no image written");
+        let settings = Box::new(crate::tui::fixtures::settings());
+        let (camera, own) = (crate::tui::fixtures::camera(), crate::tui::fixtures::own());
+        desk.worker(Event::Settings { generation: 1, settings, camera, exposure: 0.0, own });
+        assert_eq!(words(&desk.state), "cornell.png not finished");
         desk.worker(Event::Progress { generation: 1, progress: progress(0.388, None) });
-        assert_eq!(words(&desk.state), "nothing is written; the render was stopped at 38 %");
-        desk.worker(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1 });
+        assert_eq!(words(&desk.state), "cornell.png not finished (38 %)");
+        desk.worker(Event::Written { generation: 1, path: "cornell.png".into(), bytes: 1, is_own: true });
         desk.worker(done(1, Vec::new(), false));
         let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s";
         assert_eq!(words(&desk.state), made);
@@ -268,18 +316,84 @@ mod tests {
             path: None,
             message: "cannot write b.exr: no space".to_owned(),
         });
-        desk.worker(Event::Written { generation: 3, path: "a.png".into(), bytes: 1 });
+        desk.worker(Event::Written { generation: 3, path: "a.png".into(), bytes: 1, is_own: true });
         desk.worker(done(3, Vec::new(), false));
         let failed =
             "not written: cannot write b.exr: no space; wrote an earlier one to cornell.png; wrote a.png";
         assert_eq!(words(&desk.state), failed);
         desk.press('r');
         desk.worker(Event::Started { generation: 4 });
-        desk.worker(Event::Written { generation: 4, path: "a.png".into(), bytes: 1 });
+        desk.worker(Event::Written { generation: 4, path: "a.png".into(), bytes: 1, is_own: true });
         desk.worker(done(4, Vec::new(), false));
         let made = "wrote cornell.png, a.png: 640×480, 64 samples, 1.93 s";
         assert_eq!(words(&desk.state), made);
         desk.fail(vec![diagnostic(Severity::Error, "wrong")]);
         assert_eq!(words(&desk.state), format!("{made}; cornell.toml has errors since"));
+    }
+
+    #[test]
+    fn changes_by_keys_are_listed_as_options_until_they_are_kept_or_written() {
+        let mut desk = Desk::new();
+        desk.finish([200, 30, 30]);
+        assert_eq!(not_kept(&desk.state), None);
+        for key in ['s', 'i', 'd', ']', '<', 'v'] {
+            desk.press(key);
+            desk.finish([200, 30, 30]);
+        }
+        let options = "not kept: --integrator path --shadows hard --dof off --view normal \
+                       --set render.exposure=0.25 --set camera.fov=38.1";
+        assert_eq!(not_kept(&desk.state).as_deref(), Some(options));
+        desk.press('w');
+        let generation = desk.state.request.generation;
+        desk.worker(Event::Written { generation, path: "a.png".into(), bytes: 1, is_own: false });
+        assert_eq!(not_kept(&desk.state), None, "the image shows them");
+        desk.key(crate::tui::event::KeyPress::special(crossterm::event::KeyCode::Esc));
+        desk.press('l');
+        desk.finish([200, 30, 30]);
+        let words = not_kept(&desk.state).expect("moved since");
+        assert!(words.contains("--set 'camera.position=["), "{words}");
+        desk.press('0');
+        assert_eq!(not_kept(&desk.state), None);
+    }
+
+    #[test]
+    fn the_own_image_is_told_while_keys_show_something_else() {
+        let mut desk = Desk::new();
+        let own = |desk: &mut Desk, state| {
+            let generation = desk.state.request.generation;
+            desk.worker(Event::OwnImage { generation, state });
+        };
+        desk.worker(Event::Started { generation: 1 });
+        let settings = Box::new(crate::tui::fixtures::settings());
+        let (camera, own_settings) = (crate::tui::fixtures::camera(), crate::tui::fixtures::own());
+        desk.worker(Event::Settings { generation: 1, settings, camera, exposure: 0.0, own: own_settings });
+        desk.worker(Event::Progress { generation: 1, progress: progress(0.108, None) });
+        desk.press('s');
+        own(&mut desk, OwnState::Begun { is_rendering: false });
+        desk.finish([200, 30, 30]);
+        assert_eq!(words(&desk.state), "cornell.png not finished (10 %)");
+        let said = crate::tui::view::under::not_saved(&desk.state);
+        assert_eq!(said, ["not saved · w saves it", "cornell.png at 10 %: 0 continues it"]);
+        assert!(desk.text().contains("not saved · w saves it"), "{}", desk.text());
+        // `w` writes what is shown.
+        desk.press('w');
+        let generation = desk.state.request.generation;
+        desk.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: false });
+        let made = "wrote cornell.png: 640×480, 64 samples, 1.93 s, with shadows hard";
+        assert_eq!(words(&desk.state), made);
+        assert!(desk.text().contains("→ cornell.png"), "{}", desk.text());
+        // Back at the scene's own image, the file does not show it yet.
+        desk.press('0');
+        desk.worker(Event::Started { generation: desk.state.request.generation });
+        assert!(words(&desk.state).starts_with(&format!("{made}; the render after it was stopped")));
+        let generation = desk.state.request.generation;
+        desk.worker(Event::Written { generation, path: "cornell.png".into(), bytes: 1, is_own: true });
+        desk.finish([30, 200, 30]);
+        assert_eq!(words(&desk.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
+        desk.press('s');
+        own(&mut desk, OwnState::Written);
+        assert_eq!(words(&desk.state), "wrote cornell.png: 640×480, 64 samples, 1.93 s");
+        desk.event(crate::tui::event::Event::Changed(Changed { noticed: desk.now }));
+        assert!(words(&desk.state).ends_with(" (older than your last edit)"), "{}", words(&desk.state));
     }
 }

@@ -619,13 +619,7 @@ mod tests {
         history.record(shown(5, 50), Instant::now(), origin(seed, None));
         assert_eq!(
             changes(&history),
-            [
-                "first",
-                "camera.fov 40 → 30",
-                "view normal",
-                "+ seed = 1; back to the scene's view",
-                "rendered again",
-            ]
+            ["first", "camera.fov 40 → 30", "view normal", "+ seed = 1; view reset", "rendered again",]
         );
         assert_eq!((history.len(), history.looked_at()), (5, Some(4)));
     }
@@ -646,7 +640,7 @@ mod tests {
             "camera moved",
             "camera.fov 40 → 30",
             "camera.fov 30 → 40; camera moved",
-            "back to the scene's camera",
+            "camera reset",
         ];
         assert_eq!(changes(&history), words);
     }

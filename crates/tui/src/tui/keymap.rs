@@ -129,7 +129,7 @@ pub(super) const KEYMAP: &[Binding] = &[
     binding(&[KeyPress::plain(' ')], "space", Action::TogglePause, "pause the render, or go on", "pause"),
     binding(&[KeyPress::plain('r')], "r", Action::RenderAgain, "render again", "again"),
     binding(&[KeyPress::plain('w')], "w", Action::WriteNow, "write the newest image as it is now", "write"),
-    binding(&[KeyPress::plain('0')], "0", Action::SceneSettings, "back to the scene's own settings", "reset"),
+    binding(&[KeyPress::plain('0')], "0", Action::SceneSettings, "reset to the scene's settings", "reset"),
     binding(&[KeyPress::plain('e')], "e", Action::ToggleDiagnostics, "show or hide errors and warnings", ""),
     binding(&[KeyPress::ctrl('l')], "ctrl-l", Action::Redraw, "draw the screen anew", ""),
     binding(&[KeyPress::ctrl('z')], "ctrl-z", Action::Suspend, "stop and go back to the shell", ""),

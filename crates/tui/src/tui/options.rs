@@ -8,7 +8,7 @@ use super::color::ColorChoice;
 use crate::choice;
 use crate::pipeline::protocol::{Command, Event, PreviewSlot};
 use crate::pipeline::settings::Overrides;
-pub use crate::pipeline::watch::{Changed, News};
+pub use crate::pipeline::watch::{Changed, Lost, News, OutputChange};
 
 choice! {
     /// Choice of how the preview is drawn.
@@ -95,6 +95,8 @@ pub struct Ended {
     pub has_written: bool,
     /// Whether the last picture that was to be written is not on disk.
     pub is_unwritten: bool,
+    /// Changes by keys that are neither in the scene nor in an image, as options of the next call.
+    pub not_kept: Option<String>,
 }
 
 /// Why the front end could not go on.

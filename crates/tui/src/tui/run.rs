@@ -157,6 +157,7 @@ impl Ui {
             summary: exit_summary::words(&self.state),
             has_written: !saving.written.is_empty(),
             is_unwritten: saving.write_failed.is_some(),
+            not_kept: exit_summary::not_kept(&self.state),
         })
     }
 

@@ -100,6 +100,7 @@ fn value(event: &Event) -> Option<Value> {
         // Among the diagnostics at the end.
         | Event::NotKept { .. }
         | Event::Refused { .. }
+        | Event::OwnImage { .. }
         | Event::WritePostponed { .. }
         | Event::WriteDone { .. }
         | Event::LastGoodEnded { .. }

@@ -4,6 +4,7 @@
 mod orders;
 mod outcome;
 mod outputs;
+mod own;
 mod spares;
 #[cfg(test)]
 mod tests;
@@ -20,12 +21,12 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 pub(super) use self::orders::{Interruption, Meanwhile, Orders};
 use self::outcome::Outcome;
 pub use self::outcome::{Rendered, Unrendered};
+use self::own::{OwnImage, lookups, own_plan};
 use self::unfinished::Good;
 use super::assembly::{Eye, Keyed, world};
 use super::cache::{Memo, Pool};
 use super::cautions::cautions;
 use super::errands::{AtHand, Errand};
-use super::identity::Depends;
 use super::inputs::Inputs;
 use super::keys;
 use super::memory::Foretold;
@@ -36,13 +37,13 @@ use super::protocol::{Event, Failure, PreviewSize, Report, Request, Stage, Statu
 use super::render::film_cache::FilmCache;
 use super::render::film_state::FilmState;
 use super::render::first_picture::FirstPictures;
-use super::render::keeping::{Around, Claim, Keeping};
+use super::render::keeping::Claim;
 use super::render::layers;
 use super::render::preview::Screen;
 use super::render::scheduler::Rendering;
 use super::render::share::Share;
 use super::report::finish::{Finished, report};
-use super::settings::{Checkpoints, Overrides, OwnSettings, Resume, View};
+use super::settings::{Overrides, OwnSettings, View};
 use super::sink::Sink;
 use super::stages::accel::{AccelCache, accel};
 use super::stages::containers::Containers;
@@ -54,7 +55,7 @@ use super::stages::parse::{Origin, Parsed, parse};
 use super::stages::photons::{PhotonCache, PhotonStore, Sending, photons};
 use super::stages::render::render;
 use super::stages::textures::{Needed, TextureCache, Textures, add_declared, needed, textures};
-use super::stages::write::{Destination, Frames, Written, check_targets, finish, write_by_hand};
+use super::stages::write::{Destination, Frames, Written, check_targets, write_by_hand};
 use super::stages::{Findings, Reading, Staged, Stop};
 use super::table::StageTable;
 use super::targets::conflicts;
@@ -65,7 +66,6 @@ use crate::integrators::RayCounters;
 use crate::lights::Lights;
 use crate::math::DVec3;
 use crate::output::LayerImage;
-use crate::output::part::Trait;
 use crate::scene::description::CameraChange;
 use crate::scene::diagnostic::Diagnostic;
 use crate::scene::fingerprint::Key;
@@ -107,6 +107,11 @@ pub(super) struct Engine {
     photons: PhotonCache,
     films: FilmCache,
     written: Written,
+    own: Option<OwnImage>,
+    /// Whether the plan of the current film is that of the scene's own image.
+    is_own: bool,
+    /// Report of the newest request, once it is finished.
+    report: Option<Report>,
     /// Frames of a turntable so far.
     frames: Frames,
     /// Layers of the current film.
@@ -141,6 +146,8 @@ struct Ready {
     /// Key of all surfaces and of the origin of their coordinates.
     surfaces: Key,
     origin: DVec3,
+    /// Key of the film.
+    film: Key,
     texels_loaded: u64,
     texture_memory_bytes: u64,
     /// The share of the picture that is rendered. `None` for all of it.
@@ -165,6 +172,9 @@ impl Engine {
             photons: PhotonCache::default(),
             films: FilmCache::default(),
             written: Written::default(),
+            own: None,
+            is_own: true,
+            report: None,
             frames: Frames::default(),
             layers: Vec::new(),
             plan: None,
@@ -220,7 +230,10 @@ impl Engine {
             Err(Stop::Failed(Failure::Work(_)) | Stop::Cancelled) => {}
         }
         if let Ok(report) = &outcome {
-            self.write_report(report, &findings, sink, meanwhile.writing);
+            self.report = Some(report.clone());
+            if request.own.is_none() && findings.conflicts.is_empty() {
+                self.write_report(report, sink, meanwhile.writing);
+            }
         }
         self.say_files(&findings, sink);
         // What was read to the end stays for whoever comes next, even if the render was stopped.
@@ -275,15 +288,21 @@ impl Engine {
             ready.plan.settings.render.samples = share.own_samples();
         }
         ready.share = share;
+        self.share_own(request, &ready);
+        self.say_own(request, ready.film, sink);
         let rays = table.run(Stage::Render, || self.render(request, &ready, photons, sink, meanwhile))?;
         // Links and files may have changed during the render.
         self.look_for_conflicts(request, &ready.plan, findings, sink)?;
+        let was_own_written = self.is_own_written();
         let written =
             table.run(Stage::Write, || self.write(request, &ready.plan, findings, sink, meanwhile.writing));
         let is_written = written.as_ref().is_ok_and(|is_written| *is_written);
-        self.with_keeping(request, &ready, (sink, meanwhile), |keeping, engine| {
+        self.say_own(request, ready.film, sink);
+        let film = own::is_to_be_written(request).then_some(ready.film);
+        let interruption = || meanwhile.orders.interruption();
+        self.with_keeping(film, sink, &interruption, |keeping, engine| {
             if let (Some(keeping), Some(canvas)) = (keeping, engine.films.current()) {
-                keeping.finish(canvas, rays, is_written);
+                keeping.finish(canvas, canvas.traced, is_written || engine.is_own_written());
             }
         });
         let is_written = written?;
@@ -301,7 +320,15 @@ impl Engine {
             photons: photons.and_then(|key| self.photons.get(key)).map(PhotonStore::report),
             is_written,
         };
-        Ok(pool.install(|| report(&finished, table.stages, watch.seconds())))
+        let (stages, seconds) = (table.stages, watch.seconds());
+        if let Some(own) = self.own.as_ref().filter(|_| request.own.is_some()) {
+            if self.is_own_written() && !was_own_written {
+                let finished = Finished { plan: &own.plan, is_written: true, ..finished };
+                let report = pool.install(|| report(&finished, stages.clone(), seconds));
+                self.write_report(&report, sink, meanwhile.writing);
+            }
+        }
+        Ok(pool.install(|| report(&finished, stages, seconds)))
     }
 
     /// Sends photons, and makes this the picture at hand. Gives the key of the photons that the picture gathers.
@@ -333,8 +360,7 @@ impl Engine {
             meanwhile.run_errand(&at_hand, None, inputs, sink);
         };
         // A person sees the scene while the first photons are traced.
-        let of_film = keys::render(ready.world.0, &plan.settings, plan.crop);
-        let is_new = request.force || !self.films.holds(of_film);
+        let is_new = request.force || self.films.of(ready.film).is_none();
         let coarse = FirstPictures {
             tracer: tracer(self.means.kernel, &pool, ready, meanwhile.token),
             plan,
@@ -346,6 +372,7 @@ impl Engine {
         table.run(Stage::Photons, || photons(asked, key, store, sending, hear, before))?;
         let photons_key = plan.settings.effective().photons.filter(|_| plan.settings.gathers()).map(key);
         self.plan = Some(ready.plan.clone());
+        (self.is_own, self.report) = (request.own.is_none(), None);
         self.at_hand = Some(at_hand);
         Ok(photons_key)
     }
@@ -392,6 +419,7 @@ impl Engine {
         table.sink.send(Event::Text { generation: request.generation, text });
         let plan = plan(&parsed.loaded.scene, &request.scene, &request.overrides)
             .map_err(|error| Stop::Failed(Failure::Scene(vec![*error])))?;
+        let own_plan = own_plan(request, &parsed)?;
         Foretold::of_picture(&plan).check(&plan)?;
         let cautions = cautions(&parsed.loaded, &plan.scene, &plan.settings, &request.overrides);
         findings.warnings.extend(cautions);
@@ -418,7 +446,8 @@ impl Engine {
         }
         let pool = self.pool(plan.threads)?;
         let reading = Reading { sink: table.sink, token, contents, pool: &pool, containers: &containers };
-        let lookups = plan.settings.lookups();
+        // The keys of the own image's film are those of its textures, too.
+        let lookups = lookups(&plan, own_plan.as_ref());
         let (meshes, bodies, textures, needed) = self.load(&parsed, lookups, findings, table, &reading)?;
         if let Some(path) = contents.changed() {
             return Err(Stop::work(format!("{} changed while it was read", path.display())));
@@ -428,7 +457,7 @@ impl Engine {
         self.look_for_conflicts(request, &plan, findings, table.sink)?;
         let generation = request.generation;
         let good = Good { generation, parsed, meshes, bodies, textures: Arc::new(textures), needed };
-        let ready = self.build(request, &good, plan, table, &reading)?;
+        let ready = self.build(request, &good, (plan, own_plan), table, &reading)?;
         self.good = Some(good);
         Ok(ready)
     }
@@ -438,7 +467,7 @@ impl Engine {
         &mut self,
         request: &Request,
         good: &Good,
-        plan: Plan,
+        (plan, own): (Plan, Option<Plan>),
         table: &mut StageTable<'_>,
         reading: &Reading<'_>,
     ) -> Result<Ready, Stop> {
@@ -459,12 +488,19 @@ impl Engine {
         let parts = (built, lights, Arc::clone(bodies));
         let world = world(scene, (&surfaces, &of), parts, textures, &eye, &mut self.world);
         let Textures { texels_loaded, memory_bytes: texture_memory_bytes, .. } = **textures;
+        let film = keys::render(world.0, &plan.settings, plan.crop);
+        let camera = own::overrides(request).camera;
+        let own = own.unwrap_or_else(|| plan.clone());
+        let own_eye = Eye::new(&own.scene, parsed.orbiter, &camera).turned(own.turn);
+        let own = OwnImage::new((parsed, own, &own_eye), (&surfaces, &mesh_keys), (camera, &self.assets));
+        self.take_own(own);
         Ok(Ready {
             parsed: parsed.clone(),
             plan,
             world,
             surfaces,
             origin,
+            film,
             texels_loaded,
             texture_memory_bytes,
             share: None,
@@ -475,47 +511,6 @@ impl Engine {
     fn share(&self, plan: &Plan, photons: Option<Key>) -> Option<Share> {
         let are_sent = photons.and_then(|key| self.photons.get(key)).is_some_and(PhotonStore::are_sent);
         plan.shard.map(|shard| Share::new(shard, are_sent, plan.settings.render.samples))
-    }
-
-    /// Does something with the checkpoints of a request, if it has any.
-    fn with_keeping<T>(
-        &self,
-        request: &Request,
-        ready: &Ready,
-        (sink, meanwhile): (&Sink, &Meanwhile<'_>),
-        work: impl FnOnce(Option<&Keeping<'_>>, &Self) -> T,
-    ) -> T {
-        let (plan, checkpoints) = (&ready.plan, ready.plan.checkpoints);
-        let Some(output) = plan.outputs.first().filter(|_| self.keeps(request, plan)) else {
-            return work(None, self);
-        };
-        let finish = finish(plan);
-        let name = || self.identity(request, ready);
-        let interruption = || meanwhile.orders.interruption();
-        let around = Around {
-            finish: &finish,
-            inputs: &self.inputs,
-            sink,
-            name: &name,
-            interruption: &interruption,
-            claim: &self.claim,
-        };
-        work(Some(&Keeping::new(output, checkpoints, around)), self)
-    }
-
-    /// Whether a request has checkpoints: its picture is written to a file, and they are not switched off, or it goes on from one.
-    fn keeps(&self, request: &Request, plan: &Plan) -> bool {
-        let is_file =
-            plan.outputs.first().is_some_and(|path| path.metadata().map_or(true, |found| found.is_file()));
-        let Checkpoints { seconds, resume, .. } = plan.checkpoints;
-        request.write != Writing::No && (seconds > 0.0 || resume == Resume::Asked) && is_file
-    }
-
-    /// Names and values of all that a picture depends on.
-    fn identity(&self, request: &Request, ready: &Ready) -> Vec<Trait> {
-        let divided = ready.share.as_ref().map(|share| share.samples);
-        let (parsed, plan, camera) = (&ready.parsed, &ready.plan, &request.overrides.camera);
-        Depends { parsed, plan, camera, files: &self.assets, divided }.traits()
     }
 
     /// All files that the scene names; every one is tried before the first error ends it.
@@ -556,12 +551,14 @@ impl Engine {
     ) -> Result<Staged<RayCounters>, Stop> {
         let pool = self.pool(ready.plan.threads)?;
         let (plan, orders) = (&ready.plan, meanwhile.orders);
-        let key = keys::render(ready.world.0, &plan.settings, plan.crop);
+        let key = ready.film;
         let watch = Stopwatch::start(meanwhile.token);
         // What the stage changes is apart from what it reads.
         let (mut films, written) = (std::mem::take(&mut self.films), std::mem::take(&mut self.written));
         let written = std::cell::RefCell::new(written);
-        let to = Destination { plan, layers: &[], inputs: &self.inputs, contents: &self.contents, sink };
+        let is_own = request.own.is_none();
+        let to =
+            Destination { plan, layers: &[], inputs: &self.inputs, contents: &self.contents, is_own, sink };
         let pulse = |canvas: &FilmState, is_covered: bool| {
             if !is_covered {
                 meanwhile.postpone_write(sink);
@@ -575,7 +572,9 @@ impl Engine {
         let mut images = Vec::new();
         let wanted = plan.layers.as_slice();
         let of_picture = sink.within(layers::progress(wanted, None));
-        let rendered = self.with_keeping(request, ready, (sink, meanwhile), |keeping, engine| {
+        let interruption = || orders.interruption();
+        let film = own::is_to_be_written(request).then_some(key);
+        let rendered = self.with_keeping(film, sink, &interruption, |keeping, engine| {
             let rendering = Rendering {
                 tracer: tracer(engine.means.kernel, &pool, ready, meanwhile.token),
                 plan,
@@ -596,7 +595,7 @@ impl Engine {
             if let Some(state) = films.current().filter(|_| request.write != Writing::No) {
                 let made = layers::layers(state, &rendering, wanted);
                 if let (Err(_), Some(keeping)) = (&made, keeping) {
-                    keeping.finish(state, rendered.value, false);
+                    keeping.finish(state, state.traced, false);
                 }
                 images = made?;
             }
@@ -606,7 +605,7 @@ impl Engine {
         if ready.share.is_some()
             && let Some(canvas) = films.current_mut()
         {
-            canvas.identity = Some(self.identity(request, ready));
+            canvas.identity = self.own.as_ref().map(OwnImage::identity);
         }
         (self.films, self.written) = (films, written.into_inner());
         let is_reused = rendered.as_ref().is_ok_and(|staged| staged.status == Status::Reused);

@@ -1,7 +1,7 @@
 //! Files that the engine writes, and those that it must not.
 
 use super::super::plan::Plan;
-use super::super::protocol::{Report, Request, Writing};
+use super::super::protocol::{ImageReport, Report, Request, Writing};
 use super::super::render::film_state::FilmState;
 use super::super::report::finish::write_report;
 use super::super::sink::Sink;
@@ -39,10 +39,21 @@ impl Engine {
             );
             return sink.write_failed(None, message);
         }
-        let to =
-            Destination { plan, layers: &self.layers, inputs: &self.inputs, contents: &self.contents, sink };
+        let to = Destination {
+            plan,
+            layers: &self.layers,
+            inputs: &self.inputs,
+            contents: &self.contents,
+            is_own: self.is_own,
+            sink,
+        };
         let written = &mut self.written;
-        pool.install(|| write_by_hand(canvas, to, written));
+        let is_written = pool.install(|| write_by_hand(canvas, to, written));
+        let is_finished = canvas.is_finished(plan);
+        self.note_written(is_written && is_finished && self.is_own);
+        if is_written {
+            self.report_by_hand(sink);
+        }
     }
 
     /// Looks for outputs that must not be written. If the request can go on without them, tells the front end and keeps the
@@ -73,14 +84,19 @@ impl Engine {
         Ok(())
     }
 
-    pub(super) fn write_report(
-        &self,
-        report: &Report,
-        findings: &Findings,
-        sink: &Sink,
-        token: &CancelToken,
-    ) {
-        let Some(plan) = self.plan.as_ref().filter(|_| findings.conflicts.is_empty()) else { return };
+    /// Writes the report of an image that a key has written, if its render is finished.
+    fn report_by_hand(&self, sink: &Sink) {
+        let (Some(report), Some(plan)) = (&self.report, &self.plan) else { return };
+        let paths: Vec<String> =
+            plan.outputs.iter().map(|path| path.to_string_lossy().into_owned()).collect();
+        let image = ImageReport { path: paths.first().cloned(), paths, ..report.image.clone() };
+        // Nobody cancels this token: a key ordered this image.
+        self.write_report(&Report { image, ..report.clone() }, sink, &CancelToken::new());
+    }
+
+    /// Writes the report of a request's image that is in its files, or could not be written.
+    pub(super) fn write_report(&self, report: &Report, sink: &Sink, token: &CancelToken) {
+        let Some(plan) = &self.plan else { return };
         if let Err(error) = write_report(plan, &self.inputs, report, sink, token) {
             let is_cancelled = matches!(error, OutputError::Cancelled(_));
             let message =
@@ -101,15 +117,26 @@ impl Engine {
         if let Some(conflict) = findings.conflicts.first() {
             return Ok(Staged::skipped(false, conflict.message.clone()));
         }
+        if request.own.is_some() {
+            return self.write_own(sink, token);
+        }
         let pool = self.pool(plan.threads)?;
         let Some(canvas) = self.films.current() else { return Err(Stop::work("the film is gone")) };
-        let to =
-            Destination { plan, layers: &self.layers, inputs: &self.inputs, contents: &self.contents, sink };
+        let to = Destination {
+            plan,
+            layers: &self.layers,
+            inputs: &self.inputs,
+            contents: &self.contents,
+            is_own: true,
+            sink,
+        };
         let written = &mut self.written;
         let wrote = match plan.outputs.is_empty() {
             true => Staged::done(true, ""),
             false => pool.install(|| write_if_wanted(request.write, canvas, to, written, token))?,
         };
+        let own = self.own.as_ref().filter(|_| wrote.value);
+        written.own = own.map(|own| own.image);
         let Some(turn) = plan.turn.filter(|_| !plan.moving.is_empty()) else { return Ok(wrote) };
         let frames = &mut self.frames;
         pool.install(|| write_moving(canvas, to, (turn, frames), token))

@@ -48,6 +48,7 @@ impl Desk {
             overrides: Default::default(),
             preview: None,
             write: Writing::No,
+            own: None,
             force: false,
             first: None,
         };

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::own::{lookups, own_plan};
 use super::{Engine, Meanwhile};
 use crate::pipeline::plan::plan;
 use crate::pipeline::protocol::{Event, LastGoodEnd, Request, Status};
@@ -54,16 +55,18 @@ impl Engine {
         // Put the scene and the request together.
         let (loaded, path) = (&good.parsed.loaded, &request.scene);
         let Ok(plan) = plan(&loaded.scene, path, &request.overrides) else { return Ok(None) };
+        let own = own_plan(&request, &good.parsed)?;
         // Load what another view needs, if the files still hold it.
         let pool = self.pool(plan.threads)?;
         let snapshot = Snapshot::of(Arc::clone(&self.contents));
         let containers = Containers::default();
         let token = meanwhile.token;
         let reading = Reading { sink, token, contents: &snapshot, pool: &pool, containers: &containers };
-        let good = self.with_textures(good, plan.settings.lookups(), &reading)?;
+        let lookups = lookups(&plan, own.as_ref());
+        let good = self.with_textures(good, lookups, &reading)?;
         // Make it ready: all that did not change is kept from before.
         let mut table = StageTable { sink, token: meanwhile.token, stages: Vec::new(), is_silent: true };
-        let ready = self.build(&request, &good, plan, &mut table, &reading)?;
+        let ready = self.build(&request, &good, (plan, own), &mut table, &reading)?;
         let photons = self.light(&request, &ready, &mut table, sink, meanwhile)?;
         // Render and write.
         let rendered = self.render(&request, &ready, photons, sink, meanwhile)?;

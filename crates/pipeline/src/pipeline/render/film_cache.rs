@@ -12,6 +12,8 @@ pub(in crate::pipeline) struct FilmCache {
     current: Option<FilmState>,
     /// The least recently used first.
     kept: Vec<FilmState>,
+    /// Key of a film that stays whatever room it takes.
+    pinned: Option<Key>,
     most_kept_bytes: u64,
     /// Films that were made so far.
     made: u64,
@@ -19,7 +21,7 @@ pub(in crate::pipeline) struct FilmCache {
 
 impl Default for FilmCache {
     fn default() -> Self {
-        Self { current: None, kept: Vec::new(), most_kept_bytes: MOST_KEPT_BYTES, made: 0 }
+        Self { current: None, kept: Vec::new(), pinned: None, most_kept_bytes: MOST_KEPT_BYTES, made: 0 }
     }
 }
 
@@ -32,9 +34,14 @@ impl FilmCache {
         self.current.as_mut()
     }
 
-    /// Whether there is a film of this key.
-    pub(in crate::pipeline) fn holds(&self, key: Key) -> bool {
-        self.kept.iter().chain(&self.current).any(|canvas| canvas.key == key)
+    /// The film of this key.
+    pub(in crate::pipeline) fn of(&self, key: Key) -> Option<&FilmState> {
+        self.kept.iter().chain(&self.current).find(|canvas| canvas.key == key)
+    }
+
+    /// Keeps the film of this key from now on, and no longer the one that was pinned before.
+    pub(in crate::pipeline) fn pin(&mut self, key: Key) {
+        self.pinned = Some(key);
     }
 
     /// Makes the film of this key the current one, if it is kept and of use; else there is no current film. Keeps the film
@@ -61,7 +68,8 @@ impl FilmCache {
         self.current = None;
         let mut canvas = match make() {
             Err(_) if !self.kept.is_empty() => {
-                self.kept.clear();
+                let pinned = self.pinned;
+                self.kept.retain(|canvas| pinned == Some(canvas.key));
                 make()
             }
             made => made,
@@ -86,13 +94,32 @@ impl FilmCache {
         let size = canvas.memory_bytes();
         // A camera on its way would fill the memory with what nobody comes back to.
         let is_left_behind = canvas.is_passing && !canvas.is_covered();
-        if size > self.most_kept_bytes || is_left_behind || !canvas.is_begun() {
+        if !canvas.is_begun() {
             return;
         }
-        while self.kept.iter().map(FilmState::memory_bytes).sum::<u64>() + size > self.most_kept_bytes {
-            self.kept.remove(0);
+        if !self.is_pinned(&canvas) {
+            if size > self.most_kept_bytes || is_left_behind {
+                return;
+            }
+            self.make_room(size);
         }
         self.kept.push(canvas);
+    }
+
+    fn is_pinned(&self, canvas: &FilmState) -> bool {
+        self.pinned == Some(canvas.key)
+    }
+
+    /// Drops the least recently used films until one of this size fits.
+    fn make_room(&mut self, size: u64) {
+        let is_counted = |canvas: &&FilmState| !self.is_pinned(canvas);
+        let mut used: u64 = self.kept.iter().filter(is_counted).map(FilmState::memory_bytes).sum();
+        let (pinned, most) = (self.pinned, self.most_kept_bytes);
+        self.kept.retain(|canvas| {
+            let is_dropped = used + size > most && pinned != Some(canvas.key);
+            used -= if is_dropped { canvas.memory_bytes() } else { 0 };
+            !is_dropped
+        });
     }
 }
 
@@ -158,6 +185,28 @@ mod tests {
             .expect("a film");
         assert!(finds(&mut films, "a"));
         assert!(!finds(&mut films, "large"));
+    }
+
+    #[test]
+    fn the_pinned_film_stays_whatever_room_it_takes() {
+        let mut films = films(&["own"], canvas("a").memory_bytes());
+        films.pin(key("own"));
+        films.most_kept_bytes -= 1;
+        for name in ["a", "b", "c"] {
+            films.select(key(name), |_| true);
+            films.put(|| Ok::<_, ()>(canvas(name))).expect("a film");
+        }
+        assert_eq!(films.count(), 2, "the pinned one and the current one");
+        let tries = std::cell::Cell::new(0);
+        let made = films.put(|| {
+            tries.set(tries.get() + 1);
+            if tries.get() == 1 { Err("no memory") } else { Ok(canvas("d")) }
+        });
+        assert!(made.is_ok() && finds(&mut films, "own"));
+        // Another film is pinned: this one is as good as any.
+        films.pin(key("other"));
+        assert!(!finds(&mut films, "d"));
+        assert!(!finds(&mut films, "own"));
     }
 
     #[test]

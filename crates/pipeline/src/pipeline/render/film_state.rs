@@ -54,6 +54,10 @@ pub(in crate::pipeline) struct FilmState {
     own: Option<Vec<bool>>,
     /// Work of the process whose checkpoint this render continues.
     pub(in crate::pipeline) before: Before,
+    /// Rays of all requests so far, with those of the process whose checkpoint this render continues.
+    pub(in crate::pipeline) traced: RayCounters,
+    /// Whether a checkpoint has all its samples.
+    pub(in crate::pipeline) is_kept: bool,
     /// Names of all that the picture depends on. `None` before the first request for them.
     pub(in crate::pipeline) identity: Option<Vec<Trait>>,
     /// Whether it was read from a part that is finished.
@@ -115,6 +119,8 @@ impl FilmState {
             share,
             own,
             before: Before::default(),
+            traced: RayCounters::default(),
+            is_kept: false,
             identity: None,
             is_finished_part: false,
         })
@@ -393,6 +399,8 @@ mod tests {
             share: None,
             own: None,
             before: Before::default(),
+            traced: RayCounters::default(),
+            is_kept: false,
             identity: None,
             is_finished_part: false,
         }

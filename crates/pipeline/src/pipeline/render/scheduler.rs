@@ -112,12 +112,26 @@ impl<'a> Scheduler<'a> {
     /// # Errors
     /// Cancelled. The film keeps what it has.
     pub(in crate::pipeline) fn run(&mut self) -> Result<(), Stop> {
+        self.state.is_kept = false;
         let ran = self.go();
+        let (traced, seconds) = (self.traced(), self.rendered_seconds());
         if let (Some(keeping), Err(Stop::Cancelled)) = (self.rendering.keeping, &ran) {
-            let seconds = self.seconds();
-            keeping.at_the_end(self.state, self.rays, seconds);
+            self.state.is_kept = keeping.at_the_end(self.state, traced, seconds);
         }
+        self.state.traced = traced;
         ran
+    }
+
+    /// Rays of all requests for this film.
+    pub(in crate::pipeline) fn traced(&self) -> RayCounters {
+        let mut traced = self.state.traced;
+        traced += self.rays;
+        traced
+    }
+
+    /// Seconds in which all requests have rendered this film.
+    fn rendered_seconds(&mut self) -> f64 {
+        self.state.render_seconds + self.clock.seconds(self.rendering.tracer.token.is_paused())
     }
 
     /// Seconds of rendering, those of an earlier process too.
@@ -341,7 +355,8 @@ impl<'a> Scheduler<'a> {
         (self.rendering.pulse)(self.state, !self.is_first);
         let seconds = self.seconds();
         if let Some(keeping) = self.rendering.keeping {
-            keeping.tick(self.state, self.rays, seconds);
+            let rendered = self.rendered_seconds();
+            keeping.tick(self.state, self.traced(), rendered);
         }
         let budget = self.rendering.plan.time_seconds;
         self.is_over_time = !self.is_first && budget.is_some_and(|budget| seconds >= budget);

@@ -18,6 +18,7 @@ use crate::pipeline::targets::guarded;
 use crate::world::World;
 
 /// Results of a request.
+#[derive(Clone, Copy)]
 pub(in crate::pipeline) struct Finished<'a> {
     pub(in crate::pipeline) scene: &'a Path,
     pub(in crate::pipeline) plan: &'a Plan,

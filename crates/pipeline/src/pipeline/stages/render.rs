@@ -51,6 +51,7 @@ pub(in crate::pipeline) fn render(
     let mut scheduler = Scheduler::new(state, rendering);
     if finished {
         scheduler.show();
+        scheduler.state.traced = scheduler.traced();
         let why = match (is_part, is_resumed, is_other) {
             (true, ..) => "the part is finished",
             (false, true, _) => "the checkpoint has all samples",

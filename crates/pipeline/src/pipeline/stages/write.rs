@@ -49,19 +49,20 @@ impl Written {
             // A token that nobody cancels.
             contents.read(path, &CancelToken::new()).is_ok_and(|content| content == *known)
         };
-        let is_ours = |path: &Path| self.0.get(path).is_some_and(|(_, known)| holds(path, known));
+        let is_ours = |path: &Path| self.files.get(path).is_some_and(|(_, known)| holds(path, known));
         let is_there = |path: &Path| path.symlink_metadata().is_ok();
         paths.iter().map(PathBuf::as_path).find(|path| is_there(path) && !is_ours(path))
     }
 
     /// Whether there is none.
     pub(in crate::pipeline) fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.files.is_empty()
     }
 
     /// Write everything next time.
     fn forget(&mut self) {
-        self.0.clear();
+        self.files.clear();
+        self.own = None;
     }
 }
 
@@ -73,6 +74,8 @@ pub(in crate::pipeline) struct Destination<'a> {
     pub(in crate::pipeline) layers: &'a [LayerImage],
     pub(in crate::pipeline) inputs: &'a Inputs,
     pub(in crate::pipeline) contents: &'a Contents,
+    /// Whether the picture is the scene's own image, not one that keys changed.
+    pub(in crate::pipeline) is_own: bool,
     pub(in crate::pipeline) sink: &'a Sink,
 }
 
@@ -145,23 +148,26 @@ fn write(
     token: &CancelToken,
     is_must: bool,
 ) -> Result<Staged<bool>, Stop> {
-    let Destination { plan, contents, sink, .. } = to;
+    let Destination { plan, contents, is_own, sink, .. } = to;
     let mut radiance: Option<RadianceImage> = None;
     let (mut count, mut errors) = (0, Vec::new());
     for path in &plan.outputs {
         let key = key(canvas, plan, path);
-        if let Some((known, content)) = written.0.get(path)
+        if let Some((known, content)) = written.files.get(path)
             && *known == key
             && contents.read(path, token)? == *content
         {
             continue;
         }
+        contents.outputs.begin(path);
         let wrote = match canvas.share {
             Some(_) => write_part(canvas, to, path, token),
             None => {
                 let image = radiance.get_or_insert_with(|| canvas.film.image(plan.settings.view.quantity()));
-                token.check()?;
-                write_one(image, canvas, to, path, token)
+                token
+                    .check()
+                    .map_err(OutputError::from)
+                    .and_then(|()| write_one(image, canvas, to, path, token))
             }
         };
         match wrote {
@@ -170,14 +176,21 @@ fn write(
                 // The picture is on disk: a cancel from here on does not undo that. Look at the content before anybody hears of
                 // the file and may change it.
                 let content = contents.read(path, &CancelToken::new())?;
-                written.0.insert(path.clone(), (key, content));
-                sink.written(path, bytes);
+                contents.outputs.end(path, Some(content));
+                written.files.insert(path.clone(), (key, content));
+                sink.written(path, bytes, is_own);
             }
-            Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
-            Err(error) => errors.push((path, error.to_string())),
+            Err(error) => {
+                contents.outputs.end(path, None);
+                if matches!(error, OutputError::Cancelled(_)) {
+                    return Err(Stop::Cancelled);
+                }
+                errors.push((path, error.to_string()));
+            }
         }
     }
-    written.0.retain(|path, _| plan.outputs.contains(path));
+    written.files.retain(|path, _| plan.outputs.contains(path));
+    contents.outputs.retain(|path| plan.outputs.contains(path));
     match (errors.is_empty(), count) {
         (false, _) => {
             // Report each failure by itself, but for the last one if that is the reason why the request fails.
@@ -192,18 +205,25 @@ fn write(
     }
 }
 
-/// [`write`] by a person's order, whatever is on disk. Failures are reported as events.
-pub(in crate::pipeline) fn write_by_hand(canvas: &FilmState, to: Destination<'_>, written: &mut Written) {
+/// [`write`] by a person's order, whatever is on disk. Failures are reported as events. Returns whether all outputs hold the picture.
+pub(in crate::pipeline) fn write_by_hand(
+    canvas: &FilmState,
+    to: Destination<'_>,
+    written: &mut Written,
+) -> bool {
     let conflicts = conflicts(to.plan, to.inputs);
     if !conflicts.is_empty() {
-        return to.sink.refused(conflicts);
+        to.sink.refused(conflicts);
+        return false;
     }
     written.forget();
     // Nobody cancels this token: a person ordered this picture. Events tell what failed.
     let outcome = write(canvas, to, written, &CancelToken::new(), false);
-    if outcome.is_ok_and(|stage| stage.value) {
+    let is_written = outcome.is_ok_and(|stage| stage.value);
+    if is_written {
         to.sink.write_done(to.plan.outputs.clone());
     }
+    is_written
 }
 
 /// Frames of a turntable so far, each with its samples.
@@ -233,7 +253,7 @@ pub(in crate::pipeline) fn write_moving(
         min: samples.iter().map(|one| one.min).min().unwrap_or(0),
         mean: samples.iter().map(|one| one.mean).sum::<f64>() / samples.len() as f64,
         max: samples.iter().map(|one| one.max).max().unwrap_or(0),
-    });
+    };
     for path in &plan.moving {
         let Some(format) = MovingFormat::of(path) else { continue };
         let write = || {
@@ -244,7 +264,7 @@ pub(in crate::pipeline) fn write_moving(
             Ok(bytes.len() as u64)
         };
         match write() {
-            Ok(bytes) => sink.written(path, bytes),
+            Ok(bytes) => sink.written(path, bytes, true),
             Err(OutputError::Cancelled(_)) => return Err(Stop::Cancelled),
             Err(error) => return Err(Stop::work(error)),
         }

@@ -3,6 +3,7 @@
 mod adaptive;
 mod camera;
 mod orders;
+mod own;
 mod photons;
 mod previews;
 mod reuse;
@@ -144,6 +145,7 @@ impl Bench {
             overrides: self.overrides.clone(),
             preview: self.preview,
             write: self.writing,
+            own: None,
             force: self.force,
             first: self.first,
         })));

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
+use super::outputs::Outputs;
 use crate::assets::{Companion, FileHash};
 use crate::control::{CancelToken, Cancelled};
 use crate::scene::fingerprint::Fingerprint;
@@ -69,6 +70,8 @@ const CHUNK: usize = 1 << 20;
 #[derive(Debug, Default)]
 pub struct Contents {
     known: Mutex<HashMap<PathBuf, (Stamp, Content)>>,
+    /// Files that glimt wrote.
+    pub outputs: Outputs,
     /// Files that were read through.
     #[cfg(test)]
     pub(in crate::pipeline) hashed: Mutex<Vec<PathBuf>>,

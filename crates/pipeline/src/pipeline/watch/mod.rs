@@ -14,9 +14,10 @@ pub mod content;
 mod folders;
 mod growth;
 mod home;
+pub mod outputs;
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
@@ -25,6 +26,8 @@ use self::content::{Content, Contents, FileRead};
 use self::folders::{Folders, Hint};
 use self::growth::Growth;
 pub use self::home::missing_folder;
+use self::outputs::Suspects;
+pub use self::outputs::{Lost, OutputChange};
 use crate::control::CancelToken;
 
 /// Between two looks where hints are had.
@@ -65,12 +68,14 @@ impl Default for Waits {
 }
 
 /// News from a watcher.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum News {
     /// A file has another content, whole as far as can be told.
     Changed(Changed),
     /// The files that changed stay as they are: nobody seems to be writing.
     Settled,
+    /// A file that glimt wrote was changed, or is as glimt wrote it again.
+    Output(OutputChange),
 }
 
 /// Some file holds something else.
@@ -91,6 +96,8 @@ enum Message {
     Hint(Hint),
     /// Watch these, which were read after that, and these, which were read before.
     Files(Vec<FileRead>, Vec<FileRead>, Instant),
+    /// The worker has written a file.
+    Outputs,
     Quit,
 }
 
@@ -122,8 +129,9 @@ impl Watcher {
             let _ = hints.send(Message::Hint(hint));
         });
         let growth = Growth::new(waits);
-        let (files, pending) = Default::default();
-        let watch = Watch { folders, is_home: true, contents, files, growth, pending, say };
+        let (files, pending, suspects) = Default::default();
+        let quiet = waits.quiet_missing;
+        let watch = Watch { folders, is_home: true, contents, files, growth, pending, suspects, quiet, say };
         std::thread::Builder::new().name("glimt-watch".to_owned()).spawn(move || watch.run(&received))?;
         Ok(Self { orders })
     }
@@ -132,6 +140,11 @@ impl Watcher {
     /// given counts as changed, unless a change was reported since it was read.
     pub fn set_files(&self, read: Vec<FileRead>, before: Vec<FileRead>, since: Instant) {
         let _ = self.orders.send(Message::Files(read, before, since));
+    }
+
+    /// Watches the files that the worker has written by now.
+    pub fn watch_outputs(&self) {
+        let _ = self.orders.send(Message::Outputs);
     }
 }
 
@@ -151,6 +164,10 @@ struct Watch<F> {
     growth: Growth,
     /// Changes that the last look found and did not report.
     pending: Vec<FileRead>,
+    /// Changes of outputs that may pass.
+    suspects: Suspects,
+    /// Time after which they do not.
+    quiet: Duration,
     say: F,
 }
 
@@ -161,6 +178,7 @@ impl<F: FnMut(News)> Watch<F> {
             match orders.recv_timeout(pause) {
                 Ok(Message::Hint(hint)) => self.growth.hint(hint, Instant::now()),
                 Ok(Message::Files(read, before, since)) => self.set(read, before, since),
+                Ok(Message::Outputs) => self.set_folders(),
                 Err(RecvTimeoutError::Timeout) => self.look(Instant::now()),
                 Ok(Message::Quit) | Err(RecvTimeoutError::Disconnected) => return,
             }
@@ -170,7 +188,8 @@ impl<F: FnMut(News)> Watch<F> {
     fn next_look(&self) -> Instant {
         let pause = if self.is_home && self.folders.gives_hints() { HEARTBEAT } else { POLL };
         let unhinted = Instant::now() + pause;
-        self.growth.due().map_or(unhinted, |due| due.min(unhinted))
+        let due = [self.growth.due(), self.suspects.due(self.quiet)].into_iter().flatten().min();
+        due.map_or(unhinted, |due| due.min(unhinted))
     }
 
     fn set(&mut self, read: Vec<FileRead>, known: Vec<FileRead>, since: Instant) {
@@ -184,18 +203,28 @@ impl<F: FnMut(News)> Watch<F> {
             let said = before.get(&path).copied().filter(|(_, when)| *when > since);
             self.files.insert(path, said.unwrap_or((content, since)));
         }
-        self.contents.retain(|path| self.files.contains_key(path));
-        self.folders.set(self.files.keys());
+        self.set_folders();
         let was = |path: &PathBuf| before.get(path).map(|(content, _)| content);
         if self.files.iter().any(|(path, (content, _))| was(path) != Some(content)) {
             self.growth.hint(Hint::Touched, Instant::now());
         }
     }
 
+    /// Watches the folders of all files, and of the outputs.
+    fn set_folders(&mut self) {
+        let outputs = self.contents.outputs.paths();
+        let is_watched = |path: &Path| self.files.contains_key(path) || outputs.iter().any(|it| it == path);
+        self.contents.retain(is_watched);
+        self.folders.set(self.files.keys().chain(&outputs));
+    }
+
     /// It is time for a look, by the signs or without any.
     fn look(&mut self, now: Instant) {
         self.is_home = home::is_there();
         self.folders.renew_lost();
+        for change in self.suspects.look(&self.contents, self.quiet, now) {
+            (self.say)(News::Output(change));
+        }
         let found = self.differences();
         let is_said = !self.is_early(&found, now);
         if is_said {

@@ -15,7 +15,7 @@ pub(super) use self::display::DisplayState;
 pub(super) use self::overlays::{Message, OverlayState, Pane, Problems, ViewList};
 pub(super) use self::picture::PictureState;
 pub(super) use self::request::{CameraStep, Origin, RequestState, Toggles, signed_stops};
-pub(super) use self::saving::{PendingChange, SavingState};
+pub(super) use self::saving::{OwnImage, PendingChange, SavingState, Written};
 pub(super) use self::selection::{PickPurpose, Press, SelectionState};
 pub(super) use self::work::{Activity, AssetBar, Rendering, WorkState};
 use super::color::{Ansi, ColorDepth};

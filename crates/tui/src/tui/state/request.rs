@@ -26,6 +26,35 @@ pub(in crate::tui) struct Toggles {
 }
 
 impl Toggles {
+    /// The same as options of a call. A camera in an orbiter file cannot be set in one.
+    pub(in crate::tui) fn options(&self, has_orbiter: bool) -> Vec<String> {
+        let on_off = |is_on: bool| if is_on { "on" } else { "off" };
+        let vector = |key: &str, DVec3 { x, y, z }: DVec3| format!("--set 'camera.{key}=[{x},{y},{z}]'");
+        let CameraChange { pose, fov, focus } = self.camera;
+        let mut options: Vec<String> = [
+            self.integrator.map(|it| format!("--integrator {}", it.name())),
+            self.shadows.map(|it| format!("--shadows {}", it.name())),
+            self.photons.map(|it| format!("--photons {}", on_off(it))),
+            self.dof.map(|it| format!("--dof {}", on_off(it))),
+            self.view.map(|it| format!("--view {}", it.name())),
+            self.exposure.map(|it| format!("--set render.exposure={it}")),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        if has_orbiter && pose.is_some() {
+            options.push("the camera's position".to_owned());
+        } else if let Some(Pose { position, look_at, up }) = pose {
+            options.extend(
+                [("position", position), ("look_at", look_at), ("up", up)]
+                    .map(|(key, value)| vector(key, value)),
+            );
+        }
+        options.extend(fov.map(|it| format!("--set camera.fov={it}")));
+        options.extend(focus.map(|it| format!("--set camera.focus={it}")));
+        options
+    }
+
     /// Settings that differ from those before, in words; without a camera that the scene has by now, if `is_camera_written`.
     pub(in crate::tui) fn differences(&self, before: &Self, is_camera_written: bool) -> Vec<String> {
         let on_off = |is_on: bool| if is_on { "on" } else { "off" }.to_owned();
@@ -44,8 +73,16 @@ impl Toggles {
         let now = differing().filter_map(|(name, _, now)| Some(format!("{name} {}", now.as_ref()?)));
         // Settings that are the scene's own again stand together.
         let back: Vec<&str> = differing().filter(|it| it.2.is_none()).map(|it| it.0).collect();
-        let back = (!back.is_empty()).then(|| format!("back to the scene's {}", back.join(", ")));
+        let back = (!back.is_empty()).then(|| format!("{} reset", listed(&back)));
         now.chain(back).collect()
+    }
+}
+
+/// Names in a sentence: `a`, `a and b`, `a, b and c`.
+fn listed(names: &[&str]) -> String {
+    match names {
+        [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        _ => names.concat(),
     }
 }
 
@@ -201,6 +238,25 @@ impl RequestState {
         overrides
     }
 
+    /// Overrides of the scene's own image, if keys show something else.
+    pub(in crate::tui) fn own_overrides(&self) -> Option<Box<Overrides>> {
+        (!self.is_own()).then(|| Box::new(self.command_line.clone()))
+    }
+
+    /// Drops changes by keys that the scene has by now, after a save.
+    pub(in crate::tui) fn drop_saved_changes(&mut self) {
+        let (shadows, integrator, photons) =
+            (self.base_shadows(), self.base_integrator(), self.base_photons());
+        let (exposure, own) = (self.command_line.exposure.or(self.exposure), self.camera);
+        let Toggles { camera, .. } = &mut self.toggles;
+        camera.pose.take_if(|pose| own.is_some_and(|own| own.pose == *pose));
+        camera.fov.take_if(|fov| own.is_some_and(|own| own.fov == *fov));
+        self.toggles.shadows.take_if(|now| Some(*now) == shadows);
+        self.toggles.integrator.take_if(|now| Some(*now) == integrator);
+        self.toggles.photons.take_if(|now| Some(*now) == photons);
+        self.toggles.exposure.take_if(|now| Some(*now) == exposure);
+    }
+
     /// The camera as the keys have it. `None` until a scene has been understood.
     pub(in crate::tui) fn viewpoint(&self) -> Option<Viewpoint> {
         self.camera.map(|camera| camera.changed(&self.toggles.camera))
@@ -252,18 +308,18 @@ impl RequestState {
     pub(in crate::tui) fn changes(&self) -> Vec<String> {
         let CameraChange { pose, fov, focus } = self.toggles.camera;
         let is_moved = pose.is_some() || fov.is_some();
-        let moved = is_moved.then(|| "camera moved".to_owned());
-        let focused = (focus.is_some() && !is_moved).then(|| "focus moved".to_owned());
-        let exposed = self.toggles.exposure.map(|it| format!("exposure {}", signed_stops(it)));
+        let moved = is_moved.then(|| "camera".to_owned());
+        let focused = (focus.is_some() && !is_moved).then(|| "focus".to_owned());
+        let exposed = self.toggles.exposure.map(|it| format!("exposure ({})", signed_stops(it)));
         moved.into_iter().chain(focused).chain(exposed).collect()
     }
 
-    /// Whether the image is written without a key: the scene's own camera, in the view that the run began with.
-    pub(in crate::tui) fn is_written(&self) -> bool {
-        self.view() == self.base_view() && !self.toggles.camera.is_any()
+    /// Whether this is the scene's own image, the only one that is written without a key: keys change nothing of it.
+    pub(in crate::tui) fn is_own(&self) -> bool {
+        self.toggles == Toggles::default()
     }
 
-    /// The view that the run was started with: the only one that is written without a key.
+    /// The view that the run was started with.
     pub(in crate::tui) fn base_view(&self) -> View {
         self.command_line.view.unwrap_or(View::Beauty)
     }

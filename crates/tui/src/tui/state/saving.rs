@@ -1,9 +1,12 @@
 //! Saves: of the scene's files by a person, of images and of the camera by glimt.
 
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use crate::pipeline::protocol::{CameraEdit, Viewpoint};
-use crate::tui::event::{Unwritten, Written};
+use super::request::Toggles;
+use crate::pipeline::protocol::{CameraEdit, OwnState, Viewpoint};
+use crate::tui::event::Unwritten;
+use crate::tui::options::Lost;
 
 /// A save on its way to the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,14 +15,40 @@ pub(in crate::tui) struct PendingChange {
     pub noticed: Instant,
 }
 
+/// The scene's own image: that of the scene file as saved, with the options of the command line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::tui) struct OwnImage {
+    pub state: OwnState,
+    /// Progress of its render, from 0 to 1.
+    pub fraction: f64,
+}
+
+/// A picture that was written.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::tui) struct Written {
+    pub path: PathBuf,
+    pub bytes: u64,
+    /// Number of the request.
+    pub generation: u64,
+    /// Description of the file, in words, as far as it is known.
+    pub made: String,
+    /// Changes by keys that it shows. `None` for the scene's own image.
+    pub shows: Option<Toggles>,
+    /// Whether a later picture could not be written there: nobody knows what the file holds.
+    pub is_stale: bool,
+    /// Change of the file by another program.
+    pub lost: Option<Lost>,
+}
+
 /// Saves of the scene's files, and files that were written.
 pub(in crate::tui) struct SavingState {
     /// Changes of the scene's files so far.
     pub edits: u64,
     /// Request of the last edit.
     pub last_edit: Option<u64>,
-    /// Request of the last edit that changed the picture.
-    pub last_visible_edit: Option<u64>,
+    /// The first request with the files as they were saved last.
+    pub saved_at: u64,
+    pub own: OwnImage,
     /// Whether nobody is writing the scene's files.
     pub is_settled: bool,
     /// The last save, until the first cell that it changes is shown.
@@ -43,6 +72,8 @@ pub(in crate::tui) struct SavingState {
 
     /// Whether a key asked for the next image that is written.
     pub is_write_requested: bool,
+    /// Changes by keys that were shown when a key last asked for that.
+    pub write_shows: Toggles,
     /// Why the current picture is not on disk, if it should be.
     pub unwritten: Option<String>,
     /// The last failure to write, until a later picture is on disk.
@@ -51,11 +82,12 @@ pub(in crate::tui) struct SavingState {
 }
 
 impl SavingState {
-    pub(super) const fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self {
             edits: 0,
             last_edit: None,
-            last_visible_edit: None,
+            saved_at: 0,
+            own: OwnImage { state: OwnState::NotBegun, fraction: 0.0 },
             is_settled: true,
             change: None,
             editor_closed: None,
@@ -67,6 +99,7 @@ impl SavingState {
             camera_of_model: None,
             camera_refused: None,
             is_write_requested: false,
+            write_shows: Toggles::default(),
             unwritten: None,
             write_failed: None,
             written: Vec::new(),

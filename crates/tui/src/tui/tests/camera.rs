@@ -31,8 +31,8 @@ fn a_moved_camera_is_shown_and_not_written_until_it_goes_back() {
     let moved = request(&effects).expect("a request");
     assert_eq!((moved.write, moved.force), (Writing::No, false));
     let text = desk.text();
-    assert!(text.contains("camera moved: shown, not written; w writes it"), "{text}");
-    assert!(text.lines().last().is_some_and(|line| line.contains("0 camera moved")), "{text}");
+    assert!(text.contains("camera moved (preview only). w: save image"), "{text}");
+    assert!(text.lines().last().is_some_and(|line| line.contains("0 reset camera")), "{text}");
     show(&mut desk);
     let effects = desk.event(Event::Changed(Changed { noticed: desk.now }));
     let edited = request(&effects).expect("a request");
@@ -119,7 +119,7 @@ fn exposure_starts_from_the_scene_s_own() {
     show(&mut desk);
     let effects = desk.press(']');
     assert_eq!(request(&effects).and_then(|it| it.overrides.exposure), Some(1.5));
-    assert!(desk.text().contains("0 exposure +1.5"), "{}", desk.text());
+    assert!(desk.text().contains("0 reset exposure (+1.5)"), "{}", desk.text());
 }
 
 #[test]
@@ -163,7 +163,10 @@ fn what_is_back_where_the_scene_has_it_is_no_change() {
         let last = last.expect("a request");
         let is_back = keys != "]]]][";
         assert_eq!(last.overrides == Overrides::default(), is_back, "{keys}: {:?}", last.overrides);
-        assert_eq!(last.write, Writing::Try, "{keys}");
+        assert_eq!(
+            (last.write, last.own.is_none()),
+            if is_back { (Writing::Try, true) } else { (Writing::No, false) }
+        );
         let line = desk.text().lines().last().map(str::to_owned).unwrap_or_default();
         assert_eq!(!line.contains("0 "), is_back, "{keys}: {line}");
         assert!(!desk.text().contains("camera moved"), "{keys}: {}", desk.text());
@@ -200,10 +203,10 @@ fn the_scene_of_a_model_is_written_once_and_its_camera_is_kept() {
     desk.worker(WorkerEvent::CameraKept { generation, outcome: Ok(kept) });
     desk.key(KeyPress::special(KeyCode::Esc));
     assert!(!desk.text().contains("c keep"), "there is a scene already: {}", desk.text());
-    assert!(!crate::tui::exit_summary::words(&desk.state).contains("discarded"));
+    assert_eq!(crate::tui::exit_summary::not_kept(&desk.state), None);
     desk.press('l');
     desk.finish([200, 30, 30]);
-    assert!(crate::tui::exit_summary::words(&desk.state).contains("discarded"), "it was moved since");
+    assert!(crate::tui::exit_summary::not_kept(&desk.state).is_some(), "it was moved since");
 }
 
 /// A save after which the scene has this camera.

@@ -281,7 +281,7 @@ fn the_number_of_a_picture_is_that_of_its_run() {
     assert!(text.contains("– unfinished;") && text.contains(" 1 first"), "{text}");
     desk.press('n');
     assert!(desk.text().contains("unfinished picture, 0 s ago"), "{}", desk.text());
-    assert!(desk.text().contains("unfinished; after shadows hard; n older, N newer"), "{}", desk.text());
+    assert!(desk.text().contains("unfinished; after shadows hard · n older · N newer"), "{}", desk.text());
     desk.press('n');
     assert!(desk.text().contains("picture 1 of 2, 0 s ago"), "{}", desk.text());
 }
@@ -326,7 +326,7 @@ fn settings_of_the_scene_again_stand_together() {
     desk.press('s');
     desk.finish(RED);
     desk.press('n');
-    let words = "after back to the scene's shadows, photons; n older, N newer";
+    let words = "after shadows and photons reset · n older · N newer";
     assert!(!desk.text().contains("of the scene") && desk.text().contains(words), "{}", desk.text());
 }
 
@@ -402,5 +402,5 @@ fn facts_of_the_folded_line_are_apart() {
     desk.state.display.frame = Some(FrameReport { bytes: 131_000, round_trip: None });
     desk.press('m');
     desk.state.overlays.message = None;
-    assert!(desk.text().contains("3 stages reused, unwritten: w writes it"), "{}", desk.text());
+    assert!(desk.text().contains("3 stages reused, not saved · w saves it"), "{}", desk.text());
 }

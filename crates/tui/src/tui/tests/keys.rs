@@ -80,7 +80,7 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             let wanted = if action == Action::NextView { View::Normal } else { View::Error };
             let request = request(&effects).expect("a request");
             assert_eq!((request.overrides.view, request.write), (Some(wanted), Writing::No));
-            assert!(desk.text().contains(&format!("view {}:", wanted.name())));
+            assert!(desk.text().contains(&format!("view {} (preview only)", wanted.name())));
         }
         Action::OrbitLeft | Action::OrbitRight | Action::OrbitUp | Action::OrbitDown => {
             let moved = moved(&desk.key(key)).position - DVec3::Y;
@@ -107,7 +107,7 @@ fn check(action: Action, key: KeyPress, desk: &mut Desk) {
             let effects = desk.key(key);
             assert_eq!(
                 request(&effects).map(|it| (it.overrides.exposure, it.write)),
-                Some((Some(stops), Writing::Try))
+                Some((Some(stops), Writing::No))
             );
             assert!(
                 desk.text().contains(&format!("exposure {}", crate::tui::state::signed_stops(stops))),
@@ -298,19 +298,16 @@ fn a_message_stands_under_the_picture_until_the_next_key_and_the_keys_stay() {
     let hints = bottom(&mut desk);
     desk.press('0');
     let text = desk.text();
-    assert!(
-        text.lines().nth(22).is_some_and(|line| line.starts_with("the keys have changed nothing")),
-        "{text}"
-    );
+    assert!(text.lines().nth(22).is_some_and(|line| line.starts_with("nothing to reset")), "{text}");
     assert_eq!(bottom(&mut desk), hints);
     desk.press('?');
     desk.press('?');
-    assert!(!desk.text().contains("the keys have changed nothing"));
+    assert!(!desk.text().contains("nothing to reset"));
     // Without a line of its own it takes the place of the keys, and without those the place of the name.
     for rows in [12, 5] {
         desk.event(Event::Resize(window(60, rows)));
         desk.press('0');
-        assert!(desk.text().contains("the keys have changed nothing"), "{}", desk.text());
+        assert!(desk.text().contains("nothing to reset"), "{}", desk.text());
     }
 }
 
@@ -322,10 +319,10 @@ fn toggles_start_from_the_command_line_and_go_back_to_it() {
     assert!(bottom(&mut desk).starts_with("s off  p off") && bottom(&mut desk).contains("v depth"));
     let effects = desk.press('s');
     let soft = request(&effects).expect("a request");
-    assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), Writing::Try));
+    assert_eq!((soft.overrides.shadows, soft.write), (Some(Shadows::Soft), Writing::No));
+    assert_eq!(soft.own.as_deref(), Some(&base), "the image of the call is kept");
     let effects = desk.press('V');
-    let write = request(&effects).expect("a request").write;
-    assert_eq!(write, Writing::No, "only the view of the command line is written");
+    assert_eq!(request(&effects).expect("a request").write, Writing::No);
     let effects = desk.press('0');
     assert_eq!(request(&effects).map(|it| it.overrides.clone()), Some(base));
 }
@@ -377,7 +374,9 @@ fn a_new_request_lets_a_paused_worker_go_on() {
 
 #[test]
 fn a_key_that_ends_a_pause_says_so_beside_what_it_says_itself() {
-    for (key, words) in [('s', "no longer paused"), ('r', "no longer paused"), ('v', "view normal: shown")] {
+    for (key, words) in
+        [('s', "no longer paused"), ('r', "no longer paused"), ('v', "view normal (preview only)")]
+    {
         let mut desk = Desk::new();
         desk.press(' ');
         let effects = desk.press(key);
@@ -460,7 +459,7 @@ fn a_toggle_that_is_back_where_the_scene_has_it_is_no_change() {
     desk.finish(RED);
     "sssii".chars().for_each(|key| drop(desk.press(key)));
     assert!(desk.press('0').is_empty());
-    assert!(desk.text().contains("the keys have changed nothing"), "{}", desk.text());
+    assert!(desk.text().contains("nothing to reset"), "{}", desk.text());
 }
 
 #[test]

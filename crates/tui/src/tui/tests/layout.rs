@@ -98,9 +98,12 @@ fn nothing_jumps_while_a_render_runs_nor_when_it_is_done() {
                 2 => desk.worker(protocol::Event::Progress { generation, progress: progress(0.5, None) }),
                 3 => desk.press(' '),
                 4 => desk.press('0'),
-                5 => {
-                    desk.worker(protocol::Event::Written { generation, path: "cornell.png".into(), bytes: 1 })
-                }
+                5 => desk.worker(protocol::Event::Written {
+                    generation,
+                    path: "cornell.png".into(),
+                    bytes: 1,
+                    is_own: true,
+                }),
                 6 => desk.worker(done(generation, vec![diagnostic(Severity::Warning, "unused")], false)),
                 7 => desk.event(Event::Changed(Changed { noticed: desk.now })),
                 8 => {
@@ -235,7 +238,12 @@ fn the_folded_line_names_no_file_of_another_picture() {
         desk.state.work.stages = Default::default();
     };
     finish(&mut desk);
-    desk.worker(protocol::Event::Written { generation: 1, path: "dof.png".into(), bytes: 63_000 });
+    desk.worker(protocol::Event::Written {
+        generation: 1,
+        path: "dof.png".into(),
+        bytes: 63_000,
+        is_own: true,
+    });
     assert!(
         Layout::of(&desk.state).panel.is_empty() && desk.text().contains("→ dof.png 63.0 kB"),
         "{}",
@@ -247,13 +255,18 @@ fn the_folded_line_names_no_file_of_another_picture() {
     desk.press('?');
     desk.press('?');
     let text = desk.text();
-    assert!(text.contains("unwritten: w writes it") && !text.contains("dof.png 63"), "{text}");
+    assert!(text.contains("not saved · w saves it") && !text.contains("dof.png 63"), "{text}");
     desk.press('w');
-    desk.worker(protocol::Event::Written { generation: 2, path: "dof.png".into(), bytes: 64_000 });
+    desk.worker(protocol::Event::Written {
+        generation: 2,
+        path: "dof.png".into(),
+        bytes: 64_000,
+        is_own: false,
+    });
     desk.press('?');
     desk.press('?');
     let text = desk.text();
-    assert!(text.contains("→ dof.png 64.0 kB") && !text.contains("unwritten"), "{text}");
+    assert!(text.contains("→ dof.png 64.0 kB") && !text.contains("not saved"), "{text}");
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::tui::fixtures::*;
 
 const WINDOWS: [(u16, u16); 5] = [(60, 20), (80, 24), (100, 30), (120, 40), (200, 60)];
 const SHORT: &str = "exposure +0.25";
-const LONG: &str = "camera moved: shown, not written; w writes it, c keeps it, 0 goes back";
+const LONG: &str = "camera moved (preview only). w: save image · c: keep in scene · 0: reset";
 const LONGER: &str = "the camera was saved since keys moved it: camera.position = [0, 1, 4.5], camera.fov = 35; \
     press c again to write over it, or 0 to go back to the saved one";
 
@@ -82,6 +82,7 @@ fn a_notice_leaves_the_written_file_in_sight() {
                 generation: 1,
                 path: "cornell.png".into(),
                 bytes: 90_200,
+                is_own: true,
             });
             desk.finish(RED);
             crate::tui::update::say(&mut desk.state, notice);

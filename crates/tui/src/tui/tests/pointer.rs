@@ -117,7 +117,7 @@ fn a_click_after_f_focuses_there() {
     let effects = answer(&mut desk, Some(thing()));
     let focused = request(&effects).expect("a request");
     assert_eq!((focused.overrides.camera.focus, focused.write), (Some(3.8167), Writing::No));
-    assert!(desk.text().contains("focus 3.8167 away"), "{}", desk.text());
+    assert!(desk.text().contains("focus at 3.8167 (preview only)"), "{}", desk.text());
     // Another key ends the waiting for a click.
     desk.press('f');
     desk.press('e');
@@ -150,22 +150,19 @@ fn a_camera_in_the_file_is_the_scene_s_own() {
     let own = request(&effects).expect("a request");
     assert_eq!((own.overrides.camera.is_any(), own.write), (false, Writing::Try));
     let text = desk.text();
-    assert!(
-        text.contains("the camera is in scenes/cornell.toml now") && !text.contains("camera moved"),
-        "{text}"
-    );
+    assert!(text.contains("camera saved to scenes/cornell.toml") && !text.contains("camera moved"), "{text}");
     // The watcher hears of that, too.
     desk.event(Event::Changed(Changed { noticed: desk.now }));
-    assert!(desk.text().contains("the camera is in scenes/cornell.toml now"), "{}", desk.text());
+    assert!(desk.text().contains("camera saved to scenes/cornell.toml"), "{}", desk.text());
     desk.event(Event::Changed(Changed { noticed: desk.now }));
-    assert!(!desk.text().contains("the camera is in"), "{}", desk.text());
+    assert!(!desk.text().contains("camera saved to"), "{}", desk.text());
 
     desk.press('l');
     desk.press('c');
     let outcome = Err("the scene file has changed since it was read".to_owned());
     assert!(desk.worker(protocol::Event::CameraKept { generation: 0, outcome }).is_empty());
     let text = desk.text();
-    assert!(text.contains("error: the scene file has changed") && text.contains("camera moved"), "{text}");
+    assert!(text.contains("error: the scene file has changed") && text.contains("0 reset camera"), "{text}");
     // The watcher hears of that save a little later.
     desk.event(Event::Changed(Changed { noticed: desk.now }));
     assert!(desk.text().contains("error: the scene file has changed"), "{}", desk.text());
@@ -177,7 +174,7 @@ fn a_camera_in_the_file_is_the_scene_s_own() {
 fn u_asks_for_what_c_wrote_until_there_is_nothing_left() {
     let mut desk = desk();
     assert!(desk.press('u').is_empty());
-    assert!(desk.text().contains("there is nothing to undo"), "{}", desk.text());
+    assert!(desk.text().contains("nothing to undo"), "{}", desk.text());
     let edit = |after: &str| CameraEdit { path: "a.toml".into(), before: "".into(), after: after.into() };
     for after in ["one", "two"] {
         let kept = Kept {
@@ -198,7 +195,7 @@ fn u_asks_for_what_c_wrote_until_there_is_nothing_left() {
     assert!(desk.text().contains("error: a.toml has changed"), "{}", desk.text());
     assert!(asks(&mut desk, "two"), "it can be tried again");
     assert!(request(&undone(&mut desk, Ok("a.toml".into()))).is_some(), "the picture is that of the file");
-    assert!(desk.text().contains("a.toml is as it was before c"), "{}", desk.text());
+    assert!(desk.text().contains("a.toml restored"), "{}", desk.text());
     assert!(asks(&mut desk, "one"));
     undone(&mut desk, Ok("a.toml".into()));
     assert!(desk.press('u').is_empty());
@@ -239,7 +236,7 @@ fn a_camera_of_the_call_stays_before_the_file() {
     desk.press('c');
     assert!(kept(&mut desk, true, false).is_empty());
     let text = desk.text();
-    assert!(text.contains("in this call --set comes first") && text.contains("camera moved"), "{text}");
+    assert!(text.contains("in this call --set comes first") && text.contains("0 reset camera"), "{text}");
 }
 
 #[test]
@@ -490,12 +487,12 @@ fn an_older_picture_says_what_its_edit_changed() {
     desk.press('n');
     assert!(
         desk.text().contains("picture 2 of 3, 0 s ago")
-            && desk.text().contains("\nafter r 1 → 2; n older, N newer"),
+            && desk.text().contains("\nafter r 1 → 2 · n older · N newer"),
         "{}",
         desk.text()
     );
     desk.press('n');
-    assert!(desk.text().contains("\nthe first picture; N newer"), "it is of no edit: {}", desk.text());
+    assert!(desk.text().contains("\nthe first picture · N newer"), "it is of no edit: {}", desk.text());
     desk.press('b');
     desk.press('b');
     assert!(desk.text().contains("\nbefore the last edit, fov 40 → 30  "), "{}", desk.text());

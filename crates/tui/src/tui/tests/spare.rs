@@ -423,7 +423,12 @@ fn fixtures_text(buffer: &ratatui::buffer::Buffer) -> String {
 fn what_is_written_is_a_link() {
     for (columns, rows) in [(120, 40), (80, 20)] {
         let mut desk = Desk::with(state(columns, rows));
-        desk.worker(protocol::Event::Written { generation: 1, path: "cornell.png".into(), bytes: 107_000 });
+        desk.worker(protocol::Event::Written {
+            generation: 1,
+            path: "cornell.png".into(),
+            bytes: 107_000,
+            is_own: true,
+        });
         desk.finish(RED);
         let mut buffer = desk.screen();
         let drawn = view::draw(&desk.state, &mut buffer);

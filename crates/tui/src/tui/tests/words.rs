@@ -35,12 +35,12 @@ fn one_key_takes_back_all_that_keys_have_changed_and_says_so_once() {
     desk.press(']');
     desk.finish(BLUE);
     desk.key(KeyPress::special(KeyCode::Esc));
-    assert!(last_line(&mut desk).contains("0 focus moved, exposure +0.25"), "{}", desk.text());
+    assert!(last_line(&mut desk).contains("0 reset focus, exposure (+0.25)"), "{}", desk.text());
     desk.press('l');
     desk.finish(RED);
     desk.key(KeyPress::special(KeyCode::Esc));
     let keys = last_line(&mut desk);
-    assert!(keys.contains("0 camera moved, exposure +0.25") && !keys.contains("focus moved"), "{keys}");
+    assert!(keys.contains("0 reset camera, exposure (+0.25)") && !keys.contains("focus"), "{keys}");
     desk.press('[');
     assert!(desk.text().contains("exposure 0 "), "{}", desk.text());
 }
@@ -69,9 +69,9 @@ fn what_a_render_goes_on_from_is_no_news_once_it_is_done() {
     let mut desk = Desk::new();
     let news = CheckpointNews::Resumed { path: "cornell.png.checkpoint".into(), samples: 16 };
     desk.worker(protocol::Event::Checkpoint { generation: 1, news });
-    assert!(desk.text().contains("going on from cornell.png.checkpoint"), "{}", desk.text());
+    assert!(desk.text().contains("resuming from cornell.png.checkpoint"), "{}", desk.text());
     desk.finish(RED);
-    assert!(!desk.text().contains("going on from"), "{}", desk.text());
+    assert!(!desk.text().contains("resuming from"), "{}", desk.text());
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn what_was_never_rendered_is_not_rendered_again() {
     let mut desk = Desk::with(state(120, 40));
     desk.fail(vec![diagnostic(Severity::Error, "unknown key `heigth`")]);
     assert!(!desk.text().contains("render again"), "{}", desk.text());
-    assert_eq!(exit_summary::words(&desk.state), "nothing is written; cornell.toml has errors");
+    assert_eq!(exit_summary::words(&desk.state), "no image written; cornell.toml has errors");
     desk.finish(RED);
     assert!(desk.text().contains("render again"), "{}", desk.text());
 }

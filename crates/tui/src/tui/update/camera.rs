@@ -92,7 +92,7 @@ pub(super) fn step_of_camera(state: &mut State) -> Vec<Effect> {
     say(
         state,
         if state.request.toggles.camera.is_any() {
-            "camera moved: shown, not written; w writes it, c keeps it, 0 goes back"
+            "camera moved (preview only). w: save image · c: keep in scene · 0: reset"
         } else {
             "the camera is where the scene has it"
         },
@@ -118,7 +118,7 @@ pub(super) fn keep(state: &mut State) -> Vec<Effect> {
     let is_set = state.request.command_line.sets.iter().any(|set| set.trim_start().starts_with("camera"));
     // The scene of a model is worth writing with its own camera, too.
     if !state.request.toggles.camera.is_any() && !is_set && !is_mesh(&state.request.scene) {
-        return notify(state, "the camera is where the scene has it: there is nothing to write");
+        return notify(state, "camera unchanged: nothing to keep");
     }
     let saved = state.request.saved_since_moved();
     // A model has no file in which a camera is saved.
@@ -154,7 +154,7 @@ pub(super) fn kept(state: &mut State, outcome: Result<Kept, String>) -> Vec<Effe
     };
     let words = match (is_new, is_own) {
         _ if of_model => format!("wrote {name}, a scene of this model with this camera{which}"),
-        (true, true) => format!("the camera is in {name} now{which}; u undoes c"),
+        (true, true) => format!("camera saved to {name}{which} · u: undo"),
         (true, false) => format!("the camera is in {name}{which}; in this call --set comes first"),
         (false, _) => format!("{name} has this camera already{which}"),
     };
@@ -179,7 +179,7 @@ pub(super) fn undo(state: &mut State) -> Vec<Effect> {
         None if state.saving.camera_of_model.is_some() => {
             notify(state, "the scene that c wrote beside the model stays: there is nothing in it to undo")
         }
-        None => notify(state, "c has written no camera into the scene file: there is nothing to undo"),
+        None => notify(state, "nothing to undo"),
     }
 }
 
@@ -197,7 +197,7 @@ pub(super) fn undone(state: &mut State, outcome: Result<PathBuf, String>) -> Vec
     let effects = render(state, false);
     state.saving.camera_kept = Some(state.now);
     let name = visible(&path.to_string_lossy()).into_owned();
-    say(state, format!("{name} is as it was before c"));
+    say(state, format!("undone: {name} restored"));
     effects
 }
 

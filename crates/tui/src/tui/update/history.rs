@@ -93,8 +93,8 @@ fn newest(state: &State) -> Option<crate::tui::history::Shown> {
 fn look_at(state: &mut State, shown: crate::tui::history::Shown) -> Vec<Effect> {
     state.picture.shown = Some(shown);
     // The first line says which one it is, and how old, which goes on.
-    let older = if state.picture.history.is_oldest_open() { "" } else { "n older, " };
-    let words = format!("{}; {older}N newer", state.picture.history.reason_of_open());
+    let older = if state.picture.history.is_oldest_open() { "" } else { "n older · " };
+    let words = format!("{} · {older}N newer", state.picture.history.reason_of_open());
     say_until_key(state, words);
     Vec::new()
 }

@@ -210,17 +210,17 @@ fn write_now(state: &mut State) -> Vec<Effect> {
             "writing the image as it is now"
         },
     );
-    state.saving.is_write_requested = true;
+    (state.saving.is_write_requested, state.saving.write_shows) = (true, state.request.sent_toggles);
     vec![Effect::Send(Command::Write)]
 }
 
 fn scene_settings(state: &mut State) -> Vec<Effect> {
     if state.request.toggles == Toggles::default() {
-        return notify(state, "the keys have changed nothing");
+        return notify(state, "nothing to reset");
     }
     state.request.toggles = Toggles::default();
     let effects = render(state, false);
-    say(state, "back to the scene's own settings");
+    say(state, "reset to the scene's settings");
     effects
 }
 

@@ -23,10 +23,10 @@ use super::event::{Effect, Event, Signal, Source, Window};
 use super::history::Shown;
 use super::options::Changed;
 use super::preview_kind::PreviewKind;
-use super::state::{Message, PendingChange, State};
+use super::state::{Message, OwnImage, PendingChange, State};
 use super::view::layout::Layout;
 use crate::film::Picture;
-use crate::pipeline::protocol::Command;
+use crate::pipeline::protocol::{Command, OwnState};
 
 /// Time that the window must keep its size before glimt requests another preview.
 const RESIZE_QUIET: Duration = Duration::from_millis(60);
@@ -84,6 +84,8 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             }
             state.saving.edits += 1;
             let effects = render(state, false);
+            state.saving.saved_at = state.request.generation;
+            state.saving.own = OwnImage { state: OwnState::NotBegun, fraction: 0.0 };
             state.saving.last_edit = (!is_own).then_some(state.request.generation);
             // A save out of the editor is seen when that has ended at the earliest.
             let noticed = state.saving.editor_closed.map_or(noticed, |back| noticed.max(back));
@@ -94,6 +96,7 @@ fn happened(state: &mut State, event: Event) -> Vec<Effect> {
             worker::settled(state);
             Vec::new()
         }
+        Event::Output(change) => worker::output_changed(state, &change),
         Event::Signal(signal) => vec![signalled(signal)],
         Event::Shown { generation } => {
             // The picture does not wait for its entry in the strip.

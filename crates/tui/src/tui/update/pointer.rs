@@ -176,7 +176,7 @@ fn focus_at(state: &mut State, depth: f64) -> Vec<Effect> {
     if state.request.toggles.camera.focus.is_some() {
         say(
             state,
-            format!("focus {distance} away: shown, not written; w writes it, c keeps it, 0 goes back"),
+            format!("focus at {distance} (preview only). w: save image · c: keep in scene · 0: reset"),
         );
     }
     effects

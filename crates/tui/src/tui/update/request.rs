@@ -40,7 +40,8 @@ pub(super) fn render(state: &mut State, force: bool) -> Vec<Effect> {
         scene: state.request.scene.clone(),
         overrides: state.request.overrides(),
         preview: state.request.preview_size,
-        write: if state.request.is_written() { Writing::Try } else { Writing::No },
+        write: if state.request.is_own() { Writing::Try } else { Writing::No },
+        own: state.request.own_overrides(),
         force,
         first: state.request.first_section,
     };

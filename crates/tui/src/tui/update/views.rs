@@ -65,9 +65,12 @@ pub(super) fn choose_view(state: &mut State, view: View) -> Vec<Effect> {
     let effects = render(state, false);
     if state.request.toggles.view.is_some() {
         let is_empty = view == View::Photons && !state.request.photons();
-        let words =
-            if is_empty { "photons are off; p turns them on" } else { "shown, not written; w writes it" };
-        say(state, format!("view {}: {words}", view.name()));
+        let words = if is_empty {
+            ": photons are off; p turns them on"
+        } else {
+            " (preview only). w: save image · 0: reset"
+        };
+        say(state, format!("view {}{words}", view.name()));
     }
     effects
 }

@@ -7,21 +7,22 @@ use super::request::resized_preview;
 use super::say::{say, say_until_key};
 use super::{camera, history, pointer};
 use crate::pipeline::protocol::{
-    AssetProgress, CheckpointNews, Event, Failure, LastGoodEnd, Report, Stage, StageReport, Status,
+    AssetProgress, CheckpointNews, Event, Failure, LastGoodEnd, OwnState, Report, Stage, StageReport, Status,
 };
 use crate::scene::MOST_COMPARED_BYTES;
 use crate::scene::diagnostic::{Diagnostic, Severity};
 use crate::scene::sanitize::visible;
 use crate::tui::chrome;
-use crate::tui::event::{Effect, Unwritten, Written};
+use crate::tui::event::{Effect, Unwritten};
 use crate::tui::exit_summary;
 use crate::tui::noise_curve::NoiseCurve;
-use crate::tui::state::{Activity, AssetBar, Pane, Problems, Rendering, State};
+use crate::tui::options::OutputChange;
+use crate::tui::state::{Activity, AssetBar, OwnImage, Pane, Problems, Rendering, State, Written};
 
 /// Why a picture that is not on disk is not there.
 const UNWRITTEN: &str = "not written: e says why";
 /// Message that ends with the render.
-const GOING_ON: &str = "going on from";
+const GOING_ON: &str = "resuming from";
 
 pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
     let event = match event {
@@ -34,8 +35,8 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
             return Vec::new();
         }
         // Files of pictures of before are there all the same.
-        Event::Written { path, bytes, generation } if generation != state.request.generation => {
-            note(state, path, bytes, generation);
+        Event::Written { path, bytes, generation, is_own } if generation != state.request.generation => {
+            note(state, path, bytes, (generation, is_own));
             return Vec::new();
         }
         Event::Done { generation, report, .. } if generation != state.request.generation => {
@@ -57,6 +58,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::Settings { settings, camera, exposure, own, .. } => {
             state.request.own = Some(own);
             (state.request.camera, state.request.exposure) = (Some(camera), Some(exposure));
+            state.request.drop_saved_changes();
             let pinhole = state.request.overrides().dof == Some(true) && !settings.dof;
             state.request.effective = Some(*settings);
             mended(state);
@@ -73,6 +75,9 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
                 state.work.curve.note(progress.earlier_seconds + noise.seconds, noise.now);
             }
             state.work.progress = Some(progress);
+            if state.request.is_own() || state.saving.own.state == (OwnState::Begun { is_rendering: true }) {
+                state.saving.own.fraction = progress.fraction;
+            }
         }
         Event::Files { files, .. } => state.request.note_files(files),
         Event::Preview { .. }
@@ -80,7 +85,10 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         | Event::CameraKept { .. }
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
-        Event::Written { path, bytes, generation } => written(state, path, bytes, generation),
+        Event::Written { path, bytes, generation, is_own } => {
+            written(state, path, bytes, (generation, is_own))
+        }
+        Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
             let is_by_hand = std::mem::take(&mut state.saving.is_write_requested);
             // What a key asks for during a render tells nothing of the picture at its end.
@@ -160,6 +168,7 @@ fn generation(event: &Event) -> u64 {
         | Event::Progress { generation, .. }
         | Event::Preview { generation }
         | Event::Written { generation, .. }
+        | Event::OwnImage { generation, .. }
         | Event::WriteFailed { generation, .. }
         | Event::NotKept { generation, .. }
         | Event::Refused { generation, .. }
@@ -189,6 +198,9 @@ fn started(state: &mut State) {
     state.work.curve = NoiseCurve::default();
     state.work.report = None;
     state.saving.unwritten = None;
+    if state.request.is_own() {
+        state.saving.own = OwnImage { state: OwnState::Begun { is_rendering: true }, fraction: 0.0 };
+    }
     close_empty_pane(state);
     state.work.unchanged = false;
 }
@@ -223,34 +235,55 @@ fn wrote(state: &mut State, paths: &[PathBuf]) {
 }
 
 /// A file is there. It stands beside the picture: a message about each would cover the keys.
-fn written(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
+fn written(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
     // Of several outputs, another one may have failed.
     let is_by_hand = state.work.activity == Activity::Done;
     if is_by_hand {
         (state.saving.unwritten, state.saving.write_failed) = (None, None);
         close_empty_pane(state);
     }
-    note(state, path, bytes, generation);
+    note(state, path, bytes, (generation, is_own));
 }
 
 /// A picture is in a file. Its render may go on; a report that is there already is of this picture.
-fn note(state: &mut State, path: PathBuf, bytes: u64, generation: u64) {
+fn note(state: &mut State, path: PathBuf, bytes: u64, (generation, is_own): (u64, bool)) {
+    let view = if is_own { state.request.base_view() } else { state.request.view() };
     let made = match &state.work.report {
-        Some(report) => exit_summary::made(report),
-        None if generation == state.request.generation => exit_summary::view(state.request.view()),
+        Some(report) => exit_summary::made(report, view),
+        None if generation == state.request.generation => exit_summary::view(view),
         None => String::new(),
     };
     state.saving.written.retain(|other| other.path != path);
-    state.saving.written.push(Written { path, bytes, generation, made, is_stale: false });
+    let shows = (!is_own).then_some(state.saving.write_shows);
+    if !is_own && state.saving.own.state == OwnState::Written {
+        state.saving.own.state = OwnState::Begun { is_rendering: false };
+    }
+    let written = Written { path, bytes, generation, made, shows, is_stale: false, lost: None };
+    state.saving.written.push(written);
 }
 
 /// Describes the files of a finished request, if it wrote its picture at the end.
 fn describe(state: &mut State, generation: u64, report: &Report) {
-    if report.image.path.is_some() {
-        for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
-            written.made = exit_summary::made(report);
+    let (is_written, base) = (report.image.path.is_some(), state.request.base_view());
+    for written in state.saving.written.iter_mut().filter(|written| written.generation == generation) {
+        if is_written || written.shows.is_none() {
+            let view = if written.shows.is_none() { base } else { report.settings.view };
+            written.made = exit_summary::made(report, view);
         }
     }
+}
+
+/// Another program has changed a file that glimt wrote, or put it back.
+pub(super) fn output_changed(state: &mut State, OutputChange { path, lost }: &OutputChange) -> Vec<Effect> {
+    let Some(written) = state.saving.written.iter_mut().find(|written| written.path == *path) else {
+        return Vec::new();
+    };
+    (written.lost, state.dirty) = (*lost, true);
+    if let Some(lost) = lost {
+        let name = visible(&path.to_string_lossy()).into_owned();
+        say_until_key(state, format!("{name} {} · w writes it again", lost.words()));
+    }
+    Vec::new()
 }
 
 /// Shows new conflicts at once; a pane that a person has closed stays closed.
@@ -288,8 +321,9 @@ fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, u
     state.work.assets.clear();
     // The picture of this request is on disk: none is missing any more.
     let is_on_disk = report.stages[Stage::Write as usize].status != Status::Skipped;
-    if state.request.is_written() && is_on_disk && state.saving.unwritten.is_none() {
+    if state.request.is_own() && is_on_disk && state.saving.unwritten.is_none() {
         state.saving.write_failed = None;
+        state.saving.own = OwnImage { state: OwnState::Written, fraction: 1.0 };
     }
     note_noise(state, &report, unchanged);
     describe(state, state.request.generation, &report);
@@ -298,9 +332,6 @@ fn done(state: &mut State, mut report: Box<Report>, warnings: Vec<Diagnostic>, u
     warn(state, warnings);
     history::record(state);
     count(state, unchanged);
-    if !unchanged {
-        state.saving.last_visible_edit = state.saving.last_edit.or(state.saving.last_visible_edit);
-    }
     if unchanged {
         state.saving.last_edit.take_if(|edit| *edit == state.request.generation);
     }

@@ -181,7 +181,7 @@ fn of_use_first(state: &State) -> (Vec<Hint>, Vec<Hint>) {
     let reset = keymap::of(Action::SceneSettings).map_or("", |it| it.label);
     let changed = |words| Hint { tone: Tone::Strong, ..Hint::new(reset, words) };
     let changes = state.request.changes().join(", ");
-    urgent.extend((!changes.is_empty()).then(|| changed(changes)));
+    urgent.extend((!changes.is_empty()).then(|| changed(format!("reset {changes}"))));
     let now: &[Action] = match state.work.activity {
         _ if state.work.paused => &[Action::TogglePause, Action::WriteNow],
         Activity::Running { .. } => &[Action::TogglePause],

@@ -90,7 +90,7 @@ fn lines(state: &State, (width, column): (u16, u16), is_in_full: bool) -> Vec<Li
         lines.extend(Stage::ALL.into_iter().flat_map(of));
     }
     if is_done {
-        lines.extend(results(state));
+        lines.extend(results(state, column));
     }
     lines.extend(hint(state, column));
     // Bars come and go: nothing is below them.
@@ -130,15 +130,17 @@ fn asset_line(state: &State, asset: &AssetBar, width: u16) -> Line {
     vec![(name, Tone::Plain), (filled, Tone::Working), (empty, Tone::Faint), (percent, Tone::Plain)]
 }
 
-/// Results: a label and a value in each line.
-fn results(state: &State) -> Vec<Line> {
+/// Results in this many columns: a label and a value in each line.
+fn results(state: &State, width: u16) -> Vec<Line> {
     let fact =
         |label: &str, value: String| vec![(format!("{label:<LABEL$} "), Tone::Faint), (value, Tone::Plain)];
     let mut lines = Vec::new();
     lines.extend(state.saving.unwritten.iter().map(|why| vec![(why.clone(), Tone::Error)]));
-    if under::is_in_no_file(state) {
-        lines.push(vec![("unwritten: w writes it".to_owned(), Tone::Faint)]);
-    }
+    let mut add = |words: &str, tone| {
+        lines.extend(wrapped(words, usize::from(width)).into_iter().map(|line| vec![(line, tone)]));
+    };
+    under::not_saved(state).iter().for_each(|words| add(words, Tone::Faint));
+    under::lost(state).for_each(|words| add(&words, Tone::Warning));
     for written in under::files(state) {
         let name = visible(&written.path.to_string_lossy()).into_owned();
         lines.push(vec![("→ ".to_owned(), Tone::Good), (name, Tone::File)]);

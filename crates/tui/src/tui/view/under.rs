@@ -9,13 +9,13 @@ use super::stages::{self, at_work};
 use super::text::{
     Tone, about, bytes, columns, duration, gauge, percent, put, put_right, rest, running, share,
 };
-use crate::pipeline::protocol::{NoiseProgress, RenderProgress};
+use crate::pipeline::protocol::{NoiseProgress, OwnState, RenderProgress};
 use crate::pipeline::words::samples_so_far;
 use crate::scene::is_mesh;
 use crate::scene::sanitize::visible;
-use crate::tui::event::Written;
+use crate::tui::exit_summary;
 use crate::tui::preview_kind::PreviewKind;
-use crate::tui::state::{Activity, State};
+use crate::tui::state::{Activity, OwnImage, State, Written};
 
 /// The hint in a narrow window.
 const SHORT_HINT: &str = "save it to render again";
@@ -144,8 +144,15 @@ fn summary(state: &State, layout: &Layout, area: Rect, buffer: &mut Buffer, draw
         }
     };
     if layout.panel.is_empty() {
-        if is_in_no_file(state) {
-            is_room(vec![(format!("{comma}unwritten: w writes it"), Tone::Faint)]);
+        let mut comma = comma;
+        for words in not_saved(state) {
+            is_room(vec![(format!("{comma}{words}"), Tone::Faint)]);
+            comma = " · ";
+        }
+    }
+    if layout.panel.is_empty() {
+        for words in lost(state) {
+            is_room(vec![(format!(" {words}"), Tone::Warning)]);
         }
     }
     for file in of_files {
@@ -179,19 +186,46 @@ fn file_pieces(state: &State, layout: &Layout) -> Vec<Vec<(String, Tone)>> {
 
 /// The files that hold the picture at hand.
 pub(super) fn files(state: &State) -> impl Iterator<Item = &Written> {
-    // A picture that is written by itself and did not change is in the files of the request before.
-    let of_any_request = state.request.is_written() && state.saving.unwritten.is_none();
+    // The scene's own image is in the files of the previous request if it has not changed.
+    let is_own = state.request.is_own();
+    let of_any_request = is_own && state.saving.unwritten.is_none();
     state
         .saving
         .written
         .iter()
-        .filter(|written| !written.is_stale)
+        .filter(|written| !written.is_stale && written.lost.is_none())
+        .filter(move |written| written.shows.is_none() == is_own)
         .filter(move |written| of_any_request || written.generation == state.request.generation)
 }
 
-/// Whether the current picture is one that only a key writes, and that no key has written.
-pub(super) fn is_in_no_file(state: &State) -> bool {
-    !state.request.is_written() && files(state).next().is_none()
+/// Words about a picture that only a key writes and that no key has written, and about the scene's own image meanwhile.
+pub(in crate::tui) fn not_saved(state: &State) -> Vec<String> {
+    if state.request.is_own() || files(state).next().is_some() {
+        return Vec::new();
+    }
+    let mut words = vec!["not saved · w saves it".to_owned()];
+    if let Some(name) = exit_summary::image_name(state) {
+        let OwnImage { state: own, fraction } = state.saving.own;
+        match own {
+            OwnState::Written => {}
+            OwnState::Begun { .. } if state.saving.written.iter().any(|written| written.shows.is_some()) => {}
+            OwnState::Begun { .. } => {
+                words.push(format!("{name} at {} %: 0 continues it", percent(fraction)));
+            }
+            OwnState::NotBegun if state.saving.written.is_empty() => {}
+            OwnState::NotBegun => words.push(format!("{name} is older than your last edit: 0 renders it")),
+        }
+    }
+    words
+}
+
+/// Words about each written file that another program has changed.
+pub(super) fn lost(state: &State) -> impl Iterator<Item = String> {
+    let words = |written: &Written| {
+        let name = visible(&written.path.to_string_lossy()).into_owned();
+        written.lost.map(|lost| format!("{name} {} · w writes it again", lost.words()))
+    };
+    state.saving.written.iter().filter_map(words)
 }
 
 /// From the save to the first changed cell.

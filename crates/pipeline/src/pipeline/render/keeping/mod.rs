@@ -320,18 +320,24 @@ impl<'a> Keeping<'a> {
         self.due.set(Instant::now() + pause);
     }
 
-    /// Writes the checkpoint of a render that is cancelled, if it is to be gone on with.
-    pub(in crate::pipeline) fn at_the_end(&self, state: &FilmState, rays: RayCounters, seconds: f64) {
+    /// Writes the checkpoint of a cancelled render that is to be continued later. Returns whether it was written.
+    pub(in crate::pipeline) fn at_the_end(&self, state: &FilmState, rays: RayCounters, seconds: f64) -> bool {
         let is_kept = match (self.around.interruption)() {
             Interruption::Replaced => false,
             // A checkpoint that is there already is to have all that there is.
             Interruption::Left => seconds >= self.settings.seconds || self.is_own.get(),
             Interruption::Ended => true,
         };
-        if is_kept && state.is_begun() {
-            // Whoever ended it waits: the disk may take longer than that.
-            self.write(state, rays, seconds, Durability::Process);
-        }
+        // Whoever ended it waits: the disk may take longer than that.
+        is_kept && state.is_begun() && self.write(state, rays, seconds, Durability::Process)
+    }
+
+    /// Takes a checkpoint that this process wrote for an earlier request of this render as its own.
+    pub(in crate::pipeline) fn recognize(&self, state: &FilmState) {
+        let is_held = self.around.claim.borrow().holds(&self.path);
+        let is_own =
+            is_held && PartFile::head(&self.path).is_ok_and(|head| self.unlike(&head, state).is_empty());
+        self.is_own.set(is_own);
     }
 
     /// Removes the checkpoint of a picture that is written, or writes a last one if checkpoints are kept. If a long render's picture
@@ -346,7 +352,8 @@ impl<'a> Keeping<'a> {
             (false, false) if !was_long && !is_ended => return,
             (false, _) | (true, true) => {
                 let durability = if is_ended { Durability::Process } else { Durability::Power };
-                return self.write(state, rays, state.render_seconds, durability);
+                self.write(state, rays, state.render_seconds, durability);
+                return;
             }
             (true, false) => {}
         }
@@ -361,25 +368,28 @@ impl<'a> Keeping<'a> {
         }
     }
 
-    fn write(&self, state: &FilmState, rays: RayCounters, seconds: f64, durability: Durability) {
+    /// Returns whether the checkpoint was written.
+    fn write(&self, state: &FilmState, rays: RayCounters, seconds: f64, durability: Durability) -> bool {
         // 0 is never.
         if self.settings.seconds <= 0.0 {
-            return;
+            return false;
         }
         if let Err(why) = self.make_way(state, rays) {
-            return self.tell_failure(&why);
+            self.tell_failure(&why);
+            return false;
         }
         let head = self.head(Kind::Checkpoint, state);
         let written = serde_json::to_value(State::of(state, rays, seconds))
             .map_err(|error| OutputError::File { path: self.path.clone(), source: error.into() })
             .and_then(|value| self.save(&head, &state.film, &value, durability));
-        match written {
+        match &written {
             Ok(()) => {
                 self.is_own.set(true);
                 self.tell(CheckpointNews::Written { path: self.path.clone() });
             }
             Err(error) => self.tell_failure(&error.to_string()),
         }
+        written.is_ok()
     }
 
     /// Writes a checkpoint and holds it; never over something else.
