@@ -1,0 +1,272 @@
+//! Random keys, saves and ends: until `w`, the image on disk is that of the scene as saved, and the line after `q` is true.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use nix::sys::signal::Signal;
+
+use super::pty::{Folder, SCENE, Terminal};
+use crate::desk::PROGRAM;
+
+/// Sequences of the daily test.
+const SEQUENCES: u64 = 12;
+/// Sequences of the long one, over all its scenes.
+const LONG: u64 = 300;
+/// Bundled scenes of the long one.
+const BUNDLED: [&str; 6] = ["dof", "path", "phong", "photons", "shadows", "textures"];
+/// Keys that show something else.
+const LOOKING: [&str; 12] = ["s", "s", "d", "p", "i", "[", "]", "v", "l", "<", "0", "0"];
+
+/// Random numbers.
+struct Dice(Box<dyn FnMut() -> f32>);
+
+impl Dice {
+    fn below(&mut self, count: usize) -> usize {
+        ((self.0)() * count as f32) as usize % count
+    }
+}
+
+/// A scene in a folder, the program at work on it, and what has been done so far.
+struct Run<'a> {
+    folder: Folder,
+    terminal: Terminal,
+    options: &'a [&'a str],
+    /// Texts that the scene file has had.
+    saved: Vec<String>,
+    /// Whether `w` was pressed.
+    has_written: bool,
+    log: Vec<String>,
+}
+
+impl<'a> Run<'a> {
+    fn new(text: &str, options: &'a [&'a str]) -> Self {
+        let folder = Folder::new();
+        folder.write("scene.toml", text);
+        let call = [&[PROGRAM, "scene.toml"], options].concat();
+        let terminal = folder.wide_terminal_with(&call);
+        Self { folder, terminal, options, saved: vec![text.to_owned()], has_written: false, log: Vec::new() }
+    }
+
+    fn save(&mut self, text: String) {
+        self.folder.write("scene.new", &text);
+        std::fs::rename(self.folder.path("scene.new"), self.folder.path("scene.toml")).expect("saved");
+        self.saved.push(text);
+    }
+
+    /// One random step.
+    fn step(&mut self, dice: &mut Dice) {
+        let first = self.saved[0].clone();
+        match dice.below(12) {
+            0 => {
+                let seed = dice.below(3);
+                self.log.push(format!("save seed {seed}"));
+                self.save(first.replacen("[render]\n", &format!("[render]\nseed = {seed}\n"), 1));
+            }
+            1 => {
+                self.log.push("save a comment".to_owned());
+                let last = self.saved.last().cloned().unwrap_or_default();
+                self.save(format!("{last}# {}\n", self.saved.len()));
+            }
+            2 if dice.below(3) == 0 => {
+                self.log.push("w".to_owned());
+                self.has_written = true;
+                self.terminal.press("w");
+            }
+            2..=4 => {
+                self.log.push("wait".to_owned());
+                self.terminal.wait("an end", |screen| {
+                    let first = screen.contents().lines().next().unwrap_or_default().to_owned();
+                    first.contains("✓ done") || first.contains("! unwritten")
+                });
+            }
+            5 => std::thread::sleep(Duration::from_millis(10 * dice.below(20) as u64)),
+            _ => {
+                let key = LOOKING[dice.below(LOOKING.len())];
+                self.log.push(key.to_owned());
+                self.terminal.press(key);
+            }
+        }
+    }
+
+    /// The image that a headless run makes of a text.
+    fn once(&self, known: &mut HashMap<String, Vec<u8>>, text: &str, options: &[&str]) -> Vec<u8> {
+        let key = format!("{text}\0{options:?}");
+        let image = known.entry(key).or_insert_with(|| {
+            self.folder.write("once.toml", text);
+            let mut process = Command::new(PROGRAM);
+            process.current_dir(self.folder.path("")).args(["once.toml", "--once", "-o", "once.png"]);
+            let output = process.args(self.options).args(options).output().expect("it runs");
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+            without_settings(&self.folder.path("once.png"))
+        });
+        image.clone()
+    }
+}
+
+/// The pixels of a PNG: its settings name the scene's file.
+fn without_settings(path: &Path) -> Vec<u8> {
+    let file = std::io::BufReader::new(std::fs::File::open(path).expect("an image"));
+    let mut reader = png::Decoder::new(file).read_info().expect("a PNG");
+    let mut pixels = vec![0; reader.output_buffer_size().expect("a small image")];
+    reader.next_frame(&mut pixels).expect("whole");
+    pixels
+}
+
+/// Ends of a sequence.
+#[derive(Clone, Copy, Debug)]
+enum End {
+    Quit,
+    Signal(Signal),
+}
+
+fn run(seed: u64, text: &str, options: &[&str], known: &mut HashMap<String, Vec<u8>>) {
+    let mut dice = Dice(Box::new(glimt::math::random::unit(seed)));
+    let mut run = Run::new(text, options);
+    run.terminal.wait("the screen", |screen| screen.contents().contains("scene.toml"));
+    for _ in 0..3 + dice.below(8) {
+        run.step(&mut dice);
+    }
+    let ends = [Signal::SIGTERM, Signal::SIGHUP, Signal::SIGKILL].map(End::Signal);
+    let end = if dice.below(3) > 0 { End::Quit } else { ends[dice.below(ends.len())] };
+    match end {
+        End::Quit => run.terminal.press("q"),
+        End::Signal(signal) => run.terminal.signal(signal),
+    }
+    run.terminal.code();
+    let said = match end {
+        End::Quit => run.terminal.last_lines(),
+        End::Signal(_) => String::new(),
+    };
+    run.log.push(format!("{end:?}: {said}"));
+    check(&run, &said, known, seed);
+}
+
+/// Holds the image on disk and the last lines against the scene as it was saved.
+fn check(run: &Run<'_>, said: &str, known: &mut HashMap<String, Vec<u8>>, seed: u64) {
+    let log = format!("seed {seed}: {}", run.log.join(", "));
+    let path = run.folder.path("scene.png");
+    let image = path.exists().then(|| without_settings(&path));
+    let now = run.saved.last().expect("a scene").clone();
+    let newest = run.once(known, &now, &[]);
+    // The scene may have been saved too late for this run.
+    let is_current = image.as_ref() == Some(&newest);
+    if !run.has_written {
+        let earlier = run.saved.clone();
+        let is_one = |image: &Vec<u8>| earlier.iter().any(|text| run.once(known, text, &[]) == *image);
+        assert!(image.as_ref().is_none_or(is_one), "no saved scene makes this image: {log}");
+    }
+    if said.is_empty() {
+        return;
+    }
+    let first = said.lines().next().unwrap_or_default();
+    let is_older = ["older than", "not finished", "was stopped", "no image written", "is not written"];
+    if is_older.iter().any(|words| first.contains(words)) {
+        // A save of a comment makes the file older without making another image.
+        let before = run.saved.iter().rev().skip(1);
+        let was_made_before = before.clone().any(|text| run.once(known, text, &[]) == newest);
+        let is_true = run.has_written || !is_current || was_made_before || first.contains("was stopped");
+        assert!(is_true, "it is the newest one: {log}");
+    } else if first.starts_with("wrote ")
+        && first.contains("samples")
+        && !first.contains(", with ")
+        && !first.contains("view ")
+    {
+        let was_seen = run.saved.iter().rev().take(2).any(|text| image == Some(run.once(known, text, &[])));
+        assert!(is_current || was_seen, "it is of another scene: {log}");
+    }
+    if let Some(options) = said.lines().find_map(|line| line.strip_prefix("not kept: ")) {
+        let options: Vec<String> = options.split(' ').map(|word| word.replace('\'', "")).collect();
+        let options: Vec<&str> = options.iter().map(String::as_str).collect();
+        run.once(known, &now, &options);
+    }
+}
+
+#[test]
+fn the_image_is_that_of_the_saved_scene_and_the_last_line_is_true() {
+    let mut known = HashMap::new();
+    for seed in 0..SEQUENCES {
+        run(seed, SCENE, &["--samples", "64"], &mut known);
+    }
+}
+
+#[test]
+#[ignore = "takes half an hour"]
+fn sequences_over_bundled_scenes() {
+    let mut known = HashMap::new();
+    let options = ["--width", "48", "--height", "36", "--samples", "16"];
+    for seed in 0..LONG {
+        let name = BUNDLED[(seed % BUNDLED.len() as u64) as usize];
+        let root = env!("CARGO_MANIFEST_DIR");
+        let text = std::fs::read_to_string(format!("{root}/scenes/{name}.toml")).expect("a scene");
+        let text = text.replace("\"../assets", &format!("\"{root}/assets"));
+        run(seed, &text, &options, &mut known);
+    }
+}
+
+#[test]
+fn looking_leaves_a_finished_image_alone() {
+    let folder = Folder::new();
+    let mut terminal = folder.wide_terminal_with(&[PROGRAM, "scene.toml"]);
+    terminal.wait_for_render(1);
+    let image = folder.bytes("scene.png");
+    terminal.press("s");
+    terminal.wait_for_render(2);
+    terminal.press("s");
+    terminal.wait_for_render(3);
+    terminal.wait_for("not saved · w saves it");
+    assert_eq!(folder.bytes("scene.png"), image);
+    terminal.press("q");
+    assert_eq!(terminal.code(), 0);
+    let said = terminal.last_lines();
+    assert!(said.starts_with("wrote scene.png: 64×48, 4 samples"), "{said}");
+    assert!(said.contains("\nnot kept: --shadows off"), "{said}");
+    assert_eq!((folder.bytes("scene.png"), folder.once(&[])), (image.clone(), image));
+}
+
+#[test]
+fn an_interrupted_image_continues_in_the_next_call() {
+    let folder = Folder::new();
+    let whole = {
+        folder.write("scene.toml", &SCENE.replace("samples = 4", "samples = 3000"));
+        folder.once(&[])
+    };
+    let mut terminal = folder.wide_terminal_with(&[PROGRAM, "scene.toml", "--checkpoint", "0.01"]);
+    terminal.wait_for("ETA");
+    terminal.press("s");
+    terminal.wait_for("w saves it");
+    assert!(!folder.path("scene.png").exists());
+    terminal.press("q");
+    assert_eq!(terminal.code(), 0);
+    let said = terminal.last_lines();
+    let is_unfinished = said.starts_with("scene.png not finished");
+    assert!(is_unfinished && said.contains("glimt scene.toml --checkpoint 0.01 continues"), "{said}");
+    let mut terminal = folder.terminal();
+    terminal.wait("the rest", |_| folder.path("scene.png").exists());
+    terminal.press("q");
+    assert_eq!((terminal.end(), folder.bytes("scene.png")), (0, whole));
+}
+
+#[test]
+fn an_image_that_another_program_changed_is_reported() {
+    let folder = Folder::new();
+    let mut terminal = folder.wide_terminal_with(&[PROGRAM, "scene.toml"]);
+    terminal.wait_for_render(1);
+    let image = folder.bytes("scene.png");
+    std::fs::remove_file(folder.path("scene.png")).expect("removed");
+    terminal.wait_for("scene.png was removed · w writes it again");
+    terminal.press("w");
+    terminal.wait_for("wrote scene.png");
+    assert_eq!(folder.bytes("scene.png"), image);
+    terminal.wait("it is there", |screen| !screen.contents().contains("was removed"));
+    // Another glimt, with other settings.
+    let other = folder.once(&["--shadows", "off", "-o", "other.png"]);
+    drop(other);
+    std::fs::rename(folder.path("other.png"), folder.path("scene.png")).expect("moved");
+    terminal.wait_for("scene.png was replaced by another program");
+    terminal.press("q");
+    assert_eq!(terminal.code(), 0);
+    let said = terminal.last_lines();
+    assert!(said.contains("scene.png was replaced by another program since"), "{said}");
+}
