@@ -450,3 +450,67 @@ fn names_of_materials_may_be_latin_1() {
         assert_eq!((loaded.materials[0].diffuse, loaded.material_warnings.len()), (Vec3::X, 0));
     }
 }
+
+/// A corner as bits of its position and texture coordinates, with its normal.
+type CornerOf = (([u32; 3], [u32; 2]), Vec3);
+
+fn corner_of(position: Vec3, uv: Vec2, normal: Vec3) -> CornerOf {
+    ((position.to_array().map(f32::to_bits), uv.to_array().map(f32::to_bits)), normal)
+}
+
+/// The corners of each face, read with `tobj`.
+fn faces_of_tobj(path: &std::path::Path) -> Vec<Vec<CornerOf>> {
+    let (models, _) = tobj::load_obj(path, &tobj::LoadOptions::default()).expect("tobj reads it");
+    let mut faces = Vec::new();
+    for tobj::Model { mesh, .. } in &models {
+        assert!(mesh.face_arities.iter().all(|arity| *arity == 4), "all faces have four corners");
+        let at =
+            |values: &[f64], index: u32, of: usize, part: usize| values[index as usize * of + part] as f32;
+        let corner = |i: usize| {
+            let position = |part| at(&mesh.positions, mesh.indices[i], 3, part);
+            let uv =
+                |part| mesh.texcoord_indices.get(i).map_or(0.0, |index| at(&mesh.texcoords, *index, 2, part));
+            let normal =
+                |part| mesh.normal_indices.get(i).map_or(0.0, |index| at(&mesh.normals, *index, 3, part));
+            let normal = Vec3::from([0, 1, 2].map(normal)).normalize_or_zero();
+            corner_of(Vec3::from([0, 1, 2].map(position)), Vec2::from([0, 1].map(uv)), normal)
+        };
+        faces.extend((0..mesh.indices.len() / 4).map(|face| (face * 4..face * 4 + 4).map(corner).collect()));
+    }
+    faces
+}
+
+#[test]
+fn triangles_have_the_corners_that_tobj_reads() {
+    let assets = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets");
+    for name in ["knot.obj", "vase.obj", "shrub.obj", "room.obj"] {
+        let path = assets.join(name);
+        let mesh = load(&path, &ignore_progress, &CancelToken::new()).expect("whole").mesh;
+        let faces = faces_of_tobj(&path);
+        // Find the faces around each corner.
+        let mut around: HashMap<_, Vec<usize>> = HashMap::new();
+        for (face, corners) in faces.iter().enumerate() {
+            corners.iter().for_each(|(bits, _)| around.entry(*bits).or_default().push(face));
+        }
+        let has = |face: usize, (bits, normal): &CornerOf| {
+            faces[face]
+                .iter()
+                .any(|(at, of)| at == bits && (*of == Vec3::ZERO || of.distance(*normal) < 1e-6))
+        };
+        for triangle in &mesh.triangles {
+            let corners = triangle.map(|index| {
+                let index = index as usize;
+                let uv = mesh.uvs.get(index).copied().unwrap_or_default();
+                corner_of(mesh.positions[index], uv, mesh.normals[index])
+            });
+            let candidates = around.get(&corners[0].0).map_or(&[][..], Vec::as_slice);
+            let is_part = candidates.iter().any(|face| corners.iter().all(|corner| has(*face, corner)));
+            assert!(is_part, "{name}: {corners:?}");
+        }
+        // A face whose corners meet at a pole is one triangle.
+        let places =
+            |face: &Vec<CornerOf>| face.iter().map(|((at, _), _)| *at).collect::<BTreeSet<_>>().len();
+        let count: usize = faces.iter().map(|face| places(face) - 2).sum();
+        assert_eq!(mesh.triangles.len(), count, "{name}");
+    }
+}
