@@ -255,7 +255,7 @@ mod tests {
             recover(&self.scene());
             let entries = fs::read_dir(self.folder.path()).expect("a folder");
             let names = entries.map(|entry| entry.expect("an entry").path());
-            let texts = names.filter(|path| !path.extension().is_some_and(|ending| ending == "tmp"));
+            let texts = names.filter(|path| path.extension().is_none_or(|ending| ending != "tmp"));
             texts.map(|path| fs::read_to_string(path).expect("a text")).collect()
         }
 

@@ -321,12 +321,13 @@ impl Engine {
             is_written,
         };
         let (stages, seconds) = (table.stages, watch.seconds());
-        if let Some(own) = self.own.as_ref().filter(|_| request.own.is_some()) {
-            if self.is_own_written() && !was_own_written {
-                let finished = Finished { plan: &own.plan, is_written: true, ..finished };
-                let report = pool.install(|| report(&finished, stages.clone(), seconds));
-                self.write_report(&report, sink, meanwhile.writing);
-            }
+        if let Some(own) = self.own.as_ref().filter(|_| request.own.is_some())
+            && self.is_own_written()
+            && !was_own_written
+        {
+            let finished = Finished { plan: &own.plan, is_written: true, ..finished };
+            let report = pool.install(|| report(&finished, stages.clone(), seconds));
+            self.write_report(&report, sink, meanwhile.writing);
         }
         Ok(pool.install(|| report(&finished, stages, seconds)))
     }

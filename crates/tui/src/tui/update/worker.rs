@@ -86,7 +86,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         | Event::CameraUndone { .. }
         | Event::Picked { .. } => {}
         Event::Written { path, bytes, generation, is_own } => {
-            written(state, path, bytes, (generation, is_own))
+            written(state, path, bytes, (generation, is_own));
         }
         Event::OwnImage { state: own, .. } => state.saving.own.state = own,
         Event::WriteFailed { path, message, .. } => {
@@ -104,7 +104,7 @@ pub(super) fn update(state: &mut State, event: Event) -> Vec<Effect> {
         Event::NotKept { message, .. } => say_until_key(state, format!("warning: {}", visible(&message))),
         Event::Checkpoint { news, .. } => match news {
             CheckpointNews::Failed { message } => {
-                say_until_key(state, format!("warning: {}", visible(&message)))
+                say_until_key(state, format!("warning: {}", visible(&message)));
             }
             CheckpointNews::Resumed { path, .. } => {
                 say(state, format!("{GOING_ON} {}", visible(&path.to_string_lossy())));
