@@ -1,7 +1,7 @@
 //! Errors and warnings as values: a message, the place in a file, what to do about it.
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Severity of a diagnostic.
@@ -26,6 +26,18 @@ pub struct Diagnostic {
     pub place: Option<Place>,
     /// Expected values, or the way out.
     pub help: Option<String>,
+}
+
+impl Diagnostic {
+    /// An error in the file at `path`.
+    pub(crate) fn error(
+        path: &Path,
+        message: String,
+        help: Option<String>,
+        place: Option<Place>,
+    ) -> Box<Self> {
+        Box::new(Self { severity: Severity::Error, message, path: path.to_owned(), place, help })
+    }
 }
 
 /// A place in a text.

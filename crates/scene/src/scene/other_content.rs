@@ -4,9 +4,13 @@ use std::io::Read;
 use std::path::Path;
 
 use super::diagnostic::Diagnostic;
-use super::read::{may_be_scene, problem};
 use super::sanitize::visible;
 use crate::system::file::{self, PART_MARK};
+
+/// Whether a file may be a scene by its name.
+pub(super) fn may_be_scene(found: &Path) -> bool {
+    found.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
+}
 
 /// Content other than a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +65,7 @@ impl OtherContent {
                 "`glimt info` says which scene it belongs to; `glimt merge` joins parts".to_owned(),
             ),
         };
-        problem(path, message, Some(help), None)
+        Diagnostic::error(path, message, Some(help), None)
     }
 }
 

@@ -4,11 +4,11 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::diagnostic::{Diagnostic, Place, Severity};
+use super::diagnostic::{Diagnostic, Place};
 use super::document::is_mesh;
 use super::keys::endings::MESHES;
 use super::nearest::nearest;
-use super::other_content::{OtherContent, other_content};
+use super::other_content::{OtherContent, may_be_scene, other_content};
 use super::sanitize::visible;
 use super::{MAX_FILE_BYTES, MAX_PARTS, NO_SUCH_FILE, NO_SUCH_MODEL};
 use crate::system::describe_error;
@@ -23,15 +23,15 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         let message = format!("this is a model of a format that glimt does not read: .{ending}");
         let help = format!("export it as one of these: .{}", MESHES.join(", ."));
-        return Err(problem(path, message, Some(help), None));
+        return Err(Diagnostic::error(path, message, Some(help), None));
     }
     let bytes = bytes(path).map_err(|(message, help)| {
         // A large image is not a large scene.
-        other_content(path).unwrap_or_else(|| problem(path, message, help, None))
+        other_content(path).unwrap_or_else(|| Diagnostic::error(path, message, help, None))
     })?;
     if file::is_lfs_pointer(&bytes) {
         let message = "this is a Git LFS pointer, not the file's content".to_owned();
-        return Err(problem(path, message, Some("run `git lfs pull`".to_owned()), None));
+        return Err(Diagnostic::error(path, message, Some("run `git lfs pull`".to_owned()), None));
     }
     if let Some(content) = OtherContent::of(&bytes) {
         return Err(content.problem(path));
@@ -47,7 +47,7 @@ pub(super) fn text(path: &Path) -> Result<Arc<str>, Box<Diagnostic>> {
 
 /// A file that is no text.
 pub(super) fn binary(path: &Path) -> Box<Diagnostic> {
-    problem(
+    Diagnostic::error(
         path,
         "this is a binary file, not the text of a scene".to_owned(),
         Some("a scene is TOML, saved as UTF-8; `glimt new FILE` writes one to start from".to_owned()),
@@ -62,7 +62,7 @@ fn mesh(path: &Path) -> Box<Diagnostic> {
         "a scene shows it, by a table [[mesh]] with `file = \"{}\"`; `glimt new FILE` writes a scene to start from",
         visible(&name)
     );
-    problem(path, "this is a mesh, not a scene".to_owned(), Some(help), None)
+    Diagnostic::error(path, "this is a mesh, not a scene".to_owned(), Some(help), None)
 }
 
 /// Whether a file is named like a mesh and is no scene all the same, as its start shows. What cannot be read is none.
@@ -94,15 +94,6 @@ fn lacks_camera(path: &Path) -> bool {
     start().is_some_and(|bytes| memchr::memmem::find(&bytes, b"[camera]").is_none())
 }
 
-pub(super) fn problem(
-    path: &Path,
-    message: String,
-    help: Option<String>,
-    place: Option<Place>,
-) -> Box<Diagnostic> {
-    Box::new(Diagnostic { severity: Severity::Error, message, path: path.to_owned(), place, help })
-}
-
 fn not_utf8(path: &Path, bytes: &[u8], offset: usize) -> Box<Diagnostic> {
     let source: Arc<str> = String::from_utf8_lossy(bytes).into();
     let line = bytes[..offset].iter().filter(|byte| **byte == b'\n').count() + 1;
@@ -110,7 +101,7 @@ fn not_utf8(path: &Path, bytes: &[u8], offset: usize) -> Box<Diagnostic> {
     let span = offset..offset + char::REPLACEMENT_CHARACTER.len_utf8();
     let label = "not a character in UTF-8".to_owned();
     let help = Some("save the file as UTF-8".to_owned());
-    problem(path, message, help, Some(Place { source, span, label }))
+    Diagnostic::error(path, message, help, Some(Place { source, span, label }))
 }
 
 type Refusal = (String, Option<String>);
@@ -219,11 +210,6 @@ pub fn same_text_beside(path: &Path, text: &str) -> Option<PathBuf> {
 fn is_alike(found: &Path, meant: &Path) -> bool {
     found.file_name() != meant.file_name()
         && (found.extension() == meant.extension() || found.file_stem() == meant.file_stem())
-}
-
-/// Whether a file may be a scene by its name.
-pub(super) fn may_be_scene(found: &Path) -> bool {
-    found.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
 /// Whether a name of a missing file is a link.

@@ -1,133 +1,19 @@
 //! From a parser's results to a mesh that keeps the invariants.
 
-use std::path::PathBuf;
-
 use rayon::prelude::*;
 
 use super::normals::fill_missing_normals;
-use super::places::shared;
+use super::parsed::{Faces, Parsed};
 use super::polygon::triangulate;
 use super::{Source, corners};
-use crate::assets::{AssetError, Companion, Dropped, FileHash, FileMaterial, LoadedMesh};
+use crate::assets::{AssetError, Dropped, FileHash, LoadedMesh};
 use crate::control::{CancelToken, Cancelled};
-use crate::geometry::mesh::{NormalGroup, TriangleMesh};
+use crate::geometry::mesh::TriangleMesh;
 use crate::math::origin::origin_near;
 use crate::math::{DVec3, Vec2, Vec3};
 
 /// Faces between two polls of the token.
 const BATCH: usize = 1 << 14;
-
-/// Polygons over vertices: corners of all, one after the other.
-#[derive(Debug, Default)]
-pub(in crate::assets) struct Faces {
-    pub(super) corners: Vec<u32>,
-    /// Corners of each face; empty as long as all are triangles.
-    arities: Vec<u32>,
-}
-
-impl Faces {
-    /// Adds a corner to the face that [`Faces::close`] will end.
-    pub(in crate::assets) fn corner(&mut self, vertex: u32) {
-        self.corners.push(vertex);
-    }
-
-    /// Ends a face of this many corners.
-    pub(in crate::assets) fn close(&mut self, arity: usize) {
-        if self.arities.is_empty() && arity == 3 {
-            return;
-        }
-        if self.arities.is_empty() {
-            let before = self.corners.len().saturating_sub(arity) / 3;
-            self.arities.resize(before, 3);
-        }
-        self.arities.push(arity as u32);
-    }
-
-    pub(in crate::assets) fn reserve(&mut self, triangles: usize) {
-        self.corners.reserve(3 * triangles);
-    }
-
-    /// Gives corners at one place the same vertex, the first of them.
-    fn join(&mut self, positions: &[Vec3], token: &CancelToken) -> Result<(), Cancelled> {
-        let mut first: Vec<u32> = (0..positions.len() as u32).collect();
-        for place in shared(positions, token)? {
-            place.iter().for_each(|&vertex| first[vertex as usize] = place[0]);
-        }
-        self.corners.par_iter_mut().for_each(|corner| *corner = first[*corner as usize]);
-        Ok(())
-    }
-
-    /// Most corners that vertices of 32 bits can number.
-    pub(in crate::assets) const MOST_CORNERS: usize = u32::MAX as usize;
-
-    /// Number of faces.
-    pub(in crate::assets) fn len(&self) -> usize {
-        if self.arities.is_empty() { self.corners.len() / 3 } else { self.arities.len() }
-    }
-}
-
-/// A mesh file's numbers. `normals`, `normal_groups`, `uvs`, `second_uvs` and `colors` are empty or one for each position; a normal of zero is missing.
-/// `face_materials` is empty or one for each face.
-#[derive(Debug, Default)]
-pub(in crate::assets) struct Parsed {
-    pub(in crate::assets) positions: Vec<DVec3>,
-    pub(in crate::assets) normals: Vec<Vec3>,
-    pub(in crate::assets) normal_groups: Vec<NormalGroup>,
-    pub(in crate::assets) uvs: Vec<Vec2>,
-    pub(in crate::assets) second_uvs: Vec<Vec2>,
-    /// In sRGB.
-    pub(in crate::assets) colors: Vec<[u8; 3]>,
-    pub(in crate::assets) faces: Faces,
-    /// Texture coordinates of each corner of the faces, NaN where it takes those of its vertex; or empty.
-    pub(in crate::assets) corner_uvs: Vec<Vec2>,
-    /// Color of each corner of the faces, or empty.
-    pub(in crate::assets) corner_colors: Vec<[u8; 3]>,
-    /// Whether each face has vertices of its own, of which those at one place become one.
-    pub(in crate::assets) has_corners_apart: bool,
-    pub(in crate::assets) face_materials: Vec<u32>,
-    pub(in crate::assets) materials: Vec<FileMaterial>,
-    pub(in crate::assets) warnings: Vec<String>,
-    pub(in crate::assets) material_warnings: Vec<String>,
-    pub(in crate::assets) companions: Vec<Companion>,
-    pub(in crate::assets) pictures: Vec<PathBuf>,
-}
-
-/// The range of the colors of a file whose format does not say it: 0 to 1, or 0 to 255.
-#[derive(Clone, Copy, Debug, Default)]
-pub(in crate::assets) struct ColorRange {
-    greatest: f64,
-    has_fractions: bool,
-}
-
-impl ColorRange {
-    /// The greatest number.
-    pub(in crate::assets) fn greatest(&self) -> f64 {
-        self.greatest
-    }
-
-    pub(in crate::assets) fn add(&mut self, parts: [f64; 3]) {
-        for part in parts.into_iter().filter(|part| part.is_finite()) {
-            self.greatest = self.greatest.max(part);
-            self.has_fractions |= part.fract() != 0.0;
-        }
-    }
-
-    /// The number that stands for 1. Fractions up to 2 are colors brighter than 1.
-    pub(in crate::assets) fn one(&self) -> f64 {
-        let are_bytes = self.greatest > 2.0 || (self.greatest > 1.0 && !self.has_fractions);
-        if are_bytes { 255.0 } else { 1.0 }
-    }
-
-    /// A color of this range in bytes.
-    pub(in crate::assets) fn bytes(&self, parts: [f64; 3]) -> [u8; 3] {
-        color_bytes(parts.map(|part| part / self.one()))
-    }
-}
-
-/// A vertex color with parts from 0 to 1 in sRGB, in bytes; NaN is 0.
-pub(in crate::assets) fn color_bytes(parts: [f64; 3]) -> [u8; 3] {
-    parts.map(|part| (part.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
-}
 
 /// Assembles a mesh: cuts polygons, drops bad faces, compacts the vertices, completes the normals.
 pub(in crate::assets) fn assemble(source: &Source<'_>, mut parsed: Parsed) -> Result<LoadedMesh, AssetError> {

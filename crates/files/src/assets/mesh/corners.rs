@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::assemble::Parsed;
+use super::parsed::Parsed;
 use crate::control::{CancelToken, Cancelled};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::Vec2;

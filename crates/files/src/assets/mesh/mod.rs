@@ -7,6 +7,7 @@ mod mtl;
 pub(in crate::assets) mod normals;
 mod obj;
 mod off;
+pub(in crate::assets) mod parsed;
 mod places;
 pub mod ply;
 mod polygon;

@@ -2,7 +2,8 @@
 //! counts behind the header word, no edge count, undeclared columns behind coordinates and faces, comments and blank
 //! lines anywhere.
 
-use super::assemble::{ColorRange, Parsed, assemble};
+use super::assemble::assemble;
+use super::parsed::{ColorRange, Parsed};
 use super::text::{Cursor, shown};
 use super::{AssetError, LoadedMesh, Source};
 use crate::math::{DVec2, DVec3, Vec2};

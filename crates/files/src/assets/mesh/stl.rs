@@ -3,7 +3,8 @@
 //! zero or wrong, keywords in any case. Normals are those of the corners' order; corners at one place become one vertex. The format
 //! has no unit and no colours.
 
-use super::assemble::{Faces, Parsed, assemble};
+use super::assemble::assemble;
+use super::parsed::{Faces, Parsed};
 use super::text::{Cursor, shown, with_line_feeds};
 use super::{AssetError, LoadedMesh, Source};
 use crate::assets::read;

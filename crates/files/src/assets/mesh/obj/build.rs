@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::super::assemble::Parsed;
+use super::super::parsed::Parsed;
 use super::statements::{Corner, NONE, Smoothing, Statements};
 use crate::geometry::mesh::NormalGroup;
 use crate::math::{Vec2, Vec3};

@@ -9,7 +9,8 @@ mod words;
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::assemble::{Parsed, assemble};
+use super::assemble::assemble;
+use super::parsed::Parsed;
 use super::text::with_line_feeds;
 use super::{AssetError, LoadedMesh, Source};
 use crate::assets::FileMaterial;

@@ -1,6 +1,6 @@
 //! Vertices of an OBJ, with the colors that programs add to them.
 
-use super::super::assemble::ColorRange;
+use super::super::parsed::ColorRange;
 use super::super::text::shown;
 use super::words::{Words, number};
 use crate::math::DVec3;

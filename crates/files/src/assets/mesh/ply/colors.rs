@@ -1,6 +1,6 @@
 //! Colors of a PLY file, whose range depends on their type and on their greatest number.
 
-use super::super::assemble::{ColorRange, color_bytes};
+use super::super::parsed::{ColorRange, color_bytes};
 use super::header::Scalar;
 
 /// Colors in the order of the file.

@@ -1,6 +1,6 @@
 //! Faces with texture coordinates or colors of their own.
 
-use super::super::assemble::Parsed;
+use super::super::parsed::Parsed;
 use super::body::Numbers;
 use super::colors::Colors;
 use super::header::{Element, Kind, Scalar};

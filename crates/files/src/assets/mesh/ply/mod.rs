@@ -7,7 +7,8 @@ mod faces;
 mod header;
 pub mod write;
 
-use super::assemble::{Parsed, assemble};
+use super::assemble::assemble;
+use super::parsed::Parsed;
 use super::text::Cursor;
 use super::{AssetError, LoadedMesh, Source};
 use crate::math::{DVec2, DVec3};
